@@ -1,0 +1,58 @@
+# What every target of the project shares: the language, the warnings, the instruction set and the arithmetic.
+#
+# The same seed must give the same bytes on every machine, so floating-point contraction is off everywhere (a fused
+# multiply-add rounds once where two instructions round twice) and -ffast-math is used nowhere.
+
+include(CheckCXXCompilerFlag)
+include(CheckCXXSourceRuns)
+
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release or RelWithDebInfo" FORCE)
+endif()
+
+# x86-64-v3 (AVX2) where this machine has it. The results do not depend on it, only the speed.
+if(NOT DEFINED SHAKEBED_ARCH)
+  set(CMAKE_REQUIRED_FLAGS "-march=x86-64-v3")
+  check_cxx_source_runs("
+    int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }"
+    SHAKEBED_HAVE_X86_64_V3)
+  unset(CMAKE_REQUIRED_FLAGS)
+  if(SHAKEBED_HAVE_X86_64_V3)
+    set(default_arch x86-64-v3)
+  else()
+    set(default_arch "")
+  endif()
+  set(SHAKEBED_ARCH "${default_arch}" CACHE STRING "Value of -march, empty for the compiler's default")
+endif()
+
+add_library(shakebed_options INTERFACE)
+target_compile_features(shakebed_options INTERFACE cxx_std_20)
+target_include_directories(shakebed_options INTERFACE "${PROJECT_SOURCE_DIR}")
+target_compile_options(shakebed_options INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off -fno-math-errno $<$<BOOL:${SHAKEBED_WERROR}>:-Werror>)
+if(SHAKEBED_ARCH)
+  target_compile_options(shakebed_options INTERFACE "-march=${SHAKEBED_ARCH}")
+endif()
+if(SHAKEBED_SANITIZE)
+  target_compile_options(shakebed_options INTERFACE "-fsanitize=${SHAKEBED_SANITIZE}" -fno-omit-frame-pointer
+                         -fno-sanitize-recover=all)
+  target_link_options(shakebed_options INTERFACE "-fsanitize=${SHAKEBED_SANITIZE}")
+endif()
+
+# shakebed_test(NAME sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds])
+# One GoogleTest program; each of its tests becomes a ctest case with the labels given.
+function(shakebed_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LABELS;LIBRARIES" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} shakebed_options GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE "SHAKEBED_SOURCE_DIR=\"${PROJECT_SOURCE_DIR}\"")
+  string(REPLACE ";" "\\;" labels "${ARG_LABELS}")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS "${labels}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
