@@ -1,0 +1,85 @@
+#pragma once
+// Disks in a frame, to a hundredth of a pixel, with nothing to guess.
+//
+// Flatten -> chi-squared map of an ideal disk -> interior test -> joint least squares over touching neighbours with the
+// bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/calibration.hpp"
+#include "ingest/flatten.hpp"
+#include "ingest/frames.hpp"
+
+namespace shakebed::ingest {
+
+// One disk found. Centre in the pixel-centre convention.
+struct FoundDisk {
+  double x_px = 0, y_px = 0;
+  double radius_px = 0;                   // of the species, one value a film
+  double variance_x = 0, variance_y = 0;  // px^2, from the fit's curvature and the frame's noise
+  double covariance_xy = 0;               // px^2
+  double quality = 0;                     // 0 .. 1: 1 is a bead like all the others
+  double contrast = 0;                    // its own contrast, 1 for a typical bead
+  bool cut = false;                       // cut by the border of the frame or of the region of interest
+  bool half_hidden = false;               // part of it does not look like a bead: covered, out of focus, in shadow
+};
+
+// Everything is found when left alone; each member overrides one finding.
+struct FindOptions {
+  Polarity polarity = Polarity::automatic;
+  std::optional<double> radius_px;    // a first value, refined unless hold_radius
+  bool hold_radius = false;           // keep radius_px exactly
+  std::optional<PixelRectangle> roi;  // centres outside are not reported
+  int joint_fit_sweeps = 8;           // at most; 0 stops at the peaks of the map: fast, about 0.1 px
+  bool learn_profile = true;          // false keeps the ideal disk with a Gaussian-blurred edge
+  bool keep_half_hidden = false;      // report beads that fail the interior test, flagged
+};
+
+// What is common to all frames of a film, learned from its first frames.
+struct FinderCalibration {
+  Polarity polarity = Polarity::automatic;
+  double radius_px = 0;
+  double radius_std_error_px = 0;
+  double edge_width_px = 0;   // sigma of the blurred edge, the pixel's own 0.29 px included
+  double noise_level = 0;     // sigma of the residuals in grey levels, away from edges
+  double contrast_level = 0;  // bead minus background, grey levels, at the middle of the frame
+  int width = 0, height = 0;  // of the frames it was learned from
+  BeadProfile profile;
+  LightField light;
+  std::size_t frames_used = 0;
+  std::size_t disks_used = 0;
+  std::vector<std::string> warnings;  // plain sentences
+};
+
+struct FindResult {
+  std::vector<FoundDisk> disks;  // from top to bottom, then left to right
+  std::size_t rejected = 0;      // disks of another size or clarity seen and not reported
+  double residual_level = 0;     // rms of frame - model over the beads, grey levels
+  std::string why_nothing;       // a sentence when disks is empty
+  [[nodiscard]] bool empty() const { return disks.empty(); }
+};
+
+// Learns from frames of one film (all of one size; two or three suffice). `found == false` with a reason when the
+// frames show no disks: a blank frame, noise, something else.
+struct CalibrationResult {
+  bool found = false;
+  FinderCalibration calibration;
+  std::string why_not;
+};
+CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+
+// Finds the disks of one frame of that film. Depends on nothing but its arguments. Throws std::invalid_argument when
+// the frame's pixel count is not width * height.
+FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options = {});
+
+// Both in one call, for a single photograph.
+FindResult find_disks(const GrayFrame& frame, const FindOptions& options = {},
+                      FinderCalibration* calibration_found = nullptr);
+
+// The frame minus the model of background and found disks, in grey levels: what the model does not explain.
+GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const FinderCalibration& calibration);
+
+}  // namespace shakebed::ingest

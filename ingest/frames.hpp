@@ -1,0 +1,110 @@
+#pragma once
+// Frames: grey images in memory, and a stream of them from files, folders, globs and films.
+//
+// Pixel-centre convention, everywhere in ingest: the centre of the top-left pixel is (0, 0), x_px grows to the right
+// and y_px grows downwards; the frame covers -0.5 .. width - 0.5 by -0.5 .. height - 0.5.
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace shakebed::ingest {
+
+// One grey image. `pixels` holds width * height levels row by row, scaled to 0 .. 255 (not clamped, not rounded).
+struct GrayFrame {
+  int width = 0;
+  int height = 0;
+  std::vector<float> pixels;
+
+  [[nodiscard]] bool empty() const { return pixels.empty(); }
+  [[nodiscard]] float at(int column, int row) const {
+    return pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column)];
+  }
+};
+
+// A rectangle of pixels: columns left .. left + width - 1, rows top .. top + height - 1.
+struct PixelRectangle {
+  int left = 0, top = 0, width = 0, height = 0;
+};
+
+// What went wrong with an input, where, why, and what to do about it. what() is the whole sentence.
+class InputError : public std::runtime_error {
+ public:
+  InputError(std::string path, std::string problem, std::string why, std::string suggestion);
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  [[nodiscard]] const std::string& why() const { return why_; }
+  [[nodiscard]] const std::string& suggestion() const { return suggestion_; }
+
+ private:
+  std::string path_, problem_, why_, suggestion_;
+};
+
+// Where a frame comes from: a file, and the page (TIFF) or the frame (film) in it, counted from 0.
+struct FrameOrigin {
+  std::string path;
+  std::size_t page = 0;
+};
+
+struct FrameSourceOptions {
+  // Colour images: -1 takes the channel with the best contrast of the first colour frame (held for the whole stream),
+  // 0, 1, 2 take red, green, blue.
+  int channel = -1;
+  // Pixels beyond which a frame is refused (a located error), so that memory stays bounded.
+  std::size_t largest_frame_pixels = 150'000'000;
+  // Keep every `stride`-th frame of the stream, the first included.
+  std::size_t stride = 1;
+};
+
+// A stream of frames, one in memory at a time. Files are read in the order given; folders and globs (`*`, `?`, `[..]`)
+// are expanded in natural order (frame2 before frame10). Readable: PNG, TIFF (8, 16 bit, float; multi-page), JPEG, BMP,
+// PGM/PPM, and films (mp4, avi, mov, mkv, ...). Films are decoded forward from their first frame, so frame k is exactly
+// the k-th picture of the film. 16-bit files that use 10, 12 or 14 bits are scaled by the bits used, found on the
+// first.
+class FrameSource {
+ public:
+  // Throws InputError when nothing matches, a path does not exist, or is of no known kind. Opens no file's contents.
+  static FrameSource open(const std::vector<std::string>& paths, const FrameSourceOptions& options = {});
+  // Frames made on demand, e.g. by a renderer: `make(index)` for index 0 .. count - 1, called from several threads.
+  static FrameSource from_generator(std::size_t count, std::function<GrayFrame(std::size_t)> make);
+  static FrameSource from_frames(std::vector<GrayFrame> frames);
+
+  FrameSource(FrameSource&&) noexcept;
+  FrameSource& operator=(FrameSource&&) noexcept;
+  ~FrameSource();
+
+  // One item of the stream. decode() may be called once, from any thread; for image files the decoding is done then.
+  struct Item {
+    std::size_t index = 0;  // position in the stream
+    FrameOrigin origin;
+    std::function<GrayFrame()> decode;  // throws InputError: unreadable, truncated, empty, too large
+  };
+  // The next item, or nothing at the end. Throws InputError for a film that cannot be opened. Not thread-safe.
+  std::optional<Item> next_item();
+  // The next frame decoded, or nothing at the end; throws as above. After a throw the stream goes on with the next
+  // frame.
+  std::optional<GrayFrame> next(FrameOrigin* origin = nullptr);
+  // Back to the first frame.
+  void rewind();
+  // Frames in the stream if known without decoding films; TIFF files are counted by page.
+  [[nodiscard]] std::optional<std::size_t> count_if_known() const;
+
+ private:
+  struct State;
+  explicit FrameSource(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+// The page-th picture of an image file, or the page-th frame of a film. Throws InputError.
+GrayFrame read_frame(const std::filesystem::path& path, std::size_t page = 0, const FrameSourceOptions& options = {});
+
+// Writes 8-bit grey PNG, levels rounded to nearest and clamped to 0 .. 255, into a temporary file beside `path` that is
+// then renamed, so that a half-written PNG is never seen. `compression` 0 (fast) .. 9 (small). Throws InputError.
+void write_png(const std::filesystem::path& path, const GrayFrame& frame, int compression = 1);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,105 @@
+#pragma once
+// A film of a bed in, its density profile out.
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/density.hpp"
+#include "ingest/find_disks.hpp"
+#include "ingest/frames.hpp"
+
+namespace shakebed::ingest {
+
+// Only the diameter is needed; each other member overrides something that is otherwise found.
+struct MeasureOptions {
+  double bead_diameter_m = 0;            // required, > 0
+  std::optional<double> scale_m_per_px;  // else bead_diameter_m / (2 radius_px)
+  std::optional<double> floor_px;        // y_px of the floor's surface at the left edge of the frame
+  std::optional<double> floor_slope;     // px down per px right; 0 when floor_px is given without it
+  std::optional<double> left_wall_px;    // x_px of the walls' inner faces
+  std::optional<double> right_wall_px;
+  FindOptions find;                            // polarity, radius, roi, ...
+  Kernel kernel;                               // widths in D
+  double bin_width = 0.25;                     // D
+  std::optional<double> highest;               // D; else just above the highest centre
+  std::optional<double> lowest;                // D; else 0
+  std::optional<double> shaking_frequency_hz;  // with frame_rate_hz: phase-resolved profiles
+  std::optional<double> frame_rate_hz;
+  std::size_t phase_bins = 8;
+  std::size_t calibration_frames = 3;                     // taken evenly from the first calibration_window frames
+  bool profile_from_coverage = true;                      // also measure covered area, independently
+  unsigned threads = 1;                                   // results do not depend on it
+  std::function<void(std::size_t frames_done)> progress;  // called from one thread at a time
+};
+
+struct MeasuredDisk {
+  std::size_t frame = 0;
+  double x_px = 0, y_px = 0, radius_px = 0;
+  double x = 0, z = 0;  // D, from the left wall and from the floor
+  double quality = 0;
+  double std_error_px = 0;
+  bool cut = false, half_hidden = false;
+};
+
+enum class FrameStatus { good, nothing_found, unreadable, size_changed };
+struct FrameReport {
+  std::size_t index = 0;
+  FrameOrigin origin;
+  FrameStatus status = FrameStatus::good;
+  std::string why;  // a sentence unless good
+  std::size_t disks = 0;
+  std::size_t rejected = 0;
+  double residual_level = 0;  // grey levels
+};
+
+struct BedCalibration {
+  double scale_m_per_px = 0;
+  double scale_relative_std_error = 0;
+  double radius_px = 0;
+  double radius_std_error_px = 0;
+  double edge_width_px = 0;
+  double noise_level = 0;     // grey levels
+  double contrast_level = 0;  // grey levels
+  Polarity polarity = Polarity::automatic;
+  double floor_px = 0;     // at x_px = 0
+  double floor_slope = 0;  // px down per px right
+  double floor_tilt_degrees = 0;
+  double left_wall_px = 0, right_wall_px = 0;
+  double width = 0;  // D, between the walls
+  bool floor_given = false, walls_given = false, scale_given = false;
+  bool walls_are_frame_sides = false;  // no walls seen: the profile is that of the part of the bed in view
+};
+
+struct PhaseProfile {
+  double phase = 0;  // middle of the phase bin, 0 .. 1
+  DensityProfile profile;
+};
+
+struct Measurement {
+  FinderCalibration finder;
+  BedCalibration calibration;
+  std::vector<MeasuredDisk> disks;  // frame after frame
+  std::vector<FrameReport> frames;  // one a frame of the stream
+  DensityProfile profile;           // from centres
+  std::optional<DensityProfile>
+      coverage_profile;              // from covered area; same bins; kernel disk_chord with the bin's top hat
+  double coverage_disagreement = 0;  // rms difference in n D^2, centres (seen through the chord) minus coverage
+  std::vector<PhaseProfile> phases;
+  double disk_count_mean = 0;
+  double disk_count_std = 0;          // scatter of the bead number from frame to frame
+  std::vector<std::string> warnings;  // plain sentences
+};
+
+// Reads the stream once (its first frames twice). Throws std::invalid_argument for options that make no sense,
+// InputError when no frame at all could be read or no frame shows a disk; single bad frames are reported in `frames`
+// instead.
+Measurement measure_bed(FrameSource& source, const MeasureOptions& options);
+
+// CSV: frame,x_px,y_px,radius_px,x,z,quality. Atomic.
+void write_disks_csv(const std::filesystem::path& path, const Measurement& measurement,
+                     const std::vector<std::string>& comments = {});
+
+}  // namespace shakebed::ingest
