@@ -1,0 +1,59 @@
+// What a contact does: the collision rules. Reduced units, velocities in the lab frame.
+//
+// A rule is a small struct that says how two disks, or a disk and a wall, exchange momentum. `smooth elastic`,
+// `smooth dissipative` and `rough` are separate types because the engine is specialised for them; what a contact's
+// restitution is (constant, or elastic when the contact clock says so) is decided at run time.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace shakebed::sim {
+
+// Restitution and friction of one kind of contact (disk-disk, disk-wall, disk-floor).
+struct Surface {
+  double restitution = 1;             // e, normal
+  double friction = 0;                // mu_f, Coulomb
+  double tangential_restitution = 0;  // b0, largest tangential restitution [-1, 1], reached by sticking contacts
+};
+
+// Two smooth disks. (dx, dz), (dvx, dvz): position and velocity of the second from the first, which approach
+// (dx dvx + dz dvz < 0). The change of their relative velocity: -(1+e) (g.n) n. The first disk takes -m2/(m1+m2) of it,
+// the second m1/(m1+m2).
+struct NormalImpulse {
+  double jx, jz;      // change of the relative velocity
+  double dissipated;  // energy lost, for reduced mass 1
+};
+inline NormalImpulse smooth_impulse(double dx, double dz, double dvx, double dvz, double restitution) {
+  const double b = dx * dvx + dz * dvz, distance_squared = dx * dx + dz * dz;
+  const double factor = (1 + restitution) * b / distance_squared;
+  return {-factor * dx, -factor * dz, 0.5 * (1 - restitution * restitution) * b * b / distance_squared};
+}
+
+// The Walton rule for rough disks [Walton1993, Luding1998]. (nx, nz) points from the first to the second (or to the
+// wall), the tangent is (-nz, nx), spins count positive from x to z. gn = (v1 - v2).n > 0 for an approach,
+// gt = (v1 - v2).t + R1 w1 + R2 w2; inverse_inertia_ratio: 1/q, q = I/(m R^2).
+// p = -m12 (1+e) gn n - m12 (1+b)/(1+1/q) gt t, b = min(b0, -1 + mu_f (1+e)(1+1/q) |gn|/|gt|).
+// The spins then change by R p_t / I each.
+struct RoughImpulse {
+  double px, pz;      // momentum given to the first, taken from the second (or the wall)
+  double tangential;  // p_t
+  double dissipated;  // energy lost, spin included
+};
+inline RoughImpulse walton_impulse(double nx, double nz, double gn, double gt, double reduced_mass,
+                                   const Surface& surface, double inverse_inertia_ratio) {
+  const double e = surface.restitution;
+  const double normal = -reduced_mass * (1 + e) * gn;
+  double dissipated = 0.5 * reduced_mass * (1 - e * e) * gn * gn;
+  double tangential = 0;
+  if (gt != 0 && surface.friction > 0) {
+    const double lever = 1 + inverse_inertia_ratio;  // 1 + 1/q
+    const double coulomb = -1 + surface.friction * (1 + e) * lever * std::abs(gn) / std::abs(gt);
+    const double b = std::min(surface.tangential_restitution, coulomb);
+    tangential = -reduced_mass * (1 + b) / lever * gt;
+    dissipated += 0.5 * reduced_mass / lever * (1 - b * b) * gt * gt;
+  }
+  return {normal * nx - tangential * nz, normal * nz + tangential * nx, tangential, dissipated};
+}
+
+}  // namespace shakebed::sim

@@ -1,0 +1,81 @@
+// When two things next touch: pure functions of the state now, one for each pair of things. All answer a time from
+// now, in reduced units, 0 for "touching and approaching", `never` for "not".
+//
+// Every root is taken in the form that loses no digits to cancellation: for c + 2 b t + a t^2 = 0 with b < 0 the first
+// root is c / (sqrt(b^2 - a c) - b).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/disk.hpp"
+
+namespace shakebed::sim {
+
+// Two disks in free flight under the same gravity: their relative motion is a straight line.
+// (dx, dz), (dvx, dvz): position and velocity of the second from the first; contact_distance_squared: (R1 + R2)^2.
+inline double time_to_disk(double dx, double dz, double dvx, double dvz, double contact_distance_squared) {
+  const double b = dx * dvx + dz * dvz;
+  if (!(b < 0)) return never;
+  const double speed_squared = dvx * dvx + dvz * dvz;
+  const double c = std::max(dx * dx + dz * dz - contact_distance_squared, 0.0);
+  const double discriminant = b * b - speed_squared * c;
+  if (discriminant < 0) return never;
+  return c / (std::sqrt(discriminant) - b);
+}
+
+// A wall across a direction in which nothing accelerates. gap: free distance to it (slightly negative counts as
+// touching); approach_speed: how fast the gap closes.
+inline double time_to_wall(double gap, double approach_speed) {
+  if (!(approach_speed > 0)) return never;
+  return std::max(gap, 0.0) / approach_speed;
+}
+
+// A horizontal wall above, reached against gravity. gap: free distance; vz: upward velocity.
+inline double time_to_lid(double gap, double vz, double gravity) {
+  if (!(vz > 0)) return never;
+  const double c = std::max(gap, 0.0);
+  const double discriminant = vz * vz - 2 * gravity * c;
+  if (discriminant < 0) return never;
+  return 2 * c / (vz + std::sqrt(discriminant));
+}
+
+// The first time at which a disk falling freely passes downwards through a height that lies `gap` below it, where gap
+// >= 0 and vz is the upward velocity. A lower bound for its contact with a floor that never rises above that height.
+inline double time_to_fall(double gap, double vz, double gravity) {
+  if (gravity > 0) {
+    const double root = std::sqrt(vz * vz + 2 * gravity * gap);
+    return vz > 0 ? (vz + root) / gravity : 2 * gap / (root - vz);
+  }
+  return vz < 0 ? gap / -vz : never;
+}
+
+// When a disk may leave its shell: a time that is never later than the true exit. (ox, oz): offset from the shell's
+// centre, inside it; (vx, vz): velocity in the shell's frame; gravity bends the path by at most g t^2 / 2, so the exit
+// lies after the root of |o + v t| + g t^2 / 2 = radius, a convex function whose chords cut the axis before it.
+inline double time_to_leave_shell(double ox, double oz, double vx, double vz, double radius, double gravity) {
+  const double speed_squared = vx * vx + vz * vz;
+  const double b = ox * vx + oz * vz;
+  const double c = std::min(ox * ox + oz * oz - radius * radius, 0.0);
+  double straight = never;
+  if (speed_squared > 0) {
+    const double root = std::sqrt(b * b - speed_squared * c);
+    straight = b > 0 ? -c / (b + root) : (root - b) / speed_squared;
+  }
+  if (!(gravity > 0)) return straight;
+  const auto excess = [&](double t) {
+    const double px = ox + vx * t, pz = oz + vz * t;
+    return std::sqrt(px * px + pz * pz) + 0.5 * gravity * t * t - radius;
+  };
+  double left = 0, excess_left = std::min(excess(0), 0.0);
+  const double right = std::min(straight, std::sqrt(2 * (radius - excess_left) / gravity) * 1.5);
+  const double excess_right = excess(right);
+  if (!(excess_right > 0)) return left;
+  for (int step = 0; step < 3; ++step) {
+    left -= excess_left * (right - left) / (excess_right - excess_left);
+    excess_left = std::min(excess(left), 0.0);
+  }
+  return left;
+}
+
+}  // namespace shakebed::sim

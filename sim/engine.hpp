@@ -1,0 +1,137 @@
+// The event loop. One class template, specialised by run_scene.cpp for what the scene names.
+//
+// Every disk has one next event, kept in its record: with another disk, with a wall, or with the edge of its shell. It
+// is predicted when something happens to the disk, and only then. A pair's contact is taken when it is earlier than the
+// partner's own next event; the partner's former partner is not told, it finds out when its old time comes and then
+// predicts anew. Between events disks fly freely: straight lines in pairs' relative coordinates, gravity or not.
+//
+// Time is counted from the last rebasing, so its resolution does not fade in long runs. At fixed moments (every
+// `synchronisation interval`) the engine brings all disks to one time, rebases it by a whole number of floor periods
+// and predicts everything from scratch: its state there is nothing but positions, velocities, spins and contact clocks,
+// so a run continued from a checkpoint taken there gives the same bytes as one that was never stopped.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "sim/collision.hpp"
+#include "sim/contact_time.hpp"
+#include "sim/disk.hpp"
+#include "sim/event_queue.hpp"
+#include "sim/floor.hpp"
+#include "sim/lanes.hpp"
+#include "sim/neighbour_shells.hpp"
+#include "sim/overlap.hpp"
+#include "sim/policies.hpp"
+#include "sim/random.hpp"
+#include "sim/simulation.hpp"
+
+namespace shakebed::sim {
+
+template <class Space, class Rule, class Sizes>
+class Engine final : public Simulation {
+ public:
+  Engine(const Scene& scene, FloorMotion floor, const std::vector<Placed>& placed);
+
+  void advance_to(double time) override;
+  double time() const override { return base_ + now_; }
+  double next_synchronisation() const override { return base_ + synchronise_at_; }
+  void snapshot(Snapshot& out) const override;
+  EnergyLedger energy() const override;
+  Counters counters() const override { return counters_; }
+  double largest_overlap() const override;
+  std::size_t bytes() const override;
+  std::vector<std::uint8_t> checkpoint() const override;
+  void restore(const std::vector<std::uint8_t>& bytes) override;
+
+ private:
+  struct Candidate {
+    double time;
+    std::int32_t partner;
+  };
+
+  // --- flight
+  void bring_forward(Disk& disk, double time) const;
+  double x_at(const Disk& disk, double time) const { return disk.x + disk.vx * (time - disk.own_time); }
+  double z_at(const Disk& disk, double time) const;
+  double vz_at(const Disk& disk, double time) const;
+
+  // --- prediction
+  Lanes contact_times(const std::uint32_t* ids, const Disk& disk, double radius) const;
+  Candidate next_contact(std::uint32_t i) const;
+  Candidate next_wall(const Disk& disk, std::uint32_t i, Candidate best) const;
+  void commit(std::uint32_t i, const Candidate& next);
+  void predict(std::uint32_t i);
+  void predict_all();
+
+  // --- shells
+  void draw_shell(std::uint32_t i);
+  void leave_shell(std::uint32_t i);
+  bool within_reach(std::uint32_t i, std::uint32_t k) const;
+
+  // --- contacts
+  void process_until(double until);
+  void collide(std::uint32_t i, std::uint32_t j);
+  void collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx, double dvz, double reduced_mass);
+  void hit_wall(std::uint32_t i);
+  void hit_floor(std::uint32_t i);
+  void bounce(std::uint32_t i, double nx, double nz, double wall_vz, const Surface& surface);
+  bool too_soon(std::uint32_t i, std::uint32_t j);
+
+  void act_bath();
+
+  // --- synchronisation
+  void synchronise();
+  void begin_interval();
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit visit);
+
+  double kinetic_energy() const;
+  double potential_energy() const;
+
+  // --- what the scene says
+  std::uint32_t count_;
+  double gravity_ = 0;
+  double width_ = 0;
+  double lid_height_ = never;
+  Period period_x_, period_z_;
+  FloorMotion floor_;
+  bool hard_sides_ = false;
+  Surface disk_surface_, side_surface_, floor_surface_, lid_surface_;
+  double contact_duration_ = 0;
+  double inverse_inertia_ratio_ = 2;  // 1/q
+  [[no_unique_address]] Sizes sizes_;
+  Bath bath_;
+
+  // --- the state
+  std::vector<Disk> disks_;         // and a sentinel after the last
+  std::vector<double> spins_;       // rough disks only
+  std::vector<double> last_contact_;  // contact clocks, dissipative disks only
+  double now_ = 0;                  // since base_
+  double base_ = 0;                 // of the present count, since the start
+  double interval_ = 1;             // the floor's period
+  std::uint64_t intervals_ = 1;     // that many of them between synchronisations now
+  std::uint64_t intervals_done_ = 0;
+  double synchronise_at_ = 1;
+  double event_rate_ = 1;
+  std::uint64_t events_at_synchronisation_ = 0;
+  double bath_at_ = never;          // next action of the reservoir
+  Random random_;
+  Counters counters_;
+  double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
+
+  // --- bookkeeping
+  double skin_ = 0.36;
+  NeighbourShells shells_;
+  EventQueue queue_;
+  std::vector<std::uint32_t> found_;
+};
+
+}  // namespace shakebed::sim
+
+#include "sim/engine_impl.hpp"

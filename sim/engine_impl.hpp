@@ -1,0 +1,702 @@
+// The engine's member functions, in the order in which a run uses them. Included by engine.hpp only.
+#pragma once
+
+namespace shakebed::sim {
+
+inline constexpr double rest_hop = 1e-4;        // length of the hop of a disk at rest on the floor without a contact clock
+inline constexpr double shell_slack = 1e-9;     // covers the rounding of shells' centres and exit times
+inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
+
+// ------------------------------------------------------------------------------------------------ start
+
+template <class Space, class Rule, class Sizes>
+Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const std::vector<Placed>& placed)
+    : count_(static_cast<std::uint32_t>(placed.size())),
+      width_(scene.box.width),
+      floor_(std::move(floor)),
+      disk_surface_(scene.disks.contact),
+      floor_surface_(scene.box.floor_surface),
+      contact_duration_(scene.disks.contact_duration),
+      inverse_inertia_ratio_(1 / scene.disks.inertia_ratio),
+      bath_(scene.bath),
+      random_(scene.seed ^ 0x6261746800000000) {
+  if constexpr (Space::falls) gravity_ = 1;
+  if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) {
+    hard_sides_ = Space::has_walls;
+    side_surface_ = sides->surface;
+  } else {
+    period_x_ = Period(width_);
+  }
+  if (const auto* lid = std::get_if<Lid>(&scene.box.top)) {
+    lid_height_ = lid->height;
+    lid_surface_ = lid->surface;
+  }
+  if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);
+
+  disks_.resize(count_ + 1);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Placed& p = placed[i];
+    disks_[i] = {p.x, p.z, p.vx, p.vz, 0, never, nobody, 0, 0, 0, 0};
+  }
+  disks_[count_] = {0, 0, 0, 0, 0, -never, nobody, 0, 0, 0, 0};  // the sentinel: nothing can be earlier than its event
+  if constexpr (Rule::spins) {
+    for (const Placed& p : placed) spins_.push_back(p.spin);
+  }
+  if constexpr (Rule::dissipates) last_contact_.assign(count_, -never);
+  if constexpr (!Sizes::equal) {
+    for (const Placed& p : placed) {
+      sizes_.radii.push_back(scene.disks.species[p.species].diameter / 2);
+      sizes_.masses.push_back(scene.disks.species[p.species].mass);
+    }
+    sizes_.radii.push_back(0.5);
+    sizes_.masses.push_back(1);
+  }
+  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) bath_at_ = bath->interval;
+  if (const auto* bath = std::get_if<WhiteNoiseBath>(&bath_)) bath_at_ = bath->interval;
+  if (const auto* bath = std::get_if<AndersenBath>(&bath_))
+    bath_at_ = -std::log(random_.uniform_positive()) / (bath->rate * count_);
+  interval_ = floor_.period();
+  event_rate_ = 8.0 * count_;
+  initial_energy_ = kinetic_energy() + potential_energy();
+  begin_interval();
+}
+
+// ------------------------------------------------------------------------------------------------ flight
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::z_at(const Disk& disk, double time) const {
+  const double dt = time - disk.own_time;
+  if constexpr (Space::falls) return disk.z + (disk.vz - 0.5 * gravity_ * dt) * dt;
+  return disk.z + disk.vz * dt;
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::vz_at(const Disk& disk, double time) const {
+  if constexpr (Space::falls) return disk.vz - gravity_ * (time - disk.own_time);
+  return disk.vz;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::bring_forward(Disk& disk, double time) const {
+  disk.x = x_at(disk, time);
+  disk.z = z_at(disk, time);
+  disk.vz = vz_at(disk, time);
+  disk.own_time = time;
+}
+
+// ------------------------------------------------------------------------------------------------ prediction
+
+// Contact times of one disk, whose state is that at now_, with four others; `never` where there is none or where the
+// other has something earlier to do.
+template <class Space, class Rule, class Sizes>
+Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const Disk& disk,
+                                                [[maybe_unused]] double radius) const {
+  const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[2]], &k3 = disks_[ids[3]];
+  Lanes s0, s1, s2, s3;
+  std::memcpy(&s0, &k0.x, sizeof s0);
+  std::memcpy(&s1, &k1.x, sizeof s1);
+  std::memcpy(&s2, &k2.x, sizeof s2);
+  std::memcpy(&s3, &k3.x, sizeof s3);
+  const Lanes low01 = __builtin_shufflevector(s0, s1, 0, 4, 2, 6), high01 = __builtin_shufflevector(s0, s1, 1, 5, 3, 7);
+  const Lanes low23 = __builtin_shufflevector(s2, s3, 0, 4, 2, 6), high23 = __builtin_shufflevector(s2, s3, 1, 5, 3, 7);
+  const Lanes x = __builtin_shufflevector(low01, low23, 0, 1, 4, 5), vx = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+  const Lanes z = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
+  Lanes vz = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
+  const Lanes own_time = {k0.own_time, k1.own_time, k2.own_time, k3.own_time};
+  const Lanes event_time = {k0.event_time, k1.event_time, k2.event_time, k3.event_time};
+
+  const Lanes time = all_lanes(now_);
+  const Lanes dt = time - own_time;
+  Lanes dx = x + vx * dt - all_lanes(disk.x);
+  Lanes dz;
+  if constexpr (Space::falls) {
+    const Lanes fall = all_lanes(gravity_) * dt;
+    dz = z + (vz - all_lanes(0.5) * fall) * dt - all_lanes(disk.z);
+    vz = vz - fall;
+  } else {
+    dz = z + vz * dt - all_lanes(disk.z);
+  }
+  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+  const Lanes dvx = vx - all_lanes(disk.vx), dvz = vz - all_lanes(disk.vz);
+
+  Lanes contact_squared = all_lanes(1);
+  if constexpr (!Sizes::equal) {
+    const Lanes distance = all_lanes(radius) + Lanes{sizes_.radius(ids[0]), sizes_.radius(ids[1]), sizes_.radius(ids[2]),
+                                                     sizes_.radius(ids[3])};
+    contact_squared = distance * distance;
+  }
+  // As time_to_disk() in contact_time.hpp.
+  const Lanes zero = all_lanes(0);
+  const Lanes b = dx * dvx + dz * dvz;
+  const Lanes c = larger(dx * dx + dz * dz - contact_squared, zero);
+  const Lanes discriminant = b * b - (dvx * dvx + dvz * dvz) * c;
+  const Lanes contact = time + c / (sqrt_lanes(larger(discriminant, zero)) - b);
+  const LaneMask meets = (b < zero) & (discriminant >= zero) & (contact < event_time);
+  return select(meets, contact, all_lanes(never));
+}
+
+template <class Space, class Rule, class Sizes>
+auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i) const -> Candidate {
+  const Disk& disk = disks_[i];
+  const double radius = sizes_.radius(i);
+  Candidate best{never, nobody};
+  const auto consider = [&](const NeighbourBlock& block) {
+    const Lanes first = contact_times(block.disk.data(), disk, radius);
+    const Lanes second = contact_times(block.disk.data() + 4, disk, radius);
+    const EarliestLane earliest = earliest_of_eight(first, second);
+    if (earliest.time < best.time) best = {earliest.time, static_cast<std::int32_t>(block.disk[earliest.lane])};
+  };
+  consider(shells_.first_block(i));
+  if (disk.neighbours > inline_neighbours) [[unlikely]] shells_.further_blocks(i, consider);
+  return best;
+}
+
+// The next wall that the disk, whose shell touches the reach of one, meets before the time given.
+template <class Space, class Rule, class Sizes>
+auto Engine<Space, Rule, Sizes>::next_wall(const Disk& disk, std::uint32_t i, Candidate best) const -> Candidate {
+  const double radius = sizes_.radius(i);
+  const auto consider = [&](double wait, std::int32_t wall) {
+    if (now_ + wait < best.time) best = {now_ + wait, wall};
+  };
+  if (disk.near & near_left_wall) consider(time_to_wall(disk.x - radius, -disk.vx), left_wall);
+  if (disk.near & near_right_wall) consider(time_to_wall(width_ - radius - disk.x, disk.vx), right_wall);
+  if (disk.near & near_lid) consider(time_to_lid(lid_height_ - radius - disk.z, disk.vz, gravity_), lid_above);
+  if (disk.near & near_floor)
+    consider(floor_.time_to_contact(disk.z - radius, disk.vz, gravity_, now_, best.time - now_), floor_below);
+  return best;
+}
+
+// Writes down what comes next for disk i, unless it leaves its shell before.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next) {
+  Disk& disk = disks_[i];
+  const double dt = next.time - now_;
+  const double ox = disk.x - static_cast<double>(disk.shell_x), oz = disk.z - static_cast<double>(disk.shell_z);
+  // Gravity bends the path away from its chord by at most g dt^2 / 8.
+  double limit = skin_;
+  double ez = oz + disk.vz * dt;
+  if constexpr (Space::falls) {
+    limit -= gravity_ * dt * dt * 0.125;
+    ez -= 0.5 * gravity_ * dt * dt;
+  }
+  const double ex = ox + disk.vx * dt;
+  if (!(limit > 0 && ex * ex + ez * ez <= limit * limit)) {
+    const double exit = now_ + time_to_leave_shell(ox, oz, disk.vx, disk.vz, skin_, gravity_);
+    if (exit < next.time) {
+      disk.event_time = exit;
+      disk.partner = shell_exit;
+      if (exit < never) queue_.push(exit, i, i);
+      return;
+    }
+  }
+  disk.event_time = next.time;
+  disk.partner = next.partner;
+  if (next.partner >= 0) {
+    Disk& partner = disks_[static_cast<std::uint32_t>(next.partner)];
+    partner.event_time = next.time;
+    partner.partner = static_cast<std::int32_t>(i);
+    queue_.push(next.time, i, static_cast<std::uint32_t>(next.partner));
+  } else if (next.partner != nobody) {
+    queue_.push(next.time, i, i);
+  }
+}
+
+// Predicts disk i, whose state must be that at now_.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::predict(std::uint32_t i) {
+  Candidate next = next_contact(i);
+  if constexpr (Space::has_walls) {
+    if (disks_[i].near != 0) next = next_wall(disks_[i], i, next);
+  }
+  commit(i, next);
+}
+
+// Everything anew. Every disk must be predicted, even one that another has already claimed: its own best event may be
+// an earlier one with a third.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::predict_all() {
+  queue_.reset(disks_.data(), count_, now_, event_rate_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    disks_[i].event_time = never;
+    disks_[i].partner = nobody;
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    Candidate next = next_contact(i);
+    if constexpr (Space::has_walls) {
+      if (disks_[i].near != 0) next = next_wall(disks_[i], i, next);
+    }
+    if (disks_[i].partner >= 0 && next.time >= disks_[i].event_time) continue;
+    commit(i, next);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------ shells
+
+template <class Space, class Rule, class Sizes>
+bool Engine<Space, Rule, Sizes>::within_reach(std::uint32_t i, std::uint32_t k) const {
+  double dx = static_cast<double>(disks_[k].shell_x) - static_cast<double>(disks_[i].shell_x);
+  double dz = static_cast<double>(disks_[k].shell_z) - static_cast<double>(disks_[i].shell_z);
+  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+  const double reach = sizes_.contact_distance(i, k) + 2 * skin_ + shell_slack;
+  return dx * dx + dz * dz < reach * reach;
+}
+
+// Centres the disk's shell on where it is now, and notes which walls it could touch from there.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::draw_shell(std::uint32_t i) {
+  Disk& disk = disks_[i];
+  if constexpr (Space::wraps_x) disk.x = period_x_.wrapped(disk.x);
+  if constexpr (Space::wraps_z) disk.z = period_z_.wrapped(disk.z);
+  disk.shell_x = static_cast<float>(disk.x);
+  disk.shell_z = static_cast<float>(disk.z);
+  if constexpr (Space::has_walls) {
+    const double reach = sizes_.radius(i) + skin_ + shell_slack;
+    unsigned near = 0;
+    if (hard_sides_ && disk.shell_x < reach) near |= near_left_wall;
+    if (hard_sides_ && disk.shell_x > width_ - reach) near |= near_right_wall;
+    if (disk.shell_z < floor_.highest() + reach) near |= near_floor;
+    if (disk.shell_z > lid_height_ - reach) near |= near_lid;
+    disk.near = static_cast<std::uint16_t>(near);
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
+  shells_.unfile(i);
+  draw_shell(i);
+  shells_.file(i);
+  shells_.search(i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+  shells_.relist(i, found_);
+}
+
+// ------------------------------------------------------------------------------------------------ the loop
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::process_until(double until) {
+  std::uint32_t i;
+  while (queue_.pop(until, i)) {
+    Disk& disk = disks_[i];
+    now_ = disk.event_time;
+    if (disk.partner >= 0) [[likely]] {
+      const auto j = static_cast<std::uint32_t>(disk.partner);
+      const Disk& other = disks_[j];
+      if (other.event_time == now_ && other.partner == static_cast<std::int32_t>(i)) [[likely]] {
+        collide(i, j);
+        predict(i);
+        predict(j);
+      } else {  // the partner was hit by another disk first
+        ++counters_.predictions_renewed;
+        bring_forward(disk, now_);
+        predict(i);
+      }
+    } else if (disk.partner == shell_exit) {
+      ++counters_.shell_exits;
+      bring_forward(disk, now_);
+      leave_shell(i);
+      predict(i);
+    } else {
+      hit_wall(i);
+      predict(i);
+    }
+  }
+  now_ = until;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::advance_to(double time) {
+  for (;;) {
+    double goal = time - base_;
+    if (std::abs(goal - synchronise_at_) <= 8 * std::numeric_limits<double>::epsilon() * std::abs(time))
+      goal = synchronise_at_;
+    if (!(goal > now_)) return;
+    process_until(std::min({goal, synchronise_at_, bath_at_}));
+    if (now_ == bath_at_) act_bath();
+    if (now_ == synchronise_at_) {
+      synchronise();
+      if (goal == synchronise_at_ || !(time - base_ > 0)) return;
+    }
+  }
+}
+
+// ------------------------------------------------------------------------------------------------ contacts
+
+// The TC model: a contact is elastic if either partner was hit less than t_c ago. Sets the clocks.
+template <class Space, class Rule, class Sizes>
+bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
+  if (contact_duration_ <= 0) return false;
+  const bool elastic = now_ - last_contact_[i] < contact_duration_ || now_ - last_contact_[j] < contact_duration_;
+  last_contact_[i] = last_contact_[j] = now_;
+  counters_.elastic_contacts += elastic;
+  return elastic;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
+  Disk &first = disks_[i], &second = disks_[j];
+  bring_forward(first, now_);
+  bring_forward(second, now_);
+  double dx = second.x - first.x, dz = second.z - first.z;
+  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+  const double dvx = second.vx - first.vx, dvz = second.vz - first.vz;
+  ++counters_.disk_collisions;
+
+  double restitution = 1;
+  bool elastic = true;
+  if constexpr (Rule::dissipates) {
+    elastic = too_soon(i, j);
+    if (!elastic) restitution = disk_surface_.restitution;
+  }
+  const double inverse_first = 1 / sizes_.mass(i), inverse_second = 1 / sizes_.mass(j);
+  const double reduced_mass = 1 / (inverse_first + inverse_second);
+  if constexpr (Rule::spins) {
+    if (!elastic) {
+      collide_rough(i, j, dx, dz, dvx, dvz, reduced_mass);
+      return;
+    }
+  }
+  const NormalImpulse impulse = smooth_impulse(dx, dz, dvx, dvz, restitution);
+  const double share_first = reduced_mass * inverse_first, share_second = reduced_mass * inverse_second;
+  first.vx -= share_first * impulse.jx;
+  first.vz -= share_first * impulse.jz;
+  second.vx += share_second * impulse.jx;
+  second.vz += share_second * impulse.jz;
+  counters_.virial += reduced_mass * (impulse.jx * dx + impulse.jz * dz);
+  if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx,
+                                               double dvz, double reduced_mass) {
+  Disk &first = disks_[i], &second = disks_[j];
+  const double distance = std::sqrt(dx * dx + dz * dz), nx = dx / distance, nz = dz / distance;
+  const double ri = sizes_.radius(i), rj = sizes_.radius(j), mi = sizes_.mass(i), mj = sizes_.mass(j);
+  const double gn = -(dvx * nx + dvz * nz);
+  const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
+  const RoughImpulse impulse = walton_impulse(nx, nz, gn, gt, reduced_mass, disk_surface_, inverse_inertia_ratio_);
+  first.vx += impulse.px / mi;
+  first.vz += impulse.pz / mi;
+  second.vx -= impulse.px / mj;
+  second.vz -= impulse.pz / mj;
+  spins_[i] += inverse_inertia_ratio_ * impulse.tangential / (mi * ri);
+  spins_[j] += inverse_inertia_ratio_ * impulse.tangential / (mj * rj);
+  counters_.virial -= impulse.px * dx + impulse.pz * dz;
+  dissipated_ += impulse.dissipated;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
+  Disk& disk = disks_[i];
+  const std::int32_t wall = disk.partner;
+  bring_forward(disk, now_);
+  switch (wall) {
+    case left_wall: bounce(i, -1, 0, 0, side_surface_); break;
+    case right_wall: bounce(i, 1, 0, 0, side_surface_); break;
+    case lid_above: bounce(i, 0, 1, 0, lid_surface_); break;
+    default: hit_floor(i); return;
+  }
+  ++counters_.wall_collisions;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i) {
+  Disk& disk = disks_[i];
+  const double mass = sizes_.mass(i);
+  const double before = 0.5 * mass * (disk.vx * disk.vx + disk.vz * disk.vz);
+  ++counters_.floor_collisions;
+  const double floor_velocity = floor_.velocity(now_);
+  if (const auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
+    const double speed = std::sqrt(thermal->temperature / mass);
+    disk.vx = speed * random_.normal_pair().first;
+    disk.vz = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
+    floor_work_ += 0.5 * mass * (disk.vx * disk.vx + disk.vz * disk.vz) - before;
+    return;
+  }
+  const double momentum = disk.vz;
+  bounce(i, 0, -1, floor_velocity, floor_surface_);
+  floor_work_ += mass * (disk.vz - momentum) * floor_velocity;
+  // A disk that lies still on the floor is carried in small hops: a contact has to end before the next can begin.
+  const double pressing = gravity_ + floor_.acceleration(now_);
+  const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
+  const double slowest = 0.5 * pressing * hop;
+  if (disk.vz - floor_velocity < 1e-3 * slowest) {
+    const double slow = disk.vz;
+    disk.vz = floor_velocity + slowest;
+    floor_work_ += 0.5 * mass * (disk.vz - slow) * (disk.vz + slow);
+  }
+}
+
+// One disk against a wall that moves vertically; (nx, nz) points from the disk to the wall.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, double nx, double nz, double wall_vz, const Surface& surface) {
+  Disk& disk = disks_[i];
+  const double mass = sizes_.mass(i);
+  const double gx = disk.vx, gz = disk.vz - wall_vz;
+  const double gn = gx * nx + gz * nz;
+  if (!(gn > 0)) return;  // grazed, by rounding
+  Surface contact = surface;
+  if constexpr (Rule::dissipates) {
+    if (too_soon(i, i)) contact = Surface{};
+  }
+  if constexpr (Rule::spins) {
+    const double radius = sizes_.radius(i);
+    const double gt = -gx * nz + gz * nx + radius * spins_[i];
+    const RoughImpulse impulse = walton_impulse(nx, nz, gn, gt, mass, contact, inverse_inertia_ratio_);
+    disk.vx += impulse.px / mass;
+    disk.vz += impulse.pz / mass;
+    spins_[i] += inverse_inertia_ratio_ * impulse.tangential / (mass * radius);
+    dissipated_ += impulse.dissipated;
+  } else {
+    disk.vx -= (1 + contact.restitution) * gn * nx;
+    disk.vz -= (1 + contact.restitution) * gn * nz;
+    dissipated_ += 0.5 * mass * (1 - contact.restitution * contact.restitution) * gn * gn;
+  }
+}
+
+// ------------------------------------------------------------------------------------------------ reservoirs
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::act_bath() {
+  const auto kinetic = [&](const Disk& disk, std::uint32_t i) {
+    return 0.5 * sizes_.mass(i) * (disk.vx * disk.vx + disk.vz * disk.vz);
+  };
+  if (const auto* bath = std::get_if<AndersenBath>(&bath_)) {
+    const std::uint32_t i = random_.below(count_);
+    Disk& disk = disks_[i];
+    bring_forward(disk, now_);
+    const double before = kinetic(disk, i), speed = std::sqrt(bath->temperature / sizes_.mass(i));
+    const Random::Pair draw = random_.normal_pair();
+    disk.vx = speed * draw.first;
+    disk.vz = speed * draw.second;
+    bath_work_ += kinetic(disk, i) - before;
+    predict(i);
+    bath_at_ = now_ - std::log(random_.uniform_positive()) / (bath->rate * count_);
+    return;
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(disks_[i], now_);
+  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) {
+    const double keep = std::exp(-bath->rate * bath->interval);
+    const double given = std::sqrt(bath->temperature * -std::expm1(-2 * bath->rate * bath->interval));
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      Disk& disk = disks_[i];
+      const double before = kinetic(disk, i), kick = given / std::sqrt(sizes_.mass(i));
+      const Random::Pair draw = random_.normal_pair();
+      disk.vx = keep * disk.vx + kick * draw.first;
+      disk.vz = keep * disk.vz + kick * draw.second;
+      bath_work_ += kinetic(disk, i) - before;
+    }
+    bath_at_ = now_ + bath->interval;
+  } else if (const auto* noise = std::get_if<WhiteNoiseBath>(&bath_)) {
+    std::vector<Random::Pair> kicks(count_);
+    Random::Pair mean{0, 0};
+    double total_mass = 0;
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const double mass = sizes_.mass(i), kick = std::sqrt(noise->heating * noise->interval / mass);
+      const Random::Pair draw = random_.normal_pair();
+      kicks[i] = {kick * draw.first, kick * draw.second};
+      mean.first += mass * kicks[i].first;
+      mean.second += mass * kicks[i].second;
+      total_mass += mass;
+    }
+    if (!noise->conserve_momentum) mean = {0, 0};
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      Disk& disk = disks_[i];
+      const double before = kinetic(disk, i);
+      disk.vx += kicks[i].first - mean.first / total_mass;
+      disk.vz += kicks[i].second - mean.second / total_mass;
+      bath_work_ += kinetic(disk, i) - before;
+    }
+    bath_at_ = now_ + noise->interval;
+  }
+  predict_all();
+}
+
+// ------------------------------------------------------------------------------------------------ synchronisation
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::synchronise() {
+  ++counters_.synchronisations;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    bring_forward(disks_[i], now_);
+    disks_[i].own_time = 0;
+  }
+  for (double& time : last_contact_) time -= now_;
+  bath_at_ -= now_;
+  const double elapsed = now_;
+  intervals_done_ += intervals_;
+  base_ = static_cast<double>(intervals_done_) * interval_;
+  now_ = 0;
+  // Often enough for the clock's resolution, seldom enough to cost nothing: 60 to 400 collisions a disk apart.
+  const std::uint64_t events = counters_.events() - events_at_synchronisation_;
+  events_at_synchronisation_ = counters_.events();
+  event_rate_ = std::max(static_cast<double>(events), 1.0) / elapsed;
+  const double events_a_disk = static_cast<double>(events) / count_;
+  if (events_a_disk < 60 && elapsed * 2 <= longest_interval) intervals_ *= 2;
+  if (events_a_disk > 400 && intervals_ > 1) intervals_ /= 2;
+  begin_interval();
+}
+
+// From positions, velocities, spins and clocks at now_ = 0 alone.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::begin_interval() {
+  synchronise_at_ = static_cast<double>(intervals_) * interval_;
+  double largest_contact = 1;
+  if constexpr (!Sizes::equal)
+    largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  double top = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
+  const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
+  shells_.reset(disks_.data(), count_, largest_contact + 2 * skin_ + shell_slack, width_, height);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    draw_shell(i);
+    shells_.file(i);
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    shells_.search(i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+    shells_.list(i, found_);
+  }
+  predict_all();
+}
+
+namespace checkpoint_bytes {
+
+inline constexpr std::uint64_t magic = 0x31306465626b6873;  // "shkbed01", little-endian
+
+template <class T>
+void put(std::vector<std::uint8_t>& out, const T& value) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
+  out.insert(out.end(), bytes, bytes + sizeof value);
+}
+template <class T>
+void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
+  if (static_cast<std::size_t>(end - at) < sizeof value) throw std::invalid_argument("the checkpoint is cut short");
+  std::memcpy(&value, at, sizeof value);
+  at += sizeof value;
+}
+
+}  // namespace checkpoint_bytes
+
+// Calls visit(value) for everything that the future depends on besides the disks, in a fixed order.
+template <class Space, class Rule, class Sizes>
+template <class Self, class Visit>
+void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
+  visit(self.intervals_);
+  visit(self.intervals_done_);
+  visit(self.event_rate_);
+  visit(self.events_at_synchronisation_);
+  visit(self.bath_at_);
+  visit(self.counters_);
+  visit(self.initial_energy_);
+  visit(self.dissipated_);
+  visit(self.floor_work_);
+  visit(self.bath_work_);
+  for (std::uint32_t i = 0; i < self.count_; ++i) {
+    visit(self.disks_[i].x);
+    visit(self.disks_[i].z);
+    visit(self.disks_[i].vx);
+    visit(self.disks_[i].vz);
+  }
+  for (auto& spin : self.spins_) visit(spin);
+  for (auto& clock : self.last_contact_) visit(clock);
+}
+
+template <class Space, class Rule, class Sizes>
+std::vector<std::uint8_t> Engine<Space, Rule, Sizes>::checkpoint() const {
+  if (now_ != 0) throw std::logic_error("a checkpoint can be taken only at a synchronisation");
+  std::vector<std::uint8_t> out;
+  checkpoint_bytes::put(out, checkpoint_bytes::magic);
+  checkpoint_bytes::put(out, count_);
+  visit_state(*this, [&](const auto& value) { checkpoint_bytes::put(out, value); });
+  checkpoint_bytes::put(out, random_.state());
+  return out;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes) {
+  const std::uint8_t *at = bytes.data(), *end = at + bytes.size();
+  std::uint64_t magic = 0;
+  std::uint32_t count = 0;
+  checkpoint_bytes::take(at, end, magic);
+  checkpoint_bytes::take(at, end, count);
+  if (magic != checkpoint_bytes::magic) throw std::invalid_argument("these bytes are not a checkpoint");
+  if (count != count_) throw std::invalid_argument("the checkpoint is of another scene: it holds another number of disks");
+  visit_state(*this, [&](auto& value) { checkpoint_bytes::take(at, end, value); });
+  std::array<std::uint64_t, 4> random_state{};
+  checkpoint_bytes::take(at, end, random_state);
+  if (at != end) throw std::invalid_argument("the checkpoint is of another scene: it holds more than this one needs");
+  random_.set_state(random_state);
+  for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
+  base_ = static_cast<double>(intervals_done_) * interval_;
+  now_ = 0;
+  begin_interval();
+}
+
+// ------------------------------------------------------------------------------------------------ looking
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
+  out.time = time();
+  out.floor_position = floor_.position(now_);
+  out.floor_velocity = floor_.velocity(now_);
+  out.x.resize(count_);
+  out.z.resize(count_);
+  out.vx.resize(count_);
+  out.vz.resize(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Disk& disk = disks_[i];
+    out.x[i] = x_at(disk, now_);
+    out.z[i] = z_at(disk, now_);
+    out.vx[i] = disk.vx;
+    out.vz[i] = vz_at(disk, now_);
+    if constexpr (Space::wraps_x) out.x[i] = period_x_.wrapped(out.x[i]);
+    if constexpr (Space::wraps_z) out.z[i] = period_z_.wrapped(out.z[i]);
+  }
+  out.spin = spins_;
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::kinetic_energy() const {
+  long double sum = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Disk& disk = disks_[i];
+    const long double vx = disk.vx, vz = vz_at(disk, now_);
+    sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
+    if constexpr (Rule::spins) {
+      const long double surface_speed = sizes_.radius(i) * spins_[i];
+      sum += 0.5L * sizes_.mass(i) / inverse_inertia_ratio_ * surface_speed * surface_speed;
+    }
+  }
+  return static_cast<double>(sum);
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::potential_energy() const {
+  long double sum = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * z_at(disks_[i], now_);
+  return static_cast<double>(sum);
+}
+
+template <class Space, class Rule, class Sizes>
+EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
+  return {initial_energy_, kinetic_energy(), potential_energy(), dissipated_, floor_work_, bath_work_};
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::largest_overlap() const {
+  Snapshot here;
+  snapshot(here);
+  double cell = 1;
+  if constexpr (!Sizes::equal) cell = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  return sim::largest_overlap(here, cell, period_x_.length, period_z_.length,
+                              [this](std::uint32_t i, std::uint32_t k) { return sizes_.contact_distance(i, k); });
+}
+
+template <class Space, class Rule, class Sizes>
+std::size_t Engine<Space, Rule, Sizes>::bytes() const {
+  return disks_.capacity() * sizeof(Disk) + (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
+         shells_.bytes() + queue_.bytes();
+}
+
+}  // namespace shakebed::sim

@@ -1,0 +1,61 @@
+// The floor: a horizontal wall that stands still, shakes sinusoidally, or follows a table from a real shaker; and when
+// a disk in free flight next meets it. Reduced units.
+#pragma once
+
+#include <vector>
+
+namespace shakebed::sim {
+
+// What can be asked for (see scene.hpp).
+struct StillFloor {};
+struct SinusoidalFloor {
+  double amplitude = 0;  // a
+  double frequency = 0;  // f; the floor stands at a sin(2 pi f t)
+};
+// One period of measured positions, equally spaced in time; between them a periodic cubic spline.
+struct TabulatedFloor {
+  double period = 0;
+  std::vector<double> heights;
+};
+
+class FloorMotion {
+ public:
+  explicit FloorMotion(const StillFloor& = {});
+  explicit FloorMotion(const SinusoidalFloor& floor);
+  explicit FloorMotion(const TabulatedFloor& floor);
+
+  // At a time counted from a whole number of periods. Keep it within a few periods of 0: its rounding is the phase's.
+  double position(double time) const;
+  double velocity(double time) const;
+  double acceleration(double time) const;
+
+  bool moves() const { return kind_ != Kind::still; }
+  double period() const { return period_; }    // 1 for a floor that stands still
+  double highest() const { return highest_; }  // no position lies above
+  double lowest() const { return lowest_; }    // none lies below
+  double largest_upward_acceleration() const { return largest_acceleration_; }
+
+  // The first time t in [0, horizon], from `now`, at which a point that flies freely from height `bottom` with upward
+  // velocity vz meets the floor from above; `never` if none. A point at the floor or, by rounding, just below it counts
+  // as touching: it meets the floor at 0 if it approaches, else at its next fall.
+  //
+  // The gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max floor''. From any t with F >= 0 the
+  // parabola F + F' h - M h^2/2 lies below the gap, so its root can never step over a crossing; near a simple root
+  // the steps converge quadratically, and near a tangent one they crawl past it on the safe side.
+  double time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const;
+
+ private:
+  enum class Kind { still, sinusoidal, tabulated };
+  struct Motion {
+    double position, velocity, acceleration;
+  };
+  Motion motion(double time) const;
+
+  Kind kind_ = Kind::still;
+  double amplitude_ = 0, angular_frequency_ = 0, period_ = 1;
+  double highest_ = 0, lowest_ = 0, largest_acceleration_ = 0;
+  std::vector<double> heights_, curvatures_;  // spline knots: value and second derivative
+  double spacing_ = 0;
+};
+
+}  // namespace shakebed::sim

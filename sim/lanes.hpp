@@ -1,0 +1,64 @@
+// Four doubles at a time, in the compilers' own vector types: one instruction each where the machine has it, the same
+// bytes where it has not (add, subtract, multiply, divide and square root are all correctly rounded).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#if defined(__AVX__)
+#include <immintrin.h>
+#endif
+
+namespace shakebed::sim {
+
+using Lanes = double __attribute__((vector_size(32)));
+using LaneMask = std::int64_t __attribute__((vector_size(32)));
+
+inline Lanes all_lanes(double value) { return Lanes{value, value, value, value}; }
+
+inline Lanes select(LaneMask mask, Lanes if_true, Lanes if_false) {
+#if defined(__AVX__)
+  return _mm256_blendv_pd(if_false, if_true, reinterpret_cast<Lanes>(mask));
+#else
+  return reinterpret_cast<Lanes>((reinterpret_cast<LaneMask>(if_true) & mask) |
+                                 (reinterpret_cast<LaneMask>(if_false) & ~mask));
+#endif
+}
+inline Lanes sqrt_lanes(Lanes value) {
+#if defined(__AVX__)
+  return _mm256_sqrt_pd(value);
+#else
+  return Lanes{std::sqrt(value[0]), std::sqrt(value[1]), std::sqrt(value[2]), std::sqrt(value[3])};
+#endif
+}
+inline Lanes nearest_integer(Lanes value) {
+#if defined(__AVX__)
+  return _mm256_round_pd(value, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
+#else
+  return Lanes{std::nearbyint(value[0]), std::nearbyint(value[1]), std::nearbyint(value[2]), std::nearbyint(value[3])};
+#endif
+}
+inline Lanes larger(Lanes a, Lanes b) { return select(a > b, a, b); }
+
+struct EarliestLane {
+  double time;
+  unsigned lane;  // 0 to 7: the first that has this time
+};
+inline EarliestLane earliest_of_eight(Lanes first, Lanes second) {
+#if defined(__AVX__)
+  Lanes least = _mm256_min_pd(first, second);
+  least = _mm256_min_pd(least, _mm256_permute2f128_pd(least, least, 1));
+  least = _mm256_min_pd(least, _mm256_permute_pd(least, 5));
+  const auto equal_first = static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(least, first, _CMP_EQ_OQ)));
+  const auto equal_second = static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(least, second, _CMP_EQ_OQ)));
+  return {least[0], static_cast<unsigned>(__builtin_ctz(equal_first | equal_second << 4))};
+#else
+  EarliestLane best{first[0], 0};
+  for (unsigned lane = 1; lane < 8; ++lane) {
+    const double time = lane < 4 ? first[lane] : second[lane - 4];
+    if (time < best.time) best = {time, lane};
+  }
+  return best;
+#endif
+}
+
+}  // namespace shakebed::sim

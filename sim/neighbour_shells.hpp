@@ -1,0 +1,192 @@
+// Who can touch whom soon. Every disk lives in a shell, a circle of radius `skin` round the place where the disk was
+// when the shell was last drawn; while all disks stay in their shells, only pairs whose shells' centres are closer than
+// R1 + R2 + 2 skin can touch, and those stand in each other's lists. A disk that leaves its shell draws a new one.
+//
+// Centres are filed in a grid of cells that wraps round in both directions (for open boxes too: a far cell shared by
+// chance only costs a distance check), so there is no event for crossing a cell and no edge to the world.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "sim/disk.hpp"
+
+namespace shakebed::sim {
+
+inline constexpr std::uint32_t inline_neighbours = 8;
+
+struct alignas(32) NeighbourBlock {
+  std::array<std::uint32_t, inline_neighbours> disk;
+};
+
+class NeighbourShells {
+ public:
+  // disks: the records, one more than count (the last is the sentinel that fills empty places of lists).
+  // cell: at least the largest reach; width, height: of the periodic box, or of the region to grid when it is not.
+  void reset(Disk* disks, std::uint32_t count, double cell, double width, double height) {
+    disks_ = disks;
+    sentinel_ = count;
+    columns_ = std::max(1, static_cast<int>(std::min(width / cell, 30'000.0)));
+    rows_ = std::max(1, static_cast<int>(std::min(height / cell, 30'000.0)));
+    per_x_ = columns_ / width;
+    per_z_ = rows_ / height;
+    heads_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), sentinel_);
+    following_.assign(count, sentinel_);
+    lists_.resize(count + 1);
+    for (NeighbourBlock& block : lists_) block.disk.fill(sentinel_);
+    overflow_.assign(count, 0);
+    blocks_.assign(1, {});
+    links_.assign(1, 0);
+    free_block_ = 0;
+    for (std::uint32_t i = 0; i < count; ++i) disks_[i].neighbours = 0;
+  }
+
+  const NeighbourBlock& first_block(std::uint32_t i) const { return lists_[i]; }
+  // Calls visit(block) for the blocks that hold the neighbours beyond the first eight.
+  template <class Visit>
+  void further_blocks(std::uint32_t i, Visit visit) const {
+    for (std::uint32_t block = overflow_[i]; block != 0; block = links_[block]) visit(blocks_[block]);
+  }
+
+  void file(std::uint32_t i) {
+    std::uint32_t& head = heads_[cell_of(disks_[i])];
+    following_[i] = head;
+    head = i;
+  }
+  // To be called while the record still holds the old centre.
+  void unfile(std::uint32_t i) {
+    std::uint32_t* link = &heads_[cell_of(disks_[i])];
+    while (*link != i) link = &following_[*link];
+    *link = following_[i];
+  }
+  std::size_t cell_of(const Disk& disk) const {
+    const int column = wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_);
+    const int row = wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_);
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
+  }
+
+  // Fills `found` with the disks whose shells' centres are within reach of i's. within(i, k) decides.
+  template <class Within>
+  void search(std::uint32_t i, Within within, std::vector<std::uint32_t>& found) const {
+    found.clear();
+    const Disk& disk = disks_[i];
+    const int column = static_cast<int>(std::floor(disk.shell_x * per_x_));
+    const int row = static_cast<int>(std::floor(disk.shell_z * per_z_));
+    // A grid of one or two columns or rows would meet the same cell twice.
+    const int left = columns_ >= 3 ? -1 : 0, right = columns_ >= 3 ? 1 : columns_ - 1;
+    const int down = rows_ >= 3 ? -1 : 0, up = rows_ >= 3 ? 1 : rows_ - 1;
+    for (int dr = down; dr <= up; ++dr) {
+      const std::size_t base = static_cast<std::size_t>(wrap(row + dr, rows_)) * static_cast<std::size_t>(columns_);
+      for (int dc = left; dc <= right; ++dc) {
+        std::uint32_t k = heads_[base + static_cast<std::size_t>(wrap(column + dc, columns_))];
+        for (; k != sentinel_; k = following_[k]) {
+          if (k != i && within(i, k)) found.push_back(k);
+        }
+      }
+    }
+  }
+
+  // Gives i the neighbours `found`; the others' lists are not touched.
+  void list(std::uint32_t i, const std::vector<std::uint32_t>& found) {
+    for (std::uint32_t k : found) append(i, k);
+  }
+  // Gives i exactly the neighbours `found`, and mends the lists of those that it lost or won.
+  void relist(std::uint32_t i, const std::vector<std::uint32_t>& found) {
+    const std::uint32_t old_count = disks_[i].neighbours;
+    for (std::uint32_t place = 0; place < old_count; ++place) {
+      const std::uint32_t k = *slot(i, place);
+      if (std::find(found.begin(), found.end(), k) == found.end()) remove(k, i);
+    }
+    for (std::uint32_t k : found) {
+      if (!holds(i, k)) append(k, i);
+    }
+    while (disks_[i].neighbours > found.size()) drop_last(i);
+    const std::uint32_t kept = disks_[i].neighbours;
+    for (std::uint32_t place = 0; place < kept; ++place) *slot(i, place) = found[place];
+    for (std::size_t place = kept; place < found.size(); ++place) append(i, found[place]);
+  }
+
+  std::size_t bytes() const {
+    return (heads_.capacity() + following_.capacity() + overflow_.capacity() + links_.capacity()) *
+               sizeof(std::uint32_t) +
+           (lists_.capacity() + blocks_.capacity()) * sizeof(NeighbourBlock);
+  }
+
+ private:
+  static int wrap(int index, int size) {
+    if (static_cast<unsigned>(index) < static_cast<unsigned>(size)) return index;
+    index %= size;
+    return index < 0 ? index + size : index;
+  }
+
+  std::uint32_t* slot(std::uint32_t i, std::uint32_t place) {
+    if (place < inline_neighbours) return &lists_[i].disk[place];
+    std::uint32_t block = overflow_[i];
+    for (place -= inline_neighbours; place >= inline_neighbours; place -= inline_neighbours) block = links_[block];
+    return &blocks_[block].disk[place];
+  }
+  bool holds(std::uint32_t i, std::uint32_t k) {
+    for (std::uint32_t place = 0; place < disks_[i].neighbours; ++place) {
+      if (*slot(i, place) == k) return true;
+    }
+    return false;
+  }
+  void append(std::uint32_t i, std::uint32_t k) {
+    const std::uint32_t place = disks_[i].neighbours++;
+    if (place >= inline_neighbours && place % inline_neighbours == 0) {
+      std::uint32_t* link = &overflow_[i];
+      while (*link != 0) link = &links_[*link];
+      std::uint32_t fresh = free_block_;
+      if (fresh != 0) {
+        free_block_ = links_[fresh];
+        *link = fresh;
+      } else {
+        fresh = static_cast<std::uint32_t>(blocks_.size());
+        *link = fresh;  // before the vector that may hold the link grows
+        blocks_.emplace_back();
+        links_.push_back(0);
+      }
+      links_[fresh] = 0;
+      blocks_[fresh].disk.fill(sentinel_);
+    }
+    *slot(i, place) = k;
+  }
+  void drop_last(std::uint32_t i) {
+    const std::uint32_t place = --disks_[i].neighbours;
+    *slot(i, place) = sentinel_;
+    if (place >= inline_neighbours && place % inline_neighbours == 0) {
+      std::uint32_t* link = &overflow_[i];
+      while (links_[*link] != 0) link = &links_[*link];
+      const std::uint32_t block = *link;
+      *link = 0;
+      links_[block] = free_block_;
+      free_block_ = block;
+    }
+  }
+  void remove(std::uint32_t i, std::uint32_t k) {
+    const std::uint32_t last = disks_[i].neighbours - 1u;
+    for (std::uint32_t place = 0; place <= last; ++place) {
+      std::uint32_t* here = slot(i, place);
+      if (*here != k) continue;
+      *here = *slot(i, last);
+      drop_last(i);
+      return;
+    }
+  }
+
+  Disk* disks_ = nullptr;
+  std::uint32_t sentinel_ = 0;
+  int columns_ = 1, rows_ = 1;
+  double per_x_ = 1, per_z_ = 1;
+  std::vector<std::uint32_t> heads_, following_;  // the grid: a linked list a cell
+  std::vector<NeighbourBlock> lists_;             // the first eight neighbours of each disk
+  std::vector<std::uint32_t> overflow_;           // first of the blocks that hold the rest, 0 for none
+  std::vector<NeighbourBlock> blocks_;
+  std::vector<std::uint32_t> links_;
+  std::uint32_t free_block_ = 0;
+};
+
+}  // namespace shakebed::sim

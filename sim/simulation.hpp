@@ -1,0 +1,67 @@
+// A running simulation, whatever its engine: the interface between the physics and those who watch it. Reduced units.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "sim/scene.hpp"
+
+namespace shakebed::sim {
+
+// Where everything is at one moment; index = disk.
+struct Snapshot {
+  double time = 0;  // since the start
+  double floor_position = 0, floor_velocity = 0;
+  std::vector<double> x, z, vx, vz, spin;  // spin empty for smooth disks
+};
+
+// Where the energy went since the start, in m g D (weightless: in T at the start).
+// kinetic + potential + dissipated - floor_work - bath_work = initial.
+struct EnergyLedger {
+  double initial = 0;
+  double kinetic = 0, potential = 0;  // now; kinetic includes spin
+  double dissipated = 0;              // in contacts
+  double floor_work = 0;              // done by the floor's motion (and by a thermal floor)
+  double bath_work = 0;               // given by the reservoir
+  double imbalance() const { return kinetic + potential + dissipated - floor_work - bath_work - initial; }
+};
+
+struct Counters {
+  std::uint64_t disk_collisions = 0;   // between two disks
+  std::uint64_t wall_collisions = 0;   // with sides and lid
+  std::uint64_t floor_collisions = 0;
+  std::uint64_t elastic_contacts = 0;  // of the dissipative ones, those the contact clock made elastic
+  std::uint64_t predictions_renewed = 0;  // a partner was hit by another disk first
+  std::uint64_t shell_exits = 0;
+  std::uint64_t synchronisations = 0;
+  double virial = 0;  // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
+  std::uint64_t events() const {
+    return disk_collisions + wall_collisions + floor_collisions + predictions_renewed + shell_exits;
+  }
+  std::uint64_t collisions() const { return disk_collisions + wall_collisions + floor_collisions; }
+};
+
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+  // Runs to the given time since the start (never backwards). Its events do not depend on where one stops to look.
+  virtual void advance_to(double time) = 0;
+  virtual double time() const = 0;
+  virtual void snapshot(Snapshot& out) const = 0;
+  virtual EnergyLedger energy() const = 0;
+  virtual Counters counters() const = 0;
+  // Largest overlap of any two disks now, in D, 0 if none (brute force over cells, O(N)).
+  virtual double largest_overlap() const = 0;
+  virtual std::size_t bytes() const = 0;  // memory held
+  // The engine canonicalises its state at moments that only the run itself decides (see engine.hpp). checkpoint() gives
+  // everything needed to go on to the same bytes from there; it may be called only when time() is such a moment, right
+  // after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not of this scene.
+  virtual double next_synchronisation() const = 0;
+  virtual std::vector<std::uint8_t> checkpoint() const = 0;
+  virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;
+};
+
+// The one place where a scene becomes a specialised engine. Throws std::invalid_argument with check()'s words.
+std::unique_ptr<Simulation> simulate(const Scene& scene);
+}  // namespace shakebed::sim
