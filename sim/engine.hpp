@@ -42,6 +42,7 @@ class Engine final : public Simulation {
   double time() const override { return base_ + now_; }
   double next_synchronisation() const override { return base_ + synchronise_at_; }
   void snapshot(Snapshot& out) const override;
+  DiskProperties properties() const override;
   EnergyLedger energy() const override;
   Counters counters() const override { return counters_; }
   double largest_overlap() const override;

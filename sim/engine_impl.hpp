@@ -657,6 +657,16 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
 }
 
 template <class Space, class Rule, class Sizes>
+DiskProperties Engine<Space, Rule, Sizes>::properties() const {
+  DiskProperties properties;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    properties.radius.push_back(sizes_.radius(i));
+    properties.mass.push_back(sizes_.mass(i));
+  }
+  return properties;
+}
+
+template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::kinetic_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {

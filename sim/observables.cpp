@@ -1,1 +1,192 @@
-// later
+#include "sim/observables.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace shakebed::sim {
+
+void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
+                 double shift, std::vector<double>& density) {
+  const double reach = kernel.kind == KernelKind::gaussian ? 6 * kernel.width : kernel.width / 2;
+  const double weight = kernel.kind == KernelKind::gaussian
+                            ? 1 / (width * kernel.width * std::sqrt(2 * std::numbers::pi))
+                            : 1 / (width * kernel.width);
+  for (double z : heights) {
+    const double place = (z - shift - grid.lowest) / grid.spacing;
+    const double first = std::max(0.0, std::ceil(place - reach / grid.spacing));
+    const double last = std::min(static_cast<double>(grid.points) - 1, std::floor(place + reach / grid.spacing));
+    for (double i = first; i <= last; ++i) {
+      double value = weight;
+      const double distance = (i - place) * grid.spacing;
+      if (kernel.kind == KernelKind::gaussian) {
+        value *= std::exp(-0.5 * (distance / kernel.width) * (distance / kernel.width));
+      } else if (std::abs(std::abs(distance) - reach) < 1e-12) {
+        value *= 0.5;  // on the very edge of two windows: half to each
+      }
+      density[static_cast<std::size_t>(i)] += value;
+    }
+  }
+}
+
+double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) {
+  const auto full = static_cast<std::uint32_t>(std::floor(width * (1 + 1e-12)));
+  const bool room_for_shift = !hard_sides || width - full >= 0.5;
+  double sum = 0;
+  std::uint32_t left = count;
+  for (std::uint32_t row = 0; left > 0; ++row) {
+    const std::uint32_t here = std::min(left, std::max(1u, row % 2 == 1 && !room_for_shift ? full - 1 : full));
+    sum += here * (0.5 + row * std::numbers::sqrt3 / 2);
+    left -= here;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+namespace {
+
+enum Scalar : std::size_t { centre, t_x, spin_t, scalar_count };
+
+}  // namespace
+
+BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const ProfileGrid& grid,
+                         const Kernel& kernel)
+    : width_(scene.box.width),
+      masses_(disks.mass),
+      phases_(phases),
+      grid_(grid),
+      kernel_(kernel),
+      layer_count_(static_cast<std::size_t>(std::ceil(static_cast<double>(grid.points) * grid.spacing)) + 1),
+      layer_bottom_(std::floor(grid.lowest)),
+      period_sum_(2 * grid.points + scalar_count),
+      means_(2 * grid.points + scalar_count),
+      centre_by_phase_(phases),
+      layers_(phases * layer_count_) {
+  for (std::size_t i = 0; i < masses_.size(); ++i)
+    inertias_.push_back(scene.disks.inertia_ratio * masses_[i] * disks.radius[i] * disks.radius[i]);
+}
+
+void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
+  const auto n = static_cast<double>(at.z.size());
+  if (phase == 0) std::fill(period_sum_.begin(), period_sum_.end(), 0.0);
+  std::vector<double> density(grid_.points);
+  const double share = 1.0 / phases_;
+  for (int frame = 0; frame < 2; ++frame) {
+    std::fill(density.begin(), density.end(), 0.0);
+    add_density(grid_, kernel_, width_, at.z, frame == 0 ? 0 : at.floor_position, density);
+    for (std::size_t i = 0; i < grid_.points; ++i)
+      period_sum_[static_cast<std::size_t>(frame) * grid_.points + i] += share * density[i];
+  }
+  double z = 0, vx2 = 0, vz = 0, vz2 = 0, spin2 = 0;
+  double mass = 0;
+  for (std::size_t i = 0; i < at.z.size(); ++i) {
+    const double m = masses_[i];
+    mass += m;
+    z += m * at.z[i];
+    vx2 += m * at.vx[i] * at.vx[i];
+    vz += m * at.vz[i];
+    vz2 += m * at.vz[i] * at.vz[i];
+    const double place = std::clamp(std::floor(at.z[i] - layer_bottom_), 0.0, static_cast<double>(layer_count_ - 1));
+    LayerSums& layer = layers_[phase * layer_count_ + static_cast<std::size_t>(place)];
+    layer.count += 1;
+    layer.mass += m;
+    layer.vx2 += m * at.vx[i] * at.vx[i];
+    layer.vz += m * at.vz[i];
+    layer.vz2 += m * at.vz[i] * at.vz[i];
+  }
+  for (std::size_t i = 0; i < at.spin.size(); ++i) spin2 += inertias_[i] * at.spin[i] * at.spin[i];
+  double* scalars = &period_sum_[2 * grid_.points];
+  scalars[centre] += share * z / mass;
+  scalars[t_x] += share * vx2 / n;
+  scalars[spin_t] += share * spin2 / n;
+  centre_by_phase_[phase] += z / mass;
+  mean_vz_.push_back(vz / mass);
+  mean_vz2_.push_back(vz2 / n);
+  mean_mass_ = mass / n;
+  if (phase + 1 == phases_) {
+    means_.add(period_sum_);
+    ++periods_;
+  }
+}
+
+Profile BedObserver::density(bool floor_frame) const {
+  Profile profile;
+  const std::size_t first = floor_frame ? grid_.points : 0;
+  for (std::size_t i = 0; i < grid_.points; ++i) {
+    profile.height.push_back(grid_.height(i));
+    profile.number_density.push_back(means_.mean(first + i));
+    profile.std_error.push_back(means_.std_error(first + i));
+  }
+  profile.samples = periods_ * phases_;
+  return profile;
+}
+
+Measured BedObserver::centre_of_mass() const {
+  const std::size_t i = 2 * grid_.points + centre;
+  return {means_.mean(i), means_.std_error(i)};
+}
+Measured BedObserver::temperature_x() const {
+  const std::size_t i = 2 * grid_.points + t_x;
+  return {means_.mean(i), means_.std_error(i)};
+}
+Measured BedObserver::spin_temperature() const {
+  const std::size_t i = 2 * grid_.points + spin_t;
+  return {means_.mean(i), means_.std_error(i)};
+}
+
+Measured BedObserver::temperature_z() const {
+  std::vector<double> mean(phases_);
+  for (std::size_t k = 0; k < periods_ * phases_; ++k) mean[k % phases_] += mean_vz_[k] / static_cast<double>(periods_);
+  BlockedMean blocks;
+  double sum = 0;
+  for (std::size_t k = 0; k < periods_ * phases_; ++k) {
+    const double m = mean[k % phases_];
+    sum += mean_vz2_[k] + mean_mass_ * (m * m - 2 * m * mean_vz_[k]);
+    if (k % phases_ + 1 == phases_) {
+      blocks.add(sum / phases_);
+      sum = 0;
+    }
+  }
+  return {blocks.mean(), blocks.std_error()};
+}
+
+Measured BedObserver::temperature_z_local() const {
+  double sum = 0, count = 0;
+  for (const LayerSums& layer : layers_) {
+    if (layer.count < 2) continue;
+    sum += (layer.vz2 - layer.vz * layer.vz / layer.mass) * layer.count / (layer.count - 1);
+    count += layer.count;
+  }
+  // Its relative error is that of T_z: the same velocities, another mean taken away.
+  const Measured whole = temperature_z();
+  const double value = count > 0 ? sum / count : 0;
+  return {value, whole.value > 0 ? value * whole.std_error / whole.value : 0};
+}
+
+std::vector<BedObserver::Layer> BedObserver::layers() const {
+  std::vector<Layer> result;
+  double total = 0;
+  for (const LayerSums& sums : layers_) total += sums.count;
+  for (std::size_t index = 0; index < layer_count_; ++index) {
+    double count = 0, mass = 0, vx2 = 0, vz = 0, thermal = 0;
+    for (std::uint32_t phase = 0; phase < phases_; ++phase) {
+      const LayerSums& sums = layer(phase, index);
+      if (sums.count == 0) continue;
+      count += sums.count;
+      vx2 += sums.vx2;
+      vz += sums.vz;
+      mass += sums.mass;
+      thermal += sums.vz2 - sums.vz * sums.vz / sums.mass;
+    }
+    if (count == 0) continue;
+    result.push_back({layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass, count / total});
+  }
+  return result;
+}
+
+std::vector<double> BedObserver::centre_of_mass_by_phase() const {
+  std::vector<double> result = centre_by_phase_;
+  for (double& value : result) value /= static_cast<double>(periods_);
+  return result;
+}
+
+}  // namespace shakebed::sim

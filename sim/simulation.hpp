@@ -16,6 +16,11 @@ struct Snapshot {
   std::vector<double> x, z, vx, vz, spin;  // spin empty for smooth disks
 };
 
+// What never changes; index = disk.
+struct DiskProperties {
+  std::vector<double> radius, mass;
+};
+
 // Where the energy went since the start, in m g D (weightless: in T at the start).
 // kinetic + potential + dissipated - floor_work - bath_work = initial.
 struct EnergyLedger {
@@ -49,6 +54,7 @@ class Simulation {
   virtual void advance_to(double time) = 0;
   virtual double time() const = 0;
   virtual void snapshot(Snapshot& out) const = 0;
+  virtual DiskProperties properties() const = 0;
   virtual EnergyLedger energy() const = 0;
   virtual Counters counters() const = 0;
   // Largest overlap of any two disks now, in D, 0 if none (brute force over cells, O(N)).

@@ -1,0 +1,36 @@
+// Means of correlated samples with honest errors: blocking [FlyvbjergPetersen1989], as the samples stream past.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace shakebed::sim {
+
+// Means of `size` quantities sampled together. Memory: 3 numbers a quantity and level, log2(samples) levels.
+class BlockedMean {
+ public:
+  explicit BlockedMean(std::size_t size = 1) : size_(size) {}
+
+  void add(std::span<const double> sample);  // of `size` values
+  void add(double value) { add(std::span(&value, 1)); }
+
+  std::uint64_t samples() const { return levels_.empty() ? 0 : levels_[0].blocks; }
+  double mean(std::size_t i = 0) const;
+  // The largest of the estimates over all block lengths that leave at least 16 blocks: grows to the plateau where
+  // neighbouring blocks are independent. With fewer than 16 samples, the uncorrelated estimate; NaN with fewer than 2.
+  double std_error(std::size_t i = 0) const;
+
+ private:
+  struct Level {
+    std::uint64_t blocks = 0;
+    bool waiting = false;
+    std::vector<double> half;  // a block that waits for its partner
+    std::vector<double> mean, sum_of_squares;  // running (Welford)
+  };
+  std::size_t size_;
+  std::vector<Level> levels_;
+};
+
+}  // namespace shakebed::sim

@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "sim/contact_time.hpp"
+#include "sim/floor.hpp"
+#include "sim/random.hpp"
+
+namespace shakebed::sim {
+namespace {
+
+using Long = long double;
+
+struct Flight {
+  double bottom, vz, gravity, now;
+};
+
+// The gap between the point and the floor, in extended precision.
+Long gap(const SinusoidalFloor& floor, const Flight& f, Long t) {
+  const Long pi = std::numbers::pi_v<Long>;
+  return f.bottom + f.vz * t - 0.5L * f.gravity * t * t - floor.amplitude * std::sin(2 * pi * floor.frequency * (f.now + t));
+}
+
+// The first downward crossing found by walking in steps far smaller than anything moves, then bisecting.
+Long first_crossing(const SinusoidalFloor& floor, const Flight& f, Long horizon) {
+  const Long step = 1e-4L / floor.frequency;
+  for (Long t = 0; t < horizon; t += step) {
+    if (gap(floor, f, t) >= 0 && gap(floor, f, t + step) < 0) {
+      Long low = t, high = t + step;
+      for (int i = 0; i < 80; ++i) {
+        const Long middle = (low + high) / 2;
+        (gap(floor, f, middle) >= 0 ? low : high) = middle;
+      }
+      return low;
+    }
+  }
+  return std::numeric_limits<Long>::infinity();
+}
+
+TEST(MovingFloor, IsMetWhereExtendedPrecisionFindsTheFirstCrossing) {
+  Random random(21);
+  const SinusoidalFloor floor{0.836, 0.35};
+  const FloorMotion motion(floor);
+  for (int trial = 0; trial < 2'000; ++trial) {
+    Flight f{0, 3 * random.normal_pair().first, 1, random.uniform() / floor.frequency};
+    f.bottom = motion.position(f.now) + 2 * random.uniform();
+    const double t = motion.time_to_contact(f.bottom, f.vz, f.gravity, f.now, never);
+    const Long truth = first_crossing(floor, f, 40);
+    ASSERT_NEAR(t * floor.frequency, static_cast<double>(truth) * floor.frequency, 2e-14)
+        << "bottom " << f.bottom << " vz " << f.vz << " now " << f.now;
+  }
+}
+
+TEST(MovingFloor, LeavesNoGapAtTheContact) {
+  Random random(22);
+  const SinusoidalFloor floor{0.836, 0.35};
+  const FloorMotion motion(floor);
+  for (int trial = 0; trial < 100'000; ++trial) {
+    Flight f{0, 3 * random.normal_pair().first, 1, random.uniform() / floor.frequency};
+    f.bottom = motion.position(f.now) + 2 * random.uniform();
+    const double t = motion.time_to_contact(f.bottom, f.vz, f.gravity, f.now, never);
+    const double terms = std::abs(f.bottom) + std::abs(f.vz * t) + 0.5 * t * t + floor.amplitude;
+    ASSERT_LE(std::abs(static_cast<double>(gap(floor, f, t))), 1e-15 * terms);
+  }
+}
+
+TEST(MovingFloor, IsMetAgainOnlyAfterAHopByADiskThatJustLeftIt) {
+  const SinusoidalFloor floor{0.5, 0.4};
+  const FloorMotion motion(floor);
+  for (double now = 0; now < 2.5; now += 0.01) {
+    for (double speed : {1e-6, 1e-3, 0.1, 1.0}) {
+      const double rounding = 1e-16;
+      const double t = motion.time_to_contact(motion.position(now) - rounding, motion.velocity(now) + speed, 1, now, never);
+      ASSERT_GT(t, 0.0);
+      const Flight f{motion.position(now), motion.velocity(now) + speed, 1, now};
+      for (int i = 1; i < 20; ++i) ASSERT_GT(static_cast<double>(gap(floor, f, t * i / 20)), -1e-15);
+    }
+  }
+}
+
+// A parabola that grazes the floor's crest from above by 1e-9 must pass, one that is 1e-9 too low must hit.
+TEST(MovingFloor, TellsAGrazingHitFromAMiss) {
+  const SinusoidalFloor floor{0.05, 1.0};  // the floor curves less than the parabola near its trough
+  const FloorMotion motion(floor);
+  for (double lift : {1e-6, 1e-9, 1e-12}) {
+    // Fly upwards past a floor that rises below: the gap has a local minimum before the disk goes away upwards.
+    double low = -1, high = 1;  // bisect the initial height for tangency
+    const double vz = 0.1, now = 0.9;
+    const auto first = [&](double bottom) { return motion.time_to_contact(bottom, vz, 0.5, now, 0.3); };
+    for (int i = 0; i < 100; ++i) {
+      const double middle = (low + high) / 2;
+      (first(middle) == never ? high : low) = middle;
+    }
+    EXPECT_EQ(first(high + lift), never);
+    EXPECT_LT(first(high - lift), 0.3);
+  }
+}
+
+TEST(StillFloor, IsMetByAFallingDisk) {
+  const FloorMotion still;
+  EXPECT_NEAR(still.time_to_contact(2, 0, 1, 0, never), 2, 1e-15);
+  EXPECT_EQ(still.time_to_contact(2, 0, 1, 0, 1.9), never);
+  EXPECT_EQ(still.time_to_contact(0, -1, 1, 0, never), 0);
+}
+
+TEST(TabulatedFloor, FollowsASineThroughItsSamples) {
+  TabulatedFloor table{2.0, {}};
+  for (int i = 0; i < 64; ++i) table.heights.push_back(0.7 * std::sin(2 * std::numbers::pi * i / 64));
+  const FloorMotion spline(table), sine(SinusoidalFloor{0.7, 0.5});
+  for (double t = -3; t < 5; t += 0.0137) {
+    EXPECT_NEAR(spline.position(t), sine.position(t), 2e-6);
+    EXPECT_NEAR(spline.velocity(t), sine.velocity(t), 2e-4);
+    EXPECT_NEAR(spline.acceleration(t), sine.acceleration(t), 2e-2);
+    EXPECT_LE(spline.position(t), spline.highest());
+    EXPECT_GE(spline.position(t), spline.lowest());
+    EXPECT_LE(spline.acceleration(t), spline.largest_upward_acceleration() * (1 + 1e-12));
+  }
+}
+
+}  // namespace
+}  // namespace shakebed::sim
