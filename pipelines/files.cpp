@@ -1,0 +1,378 @@
+#include "pipelines/files.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <numeric>
+
+#include "pipelines/errors.hpp"
+#include "pipelines/json.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+// A file's bytes, mapped.
+class MappedFile {
+ public:
+  explicit MappedFile(const std::filesystem::path& path) {
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    struct stat status {};
+    if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+      ::close(descriptor);
+      throw InputError(path.string() + ": is not a regular file");
+    }
+    size_ = static_cast<std::size_t>(status.st_size);
+    if (size_ > 0) {
+      data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
+      if (data_ == MAP_FAILED) {
+        ::close(descriptor);
+        throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+      }
+    }
+    ::close(descriptor);
+  }
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+  ~MappedFile() {
+    if (size_ > 0) ::munmap(data_, size_);
+  }
+  std::string_view bytes() const { return {static_cast<const char*>(data_), size_}; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+std::string trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path) { return std::string(MappedFile(path).bytes()); }
+
+void write_file(const std::filesystem::path& path, std::string_view text) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) throw StageError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      const int error = errno;
+      ::close(descriptor);
+      throw StageError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(error)));
+    }
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (::close(descriptor) != 0)
+    throw StageError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+  const std::filesystem::path temporary =
+      path.parent_path() / fmt::format(".{}.{}.part", path.filename().string(), ::getpid());
+  try {
+    write_file(temporary, text);
+    std::filesystem::rename(temporary, path);
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw StageError(fmt::format("{}: cannot be written: {}", path.string(), error.code().message()));
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw;
+  }
+}
+
+// --- SHA-256
+
+namespace {
+constexpr std::array<std::uint32_t, 64> sha256_constants = {
+    0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5,
+    0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3, 0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174,
+    0xe49b69c1, 0xefbe4786, 0x0fc19dc6, 0x240ca1cc, 0x2de92c6f, 0x4a7484aa, 0x5cb0a9dc, 0x76f988da,
+    0x983e5152, 0xa831c66d, 0xb00327c8, 0xbf597fc7, 0xc6e00bf3, 0xd5a79147, 0x06ca6351, 0x14292967,
+    0x27b70a85, 0x2e1b2138, 0x4d2c6dfc, 0x53380d13, 0x650a7354, 0x766a0abb, 0x81c2c92e, 0x92722c85,
+    0xa2bfe8a1, 0xa81a664b, 0xc24b8b70, 0xc76c51a3, 0xd192e819, 0xd6990624, 0xf40e3585, 0x106aa070,
+    0x19a4c116, 0x1e376c08, 0x2748774c, 0x34b0bcb5, 0x391c0cb3, 0x4ed8aa4a, 0x5b9cca4f, 0x682e6ff3,
+    0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
+}  // namespace
+
+Sha256::Sha256()
+    : state_{0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19} {}
+
+void Sha256::block(const unsigned char* bytes) {
+  std::array<std::uint32_t, 64> w;
+  for (std::size_t i = 0; i < 16; ++i) {
+    w[i] = static_cast<std::uint32_t>(bytes[4 * i]) << 24 | static_cast<std::uint32_t>(bytes[4 * i + 1]) << 16 |
+           static_cast<std::uint32_t>(bytes[4 * i + 2]) << 8 | static_cast<std::uint32_t>(bytes[4 * i + 3]);
+  }
+  for (std::size_t i = 16; i < 64; ++i) {
+    const std::uint32_t s0 = std::rotr(w[i - 15], 7) ^ std::rotr(w[i - 15], 18) ^ (w[i - 15] >> 3);
+    const std::uint32_t s1 = std::rotr(w[i - 2], 17) ^ std::rotr(w[i - 2], 19) ^ (w[i - 2] >> 10);
+    w[i] = w[i - 16] + s0 + w[i - 7] + s1;
+  }
+  auto [a, b, c, d, e, f, g, h] = state_;
+  for (std::size_t i = 0; i < 64; ++i) {
+    const std::uint32_t t1 =
+        h + (std::rotr(e, 6) ^ std::rotr(e, 11) ^ std::rotr(e, 25)) + ((e & f) ^ (~e & g)) + sha256_constants[i] + w[i];
+    const std::uint32_t t2 = (std::rotr(a, 2) ^ std::rotr(a, 13) ^ std::rotr(a, 22)) + ((a & b) ^ (a & c) ^ (b & c));
+    h = g, g = f, f = e, e = d + t1, d = c, c = b, b = a, a = t1 + t2;
+  }
+  state_[0] += a, state_[1] += b, state_[2] += c, state_[3] += d, state_[4] += e, state_[5] += f, state_[6] += g,
+      state_[7] += h;
+}
+
+void Sha256::update(std::string_view bytes) {
+  length_ += bytes.size();
+  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
+  std::size_t left = bytes.size();
+  if (buffered_ > 0) {
+    const std::size_t taken = std::min(left, 64 - buffered_);
+    std::memcpy(buffer_.data() + buffered_, data, taken);
+    buffered_ += taken, data += taken, left -= taken;
+    if (buffered_ < 64) return;
+    block(buffer_.data());
+    buffered_ = 0;
+  }
+  for (; left >= 64; data += 64, left -= 64) block(data);
+  if (left > 0) std::memcpy(buffer_.data(), data, left);
+  buffered_ = left;
+}
+
+std::string Sha256::hex() {
+  const std::uint64_t bits = length_ * 8;
+  update(std::string_view("\x80", 1));
+  while (buffered_ != 56) update(std::string_view("\0", 1));
+  std::array<char, 8> tail;
+  for (std::size_t i = 0; i < 8; ++i) tail[i] = static_cast<char>(bits >> (56 - 8 * i) & 0xff);
+  update({tail.data(), tail.size()});
+  std::string out;
+  for (const std::uint32_t word : state_) out += fmt::format("{:08x}", word);
+  return out;
+}
+
+std::string sha256(std::string_view bytes) {
+  Sha256 hash;
+  hash.update(bytes);
+  return hash.hex();
+}
+std::string sha256_of_file(const std::filesystem::path& path) { return sha256(MappedFile(path).bytes()); }
+
+std::string fast_hash(std::string_view bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+std::string fast_hash_of_file(const std::filesystem::path& path) { return fast_hash(MappedFile(path).bytes()); }
+
+// --- zstd
+
+std::string compress(std::string_view bytes, int level) {
+  std::string out(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
+  if (ZSTD_isError(size)) throw StageError(fmt::format("compression failed: {}", ZSTD_getErrorName(size)));
+  out.resize(size);
+  return out;
+}
+
+std::string decompress(std::string_view bytes, const std::string& name) {
+  const auto free_context = [](ZSTD_DCtx* context) { ZSTD_freeDCtx(context); };
+  const std::unique_ptr<ZSTD_DCtx, decltype(free_context)> context(ZSTD_createDCtx(), free_context);
+  std::string out;
+  std::vector<char> chunk(ZSTD_DStreamOutSize());
+  ZSTD_inBuffer input{bytes.data(), bytes.size(), 0};
+  std::size_t state = 1;
+  while (input.pos < input.size) {
+    ZSTD_outBuffer output{chunk.data(), chunk.size(), 0};
+    state = ZSTD_decompressStream(context.get(), &output, &input);
+    if (ZSTD_isError(state)) throw InputError(fmt::format("{}: is not zstd: {}", name, ZSTD_getErrorName(state)));
+    out.append(chunk.data(), output.pos);
+  }
+  if (state != 0) throw InputError(name + ": ends in the middle of its compressed data");
+  return out;
+}
+
+// --- profiles
+
+std::string ProfileTable::comment(std::string_view key) const {
+  for (const std::string& line : comments) {
+    const std::size_t colon = line.find(':');
+    if (colon != std::string::npos && trimmed(std::string_view(line).substr(0, colon)) == key) {
+      return trimmed(std::string_view(line).substr(colon + 1));
+    }
+  }
+  return "";
+}
+
+std::string profile_text(const ProfileTable& profile) {
+  std::string out;
+  for (const std::string& comment : profile.comments) out += "# " + comment + '\n';
+  out += "height,number_density,std_error,area_fraction,samples\n";
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const bool has_error = i < profile.std_error.size() && profile.std_error[i] >= 0;
+    const double area =
+        i < profile.area_fraction.size() ? profile.area_fraction[i] : std::numbers::pi / 4 * profile.number_density[i];
+    out += fmt::format("{},{},{},{},{}\n", number_text(profile.height[i]), number_text(profile.number_density[i]),
+                       has_error ? number_text(profile.std_error[i]) : "", number_text(area),
+                       i < profile.samples.size() ? number_text(profile.samples[i]) : "0");
+  }
+  return out;
+}
+
+void write_profile_csv(const std::filesystem::path& path, const ProfileTable& profile) {
+  write_file(path, profile_text(profile));
+}
+
+std::vector<std::string> split_csv_line(std::string_view line, char separator) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (quoted) {
+      if (c == '"' && i + 1 < line.size() && line[i + 1] == '"')
+        cells.back() += '"', ++i;
+      else if (c == '"')
+        quoted = false;
+      else
+        cells.back() += c;
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == separator) {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  for (std::string& cell : cells) cell = trimmed(cell);
+  return cells;
+}
+
+namespace {
+// Cells separated by blanks, however many.
+std::vector<std::string> split_blanks(std::string_view line) {
+  std::vector<std::string> cells;
+  std::size_t i = 0;
+  while (true) {
+    i = line.find_first_not_of(" \t\r", i);
+    if (i == std::string_view::npos) return cells;
+    const std::size_t end = std::min(line.find_first_of(" \t\r", i), line.size());
+    cells.emplace_back(line.substr(i, end - i));
+    i = end;
+  }
+}
+
+bool is_any_of(std::string name, std::initializer_list<std::string_view> names) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+}  // namespace
+
+ProfileTable read_profile_csv(const std::filesystem::path& path) {
+  const std::string text = read_file(path);
+  ProfileTable profile;
+  std::vector<std::string> header;
+  char separator = ',';
+  std::ptrdiff_t height = -1, density = -1, error = -1, area = -1, samples = -1;
+  std::size_t line_number = 0, begin = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = trimmed(std::string_view(text).substr(begin, end - begin));
+    begin = end + 1;
+    ++line_number;
+    const auto fail = [&](const std::string& what) -> InputError {
+      return InputError(fmt::format("{}:{}: {}", path.string(), line_number, what));
+    };
+    if (line.empty()) continue;
+    if (line[0] == '#') {
+      profile.comments.push_back(trimmed(std::string_view(line).substr(1)));
+      continue;
+    }
+    const auto split = [&](std::string_view whole) {
+      return separator == ' ' ? split_blanks(whole) : split_csv_line(whole, separator);
+    };
+    if (header.empty()) {
+      for (const char candidate : {',', ';', '\t', ' '}) {
+        separator = candidate;
+        if (split(line).size() >= 2) break;
+      }
+      header = split(line);
+      for (std::size_t i = 0; i < header.size(); ++i) {
+        const auto at = static_cast<std::ptrdiff_t>(i);
+        if (is_any_of(header[i], {"height", "zeta", "z", "z/d"}))
+          height = at;
+        else if (is_any_of(header[i], {"number_density", "density", "phi"}))
+          density = at;
+        else if (is_any_of(header[i], {"std_error", "error", "sigma", "stderr"}))
+          error = at;
+        else if (is_any_of(header[i], {"area_fraction", "nu"}))
+          area = at;
+        else if (is_any_of(header[i], {"samples", "count"}))
+          samples = at;
+      }
+      if (height < 0 || (density < 0 && area < 0)) {
+        throw fail(fmt::format(
+            "the header must name at least \"height\" (in D) and \"number_density\" (n D^2), or \"area_fraction\"; "
+            "found \"{}\"",
+            line));
+      }
+      continue;
+    }
+    const auto cells = split(line);
+    if (cells.size() != header.size())
+      throw fail(fmt::format("{} cells, the header has {}", cells.size(), header.size()));
+    const auto number = [&](std::ptrdiff_t column) {
+      const std::string& cell = cells[static_cast<std::size_t>(column)];
+      double value = 0;
+      const auto [stop, problem] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+      if (problem != std::errc() || stop != cell.data() + cell.size() || !std::isfinite(value)) {
+        throw fail(fmt::format("\"{}\" in column \"{}\" is not a finite number", cell,
+                               header[static_cast<std::size_t>(column)]));
+      }
+      return value;
+    };
+    const auto given = [&](std::ptrdiff_t column) {
+      return column >= 0 && !cells[static_cast<std::size_t>(column)].empty();
+    };
+    profile.height.push_back(number(height));
+    const double covered = given(area) ? number(area) : std::numbers::pi / 4 * number(density);
+    profile.number_density.push_back(density >= 0 ? number(density) : covered * 4 / std::numbers::pi);
+    profile.area_fraction.push_back(covered);
+    profile.std_error.push_back(given(error) ? number(error) : -1);
+    profile.samples.push_back(given(samples) ? number(samples) : 0);
+    if (profile.number_density.back() < 0) throw fail("a negative density");
+    if (given(error) && profile.std_error.back() < 0) throw fail("a negative standard error");
+  }
+  if (header.empty()) throw InputError(path.string() + ": holds no header line");
+  if (profile.height.empty()) throw InputError(path.string() + ": holds no row below its header");
+  std::vector<std::size_t> order(profile.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return profile.height[a] < profile.height[b]; });
+  const auto sorted = [&](const std::vector<double>& values) {
+    std::vector<double> out;
+    for (const std::size_t i : order) out.push_back(values[i]);
+    return out;
+  };
+  profile.height = sorted(profile.height), profile.number_density = sorted(profile.number_density);
+  profile.std_error = sorted(profile.std_error), profile.area_fraction = sorted(profile.area_fraction);
+  profile.samples = sorted(profile.samples);
+  return profile;
+}
+
+}  // namespace shakebed::pipelines
