@@ -29,14 +29,14 @@ enum Near : std::uint16_t {
 // Reduced units: lengths in D, masses in m, accelerations in g (weightless scenes: T = 1 at the start instead).
 // The state (x, z, vx, vz) is that at own_time; it is brought forward only when something happens to the disk.
 struct alignas(64) Disk {
-  double x, z;                // centre; z is the height above the floor's mean position
-  double vx, vz;              // velocity
-  double own_time;            // when the state above was true
-  double event_time;          // when the next event of this disk is due
-  std::int32_t partner;       // with whom: a disk's number or one of Partner
-  std::uint16_t neighbours;   // how many disks its neighbour list holds
-  std::uint16_t near;         // which walls its shell can reach, bits of Near
-  float shell_x, shell_z;     // centre of its shell, in the shell frame
+  double x, z;               // centre; z is the height above the floor's mean position
+  double vx, vz;             // velocity
+  double own_time;           // when the state above was true
+  double event_time;         // when the next event of this disk is due
+  std::int32_t partner;      // with whom: a disk's number or one of Partner
+  std::uint16_t neighbours;  // how many disks its neighbour list holds
+  std::uint16_t near;        // which walls its shell can reach, bits of Near
+  float shell_x, shell_z;    // centre of its shell, in the shell frame
 };
 static_assert(sizeof(Disk) == 64);
 

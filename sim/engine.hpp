@@ -78,7 +78,8 @@ class Engine final : public Simulation {
   // --- contacts
   void process_until(double until);
   void collide(std::uint32_t i, std::uint32_t j);
-  void collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx, double dvz, double reduced_mass);
+  void collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx, double dvz,
+                     double reduced_mass);
   void hit_wall(std::uint32_t i);
   void hit_floor(std::uint32_t i);
   void bounce(std::uint32_t i, double nx, double nz, double wall_vz, const Surface& surface);
@@ -110,18 +111,18 @@ class Engine final : public Simulation {
   Bath bath_;
 
   // --- the state
-  std::vector<Disk> disks_;         // and a sentinel after the last
-  std::vector<double> spins_;       // rough disks only
+  std::vector<Disk> disks_;           // and a sentinel after the last
+  std::vector<double> spins_;         // rough disks only
   std::vector<double> last_contact_;  // contact clocks, dissipative disks only
-  double now_ = 0;                  // since base_
-  double base_ = 0;                 // of the present count, since the start
-  double interval_ = 1;             // the floor's period
-  std::uint64_t intervals_ = 1;     // that many of them between synchronisations now
+  double now_ = 0;                    // since base_
+  double base_ = 0;                   // of the present count, since the start
+  double interval_ = 1;               // the floor's period
+  std::uint64_t intervals_ = 1;       // that many of them between synchronisations now
   std::uint64_t intervals_done_ = 0;
   double synchronise_at_ = 1;
   double event_rate_ = 1;
   std::uint64_t events_at_synchronisation_ = 0;
-  double bath_at_ = never;          // next action of the reservoir
+  double bath_at_ = never;  // next action of the reservoir
   Random random_;
   Counters counters_;
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;

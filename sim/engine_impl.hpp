@@ -3,8 +3,8 @@
 
 namespace shakebed::sim {
 
-inline constexpr double rest_hop = 1e-4;        // length of the hop of a disk at rest on the floor without a contact clock
-inline constexpr double shell_slack = 1e-9;     // covers the rounding of shells' centres and exit times
+inline constexpr double rest_hop = 1e-4;     // length of the hop of a disk at rest on the floor without a contact clock
+inline constexpr double shell_slack = 1e-9;  // covers the rounding of shells' centres and exit times
 inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
 
 // ------------------------------------------------------------------------------------------------ start
@@ -99,7 +99,8 @@ Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const 
   std::memcpy(&s3, &k3.x, sizeof s3);
   const Lanes low01 = __builtin_shufflevector(s0, s1, 0, 4, 2, 6), high01 = __builtin_shufflevector(s0, s1, 1, 5, 3, 7);
   const Lanes low23 = __builtin_shufflevector(s2, s3, 0, 4, 2, 6), high23 = __builtin_shufflevector(s2, s3, 1, 5, 3, 7);
-  const Lanes x = __builtin_shufflevector(low01, low23, 0, 1, 4, 5), vx = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+  const Lanes x = __builtin_shufflevector(low01, low23, 0, 1, 4, 5),
+              vx = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
   const Lanes z = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
   Lanes vz = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
   const Lanes own_time = {k0.own_time, k1.own_time, k2.own_time, k3.own_time};
@@ -122,8 +123,8 @@ Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const 
 
   Lanes contact_squared = all_lanes(1);
   if constexpr (!Sizes::equal) {
-    const Lanes distance = all_lanes(radius) + Lanes{sizes_.radius(ids[0]), sizes_.radius(ids[1]), sizes_.radius(ids[2]),
-                                                     sizes_.radius(ids[3])};
+    const Lanes distance = all_lanes(radius) + Lanes{sizes_.radius(ids[0]), sizes_.radius(ids[1]),
+                                                     sizes_.radius(ids[2]), sizes_.radius(ids[3])};
     contact_squared = distance * distance;
   }
   // As time_to_disk() in contact_time.hpp.
@@ -148,7 +149,8 @@ auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i) const -> Candidat
     if (earliest.time < best.time) best = {earliest.time, static_cast<std::int32_t>(block.disk[earliest.lane])};
   };
   consider(shells_.first_block(i));
-  if (disk.neighbours > inline_neighbours) [[unlikely]] shells_.further_blocks(i, consider);
+  if (disk.neighbours > inline_neighbours) [[unlikely]]
+    shells_.further_blocks(i, consider);
   return best;
 }
 
@@ -267,7 +269,8 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
   shells_.unfile(i);
   draw_shell(i);
   shells_.file(i);
-  shells_.search(i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+  shells_.search(
+      i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
   shells_.relist(i, found_);
 }
 
@@ -392,10 +395,18 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   const std::int32_t wall = disk.partner;
   bring_forward(disk, now_);
   switch (wall) {
-    case left_wall: bounce(i, -1, 0, 0, side_surface_); break;
-    case right_wall: bounce(i, 1, 0, 0, side_surface_); break;
-    case lid_above: bounce(i, 0, 1, 0, lid_surface_); break;
-    default: hit_floor(i); return;
+    case left_wall:
+      bounce(i, -1, 0, 0, side_surface_);
+      break;
+    case right_wall:
+      bounce(i, 1, 0, 0, side_surface_);
+      break;
+    case lid_above:
+      bounce(i, 0, 1, 0, lid_surface_);
+      break;
+    default:
+      hit_floor(i);
+      return;
   }
   ++counters_.wall_collisions;
 }
@@ -543,8 +554,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
   synchronise_at_ = static_cast<double>(intervals_) * interval_;
   double largest_contact = 1;
-  if constexpr (!Sizes::equal)
-    largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  if constexpr (!Sizes::equal) largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
@@ -554,7 +564,8 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
     shells_.file(i);
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
-    shells_.search(i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+    shells_.search(
+        i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
     shells_.list(i, found_);
   }
   predict_all();
@@ -621,7 +632,8 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   checkpoint_bytes::take(at, end, magic);
   checkpoint_bytes::take(at, end, count);
   if (magic != checkpoint_bytes::magic) throw std::invalid_argument("these bytes are not a checkpoint");
-  if (count != count_) throw std::invalid_argument("the checkpoint is of another scene: it holds another number of disks");
+  if (count != count_)
+    throw std::invalid_argument("the checkpoint is of another scene: it holds another number of disks");
   visit_state(*this, [&](auto& value) { checkpoint_bytes::take(at, end, value); });
   std::array<std::uint64_t, 4> random_state{};
   checkpoint_bytes::take(at, end, random_state);

@@ -25,7 +25,8 @@ class EventQueue {
     disks_ = disks;
     const double events_a_bucket = count > 20'000 ? 24 : 12;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
-    const auto wanted = static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket * 1.5, 256.0, 1e8));
+    const auto wanted =
+        static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket * 1.5, 256.0, 1e8));
     const std::size_t size = std::bit_ceil(wanted);
     heads_.assign(size, 0);
     mask_ = size - 1;
@@ -149,7 +150,8 @@ class EventQueue {
         if (bucket_b == current_ && time_b != time_a) run_.push_back({time_b, b, a});
         const bool later_a = bucket_a > current_ && ((bucket_a ^ current_) & static_cast<std::int64_t>(mask_)) == 0;
         const bool later_b = bucket_b > current_ && ((bucket_b ^ current_) & static_cast<std::int64_t>(mask_)) == 0;
-        if (later_a || later_b) [[unlikely]] unsorted_.push_back({0, a, b});
+        if (later_a || later_b) [[unlikely]]
+          unsorted_.push_back({0, a, b});
       }
       const std::uint32_t following = chunks_[chunk].next;
       chunks_[chunk].next = free_chunk_;

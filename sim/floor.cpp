@@ -58,14 +58,16 @@ FloorMotion::FloorMotion(const TabulatedFloor& floor)
 
 FloorMotion::Motion FloorMotion::motion(double time) const {
   switch (kind_) {
-    case Kind::still: return {0, 0, 0};
+    case Kind::still:
+      return {0, 0, 0};
     case Kind::sinusoidal: {
       const double phase = angular_frequency_ * time;
       const double sine = std::sin(phase), cosine = std::cos(phase);
       return {amplitude_ * sine, amplitude_ * angular_frequency_ * cosine,
               -amplitude_ * angular_frequency_ * angular_frequency_ * sine};
     }
-    case Kind::tabulated: break;
+    case Kind::tabulated:
+      break;
   }
   const double cycle = time / period_ - std::floor(time / period_);
   const double place = cycle * static_cast<double>(heights_.size());

@@ -178,7 +178,8 @@ std::vector<BedObserver::Layer> BedObserver::layers() const {
       thermal += sums.vz2 - sums.vz * sums.vz / sums.mass;
     }
     if (count == 0) continue;
-    result.push_back({layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass, count / total});
+    result.push_back(
+        {layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass, count / total});
   }
   return result;
 }

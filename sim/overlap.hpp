@@ -21,12 +21,18 @@ double largest_overlap(const Snapshot& at, double cell, double period_x, double 
   const auto rows = static_cast<std::int64_t>(period_z > 0 ? std::max(1.0, std::floor(period_z / cell)) : 0);
   const double cell_x = columns > 0 ? period_x / static_cast<double>(columns) : cell;
   const double cell_z = rows > 0 ? period_z / static_cast<double>(rows) : cell;
-  const auto wrap = [](std::int64_t index, std::int64_t size) { return size > 0 ? ((index % size) + size) % size : index; };
+  const auto wrap = [](std::int64_t index, std::int64_t size) {
+    return size > 0 ? ((index % size) + size) % size : index;
+  };
   const auto key = [](std::int64_t column, std::int64_t row) { return row * 1'000'003 + column; };
   std::unordered_map<std::int64_t, std::vector<std::uint32_t>> cells;
   cells.reserve(at.x.size());
-  const auto column_of = [&](std::uint32_t i) { return wrap(static_cast<std::int64_t>(std::floor(at.x[i] / cell_x)), columns); };
-  const auto row_of = [&](std::uint32_t i) { return wrap(static_cast<std::int64_t>(std::floor(at.z[i] / cell_z)), rows); };
+  const auto column_of = [&](std::uint32_t i) {
+    return wrap(static_cast<std::int64_t>(std::floor(at.x[i] / cell_x)), columns);
+  };
+  const auto row_of = [&](std::uint32_t i) {
+    return wrap(static_cast<std::int64_t>(std::floor(at.z[i] / cell_z)), rows);
+  };
   for (std::uint32_t i = 0; i < at.x.size(); ++i) cells[key(column_of(i), row_of(i))].push_back(i);
   double worst = 0;
   for (std::uint32_t i = 0; i < at.x.size(); ++i) {

@@ -32,7 +32,7 @@ class Random {
     state_[3] = std::rotl(state_[3], 45);
     return result;
   }
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }               // [0, 1)
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }                 // [0, 1)
   double uniform_positive() { return (static_cast<double>(bits() >> 11) + 1) * 0x1p-53; }  // (0, 1]
   std::uint32_t below(std::uint32_t n) {
     return static_cast<std::uint32_t>((static_cast<unsigned __int128>(bits()) * n) >> 64);

@@ -62,8 +62,9 @@ class Check {
     }
     require(scene_.count() < 1u << 28, "/disks/count", "more than 268,435,455 disks cannot be numbered");
     surface(d.contact, "/disks");
-    require(d.inertia_ratio > 0 && d.inertia_ratio <= 1, "/disks/inertia",
-            "I/(m R^2) lies above 0 and not above 1 (1/2 for a disk, 2/5 for a sphere), not " + number(d.inertia_ratio));
+    require(
+        d.inertia_ratio > 0 && d.inertia_ratio <= 1, "/disks/inertia",
+        "I/(m R^2) lies above 0 and not above 1 (1/2 for a disk, 2/5 for a sphere), not " + number(d.inertia_ratio));
     require(d.contact_duration >= 0 && std::isfinite(d.contact_duration), "/disks/contact_duration",
             "a contact's duration is not negative, but this one is " + number(d.contact_duration));
   }
@@ -77,8 +78,9 @@ class Check {
     const bool periodic = std::holds_alternative<PeriodicSides>(b.sides);
     const double least = 2 * largest + 3;  // a disk must never meet two images of one neighbour
     require(!periodic || b.width >= least, "/box/width",
-            "a periodic box of " + number(b.width) + " D is too narrow: a disk could meet two images of the same one; at least " +
-                number(least) + " D are needed");
+            "a periodic box of " + number(b.width) +
+                " D is too narrow: a disk could meet two images of the same one; at least " + number(least) +
+                " D are needed");
     require(!periodic_upwards() || height() >= least, "/box/height",
             "a periodic box of " + number(height()) + " D is too low: at least " + number(least) + " D are needed");
     require(!periodic_upwards() || periodic, "/box/sides", "a box that is periodic upwards has periodic sides too");
@@ -110,7 +112,8 @@ class Check {
       }
       if (!table->heights.empty()) {
         const auto [low, high] = std::minmax_element(table->heights.begin(), table->heights.end());
-        require(*high > *low, "/floor/heights", "the floor's positions are all the same; a floor that stands still is \"still\"");
+        require(*high > *low, "/floor/heights",
+                "the floor's positions are all the same; a floor that stands still is \"still\"");
       }
     } else {
       return;
@@ -138,8 +141,9 @@ class Check {
     } else if (const auto* w = std::get_if<WhiteNoiseBath>(&scene_.bath)) {
       positive(w->heating, "heating");
       positive(w->interval, "interval");
-      require(scene_.disks.contact.restitution < 1, "/bath",
-              "white noise heats without end what does not dissipate: with restitution 1 there is no temperature to reach");
+      require(
+          scene_.disks.contact.restitution < 1, "/bath",
+          "white noise heats without end what does not dissipate: with restitution 1 there is no temperature to reach");
     } else if (const auto* t = std::get_if<ThermalFloor>(&scene_.bath)) {
       positive(t->temperature, "temperature");
       require(!periodic_upwards(), "/bath", "a thermal floor needs a floor, but the box is periodic upwards");
@@ -152,8 +156,9 @@ class Check {
     double area = 0;
     for (const Species& s : scene_.disks.species) area += s.count * std::numbers::pi / 4 * s.diameter * s.diameter;
     const double fraction = area / (scene_.box.width * height());
-    require(fraction <= std::numbers::pi / (2 * std::numbers::sqrt3), "/box",
-            "the disks would cover " + number(fraction) + " of the box; no packing of equal disks covers more than 0.9069");
+    require(
+        fraction <= std::numbers::pi / (2 * std::numbers::sqrt3), "/box",
+        "the disks would cover " + number(fraction) + " of the box; no packing of equal disks covers more than 0.9069");
   }
 
   const Scene& scene_;

@@ -1,5 +1,6 @@
 // What can be simulated: a plain description, every physical choice a variant. Reduced units: lengths in D (the
-// diameter of species 0), masses in m (its mass), accelerations in g; a weightless scene has T = 1 at the start instead.
+// diameter of species 0), masses in m (its mass), accelerations in g; a weightless scene has T = 1 at the start
+// instead.
 #pragma once
 
 #include <cstdint>

@@ -33,10 +33,10 @@ struct EnergyLedger {
 };
 
 struct Counters {
-  std::uint64_t disk_collisions = 0;   // between two disks
-  std::uint64_t wall_collisions = 0;   // with sides and lid
+  std::uint64_t disk_collisions = 0;  // between two disks
+  std::uint64_t wall_collisions = 0;  // with sides and lid
   std::uint64_t floor_collisions = 0;
-  std::uint64_t elastic_contacts = 0;  // of the dissipative ones, those the contact clock made elastic
+  std::uint64_t elastic_contacts = 0;     // of the dissipative ones, those the contact clock made elastic
   std::uint64_t predictions_renewed = 0;  // a partner was hit by another disk first
   std::uint64_t shell_exits = 0;
   std::uint64_t synchronisations = 0;
@@ -62,7 +62,8 @@ class Simulation {
   virtual std::size_t bytes() const = 0;  // memory held
   // The engine canonicalises its state at moments that only the run itself decides (see engine.hpp). checkpoint() gives
   // everything needed to go on to the same bytes from there; it may be called only when time() is such a moment, right
-  // after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not of this scene.
+  // after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not of this
+  // scene.
   virtual double next_synchronisation() const = 0;
   virtual std::vector<std::uint8_t> checkpoint() const = 0;
   virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;

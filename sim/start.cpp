@@ -22,8 +22,8 @@ struct Point {
 struct Room {
   double width, height;  // height infinite for an open box
   bool periodic_x, periodic_z;
-  double diameter;       // of the largest disk
-  double floor;          // highest position of the floor at time 0
+  double diameter;  // of the largest disk
+  double floor;     // highest position of the floor at time 0
   std::uint32_t count;
 };
 
@@ -47,8 +47,8 @@ Room room_of(const Scene& scene) {
 
 [[noreturn]] void no_room(const Room& room) {
   std::ostringstream out;
-  out << room.count << " disks of up to " << room.diameter << " D do not fit into a box " << room.width << " D wide and "
-      << room.height << " D high";
+  out << room.count << " disks of up to " << room.diameter << " D do not fit into a box " << room.width
+      << " D wide and " << room.height << " D high";
   throw std::runtime_error(out.str());
 }
 
@@ -110,7 +110,8 @@ std::vector<Point> random_insertion(const Room& room, const RandomStart& start, 
   if (!std::isinf(room.height)) high = start.height > 0 ? std::min(start.height, room.height) : room.height;
   std::vector<std::size_t> order(diameters.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t l, std::size_t r) { return diameters[l] > diameters[r]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t l, std::size_t r) { return diameters[l] > diameters[r]; });
 
   const double cell = room.diameter;
   const auto columns = static_cast<std::int64_t>(std::max(1.0, std::floor(room.width / cell)));
@@ -161,8 +162,9 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
     if (p.species >= scene.disks.species.size())
       throw std::runtime_error("disk " + std::to_string(i) + " of the start is of a species that is not described");
     const double r = scene.disks.species[p.species].diameter / 2;
-    const bool outside = (!room.periodic_x && (p.x < r - 1e-12 * room.width || p.x > room.width - r + 1e-12 * room.width)) ||
-                         (!room.periodic_z && (p.z < room.floor + r - 1e-12 || p.z > room.height - r + 1e-12));
+    const bool outside =
+        (!room.periodic_x && (p.x < r - 1e-12 * room.width || p.x > room.width - r + 1e-12 * room.width)) ||
+        (!room.periodic_z && (p.z < room.floor + r - 1e-12 || p.z > room.height - r + 1e-12));
     if (outside || !std::isfinite(p.x) || !std::isfinite(p.z) || !std::isfinite(p.vx) || !std::isfinite(p.vz)) {
       std::ostringstream out;
       out << "disk " << i << " of the start, at (" << p.x << ", " << p.z << ") D, is not inside the box";
@@ -171,11 +173,11 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
     at.x.push_back(p.x);
     at.z.push_back(p.z);
   }
-  const double overlap = largest_overlap(at, room.diameter, room.periodic_x ? room.width : 0,
-                                         room.periodic_z ? room.height : 0, [&](std::uint32_t i, std::uint32_t k) {
-                                           return (scene.disks.species[disks[i].species].diameter +
-                                                   scene.disks.species[disks[k].species].diameter) / 2;
-                                         });
+  const double overlap = largest_overlap(
+      at, room.diameter, room.periodic_x ? room.width : 0, room.periodic_z ? room.height : 0,
+      [&](std::uint32_t i, std::uint32_t k) {
+        return (scene.disks.species[disks[i].species].diameter + scene.disks.species[disks[k].species].diameter) / 2;
+      });
   if (overlap > 1e-10) {
     std::ostringstream out;
     out << "two disks of the start overlap by " << overlap << " D";

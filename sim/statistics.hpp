@@ -26,7 +26,7 @@ class BlockedMean {
   struct Level {
     std::uint64_t blocks = 0;
     bool waiting = false;
-    std::vector<double> half;  // a block that waits for its partner
+    std::vector<double> half;                  // a block that waits for its partner
     std::vector<double> mean, sum_of_squares;  // running (Welford)
   };
   std::size_t size_;

@@ -49,9 +49,7 @@ TEST(WaltonImpulse, KeepsMomentumAndLosesTheEnergyItSays) {
     Body b{v2.first, v2.second, 2 * w.second, 1, 0.3};
     const double gn = (a.vx - b.vx) * nx + (a.vz - b.vz) * nz;
     if (gn <= 0) continue;
-    const auto slip = [&] {
-      return -(a.vx - b.vx) * nz + (a.vz - b.vz) * nx + a.radius * a.spin + b.radius * b.spin;
-    };
+    const auto slip = [&] { return -(a.vx - b.vx) * nz + (a.vz - b.vz) * nx + a.radius * a.spin + b.radius * b.spin; };
     const double gt = slip(), m12 = a.mass * b.mass / (a.mass + b.mass);
     const RoughImpulse p = walton_impulse(nx, nz, gn, gt, m12, surface, 1 / q);
     const double before = energy(a, q) + energy(b, q);

@@ -62,7 +62,9 @@ TEST(ShellExit, IsNeverLaterThanTheTrueExit) {
       worst_share = std::min(worst_share, t / truth);
     }
   }
-  EXPECT_GT(worst_share, 0.7);
+  // At thermal speed 1, straight up: 0.311 by the bound (0.36 = t + t^2/2) of 0.471 (0.36 = t - t^2/2), a share of
+  // 0.66.
+  EXPECT_GT(worst_share, 0.65);
 }
 
 }  // namespace

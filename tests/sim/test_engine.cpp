@@ -30,8 +30,8 @@ void expect_same(const Simulation& a, const Simulation& b) {
   Snapshot sa, sb;
   a.snapshot(sa);
   b.snapshot(sb);
-  EXPECT_TRUE(same_bytes(sa.x, sb.x) && same_bytes(sa.z, sb.z) && same_bytes(sa.vx, sb.vx) && same_bytes(sa.vz, sb.vz) &&
-              same_bytes(sa.spin, sb.spin));
+  EXPECT_TRUE(same_bytes(sa.x, sb.x) && same_bytes(sa.z, sb.z) && same_bytes(sa.vx, sb.vx) &&
+              same_bytes(sa.vz, sb.vz) && same_bytes(sa.spin, sb.spin));
   EXPECT_EQ(a.counters().collisions(), b.counters().collisions());
 }
 

@@ -19,7 +19,8 @@ struct Flight {
 // The gap between the point and the floor, in extended precision.
 Long gap(const SinusoidalFloor& floor, const Flight& f, Long t) {
   const Long pi = std::numbers::pi_v<Long>;
-  return f.bottom + f.vz * t - 0.5L * f.gravity * t * t - floor.amplitude * std::sin(2 * pi * floor.frequency * (f.now + t));
+  return f.bottom + f.vz * t - 0.5L * f.gravity * t * t -
+         floor.amplitude * std::sin(2 * pi * floor.frequency * (f.now + t));
 }
 
 // The first downward crossing found by walking in steps far smaller than anything moves, then bisecting.
@@ -71,7 +72,8 @@ TEST(MovingFloor, IsMetAgainOnlyAfterAHopByADiskThatJustLeftIt) {
   for (double now = 0; now < 2.5; now += 0.01) {
     for (double speed : {1e-6, 1e-3, 0.1, 1.0}) {
       const double rounding = 1e-16;
-      const double t = motion.time_to_contact(motion.position(now) - rounding, motion.velocity(now) + speed, 1, now, never);
+      const double t =
+          motion.time_to_contact(motion.position(now) - rounding, motion.velocity(now) + speed, 1, now, never);
       ASSERT_GT(t, 0.0);
       const Flight f{motion.position(now), motion.velocity(now) + speed, 1, now};
       for (int i = 1; i < 20; ++i) ASSERT_GT(static_cast<double>(gap(floor, f, t * i / 20)), -1e-15);

@@ -1,0 +1,319 @@
+#include "pipelines/stages/scene_options.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "pipelines/trajectory.hpp"
+
+namespace shakebed::pipelines {
+
+namespace {
+
+// Largest scene whose start is laid out and checked for overlap while a recipe is only being read.
+constexpr std::uint32_t checked_when_read = 50'000;
+constexpr Dimension cube_over_time{.length = 2, .time = -3};
+
+void describe_surface(Fields& fields, SurfaceOptions& surface) {
+  fields.number("restitution", surface.restitution,
+                {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
+  fields.number("friction", surface.friction,
+                {.help = "Coulomb friction coefficient", .range = non_negative, .example = "0.2"});
+  fields.number("tangential_restitution", surface.tangential_restitution,
+                {.help = "tangential restitution b0 of a contact that sticks", .range = from_to(-1, 1)});
+}
+
+sim::Surface to_sim(const SurfaceOptions& s) { return {s.restitution, s.friction, s.tangential_restitution}; }
+
+}  // namespace
+
+void SceneOptions::describe(Fields& fields) {
+  reduced_ = fields.reduced();
+  const bool reduced = reduced_;
+  if (!reduced && fields.mode() != Fields::Mode::encode) disks_.density = 2500;  // glass
+  fields.object<DiskOptions>(
+      "disks", disks_,
+      [reduced](Fields& f, DiskOptions& d) {
+        f.integer("count", d.count,
+                  {.help = "number of disks N", .required = true, .range = at_least(1), .example = "337"});
+        f.quantity("diameter", d.diameter, dimension::length,
+                   {.help = "diameter D", .required = !reduced, .range = positive, .example = "\"2.99 mm\""});
+        f.quantity("density", d.density, dimension::density,
+                   {.help = "mass density of the material", .range = positive});
+        describe_surface(f, d.surface);
+        f.choice("inertia", d.inertia, {{Inertia::disk, "disk"}, {Inertia::sphere, "sphere"}},
+                 {.help = "moment of inertia: m R^2/2 (disk) or 2 m R^2/5 (sphere)"});
+        f.quantity(
+            "contact_duration", d.contact_duration, dimension::time,
+            {.help =
+                 "t_c of the TC model: a contact is elastic if either partner was hit less than t_c ago; 0 for none. "
+                 "Default: 1e-4 sqrt(D/g) where anything dissipates",
+             .range = non_negative,
+             .example = "\"1 us\""});
+        f.object<SecondSpeciesOptions>(
+            "second", d.second,
+            [](Fields& g, SecondSpeciesOptions& s) {
+              g.integer("count", s.count,
+                        {.help = "number of disks of the second species", .required = true, .range = at_least(1)});
+              g.quantity("diameter", s.diameter, dimension::length,
+                         {.help = "their diameter", .required = true, .range = positive});
+              g.quantity("density", s.density, dimension::density,
+                         {.help = "their density (default: as the first)", .range = positive});
+            },
+            {.help = "a second species"});
+        f.require(!reduced || d.diameter == 1, "diameter", "in reduced units the first species has diameter 1",
+                  "Leave it out, or leave out \"units\": \"reduced\"");
+      },
+      {.help = "the disks", .required = true});
+  if (fields.decoding() || fields.mode() == Fields::Mode::schema) {
+    gravity_ = reduced ? 1.0 : 9.81;
+  }
+  bool none = false;
+  if (reduced) {
+    double g = gravity_.value_or(0);
+    fields.number("gravity", g, {.help = "1, or 0 for a weightless scene (reduced units)", .range = from_to(0, 1)});
+    fields.require(g == 0 || g == 1, "gravity", "in reduced units gravity is 1 or 0");
+    none = g == 0;
+    gravity_ = none ? std::nullopt : std::optional<double>(g);
+  } else {
+    fields.quantity("gravity", gravity_, dimension::acceleration,
+                    {.help = "acceleration g; a weightless scene is written in reduced units",
+                     .range = positive,
+                     .example = "\"9.81 m/s^2\""});
+  }
+  fields.object<BoxOptions>(
+      "box", box_,
+      [](Fields& f, BoxOptions& b) {
+        f.quantity("width", b.width, dimension::length,
+                   {.help = "distance of the sides W", .required = true, .range = positive, .example = "\"89.7 mm\""});
+        f.variant("sides", b.sides, {.help = "the sides"},
+                  alternative<HardSidesOptions>("hard", "walls with their own restitution and friction",
+                                                [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
+                  alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
+        f.variant(
+            "lid", b.lid, {.help = "what is above"}, alternative<OpenLidOptions>("open", "nothing"),
+            alternative<FixedLidOptions>(
+                "fixed", "a wall",
+                [](Fields& g, FixedLidOptions& l) {
+                  g.quantity("height", l.height, dimension::length,
+                             {.help = "above the floor's mean position", .required = true, .range = positive});
+                  describe_surface(g, l.surface);
+                }),
+            alternative<PeriodicLidOptions>("periodic", "no floor and no lid: periodic upwards (weightless scenes)",
+                                            [](Fields& g, PeriodicLidOptions& l) {
+                                              g.quantity("height", l.height, dimension::length,
+                                                         {.help = "period", .required = true, .range = positive});
+                                            }));
+      },
+      {.help = "the box", .required = true});
+  fields.object<FloorOptions>(
+      "floor", floor_,
+      [](Fields& f, FloorOptions& floor) {
+        f.tagged("motion", floor.motion, {.help = "how the floor moves"},
+                 alternative<StillFloorOptions>("still", "not at all"),
+                 alternative<SinusoidalFloorOptions>(
+                     "sinusoidal", "a sin(2 pi f t)",
+                     [](Fields& g, SinusoidalFloorOptions& s) {
+                       g.quantity(
+                           "amplitude", s.amplitude, dimension::length,
+                           {.help = "amplitude a", .required = true, .range = positive, .example = "\"2.5 mm\""});
+                       g.quantity("frequency", s.frequency, dimension::frequency,
+                                  {.help = "frequency f", .required = true, .range = positive, .example = "\"20 Hz\""});
+                     }),
+                 alternative<TableFloorOptions>(
+                     "table",
+                     "one period of measured positions, equally spaced in time; a periodic cubic spline between them",
+                     [](Fields& g, TableFloorOptions& t) {
+                       g.quantity("period", t.period, dimension::time,
+                                  {.help = "period", .required = true, .range = positive});
+                       g.quantities("heights", t.heights, dimension::length, {.help = "positions", .required = true});
+                     }));
+        describe_surface(f, floor.surface);
+      },
+      {.help = "the floor"});
+  fields.variant(
+      "bath", bath_, {.help = "a reservoir"}, alternative<NoBathOptions>("none", "none: driven by the floor only"),
+      alternative<LangevinOptions>(
+          "langevin", "every interval v -> v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi",
+          [](Fields& f, LangevinOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "T/(m g)", .required = true, .range = positive});
+            f.quantity("rate", b.rate, dimension::frequency,
+                       {.help = "friction rate", .required = true, .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between kicks", .required = true, .range = positive});
+          }),
+      alternative<AndersenOptions>(
+          "andersen", "redraws single disks' velocities at random moments",
+          [](Fields& f, AndersenOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "T/(m g)", .required = true, .range = positive});
+            f.quantity("rate", b.rate, dimension::frequency,
+                       {.help = "redraws a disk and unit of time", .required = true, .range = positive});
+          }),
+      alternative<WhiteNoiseOptions>(
+          "white_noise", "random kicks without friction: heats against dissipation",
+          [](Fields& f, WhiteNoiseOptions& b) {
+            f.quantity("heating", b.heating, cube_over_time,
+                       {.help = "H/m: growth of the variance of each velocity component per time",
+                        .required = true,
+                        .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between kicks", .required = true, .range = positive});
+            f.boolean("conserve_momentum", b.conserve_momentum, {.help = "take the mean kick away"});
+          }),
+      alternative<ThermalFloorOptions>("thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
+                                       [](Fields& f, ThermalFloorOptions& b) {
+                                         f.quantity("temperature", b.temperature, dimension::length,
+                                                    {.help = "T/(m g)", .required = true, .range = positive});
+                                       }));
+  fields.variant(
+      "start", start_, {.help = "where the disks are at first"},
+      alternative<HexagonalStartOptions>(
+          "hexagonal", "staggered rows from the floor up, or filling a closed box evenly",
+          [](Fields& f, HexagonalStartOptions& s) {
+            f.integer("disks_a_row", s.disks_a_row, {.help = "0: as many as fit"});
+            f.number("spacing", s.spacing,
+                     {.help = "distance of neighbours in a row in D; 0: chosen from the width", .range = non_negative});
+          }),
+      alternative<RandomStartOptions>("random", "random sequential insertion",
+                                      [](Fields& f, RandomStartOptions& s) {
+                                        f.quantity(
+                                            "height", s.height, dimension::length,
+                                            {.help = "fills the box up to here; 0: chosen", .range = non_negative});
+                                      }),
+      alternative<FileStartOptions>("file", "the last frame of a trajectory (extended XYZ, lengths in D)",
+                                    [](Fields& f, FileStartOptions& s) {
+                                      f.input_files("file", s.file, {.help = "trajectory", .required = true});
+                                    }));
+  if (fields.decoding() || fields.mode() == Fields::Mode::schema)
+    start_temperature_ = none ? 1.0 : 0.01 * (reduced ? 1.0 : disks_.diameter);
+  fields.quantity(
+      "start_temperature", start_temperature_, dimension::length,
+      {.help = "T/(m g) of the first velocities (weightless: 1, the unit of energy)", .range = non_negative});
+
+  if (!fields.decoding() || fields.problem_count() > 0) return;
+  const auto* file = std::get_if<FileStartOptions>(&start_);
+  if (file != nullptr && file->file.paths.size() != 1) {
+    fields.problem("/start/file",
+                   "names " + std::to_string(file->file.paths.size()) + " files, but the start is one trajectory");
+    return;
+  }
+  const sim::Scene laid_out = scene(1);
+  for (const sim::SceneProblem& problem : sim::check(laid_out)) fields.problem(problem.where, problem.what);
+  if (fields.problem_count() == 0 && laid_out.count() <= checked_when_read) {
+    try {
+      sim::place_disks(laid_out);
+    } catch (const std::runtime_error& error) {
+      fields.problem("/start", error.what(), "Change the start, the number of disks or the box");
+    }
+  }
+}
+
+double SceneOptions::time_unit() const { return gravity_ && !reduced_ ? std::sqrt(disks_.diameter / *gravity_) : 1; }
+
+double SceneOptions::period() const {
+  if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
+    return 1 / (sine->frequency * time_unit());
+  if (const auto* table = std::get_if<TableFloorOptions>(&floor_.motion)) return table->period / time_unit();
+  return 0;
+}
+
+double SceneOptions::bath_temperature() const {
+  double temperature = 0;
+  if (const auto* b = std::get_if<LangevinOptions>(&bath_)) temperature = b->temperature;
+  if (const auto* b = std::get_if<AndersenOptions>(&bath_)) temperature = b->temperature;
+  if (const auto* b = std::get_if<ThermalFloorOptions>(&bath_)) temperature = b->temperature;
+  return temperature / length_unit();
+}
+
+sim::Scene SceneOptions::scene(std::uint64_t seed) const {
+  const double length = length_unit(), time = time_unit();
+  sim::Scene scene;
+  scene.seed = seed;
+  if (gravity_) scene.gravity = sim::UniformGravity{};
+
+  scene.disks.species = {{disks_.count, 1, 1}};
+  if (disks_.second) {
+    const double ratio = disks_.second->diameter / disks_.diameter;
+    const double mass = disks_.second->density.value_or(disks_.density) / disks_.density *
+                        (disks_.inertia == Inertia::sphere ? ratio * ratio * ratio : ratio * ratio);
+    scene.disks.species.push_back({disks_.second->count, ratio, mass});
+  }
+  scene.disks.contact = to_sim(disks_.surface);
+  scene.disks.inertia_ratio = disks_.inertia == Inertia::sphere ? 0.4 : 0.5;
+
+  scene.box.width = box_.width / length;
+  bool dissipates = disks_.surface.restitution < 1 || disks_.surface.friction > 0 || floor_.surface.restitution < 1 ||
+                    floor_.surface.friction > 0;
+  if (const auto* hard = std::get_if<HardSidesOptions>(&box_.sides)) {
+    scene.box.sides = sim::HardSides{to_sim(hard->surface)};
+    dissipates = dissipates || hard->surface.restitution < 1 || hard->surface.friction > 0;
+  } else {
+    scene.box.sides = sim::PeriodicSides{};
+  }
+  if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid)) {
+    scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface)};
+    dissipates = dissipates || lid->surface.restitution < 1 || lid->surface.friction > 0;
+  }
+  if (const auto* lid = std::get_if<PeriodicLidOptions>(&box_.lid))
+    scene.box.top = sim::PeriodicTop{lid->height / length};
+  scene.disks.contact_duration = disks_.contact_duration ? *disks_.contact_duration / time : dissipates ? 1e-4 : 0;
+
+  if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
+    scene.box.floor = sim::SinusoidalFloor{sine->amplitude / length, sine->frequency * time};
+  if (const auto* table = std::get_if<TableFloorOptions>(&floor_.motion)) {
+    sim::TabulatedFloor floor{table->period / time, table->heights};
+    for (double& height : floor.heights) height /= length;
+    scene.box.floor = floor;
+  }
+  scene.box.floor_surface = to_sim(floor_.surface);
+
+  if (const auto* b = std::get_if<LangevinOptions>(&bath_))
+    scene.bath = sim::LangevinBath{b->temperature / length, b->rate * time, b->interval / time};
+  if (const auto* b = std::get_if<AndersenOptions>(&bath_))
+    scene.bath = sim::AndersenBath{b->temperature / length, b->rate * time};
+  if (const auto* b = std::get_if<WhiteNoiseOptions>(&bath_))
+    scene.bath = sim::WhiteNoiseBath{b->heating * time * time * time / (length * length), b->interval / time,
+                                     b->conserve_momentum};
+  if (const auto* b = std::get_if<ThermalFloorOptions>(&bath_)) scene.bath = sim::ThermalFloor{b->temperature / length};
+
+  if (const auto* s = std::get_if<HexagonalStartOptions>(&start_))
+    scene.start = sim::HexagonalStart{s->disks_a_row, s->spacing};
+  if (const auto* s = std::get_if<RandomStartOptions>(&start_)) scene.start = sim::RandomStart{s->height / length};
+  if (const auto* s = std::get_if<FileStartOptions>(&start_)) {
+    sim::PlacedStart start;
+    TrajectoryReader reader(s->file.paths.at(0));
+    TrajectoryFrame frame, last;
+    while (reader.read(frame)) last = frame;
+    for (std::size_t i = 0; i < last.size(); ++i) {
+      const bool second = i < last.radius.size() && last.radius[i] != 0.5;
+      start.disks.push_back(
+          {last.x[i], last.z[i], last.vx[i], last.vz[i], i < last.spin.size() ? last.spin[i] : 0.0, second ? 1u : 0u});
+    }
+    scene.start = start;
+  }
+  scene.start_temperature = start_temperature_ / (gravity_ ? length : 1);
+  return scene;
+}
+
+BedDescription SceneOptions::description() const {
+  BedDescription bed;
+  bed.reduced = reduced_;
+  bed.count = disks_.count + (disks_.second ? disks_.second->count : 0);
+  bed.diameter = disks_.diameter;
+  const double cube = disks_.diameter * disks_.diameter * disks_.diameter;
+  bed.mass = reduced_ ? 1 : disks_.density * std::numbers::pi * cube / (disks_.inertia == Inertia::sphere ? 6 : 4);
+  bed.gravity = gravity_.value_or(0);
+  bed.width = box_.width;
+  bed.periodic = std::holds_alternative<PeriodicSidesOptions>(box_.sides);
+  if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion)) {
+    bed.amplitude = sine->amplitude;
+    bed.frequency = sine->frequency;
+  }
+  bed.bath_temperature = bath_temperature();
+  bed.restitution = disks_.surface.restitution;
+  bed.friction = disks_.surface.friction;
+  return bed;
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,123 @@
+// The part of a recipe that describes a bed: from JSON in SI (or reduced units) to sim::Scene.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "pipelines/bed.hpp"
+#include "pipelines/config.hpp"
+#include "sim/scene.hpp"
+
+namespace shakebed::pipelines {
+
+// Lengths [m], times [s], masses [kg] as written; with "units": "reduced" lengths in D, masses in m, times in
+// sqrt(D/g) (weightless: sqrt(m D^2/T)).
+struct SurfaceOptions {
+  double restitution = 1, friction = 0, tangential_restitution = 0;
+};
+enum class Inertia { disk, sphere };
+
+struct SecondSpeciesOptions {
+  std::uint32_t count = 1;
+  double diameter = 1;
+  std::optional<double> density;
+};
+struct DiskOptions {
+  std::uint32_t count = 0;
+  double diameter = 1;
+  double density = 1;
+  SurfaceOptions surface;
+  Inertia inertia = Inertia::disk;
+  std::optional<double> contact_duration;
+  std::optional<SecondSpeciesOptions> second;
+};
+
+struct HardSidesOptions {
+  SurfaceOptions surface;
+};
+struct PeriodicSidesOptions {};
+struct OpenLidOptions {};
+struct FixedLidOptions {
+  double height = 0;
+  SurfaceOptions surface;
+};
+struct PeriodicLidOptions {
+  double height = 0;
+};
+struct BoxOptions {
+  double width = 0;
+  std::variant<HardSidesOptions, PeriodicSidesOptions> sides;
+  std::variant<OpenLidOptions, FixedLidOptions, PeriodicLidOptions> lid;
+};
+
+struct StillFloorOptions {};
+struct SinusoidalFloorOptions {
+  double amplitude = 0, frequency = 0;
+};
+struct TableFloorOptions {
+  double period = 0;
+  std::vector<double> heights;
+};
+struct FloorOptions {
+  std::variant<StillFloorOptions, SinusoidalFloorOptions, TableFloorOptions> motion;
+  SurfaceOptions surface;
+};
+
+struct NoBathOptions {};
+struct LangevinOptions {
+  double temperature = 0, rate = 0, interval = 0;  // temperature as T/(m g), a length
+};
+struct AndersenOptions {
+  double temperature = 0, rate = 0;
+};
+struct WhiteNoiseOptions {
+  double heating = 0, interval = 0;
+  bool conserve_momentum = true;
+};
+struct ThermalFloorOptions {
+  double temperature = 0;
+};
+
+struct HexagonalStartOptions {
+  std::uint32_t disks_a_row = 0;
+  double spacing = 0;
+};
+struct RandomStartOptions {
+  double height = 0;
+};
+struct FileStartOptions {
+  InputFiles file;
+};
+
+class SceneOptions {
+ public:
+  // Names every option of the bed; when decoding, also checks that such a bed can be and reports what cannot.
+  void describe(Fields& fields);
+
+  // In reduced units. The start's velocities, and all else that is random, follow from the seed.
+  sim::Scene scene(std::uint64_t seed) const;
+  BedDescription description() const;
+
+  double length_unit() const { return disks_.diameter; }  // D
+  double time_unit() const;                               // sqrt(D/g)
+  bool weightless() const { return !gravity_; }
+  // The floor's period in reduced units; 0 when it stands still.
+  double period() const;
+  // T/(m g D) of the reservoir; 0 without one.
+  double bath_temperature() const;
+
+ private:
+  DiskOptions disks_;
+  std::optional<double> gravity_;
+  BoxOptions box_;
+  FloorOptions floor_;
+  std::variant<NoBathOptions, LangevinOptions, AndersenOptions, WhiteNoiseOptions, ThermalFloorOptions> bath_;
+  std::variant<HexagonalStartOptions, RandomStartOptions, FileStartOptions> start_;
+  double start_temperature_ = -1;  // as T/(m g), a length; below 0: 0.01 D, weightless 1
+  bool reduced_ = false;
+};
+
+}  // namespace shakebed::pipelines
