@@ -288,7 +288,7 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
     estimate.why_not = "the frame is smaller than 5 x 5 px: too small to hold a disk";
     return estimate;
   }
-  if (largest_radius_px <= 0) largest_radius_px = std::max(frame.width, frame.height) / 2.0;
+  if (largest_radius_px <= 0) largest_radius_px = std::min(frame.width, frame.height) / 2.2;
   std::vector<Candidate> candidates;
   GrayFrame level = frame;
   double scale = 1, low = std::max(1.0, smallest_radius_px);
@@ -304,8 +304,10 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
   }
   const Candidate* best = nullptr;
   const auto merit = [](const Candidate& c) { return c.explained * c.support * c.support; };
+  // Rims of a crystal are explained as well by the small bright voids between beads: larger circles are preferred.
+  const auto preference = [&](const Candidate& c) { return merit(c) * std::sqrt(c.radius); };
   for (const Candidate& candidate : candidates)
-    if (!best || merit(candidate) > merit(*best)) best = &candidate;
+    if (!best || preference(candidate) > preference(*best)) best = &candidate;
   constexpr double least_merit = 0.02;  // of all edges in the frame; white noise reaches 0.002
   if (!best || merit(*best) < least_merit) {
     estimate.why_not = "no circle of any radius: no rim in the frame points to a common centre";

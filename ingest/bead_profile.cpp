@@ -1,0 +1,289 @@
+#include "ingest/bead_profile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ingest/blurred_disk.hpp"
+#include "ingest/smooth_field.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// The four uniform cubic B-splines that live on a cell, at part t of it.
+std::array<double, 4> cubic_b_splines(double t) {
+  const double s = 1 - t;
+  return {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6};
+}
+
+double value_at(const std::vector<float>& samples, double step, double r) {
+  const double place = r / step;
+  const auto cell = static_cast<std::size_t>(place);
+  if (cell + 1 >= samples.size()) return 0;
+  const double part = place - static_cast<double>(cell);
+  return static_cast<double>(samples[cell]) * (1 - part) + static_cast<double>(samples[cell + 1]) * part;
+}
+
+}  // namespace
+
+BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px) {
+  BeadProfile profile;
+  profile.step_px = std::min(edge_px / 10, reach_px / 20);
+  const std::size_t count = static_cast<std::size_t>(std::ceil(reach_px / profile.step_px)) + 1;
+  profile.level.resize(count);
+  const RadialContrast flat = [](double) { return 1.0; };
+  for (std::size_t i = 0; i < count; ++i)
+    profile.level[i] =
+        static_cast<float>(blurred_disk_contrast(radius_px, edge_px, flat, static_cast<double>(i) * profile.step_px));
+  profile.level.back() = 0;
+  profile.fourth_harmonic.assign(count, 0.0F);
+  return profile;
+}
+
+BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
+                          const std::vector<const std::vector<ModelDisk>*>& disks, const BeadProfile& current,
+                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic) {
+  // Coefficient k belongs to the spline centred at knot k - 1, k = 0 .. cells + 2. The three that reach past the last
+  // knot are held at 0; coefficient 0 is folded onto 2, so that p'(0) = 0.
+  const std::size_t cells = std::max<std::size_t>(4, static_cast<std::size_t>(std::ceil(reach_px / knot_px)));
+  const double knot = reach_px / static_cast<double>(cells);
+  const std::size_t free_count = cells - 1;  // coefficients 1 .. cells - 1
+  // +3 slots that swallow the coefficients held at 0
+  const std::size_t size = free_count + 4;
+  std::vector<double> matrix(size * size, 0.0), right(size, 0.0);
+  const auto slot = [&](std::size_t coefficient) -> std::size_t {
+    if (coefficient == 0) return 1;  // folded onto coefficient 2
+    return std::min(coefficient - 1, size - 1);
+  };
+  const double inverse_knot = 1 / knot;
+  const double reach_squared = reach_px * reach_px;
+  // p4 lives on cells around the rim.
+  const double ring_low = std::max(0.0, radius_px - 2.5), ring_high = radius_px + 2.5;
+  const std::size_t ring_cells = static_cast<std::size_t>(std::ceil((ring_high - ring_low) / 0.25));
+  std::vector<double> ring_sum(ring_cells + 1, 0.0), ring_weight(ring_cells + 1, 0.0);
+
+  for (std::size_t f = 0; f < fits.size(); ++f) {
+    const JointFit& fit = *fits[f];
+    const std::vector<ModelDisk>& beads = *disks[f];
+    for (const ModelDisk& bead : beads) {
+      const int top = std::max(0, static_cast<int>(std::ceil(bead.y - reach_px)));
+      const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(bead.y + reach_px)));
+      for (int row = top; row <= bottom; ++row) {
+        const double dy = row - bead.y;
+        const double half = std::sqrt(std::max(0.0, reach_squared - dy * dy));
+        const int left = std::max(0, static_cast<int>(std::ceil(bead.x - half)));
+        const int right_column = std::min(fit.width() - 1, static_cast<int>(std::floor(bead.x + half)));
+        const float* line = fit.residual_row(row);
+        for (int column = left; column <= right_column; ++column) {
+          const double dx = column - bead.x;
+          const double r = std::sqrt(dx * dx + dy * dy);
+          const double place = r * inverse_knot;
+          const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
+          const auto splines = cubic_b_splines(place - static_cast<double>(cell));
+          const double e = static_cast<double>(line[column]);
+          std::array<std::size_t, 4> at;
+          for (std::size_t a = 0; a < 4; ++a) at[a] = slot(cell + a);
+          for (std::size_t a = 0; a < 4; ++a) {
+            right[at[a]] += splines[a] * e;
+            double* matrix_row = matrix.data() + at[a] * size;
+            for (std::size_t b = 0; b < 4; ++b) matrix_row[at[b]] += splines[a] * splines[b];
+          }
+          if (fourth_harmonic && r > ring_low && r < ring_high) {
+            const double squared = r * r;
+            const double a2 = dx * dx, b2 = dy * dy;
+            const double cosine = (a2 * a2 - 6 * a2 * b2 + b2 * b2) / (squared * squared);
+            const double ring_place = (r - ring_low) / 0.25;
+            const auto ring = static_cast<std::size_t>(ring_place);
+            const double part = ring_place - static_cast<double>(ring);
+            ring_sum[ring] += (1 - part) * e * cosine;
+            ring_weight[ring] += (1 - part) * cosine * cosine;
+            if (ring + 1 <= ring_cells) {
+              ring_sum[ring + 1] += part * e * cosine;
+              ring_weight[ring + 1] += part * cosine * cosine;
+            }
+          }
+        }
+      }
+    }
+    // Pairs whose reaches overlap: their splines meet in the same pixels.
+    std::vector<std::size_t> order(beads.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return beads[a].y < beads[b].y; });
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const ModelDisk& one = beads[order[i]];
+      for (std::size_t j = i + 1; j < order.size(); ++j) {
+        const ModelDisk& other = beads[order[j]];
+        if (other.y - one.y > 2 * reach_px) break;
+        if (std::abs(other.x - one.x) > 2 * reach_px) continue;
+        const int top = std::max(0, static_cast<int>(std::ceil(other.y - reach_px)));
+        const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(one.y + reach_px)));
+        for (int row = top; row <= bottom; ++row) {
+          const double dy1 = row - one.y, dy2 = row - other.y;
+          const double half1 = std::sqrt(std::max(0.0, reach_squared - dy1 * dy1));
+          const double half2 = std::sqrt(std::max(0.0, reach_squared - dy2 * dy2));
+          const int left = std::max(0, static_cast<int>(std::ceil(std::max(one.x - half1, other.x - half2))));
+          const int right_column =
+              std::min(fit.width() - 1, static_cast<int>(std::floor(std::min(one.x + half1, other.x + half2))));
+          for (int column = left; column <= right_column; ++column) {
+            const double dx1 = column - one.x, dx2 = column - other.x;
+            const double place1 = std::sqrt(dx1 * dx1 + dy1 * dy1) * inverse_knot;
+            const double place2 = std::sqrt(dx2 * dx2 + dy2 * dy2) * inverse_knot;
+            const std::size_t cell1 = std::min(cells - 1, static_cast<std::size_t>(place1));
+            const std::size_t cell2 = std::min(cells - 1, static_cast<std::size_t>(place2));
+            const auto splines1 = cubic_b_splines(place1 - static_cast<double>(cell1));
+            const auto splines2 = cubic_b_splines(place2 - static_cast<double>(cell2));
+            for (std::size_t a = 0; a < 4; ++a)
+              for (std::size_t b = 0; b < 4; ++b) {
+                const std::size_t p = slot(cell1 + a), q = slot(cell2 + b);
+                const double product = splines1[a] * splines2[b];
+                matrix[p * size + q] += product;
+                matrix[q * size + p] += product;
+              }
+          }
+        }
+      }
+    }
+  }
+
+  // A touch of smoothness (second differences of the change) where few pixels speak, and 0 in the swallowing slots.
+  double trace = 0;
+  for (std::size_t i = 0; i < free_count; ++i) trace += matrix[i * size + i];
+  const double smoothness = 1e-7 * trace / static_cast<double>(free_count);
+  std::vector<double> system(free_count * free_count), change(free_count);
+  for (std::size_t i = 0; i < free_count; ++i) {
+    change[i] = right[i];
+    for (std::size_t j = 0; j < free_count; ++j) system[i * free_count + j] = matrix[i * size + j];
+    system[i * free_count + i] += smoothness;
+  }
+  for (std::size_t i = 0; i + 2 < free_count; ++i) {
+    const std::array<double, 3> difference = {1, -2, 1};
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = 0; b < 3; ++b)
+        system[(i + a) * free_count + i + b] += 10 * smoothness * difference[a] * difference[b];
+  }
+  const bool solved = solve_symmetric(system, change, free_count);
+
+  BeadProfile learned;
+  learned.step_px = std::min(current.step_px, knot / 8);
+  const std::size_t count = static_cast<std::size_t>(std::ceil(reach_px / learned.step_px)) + 1;
+  learned.level.resize(count);
+  learned.fourth_harmonic.assign(count, 0.0F);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double r = static_cast<double>(i) * learned.step_px;
+    double value = value_at(current.level, current.step_px, r);
+    if (solved && r < reach_px) {
+      const double place = r * inverse_knot;
+      const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
+      const auto splines = cubic_b_splines(place - static_cast<double>(cell));
+      for (std::size_t a = 0; a < 4; ++a) {
+        const std::size_t k = slot(cell + a);
+        if (k < free_count) value += splines[a] * change[k];
+      }
+    }
+    learned.level[i] = static_cast<float>(value);
+    double harmonic = value_at(current.fourth_harmonic, current.step_px, r);
+    if (fourth_harmonic && r > ring_low && r < ring_high) {
+      const double ring_place = (r - ring_low) / 0.25;
+      const auto ring = std::min(ring_cells - 1, static_cast<std::size_t>(ring_place));
+      const double part = ring_place - static_cast<double>(ring);
+      const auto at = [&](std::size_t k) { return ring_weight[k] > 10 ? ring_sum[k] / ring_weight[k] : 0.0; };
+      harmonic += (1 - part) * at(ring) + part * at(ring + 1);
+    }
+    learned.fourth_harmonic[i] = static_cast<float>(harmonic);
+  }
+  learned.level.back() = 0;
+  return learned;
+}
+
+RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
+  RimFit best;
+  const double reach = profile.reach_px();
+  const double low = std::max(0.0, std::min(0.55 * radius_guess_px, radius_guess_px - 2.5 * edge_guess_px));
+  const double spacing = std::max(0.2, (reach - low) / 60);
+  std::vector<double> distance, level;
+  for (double r = low + 0.5 * spacing; r < reach; r += spacing) {
+    distance.push_back(r);
+    level.push_back(value_at(profile.level, profile.step_px, r));
+  }
+  if (distance.size() < 6) return best;
+  // For a given radius and edge, the three shapes enter linearly.
+  const auto misfit_of = [&](double radius, double edge, std::vector<double>& residual) {
+    std::vector<double> matrix(9, 0.0), right(3, 0.0);
+    std::vector<std::array<double, 3>> rows(distance.size());
+    for (std::size_t i = 0; i < distance.size(); ++i) {
+      const BlurredShapes shapes = blurred_disk_shapes(radius, edge, distance[i]);
+      rows[i] = {shapes.flat, shapes.sphere, shapes.parabola};
+      const double weight = distance[i];  // pixels at this distance
+      for (std::size_t a = 0; a < 3; ++a) {
+        right[a] += weight * rows[i][a] * level[i];
+        for (std::size_t b = 0; b < 3; ++b) matrix[a * 3 + b] += weight * rows[i][a] * rows[i][b];
+      }
+    }
+    const double ridge = 1e-5 * matrix[0];
+    matrix[0] += 1e-3 * ridge;
+    matrix[4] += ridge;
+    matrix[8] += ridge;
+    if (!solve_symmetric(matrix, right, 3)) return 1e30;
+    residual.resize(distance.size());
+    double sum = 0, weights = 0;
+    for (std::size_t i = 0; i < distance.size(); ++i) {
+      residual[i] =
+          std::sqrt(distance[i]) * (level[i] - right[0] * rows[i][0] - right[1] * rows[i][1] - right[2] * rows[i][2]);
+      sum += residual[i] * residual[i];
+      weights += distance[i];
+    }
+    const double shrink = ridge * (right[1] * right[1] + right[2] * right[2]);
+    return (sum + shrink) / weights;
+  };
+  double radius = radius_guess_px, edge = std::max(0.2, edge_guess_px);
+  std::vector<double> residual, shifted;
+  double misfit = misfit_of(radius, edge, residual);
+  double damping = 1e-3;
+  for (int round = 0; round < 30; ++round) {
+    const double delta = 1e-3;
+    std::vector<double> slope_radius, slope_edge;
+    misfit_of(radius + delta, edge, slope_radius);
+    misfit_of(radius, edge + delta, slope_edge);
+    if (slope_radius.size() != residual.size() || slope_edge.size() != residual.size()) return best;
+    double rr = 0, re = 0, ee = 0, br = 0, be = 0;
+    for (std::size_t i = 0; i < residual.size(); ++i) {
+      const double by_radius = (slope_radius[i] - residual[i]) / delta, by_edge = (slope_edge[i] - residual[i]) / delta;
+      rr += by_radius * by_radius;
+      re += by_radius * by_edge;
+      ee += by_edge * by_edge;
+      br -= by_radius * residual[i];
+      be -= by_edge * residual[i];
+    }
+    bool improved = false;
+    double moved = 0;
+    for (int attempt = 0; attempt < 8 && !improved; ++attempt) {
+      const double a = rr * (1 + damping), c = ee * (1 + damping);
+      const double determinant = a * c - re * re;
+      if (!(determinant > 0)) break;
+      const double step_radius = std::clamp((c * br - re * be) / determinant, -0.5, 0.5);
+      const double step_edge = std::clamp((a * be - re * br) / determinant, -0.3, 0.3);
+      const double new_radius = std::max(0.5, radius + step_radius), new_edge = std::max(0.15, edge + step_edge);
+      const double new_misfit = misfit_of(new_radius, new_edge, shifted);
+      if (new_misfit <= misfit) {
+        moved = std::abs(new_radius - radius) + std::abs(new_edge - edge);
+        radius = new_radius;
+        edge = new_edge;
+        misfit = new_misfit;
+        residual = shifted;
+        damping = std::max(1e-9, damping * 0.2);
+        improved = true;
+      } else {
+        damping = std::max(1e-6, damping * 10);
+      }
+    }
+    if (!improved || moved < 1e-5) break;
+  }
+  best.good = std::isfinite(radius) && misfit < 0.01;
+  best.radius_px = radius;
+  best.edge_px = edge;
+  best.misfit = std::sqrt(misfit);
+  return best;
+}
+
+}  // namespace shakebed::ingest

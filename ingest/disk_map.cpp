@@ -1,0 +1,126 @@
+#include "ingest/disk_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <unordered_map>
+
+namespace shakebed::ingest {
+
+int map_reduction(double radius_px) { return std::max(1, static_cast<int>(radius_px / 4.5)); }
+
+std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
+                                           double least_distance_px) {
+  const double radius = radius_px / factor;
+  const double support = radius + 1.2;
+  const int margin = static_cast<int>(std::ceil(0.8 * radius));  // centres this far outside are still looked at
+  const int pad = margin + static_cast<int>(std::ceil(support)) + 1;
+  const int wide = small.width + 2 * pad, high = small.height + 2 * pad;
+  const std::size_t stride = static_cast<std::size_t>(wide) + 1;
+  // Running sums along rows of the level and of its square, so that a chord costs two look-ups.
+  std::vector<float> levels(stride * static_cast<std::size_t>(high), 0.0F), squares(levels.size(), 0.0F);
+  for (int row = 0; row < small.height; ++row) {
+    const float* from = small.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(small.width);
+    float* level = levels.data() + static_cast<std::size_t>(row + pad) * stride + static_cast<std::size_t>(pad);
+    float* square = squares.data() + static_cast<std::size_t>(row + pad) * stride + static_cast<std::size_t>(pad);
+    float sum = 0, sum_of_squares = 0;
+    for (int column = 0; column < small.width; ++column) {
+      const float value = std::min(1.6F, std::max(-0.6F, from[column]));
+      sum += value;
+      sum_of_squares += value * value;
+      level[column + 1] = sum;
+      square[column + 1] = sum_of_squares;
+    }
+    for (int column = small.width + 1; column <= small.width + pad; ++column) {
+      level[column] = sum;
+      square[column] = sum_of_squares;
+    }
+  }
+  const int reach = static_cast<int>(std::floor(support));
+  std::vector<int> half_inner, half_outer;  // half chords in whole pixels, -1 where there is none
+  double area = 0;
+  for (int dy = -reach; dy <= reach; ++dy) {
+    const double inner = radius * radius - dy * dy, outer = support * support - dy * dy;
+    half_inner.push_back(inner >= 0 ? static_cast<int>(std::lround(std::sqrt(inner) - 0.25)) : -1);
+    half_outer.push_back(static_cast<int>(std::floor(std::sqrt(std::max(0.0, outer)))));
+    if (inner >= 0) area += 2 * half_inner.back() + 1;
+  }
+  const int map_width = small.width + 2 * margin, map_height = small.height + 2 * margin;
+  const std::size_t map_stride = static_cast<std::size_t>(map_width);
+  std::vector<float> map(map_stride * static_cast<std::size_t>(map_height));
+  const float scale = static_cast<float>(1 / area);
+  const int shift = pad - margin;
+  for (int row = 0; row < map_height; ++row) {
+    float* to = map.data() + static_cast<std::size_t>(row) * map_stride;
+    std::fill(to, to + map_width, 0.0F);
+    for (int dy = -reach; dy <= reach; ++dy) {
+      const std::size_t source = static_cast<std::size_t>(row + shift + dy) * stride + static_cast<std::size_t>(shift);
+      const int inner = half_inner[static_cast<std::size_t>(dy + reach)],
+                outer = half_outer[static_cast<std::size_t>(dy + reach)];
+      const float* square_low = squares.data() + source - outer;
+      const float* square_high = squares.data() + source + outer + 1;
+      if (inner >= 0) {
+        const float* level_low = levels.data() + source - inner;
+        const float* level_high = levels.data() + source + inner + 1;
+        for (int column = 0; column < map_width; ++column)
+          to[column] += 2 * (level_high[column] - level_low[column]) - (square_high[column] - square_low[column]);
+      } else {
+        for (int column = 0; column < map_width; ++column) to[column] -= square_high[column] - square_low[column];
+      }
+    }
+    for (int column = 0; column < map_width; ++column) to[column] *= scale;
+  }
+
+  std::vector<DiskCandidate> maxima;
+  const float least = static_cast<float>(least_score);
+  for (int row = 1; row + 1 < map_height; ++row) {
+    const float* b = map.data() + static_cast<std::size_t>(row) * map_stride;
+    const float* a = b - map_stride;
+    const float* c = b + map_stride;
+    for (int column = 1; column + 1 < map_width; ++column) {
+      const float here = b[column];
+      if (here < least) continue;
+      if (here <= b[column - 1] || here < b[column + 1] || here <= a[column] || here < c[column] ||
+          here <= a[column - 1] || here <= a[column + 1] || here < c[column - 1] || here < c[column + 1])
+        continue;
+      const auto offset = [](float low, float middle, float top) {
+        const double bend = static_cast<double>(low) - 2 * static_cast<double>(middle) + static_cast<double>(top);
+        return bend < 0 ? std::clamp(0.5 * (static_cast<double>(low) - static_cast<double>(top)) / bend, -0.5, 0.5)
+                        : 0.0;
+      };
+      const double x = column - margin + offset(b[column - 1], here, b[column + 1]);
+      const double y = row - margin + offset(a[column], here, c[column]);
+      maxima.push_back({(x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5, static_cast<double>(here)});
+    }
+  }
+  std::sort(maxima.begin(), maxima.end(), [](const DiskCandidate& a, const DiskCandidate& b) {
+    if (a.score != b.score) return a.score > b.score;
+    if (a.y != b.y) return a.y < b.y;
+    return a.x < b.x;
+  });
+  // Keep the better of two that are too near, by a grid of cells as wide as that distance.
+  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells;
+  const auto cell_of = [&](double value) { return static_cast<std::int64_t>(std::floor(value / least_distance_px)); };
+  const auto key = [](std::int64_t column, std::int64_t row) { return row * 0x100000000LL + column; };
+  std::vector<DiskCandidate> kept;
+  for (const DiskCandidate& candidate : maxima) {
+    const std::int64_t column = cell_of(candidate.x), row = cell_of(candidate.y);
+    bool free = true;
+    for (std::int64_t y = row - 1; y <= row + 1 && free; ++y)
+      for (std::int64_t x = column - 1; x <= column + 1 && free; ++x) {
+        const auto found = cells.find(key(x, y));
+        if (found == cells.end()) continue;
+        for (const std::size_t other : found->second)
+          if (std::hypot(kept[other].x - candidate.x, kept[other].y - candidate.y) < least_distance_px) {
+            free = false;
+            break;
+          }
+      }
+    if (!free) continue;
+    cells[key(column, row)].push_back(kept.size());
+    kept.push_back(candidate);
+  }
+  return kept;
+}
+
+}  // namespace shakebed::ingest

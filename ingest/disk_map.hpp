@@ -1,0 +1,25 @@
+#pragma once
+// The chi-squared map of an ideal disk, at the scale where the disk is a few pixels wide.
+
+#include <vector>
+
+#include "ingest/frames.hpp"
+
+namespace shakebed::ingest {
+
+// A place where an ideal disk fits.
+struct DiskCandidate {
+  double x = 0, y = 0;  // px of the full frame
+  double score = 0;     // 1 - chi^2/area: 1 for a perfect disk, 0 on empty background
+};
+
+// Factor by which a frame is reduced for the map of disks of this radius (their radius becomes 4.5 to 9 px, or stays).
+int map_reduction(double radius_px);
+
+// Local maxima of the map of `small` (a flattened frame reduced by `factor`) for disks of `radius_px` full pixels, with
+// a score of at least `least_score`, the best first; of two nearer than `least_distance_px` only the better stays. The
+// map reaches 0.8 radii beyond the frame, where cut disks have their centres.
+std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
+                                           double least_distance_px);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,475 @@
+#include "ingest/find_disks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "ingest/bead_profile.hpp"
+#include "ingest/disk_map.hpp"
+#include "ingest/joint_fit.hpp"
+#include "ingest/smooth_field.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Two beads of one film are never seen nearer than this share of a diameter (beads a little in front of one another).
+constexpr double least_separation = 0.72;
+// A bead explains at least this share of the contrast around its place, relative to the median bead.
+constexpr double least_explained = 0.72;
+// Below this share it is nothing at all.
+constexpr double faintly_explained = 0.35;
+
+void require_consistent(const GrayFrame& frame) {
+  if (frame.width < 0 || frame.height < 0 ||
+      frame.pixels.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height))
+    throw std::invalid_argument("find_disks: the frame's pixel count is not width x height");
+}
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// How far the edge's blur reaches beyond the radius.
+double reach_of(double radius, double edge) { return radius + 3.6 * edge + 0.7; }
+
+// Steps use a gradient widened to about this edge while beads may still be off by half a pixel.
+double softening_for(double edge) { return edge < 0.8 ? std::sqrt(0.8 * 0.8 - edge * edge) : 0.0; }
+
+std::vector<ModelDisk> disks_at(const std::vector<DiskCandidate>& candidates) {
+  std::vector<ModelDisk> disks;
+  disks.reserve(candidates.size());
+  for (const DiskCandidate& candidate : candidates) {
+    ModelDisk disk;
+    disk.x = candidate.x;
+    disk.y = candidate.y;
+    disks.push_back(disk);
+  }
+  std::sort(disks.begin(), disks.end(), [](const ModelDisk& a, const ModelDisk& b) {
+    if (a.y != b.y) return a.y < b.y;
+    return a.x < b.x;
+  });
+  return disks;
+}
+
+// Takes out beads that explain nothing and the worse of two in one place; puts their share back into the residual.
+std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least) {
+  fit.judge(disks, radius + 1);
+  std::vector<std::uint8_t> drop(disks.size(), 0);
+  for (std::size_t i = 0; i < disks.size(); ++i) drop[i] = disks[i].explained < least;
+  std::vector<std::size_t> order(disks.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return disks[a].y < disks[b].y; });
+  const double near = 2 * radius * least_separation;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (drop[order[i]]) continue;
+    for (std::size_t j = i + 1; j < order.size(); ++j) {
+      const ModelDisk &one = disks[order[i]], &other = disks[order[j]];
+      if (other.y - one.y > near) break;
+      if (drop[order[j]] || std::hypot(one.x - other.x, one.y - other.y) > near) continue;
+      const bool first_worse = one.explained < other.explained;
+      drop[first_worse ? order[i] : order[j]] = 1;
+      if (first_worse) break;
+    }
+  }
+  std::vector<ModelDisk> kept;
+  kept.reserve(disks.size());
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    if (drop[i])
+      fit.subtract(disks[i].x, disks[i].y, -1.0F);
+    else
+      kept.push_back(disks[i]);
+  }
+  const std::size_t dropped = disks.size() - kept.size();
+  disks = std::move(kept);
+  return dropped;
+}
+
+// Smooth corrections to background and contrast, from the regression of the flattened frame on the model over tiles:
+// flat = beta + gamma model, beta and gamma polynomials over the frame.
+struct TileSums {
+  double u = 0, v = 0;
+  double count = 0, model = 0, model_model = 0, flat = 0, flat_model = 0;
+};
+
+void add_tile_sums(const GrayFrame& flat, const JointFit& fit, double spread, std::vector<TileSums>& tiles) {
+  constexpr int side = 32;
+  const float bound = static_cast<float>(4 * spread);
+  for (int top = 0; top < flat.height; top += side)
+    for (int left = 0; left < flat.width; left += side) {
+      const int bottom = std::min(flat.height, top + side), right = std::min(flat.width, left + side);
+      TileSums tile;
+      tile.u = (static_cast<double>(left + right - 1)) / flat.width - 1;
+      tile.v = (static_cast<double>(top + bottom - 1)) / flat.height - 1;
+      for (int row = top; row < bottom; ++row) {
+        const float* residual = fit.residual_row(row);
+        const float* level = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(flat.width);
+        float count = 0, model_sum = 0, model_model = 0, flat_sum = 0, flat_model = 0;
+        for (int column = left; column < right; ++column) {
+          const float use = std::abs(residual[column]) < bound ? 1.0F : 0.0F;
+          const float model = level[column] - residual[column];
+          count += use;
+          model_sum += use * model;
+          model_model += use * model * model;
+          flat_sum += use * level[column];
+          flat_model += use * level[column] * model;
+        }
+        tile.count += static_cast<double>(count);
+        tile.model += static_cast<double>(model_sum);
+        tile.model_model += static_cast<double>(model_model);
+        tile.flat += static_cast<double>(flat_sum);
+        tile.flat_model += static_cast<double>(flat_model);
+      }
+      tiles.push_back(tile);
+    }
+}
+
+void refine_light(LightField& light, const std::vector<TileSums>& tiles, int width, int height) {
+  const int order = std::min(width, height) >= 200 && tiles.size() >= 60 ? 4 : tiles.size() >= 20 ? 2 : 0;
+  const std::size_t terms = polynomial_terms(order), size = 2 * terms;
+  std::vector<double> matrix(size * size, 0.0), right(size, 0.0), basis(terms);
+  for (const TileSums& tile : tiles) {
+    polynomial_values(tile.u, tile.v, order, basis.data());
+    for (std::size_t a = 0; a < terms; ++a) {
+      right[a] += basis[a] * (tile.flat - tile.model);  // target of beta + (gamma - 1) model
+      right[terms + a] += basis[a] * (tile.flat_model - tile.model_model);
+      for (std::size_t b = 0; b < terms; ++b) {
+        const double both = basis[a] * basis[b];
+        matrix[a * size + b] += both * tile.count;
+        matrix[a * size + terms + b] += both * tile.model;
+        matrix[(terms + a) * size + b] += both * tile.model;
+        matrix[(terms + a) * size + terms + b] += both * tile.model_model;
+      }
+    }
+  }
+  for (std::size_t a = 0; a < terms; ++a) {
+    matrix[a * size + a] += 1e-4 * matrix[0] + 1e-9;
+    matrix[(terms + a) * size + terms + a] += 1e-3 * matrix[terms * size + terms] + 1e-9;
+  }
+  if (!solve_symmetric(matrix, right, size)) return;
+  for (int row = 0; row < light.rows; ++row)
+    for (int column = 0; column < light.columns; ++column) {
+      const double u = std::clamp((2 * column * light.spacing_px + 1) / width - 1, -1.0, 1.05);
+      const double v = std::clamp((2 * row * light.spacing_px + 1) / height - 1, -1.0, 1.05);
+      polynomial_values(u, v, order, basis.data());
+      double beta = 0, gamma = 1;
+      for (std::size_t a = 0; a < terms; ++a) {
+        beta += right[a] * basis[a];
+        gamma += right[terms + a] * basis[a];
+      }
+      beta = std::clamp(beta, -0.5, 0.5);
+      gamma = std::clamp(gamma, 0.5, 2.0);
+      const std::size_t at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
+      light.background[at] += light.contrast[at] * static_cast<float>(beta);
+      light.contrast[at] *= static_cast<float>(gamma);
+    }
+}
+
+// Typical size of the residual, robust against what is no bead at all.
+double residual_spread(const JointFit& fit) {
+  std::vector<float> sizes;
+  const std::size_t total = static_cast<std::size_t>(fit.width()) * static_cast<std::size_t>(fit.height());
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(total) / 20000)));
+  for (int row = 0; row < fit.height(); row += step)
+    for (int column = (row / step) % 2; column < fit.width(); column += step)
+      sizes.push_back(std::abs(fit.residual(column, row)));
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return 1.4826 * static_cast<double>(*middle);
+}
+
+double mean_contrast(const LightField& light) {
+  const std::size_t middle = static_cast<std::size_t>(light.rows / 2) * static_cast<std::size_t>(light.columns) +
+                             static_cast<std::size_t>(light.columns / 2);
+  return static_cast<double>(light.contrast[middle]);
+}
+
+// Beads hidden in the residual are added; true if there were any.
+bool add_missed(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least_score) {
+  const int factor = map_reduction(radius);
+  const GrayFrame small = reduced(fit.residual_image(), factor);
+  auto candidates = find_candidates(small, factor, radius, least_score, 2 * radius * least_separation);
+  std::vector<ModelDisk> fresh = disks_at(candidates);
+  bool added = false;
+  for (ModelDisk& disk : fresh) {
+    bool free = true;
+    for (const ModelDisk& other : disks)
+      if (std::abs(other.y - disk.y) < 2 * radius && std::hypot(other.x - disk.x, other.y - disk.y) < 1.2 * radius) {
+        free = false;
+        break;
+      }
+    if (!free) continue;
+    fit.subtract(disk.x, disk.y, 1.0F);
+    disks.push_back(disk);
+    added = true;
+  }
+  return added;
+}
+
+}  // namespace
+
+CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
+  CalibrationResult result;
+  FinderCalibration& calibration = result.calibration;
+  if (frames.empty()) {
+    result.why_not = "there is no frame to learn from";
+    return result;
+  }
+  for (const GrayFrame* frame : frames) require_consistent(*frame);
+  calibration.width = frames.front()->width;
+  calibration.height = frames.front()->height;
+
+  // A first radius and the polarity.
+  RadiusEstimate estimate;
+  if (options.radius_px && *options.radius_px > 0) {
+    estimate = estimate_radius(*frames.front(), options.polarity, std::max(1.0, 0.8 * *options.radius_px),
+                               1.25 * *options.radius_px);
+    if (!estimate.found && options.polarity != Polarity::automatic) {
+      estimate.found = true;
+      estimate.polarity = options.polarity;
+    }
+    if (estimate.found) estimate.radius_px = *options.radius_px;
+  } else {
+    for (const GrayFrame* frame : frames) {
+      estimate = estimate_radius(*frame, options.polarity);
+      if (estimate.found) break;
+    }
+  }
+  if (!estimate.found) {
+    result.why_not = "no disks seen: " + estimate.why_not;
+    return result;
+  }
+  calibration.polarity = estimate.polarity;
+  double radius = estimate.radius_px;
+  double edge = std::clamp(0.08 * radius, 0.6, 1.5);
+
+  std::vector<const GrayFrame*> used;
+  for (const GrayFrame* frame : frames)
+    if (frame->width == calibration.width && frame->height == calibration.height) used.push_back(frame);
+  LightField light = estimate_light(*used.front(), radius, calibration.polarity);
+  BeadProfile profile = ideal_profile(radius, edge, reach_of(radius, edge));
+
+  std::vector<GrayFrame> flats(used.size());
+  std::vector<std::unique_ptr<JointFit>> fits(used.size());
+  std::vector<std::vector<ModelDisk>> disks(used.size());
+  double spread = 0.1;
+  double typical_explained = 1;
+  constexpr int rounds = 5;
+  for (int round = 0; round < rounds; ++round) {
+    const bool search = round <= 1;
+    const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
+    const int factor = map_reduction(radius);
+    std::size_t total = 0;
+    for (std::size_t f = 0; f < used.size(); ++f) {
+      flats[f] = flatten(*used[f], light);
+      if (!fits[f]) fits[f] = std::make_unique<JointFit>(flats[f]);
+      fits[f]->set_table(&table);
+      if (search) {
+        const GrayFrame small = reduced(flats[f], factor);
+        disks[f] = disks_at(find_candidates(small, factor, radius, 0.3, 2 * radius * least_separation));
+      }
+      for (ModelDisk& disk : disks[f]) disk.quiet_sweeps = 0;
+      fits[f]->reset(flats[f], disks[f]);
+      const int sweeps = round == 0 ? 2 : 3;
+      for (int sweep = 0; sweep < sweeps; ++sweep)
+        fits[f]->sweep(disks[f], search && sweep == 0 ? 0.3 * radius : 0.5, 1e-5);
+      fits[f]->judge(disks[f], radius + 1);
+      total += disks[f].size();
+    }
+    if (total == 0) {
+      result.why_not =
+          "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but no filled disk fits";
+      return result;
+    }
+    std::vector<double> explained;
+    for (const auto& one : disks)
+      for (const ModelDisk& disk : one) explained.push_back(disk.explained);
+    // The better half stands for the bead: in a mixed bed the rest may be something else.
+    std::sort(explained.begin(), explained.end());
+    typical_explained = explained[explained.size() * 3 / 4];
+    for (std::size_t f = 0; f < used.size(); ++f)
+      prune(*fits[f], disks[f], radius, (round == 0 ? 0.5 : least_explained) * typical_explained);
+    spread = std::max(1e-3, residual_spread(*fits.front()));
+    if (round + 1 == rounds) break;
+
+    std::vector<const JointFit*> fit_pointers;
+    std::vector<const std::vector<ModelDisk>*> disk_pointers;
+    for (std::size_t f = 0; f < used.size(); ++f) {
+      fit_pointers.push_back(fits[f].get());
+      disk_pointers.push_back(&disks[f]);
+    }
+    if (options.learn_profile || round < 2) {
+      const double reach = std::max(reach_of(radius, edge), round == 0 ? 1.12 * radius + 2 : 0.0);
+      const double knot = std::clamp(round == 0 ? 0.05 * radius : 0.55 * edge, 0.25, std::max(0.25, radius / 8));
+      const bool sharp = edge < 0.6 && round >= 2;
+      const BeadProfile learned = learn_profile(fit_pointers, disk_pointers, profile, reach, knot, radius, sharp);
+      const RimFit rim = fit_rim(learned, radius, edge);
+      if (rim.good && rim.radius_px > 0.5 * radius && rim.radius_px < 2 * radius) {
+        if (!options.hold_radius) radius = rim.radius_px;
+        edge = std::clamp(rim.edge_px, 0.2, 0.6 * radius);
+      }
+      profile = options.learn_profile ? learned : ideal_profile(radius, edge, reach_of(radius, edge));
+    }
+    if (round >= 1) {
+      std::vector<TileSums> tiles;
+      const ProfileTable latest(profile, radius, edge, 0);
+      for (std::size_t f = 0; f < used.size(); ++f) {
+        fits[f]->set_table(&latest);
+        fits[f]->reset(flats[f], disks[f]);
+        add_tile_sums(flats[f], *fits[f], spread, tiles);
+      }
+      refine_light(light, tiles, calibration.width, calibration.height);
+    }
+  }
+  std::size_t total = 0;
+  for (const auto& one : disks) total += one.size();
+  if (total == 0) {
+    result.why_not =
+        "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but none is filled like a bead";
+    return result;
+  }
+  calibration.radius_px = radius;
+  calibration.edge_width_px = edge;
+  calibration.profile = profile;
+  calibration.light = light;
+  calibration.contrast_level = mean_contrast(light);
+  calibration.noise_level = spread * std::abs(calibration.contrast_level);
+  // Information on a radius: the rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per
+  // px^2.
+  const double information =
+      static_cast<double>(total) * 2 * 3.14159265 * radius / (2 * std::sqrt(3.14159265) * std::max(0.3, edge));
+  calibration.radius_std_error_px = std::hypot(spread / std::sqrt(information), 0.002);
+  calibration.frames_used = used.size();
+  calibration.disks_used = total;
+  if (total < 5)
+    calibration.warnings.push_back("Only " + std::to_string(total) +
+                                   " disks to learn the bead from: its radius is uncertain.");
+  result.found = true;
+  return result;
+}
+
+FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
+  require_consistent(frame);
+  FindResult result;
+  if (frame.width != calibration.width || frame.height != calibration.height) {
+    result.why_nothing = "the frame is " + std::to_string(frame.width) + " x " + std::to_string(frame.height) +
+                         " px, the film was learned at " + std::to_string(calibration.width) + " x " +
+                         std::to_string(calibration.height) + " px";
+    return result;
+  }
+  const double radius = calibration.radius_px, edge = calibration.edge_width_px;
+  GrayFrame flat = flatten(frame, calibration.light);
+  const int factor = map_reduction(radius);
+  std::vector<ModelDisk> disks =
+      disks_at(find_candidates(reduced(flat, factor), factor, radius, 0.3, 2 * radius * least_separation));
+  const double contrast = std::abs(calibration.contrast_level);
+  if (disks.empty()) {
+    result.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius) + " px";
+    return result;
+  }
+  const ProfileTable soft(calibration.profile, radius, edge, softening_for(edge));
+  const ProfileTable exact(calibration.profile, radius, edge, 0.6 * softening_for(edge));
+  JointFit fit(flat);
+  fit.set_table(&exact);
+  fit.reset(flat, disks);
+  const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, contrast));
+  const double tolerance = std::clamp(0.004 * noise / 0.1, 2e-4, 4e-3);
+  std::size_t dropped = 0;
+  bool searched = false;
+  double largest = 1;
+  for (int sweep = 0; sweep < options.joint_fit_sweeps; ++sweep) {
+    fit.set_table(sweep < 2 ? &soft : &exact);
+    largest = fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance);
+    if (sweep == 1) {
+      dropped += prune(fit, disks, radius, faintly_explained);
+      searched = true;
+      add_missed(fit, disks, radius, 0.35);
+    }
+    if (largest < tolerance && sweep >= 2) break;
+  }
+  if (!searched) dropped += prune(fit, disks, radius, faintly_explained);
+  fit.judge(disks, radius + 1);
+
+  std::vector<double> explained;
+  for (const ModelDisk& disk : disks) explained.push_back(disk.explained);
+  const double typical = std::max(0.3, median_of(explained));
+  double residual_sum = 0;
+  std::size_t residual_count = 0;
+  const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;
+  const double right = options.roi ? options.roi->left + options.roi->width : frame.width;
+  const double bottom = options.roi ? options.roi->top + options.roi->height : frame.height;
+  for (const ModelDisk& disk : disks) {
+    const double share = disk.explained / typical;
+    const bool inside = disk.x >= left - 0.5 && disk.y >= top - 0.5 && disk.x < right - 0.5 && disk.y < bottom - 0.5;
+    const bool doubtful = share < least_explained;
+    if (share < 0.5 || (doubtful && !options.keep_half_hidden)) {
+      ++dropped;
+      continue;
+    }
+    if (!inside) continue;
+    FoundDisk found;
+    found.x_px = disk.x;
+    found.y_px = disk.y;
+    found.radius_px = radius;
+    const double determinant = disk.hessian_xx * disk.hessian_yy - disk.hessian_xy * disk.hessian_xy;
+    if (determinant > 0) {
+      found.variance_x = noise * noise * disk.hessian_yy / determinant;
+      found.variance_y = noise * noise * disk.hessian_xx / determinant;
+      found.covariance_xy = -noise * noise * disk.hessian_xy / determinant;
+    }
+    found.quality = std::clamp(share, 0.0, 1.0);
+    found.contrast = disk.amplitude;
+    found.cut = disk.x - radius < left - 0.5 || disk.y - radius < top - 0.5 || disk.x + radius > right - 0.5 ||
+                disk.y + radius > bottom - 0.5;
+    found.half_hidden = doubtful || disk.rim_explained < 0.4 * typical;
+    residual_sum += 1 - disk.explained;
+    ++residual_count;
+    result.disks.push_back(found);
+  }
+  std::sort(result.disks.begin(), result.disks.end(), [](const FoundDisk& a, const FoundDisk& b) {
+    if (a.y_px != b.y_px) return a.y_px < b.y_px;
+    return a.x_px < b.x_px;
+  });
+  result.rejected = dropped;
+  if (residual_count)
+    result.residual_level = contrast * std::sqrt(std::max(0.0, residual_sum / static_cast<double>(residual_count)));
+  if (result.disks.empty())
+    result.why_nothing = std::to_string(dropped) + " places were tried, but none is filled like a bead of radius " +
+                         std::to_string(radius) + " px";
+  return result;
+}
+
+FindResult find_disks(const GrayFrame& frame, const FindOptions& options, FinderCalibration* calibration_found) {
+  const CalibrationResult calibrated = calibrate_finder({&frame}, options);
+  if (!calibrated.found) {
+    FindResult nothing;
+    nothing.why_nothing = calibrated.why_not;
+    return nothing;
+  }
+  if (calibration_found) *calibration_found = calibrated.calibration;
+  return find_disks(frame, calibrated.calibration, options);
+}
+
+GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const FinderCalibration& calibration) {
+  require_consistent(frame);
+  if (frame.width != calibration.width || frame.height != calibration.height)
+    throw std::invalid_argument("residual_frame: the frame has not the size of the film's frames");
+  const GrayFrame flat = flatten(frame, calibration.light);
+  const ProfileTable table(calibration.profile, calibration.radius_px, calibration.edge_width_px, 0);
+  JointFit fit(flat);
+  fit.set_table(&table);
+  for (const FoundDisk& disk : found.disks) fit.subtract(disk.x_px, disk.y_px, 1.0F);
+  GrayFrame residual = fit.residual_image();
+  for (float& level : residual.pixels) level *= static_cast<float>(calibration.contrast_level);
+  return residual;
+}
+
+}  // namespace shakebed::ingest

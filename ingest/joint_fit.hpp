@@ -1,0 +1,78 @@
+#pragma once
+// The model of a frame (a sum of identical beads) and the joint least squares of all their centres.
+
+#include <cstddef>
+#include <vector>
+
+#include "ingest/calibration.hpp"
+#include "ingest/frames.hpp"
+
+namespace shakebed::ingest {
+
+// One bead of the model.
+struct ModelDisk {
+  double x = 0, y = 0;                                    // centre, px of the frame
+  double last_step = 1e9;                                 // px, length of its last move
+  int quiet_sweeps = 0;                                   // sweeps in a row in which it did not move
+  double hessian_xx = 0, hessian_xy = 0, hessian_yy = 0;  // of half the sum of squares, contrast^2/px^2
+  double explained = 0;                                   // share of the contrast around it that it explains, 1 at best
+  double amplitude = 1;                                   // its own contrast over the typical one
+  double rim_explained = 1;                               // the worst eighth of its rim, likewise
+};
+
+// A bead's profile tabulated against the squared distance, so that no square root is taken per pixel.
+class ProfileTable {
+ public:
+  ProfileTable() = default;
+  // `softening_px` > 0 widens the gradient used for the steps (not the model): beads further off are then drawn in.
+  ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px);
+  [[nodiscard]] double reach() const { return reach_; }
+  [[nodiscard]] double at(double squared_distance) const;
+
+ private:
+  friend class JointFit;
+  double reach_ = 0;
+  float inverse_step_ = 0;
+  int last_ = 0;
+  std::vector<float> level_, rise_, soft_rise_;
+  bool fourth_ = false;
+  std::vector<float> fourth_level_, fourth_rise_;  // p4(r)/r^4
+};
+
+// Residual image of one frame and the beads that explain it.
+class JointFit {
+ public:
+  // `flat`: flattened frame, 0 background, 1 bead.
+  explicit JointFit(const GrayFrame& flat);
+  void set_table(const ProfileTable* table) { table_ = table; }
+
+  // Adds or takes out one bead's contrast (sign +1 takes the model's part out of the residual).
+  void subtract(double x, double y, float sign);
+  // Residual := flat frame minus all beads.
+  void reset(const GrayFrame& flat, const std::vector<ModelDisk>& disks);
+  // One Gauss-Seidel sweep of Newton steps, each at most `largest_step` px. Beads that moved less than `tolerance`
+  // twice are left alone. Returns the largest move.
+  double sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance);
+  // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
+  void judge(std::vector<ModelDisk>& disks, double radius) const;
+  // Residual (flat frame minus model) at a pixel.
+  [[nodiscard]] float residual(int column, int row) const {
+    return residual_[static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column)];
+  }
+  [[nodiscard]] float* residual_row(int row) { return residual_.data() + static_cast<std::size_t>(row) * stride_; }
+  [[nodiscard]] const float* residual_row(int row) const {
+    return residual_.data() + static_cast<std::size_t>(row) * stride_;
+  }
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] GrayFrame residual_image() const;
+
+ private:
+  void move(double old_x, double old_y, double new_x, double new_y);
+  int width_, height_;
+  std::size_t stride_;
+  std::vector<float> residual_;
+  const ProfileTable* table_ = nullptr;
+};
+
+}  // namespace shakebed::ingest
