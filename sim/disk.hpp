@@ -7,6 +7,7 @@
 namespace shakebed::sim {
 
 inline constexpr double never = std::numeric_limits<double>::infinity();
+inline constexpr double skin_unit = 1.0 / 128;
 
 // What a disk meets next. A partner >= 0 is another disk's number; the rest are these.
 enum Partner : std::int32_t {
@@ -19,7 +20,7 @@ enum Partner : std::int32_t {
 };
 
 // Bits of Disk::near: what the disk could touch while it stays in its shell.
-enum Near : std::uint16_t {
+enum Near : std::uint8_t {
   near_left_wall = 1,
   near_right_wall = 2,
   near_floor = 4,
@@ -35,8 +36,9 @@ struct alignas(64) Disk {
   double event_time;         // when the next event of this disk is due
   std::int32_t partner;      // with whom: a disk's number or one of Partner
   std::uint16_t neighbours;  // how many disks its neighbour list holds
-  std::uint16_t near;        // which walls its shell can reach, bits of Near
-  float shell_x, shell_z;    // centre of its shell, in the shell frame
+  std::uint8_t near;         // which walls its shell can reach, bits of Near
+  std::uint8_t skin;         // radius of its shell, in units of skin_unit
+  float shell_x, shell_z;    // centre of its shell
 };
 static_assert(sizeof(Disk) == 64);
 

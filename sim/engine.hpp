@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <vector>
 
@@ -56,33 +57,40 @@ class Engine final : public Simulation {
     std::int32_t partner;
   };
 
+  // A disk's state at one moment, in registers: what is predicted from it must not wait for the record to be written.
+  struct Motion {
+    double x, z, vx, vz;
+  };
+
   // --- flight
-  void bring_forward(Disk& disk, double time) const;
-  double x_at(const Disk& disk, double time) const { return disk.x + disk.vx * (time - disk.own_time); }
-  double z_at(const Disk& disk, double time) const;
-  double vz_at(const Disk& disk, double time) const;
+  Motion motion_at(const Disk& disk, double time) const;
+  void write_down(std::uint32_t i, const Motion& motion);
+  void bring_forward(std::uint32_t i) { write_down(i, motion_at(disks_[i], now_)); }
 
   // --- prediction
-  Lanes contact_times(const std::uint32_t* ids, const Disk& disk, double radius) const;
-  Candidate next_contact(std::uint32_t i) const;
-  Candidate next_wall(const Disk& disk, std::uint32_t i, Candidate best) const;
-  void commit(std::uint32_t i, const Candidate& next);
-  void predict(std::uint32_t i);
+  Lanes contact_times(const std::uint32_t* ids, const Motion& motion, double radius) const;
+  Candidate next_contact(std::uint32_t i, const Motion& motion) const;
+  Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best) const;
+  Candidate next_event(std::uint32_t i, const Motion& motion) const;
+  void commit(std::uint32_t i, const Motion& motion, const Candidate& next);
+  void predict(std::uint32_t i, const Motion& motion) { commit(i, motion, next_event(i, motion)); }
   void predict_all();
 
   // --- shells
-  void draw_shell(std::uint32_t i);
+  void centre_shell(std::uint32_t i);
+  void look_round(std::uint32_t i);
+  void choose_skin(std::uint32_t i);
+  void find_neighbours(std::uint32_t i);
+  void mark_near_walls(std::uint32_t i);
   void leave_shell(std::uint32_t i);
-  bool within_reach(std::uint32_t i, std::uint32_t k) const;
 
   // --- contacts
   void process_until(double until);
   void collide(std::uint32_t i, std::uint32_t j);
-  void collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx, double dvz,
-                     double reduced_mass);
+  void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
-  void hit_floor(std::uint32_t i);
-  void bounce(std::uint32_t i, double nx, double nz, double wall_vz, const Surface& surface);
+  void hit_floor(std::uint32_t i, Motion& motion);
+  void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Surface& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
 
   void act_bath();
@@ -128,9 +136,14 @@ class Engine final : public Simulation {
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
 
   // --- bookkeeping
-  double skin_ = 0.36;
+  struct Nearby {
+    double reached_by;  // the radius of a shell that would just reach this disk's
+    std::uint32_t disk;
+  };
+  double smallest_skin_ = 0.15, largest_skin_ = 0.36;
   NeighbourShells shells_;
   EventQueue queue_;
+  std::vector<Nearby> nearby_;
   std::vector<std::uint32_t> found_;
 };
 

@@ -36,9 +36,10 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   disks_.resize(count_ + 1);
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Placed& p = placed[i];
-    disks_[i] = {p.x, p.z, p.vx, p.vz, 0, never, nobody, 0, 0, 0, 0};
+    disks_[i] = {p.x, p.z, p.vx, p.vz, 0, never, nobody, 0, 0, 0, 0, 0};
   }
-  disks_[count_] = {0, 0, 0, 0, 0, -never, nobody, 0, 0, 0, 0};  // the sentinel: nothing can be earlier than its event
+  disks_[count_] = {0,      0, 0, 0, 0, -never,
+                    nobody, 0, 0, 0, 0, 0};  // the sentinel: nothing can be earlier than its event
   if constexpr (Rule::spins) {
     for (const Placed& p : placed) spins_.push_back(p.spin);
   }
@@ -64,24 +65,24 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
 // ------------------------------------------------------------------------------------------------ flight
 
 template <class Space, class Rule, class Sizes>
-double Engine<Space, Rule, Sizes>::z_at(const Disk& disk, double time) const {
+auto Engine<Space, Rule, Sizes>::motion_at(const Disk& disk, double time) const -> Motion {
   const double dt = time - disk.own_time;
-  if constexpr (Space::falls) return disk.z + (disk.vz - 0.5 * gravity_ * dt) * dt;
-  return disk.z + disk.vz * dt;
+  if constexpr (Space::falls) {
+    const double fall = gravity_ * dt;
+    return {disk.x + disk.vx * dt, disk.z + (disk.vz - 0.5 * fall) * dt, disk.vx, disk.vz - fall};
+  } else {
+    return {disk.x + disk.vx * dt, disk.z + disk.vz * dt, disk.vx, disk.vz};
+  }
 }
 
 template <class Space, class Rule, class Sizes>
-double Engine<Space, Rule, Sizes>::vz_at(const Disk& disk, double time) const {
-  if constexpr (Space::falls) return disk.vz - gravity_ * (time - disk.own_time);
-  return disk.vz;
-}
-
-template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::bring_forward(Disk& disk, double time) const {
-  disk.x = x_at(disk, time);
-  disk.z = z_at(disk, time);
-  disk.vz = vz_at(disk, time);
-  disk.own_time = time;
+void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motion) {
+  Disk& disk = disks_[i];
+  disk.x = motion.x;
+  disk.z = motion.z;
+  disk.vx = motion.vx;
+  disk.vz = motion.vz;
+  disk.own_time = now_;
 }
 
 // ------------------------------------------------------------------------------------------------ prediction
@@ -89,8 +90,9 @@ void Engine<Space, Rule, Sizes>::bring_forward(Disk& disk, double time) const {
 // Contact times of one disk, whose state is that at now_, with four others; `never` where there is none or where the
 // other has something earlier to do.
 template <class Space, class Rule, class Sizes>
-Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const Disk& disk,
-                                                [[maybe_unused]] double radius) const {
+[[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
+                                                                              const Motion& motion,
+                                                                              [[maybe_unused]] double radius) const {
   const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[2]], &k3 = disks_[ids[3]];
   Lanes s0, s1, s2, s3;
   std::memcpy(&s0, &k0.x, sizeof s0);
@@ -108,18 +110,18 @@ Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const 
 
   const Lanes time = all_lanes(now_);
   const Lanes dt = time - own_time;
-  Lanes dx = x + vx * dt - all_lanes(disk.x);
+  Lanes dx = x + vx * dt - all_lanes(motion.x);
   Lanes dz;
   if constexpr (Space::falls) {
     const Lanes fall = all_lanes(gravity_) * dt;
-    dz = z + (vz - all_lanes(0.5) * fall) * dt - all_lanes(disk.z);
+    dz = z + (vz - all_lanes(0.5) * fall) * dt - all_lanes(motion.z);
     vz = vz - fall;
   } else {
-    dz = z + vz * dt - all_lanes(disk.z);
+    dz = z + vz * dt - all_lanes(motion.z);
   }
   if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-  const Lanes dvx = vx - all_lanes(disk.vx), dvz = vz - all_lanes(disk.vz);
+  const Lanes dvx = vx - all_lanes(motion.vx), dvz = vz - all_lanes(motion.vz);
 
   Lanes contact_squared = all_lanes(1);
   if constexpr (!Sizes::equal) {
@@ -138,53 +140,63 @@ Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids, const 
 }
 
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i) const -> Candidate {
-  const Disk& disk = disks_[i];
+auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i, const Motion& motion) const -> Candidate {
   const double radius = sizes_.radius(i);
   Candidate best{never, nobody};
-  const auto consider = [&](const NeighbourBlock& block) {
-    const Lanes first = contact_times(block.disk.data(), disk, radius);
-    const Lanes second = contact_times(block.disk.data() + 4, disk, radius);
+  const auto consider = [&](const NeighbourBlock& block) [[gnu::always_inline]] {
+    const Lanes first = contact_times(block.disk.data(), motion, radius);
+    const Lanes second = contact_times(block.disk.data() + 4, motion, radius);
     const EarliestLane earliest = earliest_of_eight(first, second);
     if (earliest.time < best.time) best = {earliest.time, static_cast<std::int32_t>(block.disk[earliest.lane])};
   };
   consider(shells_.first_block(i));
-  if (disk.neighbours > inline_neighbours) [[unlikely]]
+  if (disks_[i].neighbours > inline_neighbours) [[unlikely]]
     shells_.further_blocks(i, consider);
   return best;
 }
 
-// The next wall that the disk, whose shell touches the reach of one, meets before the time given.
+// The next wall that the disk meets, if it comes before `best`; else `best`.
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_wall(const Disk& disk, std::uint32_t i, Candidate best) const -> Candidate {
+auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best) const -> Candidate {
   const double radius = sizes_.radius(i);
+  const unsigned near = disks_[i].near;
   const auto consider = [&](double wait, std::int32_t wall) {
     if (now_ + wait < best.time) best = {now_ + wait, wall};
   };
-  if (disk.near & near_left_wall) consider(time_to_wall(disk.x - radius, -disk.vx), left_wall);
-  if (disk.near & near_right_wall) consider(time_to_wall(width_ - radius - disk.x, disk.vx), right_wall);
-  if (disk.near & near_lid) consider(time_to_lid(lid_height_ - radius - disk.z, disk.vz, gravity_), lid_above);
-  if (disk.near & near_floor)
-    consider(floor_.time_to_contact(disk.z - radius, disk.vz, gravity_, now_, best.time - now_), floor_below);
+  if (near & near_left_wall) consider(time_to_wall(motion.x - radius, -motion.vx), left_wall);
+  if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x, motion.vx), right_wall);
+  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z, motion.vz, gravity_), lid_above);
+  if (near & near_floor)
+    consider(floor_.time_to_contact(motion.z - radius, motion.vz, gravity_, now_, best.time - now_), floor_below);
   return best;
 }
 
-// Writes down what comes next for disk i, unless it leaves its shell before.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next) {
+auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const -> Candidate {
+  const Candidate next = next_contact(i, motion);
+  if constexpr (Space::has_walls) {
+    if (disks_[i].near != 0) return next_wall(i, motion, next);
+  }
+  return next;
+}
+
+// Writes down what comes next for disk i, whose state now is `motion`, unless it leaves its shell before.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, const Candidate& next) {
   Disk& disk = disks_[i];
   const double dt = next.time - now_;
-  const double ox = disk.x - static_cast<double>(disk.shell_x), oz = disk.z - static_cast<double>(disk.shell_z);
+  const double ox = motion.x - static_cast<double>(disk.shell_x), oz = motion.z - static_cast<double>(disk.shell_z);
   // Gravity bends the path away from its chord by at most g dt^2 / 8.
-  double limit = skin_;
-  double ez = oz + disk.vz * dt;
+  const double skin = disk.skin * skin_unit;
+  double limit = skin;
+  double ez = oz + motion.vz * dt;
   if constexpr (Space::falls) {
     limit -= gravity_ * dt * dt * 0.125;
     ez -= 0.5 * gravity_ * dt * dt;
   }
-  const double ex = ox + disk.vx * dt;
+  const double ex = ox + motion.vx * dt;
   if (!(limit > 0 && ex * ex + ez * ez <= limit * limit)) {
-    const double exit = now_ + time_to_leave_shell(ox, oz, disk.vx, disk.vz, skin_, gravity_);
+    const double exit = now_ + time_to_leave_shell(ox, oz, motion.vx, motion.vz, skin, gravity_);
     if (exit < next.time) {
       disk.event_time = exit;
       disk.partner = shell_exit;
@@ -204,16 +216,6 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next) 
   }
 }
 
-// Predicts disk i, whose state must be that at now_.
-template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::predict(std::uint32_t i) {
-  Candidate next = next_contact(i);
-  if constexpr (Space::has_walls) {
-    if (disks_[i].near != 0) next = next_wall(disks_[i], i, next);
-  }
-  commit(i, next);
-}
-
 // Everything anew. Every disk must be predicted, even one that another has already claimed: its own best event may be
 // an earlier one with a third.
 template <class Space, class Rule, class Sizes>
@@ -224,53 +226,90 @@ void Engine<Space, Rule, Sizes>::predict_all() {
     disks_[i].partner = nobody;
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
-    Candidate next = next_contact(i);
-    if constexpr (Space::has_walls) {
-      if (disks_[i].near != 0) next = next_wall(disks_[i], i, next);
-    }
+    const Motion motion = motion_at(disks_[i], now_);
+    const Candidate next = next_event(i, motion);
     if (disks_[i].partner >= 0 && next.time >= disks_[i].event_time) continue;
-    commit(i, next);
+    commit(i, motion, next);
   }
 }
 
 // ------------------------------------------------------------------------------------------------ shells
 
+// Centres the disk's shell on where it is now.
 template <class Space, class Rule, class Sizes>
-bool Engine<Space, Rule, Sizes>::within_reach(std::uint32_t i, std::uint32_t k) const {
-  double dx = static_cast<double>(disks_[k].shell_x) - static_cast<double>(disks_[i].shell_x);
-  double dz = static_cast<double>(disks_[k].shell_z) - static_cast<double>(disks_[i].shell_z);
-  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
-  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-  const double reach = sizes_.contact_distance(i, k) + 2 * skin_ + shell_slack;
-  return dx * dx + dz * dz < reach * reach;
-}
-
-// Centres the disk's shell on where it is now, and notes which walls it could touch from there.
-template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::draw_shell(std::uint32_t i) {
+void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
   Disk& disk = disks_[i];
   if constexpr (Space::wraps_x) disk.x = period_x_.wrapped(disk.x);
   if constexpr (Space::wraps_z) disk.z = period_z_.wrapped(disk.z);
   disk.shell_x = static_cast<float>(disk.x);
   disk.shell_z = static_cast<float>(disk.z);
+}
+
+// Fills nearby_ with the disks round i and with how large a shell of i's would just reach theirs.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
+  nearby_.clear();
+  const double x = static_cast<double>(disks_[i].shell_x), z = static_cast<double>(disks_[i].shell_z);
+  const double farthest = sizes_.radius(i) + largest_skin_ + shell_slack;
+  shells_.search(i, [&](std::uint32_t k) {
+    double dx = static_cast<double>(disks_[k].shell_x) - x, dz = static_cast<double>(disks_[k].shell_z) - z;
+    if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+    if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+    const double distance_squared = dx * dx + dz * dz;
+    const double others = sizes_.radius(k) + disks_[k].skin * skin_unit;
+    if (distance_squared < (farthest + others) * (farthest + others))
+      nearby_.push_back({std::sqrt(distance_squared) - others - sizes_.radius(i) - shell_slack, k});
+  });
+}
+
+// The largest shell with which i would have no more than eight neighbours, within bounds.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
+  double skin = largest_skin_;
+  if (nearby_.size() > inline_neighbours) {
+    const auto ninth = nearby_.begin() + inline_neighbours;
+    std::nth_element(nearby_.begin(), ninth, nearby_.end(), [](const Nearby& l, const Nearby& r) {
+      return l.reached_by != r.reached_by ? l.reached_by < r.reached_by : l.disk < r.disk;
+    });
+    skin = std::clamp(ninth->reached_by, smallest_skin_, largest_skin_);
+  }
+  disks_[i].skin = static_cast<std::uint8_t>(skin / skin_unit);
+}
+
+// Fills found_ with those of nearby_ that i's shell reaches.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
+  const double skin = disks_[i].skin * skin_unit;
+  found_.clear();
+  for (const Nearby& other : nearby_) {
+    if (other.reached_by < skin) found_.push_back(other.disk);
+  }
+}
+
+// Notes which walls the disk could touch from its shell.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::mark_near_walls(std::uint32_t i) {
   if constexpr (Space::has_walls) {
-    const double reach = sizes_.radius(i) + skin_ + shell_slack;
+    Disk& disk = disks_[i];
+    const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
     unsigned near = 0;
     if (hard_sides_ && disk.shell_x < reach) near |= near_left_wall;
     if (hard_sides_ && disk.shell_x > width_ - reach) near |= near_right_wall;
     if (disk.shell_z < floor_.highest() + reach) near |= near_floor;
     if (disk.shell_z > lid_height_ - reach) near |= near_lid;
-    disk.near = static_cast<std::uint16_t>(near);
+    disk.near = static_cast<std::uint8_t>(near);
   }
 }
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
   shells_.unfile(i);
-  draw_shell(i);
+  centre_shell(i);
   shells_.file(i);
-  shells_.search(
-      i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+  look_round(i);
+  choose_skin(i);
+  mark_near_walls(i);
+  find_neighbours(i);
   shells_.relist(i, found_);
 }
 
@@ -280,28 +319,27 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i;
   while (queue_.pop(until, i)) {
-    Disk& disk = disks_[i];
+    const Disk& disk = disks_[i];
     now_ = disk.event_time;
     if (disk.partner >= 0) [[likely]] {
       const auto j = static_cast<std::uint32_t>(disk.partner);
       const Disk& other = disks_[j];
       if (other.event_time == now_ && other.partner == static_cast<std::int32_t>(i)) [[likely]] {
         collide(i, j);
-        predict(i);
-        predict(j);
       } else {  // the partner was hit by another disk first
         ++counters_.predictions_renewed;
-        bring_forward(disk, now_);
-        predict(i);
+        const Motion motion = motion_at(disk, now_);
+        const Candidate next = next_event(i, motion);
+        write_down(i, motion);
+        commit(i, motion, next);
       }
     } else if (disk.partner == shell_exit) {
       ++counters_.shell_exits;
-      bring_forward(disk, now_);
+      bring_forward(i);
       leave_shell(i);
-      predict(i);
+      predict(i, motion_at(disk, now_));
     } else {
       hit_wall(i);
-      predict(i);
     }
   }
   now_ = until;
@@ -337,14 +375,30 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
-  Disk &first = disks_[i], &second = disks_[j];
-  bring_forward(first, now_);
-  bring_forward(second, now_);
+  Motion first = motion_at(disks_[i], now_), second = motion_at(disks_[j], now_);
+  exchange(i, j, first, second);
+  ++counters_.disk_collisions;
+  // Both are predicted before either record changes, so that the two predictions overlap in the processor. Neither sees
+  // the other: they separate.
+  const Candidate next_first = next_event(i, first);
+  Candidate next_second = next_event(j, second);
+  write_down(i, first);
+  write_down(j, second);
+  commit(i, first, next_first);
+  const bool taken = next_second.partner >= 0 &&
+                     !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
+  if (taken) [[unlikely]]
+    next_second = next_event(j, second);
+  commit(j, second, next_second);
+}
+
+// The contact itself: changes the velocities, the spins and the ledger.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second) {
   double dx = second.x - first.x, dz = second.z - first.z;
   if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
   const double dvx = second.vx - first.vx, dvz = second.vz - first.vz;
-  ++counters_.disk_collisions;
 
   double restitution = 1;
   bool elastic = true;
@@ -356,7 +410,19 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   const double reduced_mass = 1 / (inverse_first + inverse_second);
   if constexpr (Rule::spins) {
     if (!elastic) {
-      collide_rough(i, j, dx, dz, dvx, dvz, reduced_mass);
+      const double distance = std::sqrt(dx * dx + dz * dz), nx = dx / distance, nz = dz / distance;
+      const double ri = sizes_.radius(i), rj = sizes_.radius(j);
+      const double gn = -(dvx * nx + dvz * nz);
+      const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
+      const RoughImpulse p = walton_impulse(nx, nz, gn, gt, reduced_mass, disk_surface_, inverse_inertia_ratio_);
+      first.vx += p.px * inverse_first;
+      first.vz += p.pz * inverse_first;
+      second.vx -= p.px * inverse_second;
+      second.vz -= p.pz * inverse_second;
+      spins_[i] += inverse_inertia_ratio_ * p.tangential * inverse_first / ri;
+      spins_[j] += inverse_inertia_ratio_ * p.tangential * inverse_second / rj;
+      counters_.virial -= p.px * dx + p.pz * dz;
+      dissipated_ += p.dissipated;
       return;
     }
   }
@@ -371,80 +437,60 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
 }
 
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::collide_rough(std::uint32_t i, std::uint32_t j, double dx, double dz, double dvx,
-                                               double dvz, double reduced_mass) {
-  Disk &first = disks_[i], &second = disks_[j];
-  const double distance = std::sqrt(dx * dx + dz * dz), nx = dx / distance, nz = dz / distance;
-  const double ri = sizes_.radius(i), rj = sizes_.radius(j), mi = sizes_.mass(i), mj = sizes_.mass(j);
-  const double gn = -(dvx * nx + dvz * nz);
-  const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
-  const RoughImpulse impulse = walton_impulse(nx, nz, gn, gt, reduced_mass, disk_surface_, inverse_inertia_ratio_);
-  first.vx += impulse.px / mi;
-  first.vz += impulse.pz / mi;
-  second.vx -= impulse.px / mj;
-  second.vz -= impulse.pz / mj;
-  spins_[i] += inverse_inertia_ratio_ * impulse.tangential / (mi * ri);
-  spins_[j] += inverse_inertia_ratio_ * impulse.tangential / (mj * rj);
-  counters_.virial -= impulse.px * dx + impulse.pz * dz;
-  dissipated_ += impulse.dissipated;
-}
-
-template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
-  Disk& disk = disks_[i];
-  const std::int32_t wall = disk.partner;
-  bring_forward(disk, now_);
-  switch (wall) {
+  Motion motion = motion_at(disks_[i], now_);
+  switch (disks_[i].partner) {
     case left_wall:
-      bounce(i, -1, 0, 0, side_surface_);
+      bounce(i, motion, -1, 0, 0, side_surface_);
       break;
     case right_wall:
-      bounce(i, 1, 0, 0, side_surface_);
+      bounce(i, motion, 1, 0, 0, side_surface_);
       break;
     case lid_above:
-      bounce(i, 0, 1, 0, lid_surface_);
+      bounce(i, motion, 0, 1, 0, lid_surface_);
       break;
     default:
-      hit_floor(i);
-      return;
+      hit_floor(i, motion);
+      break;
   }
-  ++counters_.wall_collisions;
+  (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
+  const Candidate next = next_event(i, motion);
+  write_down(i, motion);
+  commit(i, motion, next);
 }
 
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i) {
-  Disk& disk = disks_[i];
+void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   const double mass = sizes_.mass(i);
-  const double before = 0.5 * mass * (disk.vx * disk.vx + disk.vz * disk.vz);
-  ++counters_.floor_collisions;
   const double floor_velocity = floor_.velocity(now_);
   if (const auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
+    const double before = motion.vx * motion.vx + motion.vz * motion.vz;
     const double speed = std::sqrt(thermal->temperature / mass);
-    disk.vx = speed * random_.normal_pair().first;
-    disk.vz = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
-    floor_work_ += 0.5 * mass * (disk.vx * disk.vx + disk.vz * disk.vz) - before;
+    motion.vx = speed * random_.normal_pair().first;
+    motion.vz = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
+    floor_work_ += 0.5 * mass * (motion.vx * motion.vx + motion.vz * motion.vz - before);
     return;
   }
-  const double momentum = disk.vz;
-  bounce(i, 0, -1, floor_velocity, floor_surface_);
-  floor_work_ += mass * (disk.vz - momentum) * floor_velocity;
+  const double vz_before = motion.vz;
+  bounce(i, motion, 0, -1, floor_velocity, floor_surface_);
+  floor_work_ += mass * (motion.vz - vz_before) * floor_velocity;
   // A disk that lies still on the floor is carried in small hops: a contact has to end before the next can begin.
   const double pressing = gravity_ + floor_.acceleration(now_);
   const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
   const double slowest = 0.5 * pressing * hop;
-  if (disk.vz - floor_velocity < 1e-3 * slowest) {
-    const double slow = disk.vz;
-    disk.vz = floor_velocity + slowest;
-    floor_work_ += 0.5 * mass * (disk.vz - slow) * (disk.vz + slow);
+  if (motion.vz - floor_velocity < 1e-3 * slowest) {
+    const double slow = motion.vz;
+    motion.vz = floor_velocity + slowest;
+    floor_work_ += 0.5 * mass * (motion.vz - slow) * (motion.vz + slow);
   }
 }
 
 // One disk against a wall that moves vertically; (nx, nz) points from the disk to the wall.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, double nx, double nz, double wall_vz, const Surface& surface) {
-  Disk& disk = disks_[i];
+void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz,
+                                        const Surface& surface) {
   const double mass = sizes_.mass(i);
-  const double gx = disk.vx, gz = disk.vz - wall_vz;
+  const double gx = motion.vx, gz = motion.vz - wall_vz;
   const double gn = gx * nx + gz * nz;
   if (!(gn > 0)) return;  // grazed, by rounding
   Surface contact = surface;
@@ -455,13 +501,13 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, double nx, double nz, d
     const double radius = sizes_.radius(i);
     const double gt = -gx * nz + gz * nx + radius * spins_[i];
     const RoughImpulse impulse = walton_impulse(nx, nz, gn, gt, mass, contact, inverse_inertia_ratio_);
-    disk.vx += impulse.px / mass;
-    disk.vz += impulse.pz / mass;
+    motion.vx += impulse.px / mass;
+    motion.vz += impulse.pz / mass;
     spins_[i] += inverse_inertia_ratio_ * impulse.tangential / (mass * radius);
     dissipated_ += impulse.dissipated;
   } else {
-    disk.vx -= (1 + contact.restitution) * gn * nx;
-    disk.vz -= (1 + contact.restitution) * gn * nz;
+    motion.vx -= (1 + contact.restitution) * gn * nx;
+    motion.vz -= (1 + contact.restitution) * gn * nz;
     dissipated_ += 0.5 * mass * (1 - contact.restitution * contact.restitution) * gn * gn;
   }
 }
@@ -476,17 +522,17 @@ void Engine<Space, Rule, Sizes>::act_bath() {
   if (const auto* bath = std::get_if<AndersenBath>(&bath_)) {
     const std::uint32_t i = random_.below(count_);
     Disk& disk = disks_[i];
-    bring_forward(disk, now_);
+    bring_forward(i);
     const double before = kinetic(disk, i), speed = std::sqrt(bath->temperature / sizes_.mass(i));
     const Random::Pair draw = random_.normal_pair();
     disk.vx = speed * draw.first;
     disk.vz = speed * draw.second;
     bath_work_ += kinetic(disk, i) - before;
-    predict(i);
+    predict(i, motion_at(disk, now_));
     bath_at_ = now_ - std::log(random_.uniform_positive()) / (bath->rate * count_);
     return;
   }
-  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(disks_[i], now_);
+  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
   if (const auto* bath = std::get_if<LangevinBath>(&bath_)) {
     const double keep = std::exp(-bath->rate * bath->interval);
     const double given = std::sqrt(bath->temperature * -std::expm1(-2 * bath->rate * bath->interval));
@@ -530,7 +576,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::synchronise() {
   ++counters_.synchronisations;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    bring_forward(disks_[i], now_);
+    bring_forward(i);
     disks_[i].own_time = 0;
   }
   for (double& time : last_contact_) time -= now_;
@@ -539,13 +585,13 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   intervals_done_ += intervals_;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
-  // Often enough for the clock's resolution, seldom enough to cost nothing: 60 to 400 collisions a disk apart.
+  // Often enough for the clock's resolution, seldom enough to cost nothing: 150 to 1000 events a disk apart.
   const std::uint64_t events = counters_.events() - events_at_synchronisation_;
   events_at_synchronisation_ = counters_.events();
   event_rate_ = std::max(static_cast<double>(events), 1.0) / elapsed;
   const double events_a_disk = static_cast<double>(events) / count_;
-  if (events_a_disk < 60 && elapsed * 2 <= longest_interval) intervals_ *= 2;
-  if (events_a_disk > 400 && intervals_ > 1) intervals_ /= 2;
+  if (events_a_disk < 150 && elapsed * 2 <= longest_interval) intervals_ *= 2;
+  if (events_a_disk > 1000 && intervals_ > 1) intervals_ /= 2;
   begin_interval();
 }
 
@@ -558,14 +604,25 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  shells_.reset(disks_.data(), count_, largest_contact + 2 * skin_ + shell_slack, width_, height);
+  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average; a bed under gravity
+  // has a gas above it, where larger ones save work.
+  const double density = count_ / (width_ * height);
+  largest_skin_ = std::clamp(0.5 * (std::sqrt(8.3 / (std::numbers::pi * density)) - 1), 0.25, 1.5);
+  if constexpr (Space::falls) largest_skin_ = std::max(largest_skin_, 0.5);
+  shells_.reset(disks_.data(), count_, largest_contact + 2 * largest_skin_ + shell_slack, width_, height);
   for (std::uint32_t i = 0; i < count_; ++i) {
-    draw_shell(i);
+    centre_shell(i);
+    disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
     shells_.file(i);
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
-    shells_.search(
-        i, [this](std::uint32_t a, std::uint32_t b) { return within_reach(a, b); }, found_);
+    look_round(i);
+    choose_skin(i);
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    mark_near_walls(i);
+    look_round(i);
+    find_neighbours(i);
     shells_.list(i, found_);
   }
   predict_all();
@@ -657,11 +714,11 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.vx.resize(count_);
   out.vz.resize(count_);
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Disk& disk = disks_[i];
-    out.x[i] = x_at(disk, now_);
-    out.z[i] = z_at(disk, now_);
-    out.vx[i] = disk.vx;
-    out.vz[i] = vz_at(disk, now_);
+    const Motion motion = motion_at(disks_[i], now_);
+    out.x[i] = motion.x;
+    out.z[i] = motion.z;
+    out.vx[i] = motion.vx;
+    out.vz[i] = motion.vz;
     if constexpr (Space::wraps_x) out.x[i] = period_x_.wrapped(out.x[i]);
     if constexpr (Space::wraps_z) out.z[i] = period_z_.wrapped(out.z[i]);
   }
@@ -682,8 +739,8 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::kinetic_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Disk& disk = disks_[i];
-    const long double vx = disk.vx, vz = vz_at(disk, now_);
+    const Motion motion = motion_at(disks_[i], now_);
+    const long double vx = motion.vx, vz = motion.vz;
     sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
     if constexpr (Rule::spins) {
       const long double surface_speed = sizes_.radius(i) * spins_[i];
@@ -696,7 +753,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
 template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
-  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * z_at(disks_[i], now_);
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z;
   return static_cast<double>(sum);
 }
 

@@ -27,6 +27,12 @@ std::vector<double> periodic_spline_curvatures(const std::vector<double>& values
   return curvature;
 }
 
+// The positive root h of gap + gap_rate h - bend h^2/2, gap >= 0, bend > 0, without cancellation.
+double step_to_root(double gap, double gap_rate, double bend) {
+  const double root = std::sqrt(gap_rate * gap_rate + 2 * bend * gap);
+  return gap_rate < 0 ? 2 * gap / (root - gap_rate) : (gap_rate + root) / bend;
+}
+
 }  // namespace
 
 FloorMotion::FloorMotion(const StillFloor&) {}
@@ -91,15 +97,25 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
   }
   if (gravity == 0 && bottom > highest_ && vz >= 0) return never;
   double t = bottom > highest_ ? time_to_fall(bottom - highest_, vz, gravity) : 0;
-  const double bend = gravity + largest_acceleration_;  // M
+  const double largest_bend = gravity + largest_acceleration_;
   while (t <= horizon) {
     const Motion floor = motion(now + t);
     const double gap = bottom + (vz - 0.5 * gravity * t) * t - floor.position;
     const double gap_rate = vz - gravity * t - floor.velocity;
     if (gap <= 0 && gap_rate < 0) return t;
     if (gravity == 0 && gap + floor.position > highest_ && vz >= 0) return never;
-    const double root = std::sqrt(gap_rate * gap_rate + 2 * bend * std::max(gap, 0.0));
-    const double step = gap_rate < 0 ? 2 * std::max(gap, 0.0) / (root - gap_rate) : (gap_rate + root) / bend;
+    const double touching = std::max(gap, 0.0);
+    double step = step_to_root(touching, gap_rate, largest_bend);
+    if (kind_ == Kind::sinusoidal) {
+      // A closer bound, good for twice that step: the floor's acceleration -a w^2 sin(p) can grow by a w^2 (d |cos p| +
+      // d^2/2) at most while its phase p advances by d.
+      const double reach = 2 * step, d = angular_frequency_ * reach;
+      const double peak = amplitude_ * angular_frequency_ * angular_frequency_;
+      const double growth = std::max(-floor.velocity * angular_frequency_, 0.0) * d + peak * d * d / 2;
+      const double bend = gravity + std::min(floor.acceleration + growth, largest_acceleration_);
+      step = bend > 0 ? std::min(step_to_root(touching, gap_rate, bend), reach)
+                      : (gap_rate < 0 ? std::min(touching / -gap_rate, reach) : reach);
+    }
     if (!(t + step > t)) return t;
     t += step;
   }

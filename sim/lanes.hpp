@@ -39,6 +39,19 @@ inline Lanes nearest_integer(Lanes value) {
 }
 inline Lanes larger(Lanes a, Lanes b) { return select(a > b, a, b); }
 
+// Bit k set where words[k] == value, k = 0 to 7. words: 32-byte aligned.
+inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
+#if defined(__AVX2__)
+  const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(words));
+  const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(static_cast<int>(value)));
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
+#else
+  unsigned mask = 0;
+  for (unsigned k = 0; k < 8; ++k) mask |= static_cast<unsigned>(words[k] == value) << k;
+  return mask;
+#endif
+}
+
 struct EarliestLane {
   double time;
   unsigned lane;  // 0 to 7: the first that has this time

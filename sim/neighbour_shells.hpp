@@ -1,6 +1,7 @@
-// Who can touch whom soon. Every disk lives in a shell, a circle of radius `skin` round the place where the disk was
-// when the shell was last drawn; while all disks stay in their shells, only pairs whose shells' centres are closer than
-// R1 + R2 + 2 skin can touch, and those stand in each other's lists. A disk that leaves its shell draws a new one.
+// Who can touch whom soon. Every disk lives in a shell, a circle round the place where the disk was when the shell was
+// last drawn; while all disks stay in their shells, only pairs whose shells' centres are closer than the disks' contact
+// distance plus the two shells' radii can touch, and those stand in each other's lists. A disk that leaves its shell
+// draws a new one, as large as it can be without more than eight neighbours: large in a gas, small in a crystal.
 //
 // Centres are filed in a grid of cells that wraps round in both directions (for open boxes too: a far cell shared by
 // chance only costs a distance check), so there is no event for crossing a cell and no edge to the world.
@@ -13,10 +14,12 @@
 #include <vector>
 
 #include "sim/disk.hpp"
+#include "sim/lanes.hpp"
 
 namespace shakebed::sim {
 
 inline constexpr std::uint32_t inline_neighbours = 8;
+inline constexpr int rings = 2;  // of cells round one's own in which others are searched
 
 struct alignas(32) NeighbourBlock {
   std::array<std::uint32_t, inline_neighbours> disk;
@@ -25,8 +28,10 @@ struct alignas(32) NeighbourBlock {
 class NeighbourShells {
  public:
   // disks: the records, one more than count (the last is the sentinel that fills empty places of lists).
-  // cell: at least the largest reach; width, height: of the periodic box, or of the region to grid when it is not.
-  void reset(Disk* disks, std::uint32_t count, double cell, double width, double height) {
+  // reach: the largest distance of centres that can make a pair; cells are half as wide. width, height: of the periodic
+  // box, or of the region to grid when it is not.
+  void reset(Disk* disks, std::uint32_t count, double reach, double width, double height) {
+    const double cell = reach / rings;
     disks_ = disks;
     sentinel_ = count;
     columns_ = std::max(1, static_cast<int>(std::min(width / cell, 30'000.0)));
@@ -68,22 +73,22 @@ class NeighbourShells {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   }
 
-  // Fills `found` with the disks whose shells' centres are within reach of i's. within(i, k) decides.
-  template <class Within>
-  void search(std::uint32_t i, Within within, std::vector<std::uint32_t>& found) const {
-    found.clear();
+  // Calls visit(k) for every other disk whose shell's centre may be within reach of i's.
+  template <class Visit>
+  void search(std::uint32_t i, Visit visit) const {
     const Disk& disk = disks_[i];
     const int column = static_cast<int>(std::floor(disk.shell_x * per_x_));
     const int row = static_cast<int>(std::floor(disk.shell_z * per_z_));
-    // A grid of one or two columns or rows would meet the same cell twice.
-    const int left = columns_ >= 3 ? -1 : 0, right = columns_ >= 3 ? 1 : columns_ - 1;
-    const int down = rows_ >= 3 ? -1 : 0, up = rows_ >= 3 ? 1 : rows_ - 1;
+    // A grid of few columns or rows would meet the same cell twice.
+    const int side = 2 * rings + 1;
+    const int left = columns_ >= side ? -rings : 0, right = columns_ >= side ? rings : columns_ - 1;
+    const int down = rows_ >= side ? -rings : 0, up = rows_ >= side ? rings : rows_ - 1;
     for (int dr = down; dr <= up; ++dr) {
       const std::size_t base = static_cast<std::size_t>(wrap(row + dr, rows_)) * static_cast<std::size_t>(columns_);
       for (int dc = left; dc <= right; ++dc) {
         std::uint32_t k = heads_[base + static_cast<std::size_t>(wrap(column + dc, columns_))];
         for (; k != sentinel_; k = following_[k]) {
-          if (k != i && within(i, k)) found.push_back(k);
+          if (k != i) visit(k);
         }
       }
     }
@@ -95,17 +100,27 @@ class NeighbourShells {
   }
   // Gives i exactly the neighbours `found`, and mends the lists of those that it lost or won.
   void relist(std::uint32_t i, const std::vector<std::uint32_t>& found) {
+    alignas(32) std::array<std::uint32_t, inline_neighbours> first;
+    first.fill(sentinel_);
+    std::copy_n(found.begin(), std::min<std::size_t>(found.size(), inline_neighbours), first.begin());
     const std::uint32_t old_count = disks_[i].neighbours;
     for (std::uint32_t place = 0; place < old_count; ++place) {
       const std::uint32_t k = *slot(i, place);
-      if (std::find(found.begin(), found.end(), k) == found.end()) remove(k, i);
+      if (equal_words(first.data(), k) != 0) continue;
+      if (found.size() > inline_neighbours &&
+          std::find(found.begin() + inline_neighbours, found.end(), k) != found.end())
+        continue;
+      remove(k, i);
     }
     for (std::uint32_t k : found) {
       if (!holds(i, k)) append(k, i);
     }
     while (disks_[i].neighbours > found.size()) drop_last(i);
+    lists_[i].disk = first;
+    disks_[i].neighbours = static_cast<std::uint16_t>(
+        std::max<std::size_t>(disks_[i].neighbours, std::min<std::size_t>(found.size(), inline_neighbours)));
     const std::uint32_t kept = disks_[i].neighbours;
-    for (std::uint32_t place = 0; place < kept; ++place) *slot(i, place) = found[place];
+    for (std::uint32_t place = inline_neighbours; place < kept; ++place) *slot(i, place) = found[place];
     for (std::size_t place = kept; place < found.size(); ++place) append(i, found[place]);
   }
 
@@ -129,7 +144,8 @@ class NeighbourShells {
     return &blocks_[block].disk[place];
   }
   bool holds(std::uint32_t i, std::uint32_t k) {
-    for (std::uint32_t place = 0; place < disks_[i].neighbours; ++place) {
+    if (equal_words(lists_[i].disk.data(), k) != 0) return true;
+    for (std::uint32_t place = inline_neighbours; place < disks_[i].neighbours; ++place) {
       if (*slot(i, place) == k) return true;
     }
     return false;
@@ -168,13 +184,16 @@ class NeighbourShells {
   }
   void remove(std::uint32_t i, std::uint32_t k) {
     const std::uint32_t last = disks_[i].neighbours - 1u;
-    for (std::uint32_t place = 0; place <= last; ++place) {
-      std::uint32_t* here = slot(i, place);
-      if (*here != k) continue;
-      *here = *slot(i, last);
-      drop_last(i);
-      return;
+    std::uint32_t* here = nullptr;
+    if (const unsigned equal = equal_words(lists_[i].disk.data(), k)) {
+      here = &lists_[i].disk[static_cast<unsigned>(__builtin_ctz(equal))];
+    } else {
+      std::uint32_t place = inline_neighbours;
+      while (*slot(i, place) != k) ++place;
+      here = slot(i, place);
     }
+    *here = *slot(i, last);
+    drop_last(i);
   }
 
   Disk* disks_ = nullptr;
