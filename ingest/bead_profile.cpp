@@ -286,4 +286,194 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
   return best;
 }
 
+namespace {
+
+// A flat disk on an even background, contrast and background free, by a search over radius and edge.
+RimFit fit_flat_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
+  const double low = std::max(0.0, radius_guess_px - 4.5 * edge_guess_px);
+  const double high = std::min(profile.reach_px(), radius_guess_px + 2.5 * edge_guess_px);
+  std::vector<double> distance, level;
+  const double spacing = std::max(profile.step_px, (high - low) / 40);
+  for (double r = low; r < high; r += spacing) {
+    distance.push_back(r);
+    level.push_back(value_at(profile.level, profile.step_px, r));
+  }
+  const auto misfit_of = [&](double radius, double edge) {
+    double ff = 0, f = 0, fp = 0, p = 0, pp = 0;
+    const double n = static_cast<double>(distance.size());
+    for (std::size_t i = 0; i < distance.size(); ++i) {
+      const double shape = blurred_disk_shapes(radius, edge, distance[i]).flat;
+      ff += shape * shape;
+      f += shape;
+      fp += shape * level[i];
+      p += level[i];
+      pp += level[i] * level[i];
+    }
+    const double determinant = ff * n - f * f;
+    if (!(determinant > 0)) return 1.0;
+    const double contrast = (n * fp - f * p) / determinant, offset = (ff * p - f * fp) / determinant;
+    return std::sqrt(std::max(0.0, (pp - contrast * fp - offset * p) / n));
+  };
+  RimFit best;
+  best.misfit = 1;
+  if (distance.size() < 8) return best;
+  double radius = radius_guess_px, edge = edge_guess_px, step = 0.5 * edge_guess_px;
+  best.misfit = misfit_of(radius, edge);
+  while (step > 1e-3) {  // pattern search: two unknowns, a smooth bowl
+    bool moved = false;
+    for (const auto& [by_radius, by_edge] : {std::pair{1.0, 0.0}, {-1.0, 0.0}, {0.0, 0.5}, {0.0, -0.5}}) {
+      const double new_radius = radius + by_radius * step, new_edge = edge + by_edge * step;
+      if (new_radius < 0.5 || new_edge < 0.2) continue;
+      const double misfit = misfit_of(new_radius, new_edge);
+      if (misfit < best.misfit) {
+        best.misfit = misfit;
+        radius = new_radius;
+        edge = new_edge;
+        moved = true;
+      }
+    }
+    if (!moved) step *= 0.5;
+  }
+  best.good = best.misfit < 0.1;
+  best.radius_px = radius;
+  best.edge_px = edge;
+  return best;
+}
+
+}  // namespace
+
+ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, double bead_level,
+                          double radius_guess_px, double edge_guess_px) {
+  ToneFit fit;
+  fit.linear = fit_flat_rim(profile, radius_guess_px, edge_guess_px);
+  fit.chosen = fit.linear;
+  constexpr double already_good = 0.005;  // rms misfit in units of the bead's contrast
+  constexpr double display_exponent = 0.45;
+  const double middle = value_at(profile.level, profile.step_px, 0.6 * radius_guess_px);
+  const double nearer_rim = value_at(profile.level, profile.step_px, radius_guess_px - 3 * edge_guess_px);
+  const bool flat = std::abs(middle - nearer_rim) < 0.03 * std::abs(middle);
+  if (!fit.linear.good || fit.linear.misfit < already_good || !flat) return fit;
+  const double brightest = std::max({background_level, bead_level, 1.0});
+  const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
+  const double background = light(background_level), bead = light(bead_level);
+  if (std::abs(bead - background) < 0.05) return fit;
+  BeadProfile straightened = profile;
+  for (float& level : straightened.level) {
+    const double recorded = background_level + (bead_level - background_level) * static_cast<double>(level) / middle;
+    level = static_cast<float>((light(recorded) - background) / (bead - background));
+  }
+  const RimFit encoded = fit_flat_rim(straightened, radius_guess_px, edge_guess_px);
+  if (encoded.good && encoded.misfit < 0.98 * fit.linear.misfit) {
+    fit.exponent = display_exponent;
+    fit.chosen = encoded;
+  }
+  return fit;
+}
+
+FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<const std::vector<ModelDisk>*>& disks,
+                       double radius_px, double edge_px) {
+  constexpr int sectors = 16;
+  constexpr double spacing = 0.2;
+  FreeRim rim;
+  const double inner = std::max(0.0, radius_px - std::max(5 * edge_px, 0.35 * radius_px));
+  const double open_from = radius_px + 2.5 * edge_px + 0.7, open_to = radius_px + 5.5 * edge_px + 2;
+  const double core_to = std::max(0.5 * inner + 0.3 * radius_px, inner + 0.1);
+  const auto bins = static_cast<std::size_t>(std::ceil(open_to / spacing)) + 1;
+  std::vector<double> sums(bins, 0.0), weights(bins, 0.0);
+  struct Sample {
+    double r;
+    float level;
+  };
+  for (std::size_t f = 0; f < flats.size(); ++f) {
+    const GrayFrame& flat = flats[f];
+    std::vector<ModelDisk> beads = *disks[f];
+    std::sort(beads.begin(), beads.end(), [](const ModelDisk& a, const ModelDisk& b) { return a.y < b.y; });
+    const double far = open_to + radius_px + 3 * edge_px;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < beads.size(); ++i) {
+      const ModelDisk& bead = beads[i];
+      while (beads[first].y < bead.y - far) ++first;
+      if (bead.x < open_to || bead.y < open_to || bead.x > flat.width - 1 - open_to ||
+          bead.y > flat.height - 1 - open_to)
+        continue;
+      std::array<bool, sectors> open;
+      open.fill(true);
+      for (std::size_t j = first; j < beads.size() && beads[j].y <= bead.y + far; ++j) {
+        const double dx = beads[j].x - bead.x, dy = beads[j].y - bead.y;
+        if (j == i || std::abs(dx) > far) continue;
+        const double distance = std::hypot(dx, dy);
+        if (distance > far) continue;
+        const double half =
+            std::asin(std::min(1.0, (radius_px + 3 * edge_px + 1) / distance)) + 2 * 3.14159265358979 / sectors / 2;
+        const double direction = std::atan2(dy, dx);
+        for (int s = 0; s < sectors; ++s) {
+          const double middle = (s + 0.5) * 2 * 3.14159265358979 / sectors - 3.14159265358979;
+          if (std::abs(std::remainder(direction - middle, 2 * 3.14159265358979)) < half)
+            open[static_cast<std::size_t>(s)] = false;
+        }
+      }
+      if (std::none_of(open.begin(), open.end(), [](bool free) { return free; })) continue;
+      std::array<std::vector<Sample>, sectors> samples;
+      const int top = static_cast<int>(std::ceil(bead.y - open_to)),
+                bottom = static_cast<int>(std::floor(bead.y + open_to));
+      const int left = static_cast<int>(std::ceil(bead.x - open_to)),
+                right = static_cast<int>(std::floor(bead.x + open_to));
+      for (int row = top; row <= bottom; ++row)
+        for (int column = left; column <= right; ++column) {
+          const double dx = column - bead.x, dy = row - bead.y;
+          const double r = std::hypot(dx, dy);
+          if (r < inner || r > open_to) continue;
+          const int s = std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * 3.14159265358979) + 0.5) * sectors), 0,
+                                   sectors - 1);
+          if (open[static_cast<std::size_t>(s)])
+            samples[static_cast<std::size_t>(s)].push_back({r, flat.at(column, row)});
+        }
+      for (const auto& sector : samples) {
+        double outside = 0, inside = 0, outside_count = 0, inside_count = 0, square = 0;
+        for (const Sample& sample : sector) {
+          const double level = static_cast<double>(sample.level);
+          if (sample.r > open_from) {
+            outside += level;
+            square += level * level;
+            ++outside_count;
+          } else if (sample.r < core_to) {
+            inside += level;
+            ++inside_count;
+          }
+        }
+        if (outside_count < 4 || inside_count < 2) continue;
+        outside /= outside_count;
+        inside /= inside_count;
+        const double scatter = std::sqrt(std::max(0.0, square / outside_count - outside * outside));
+        if (std::abs(outside) > 0.2 || scatter > 0.2 || inside - outside < 0.4) continue;
+        ++rim.sectors;
+        for (const Sample& sample : sector) {
+          const double level = static_cast<double>(sample.level) - outside;
+          const double place = sample.r / spacing;
+          const auto bin = static_cast<std::size_t>(place);
+          const double part = place - static_cast<double>(bin);
+          if (bin + 1 >= bins) continue;
+          sums[bin] += (1 - part) * level;
+          weights[bin] += 1 - part;
+          sums[bin + 1] += part * level;
+          weights[bin + 1] += part;
+        }
+      }
+    }
+  }
+  rim.profile.step_px = spacing;
+  rim.profile.level.assign(bins, 0.0F);
+  rim.profile.fourth_harmonic.assign(bins, 0.0F);
+  float first = 1;
+  bool seen = false;
+  for (std::size_t k = 0; k < bins; ++k)
+    if (weights[k] > 0) {
+      rim.profile.level[k] = static_cast<float>(sums[k] / weights[k]);
+      if (!seen) first = rim.profile.level[k];
+      seen = true;
+    }
+  for (std::size_t k = 0; k < bins && weights[k] <= 0; ++k) rim.profile.level[k] = first;
+  return rim;
+}
+
 }  // namespace shakebed::ingest

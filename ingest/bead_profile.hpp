@@ -29,4 +29,24 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
 // a sphere's sqrt(1 - rho^2) and a parabola.
 RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px);
 
+// The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides; one
+// that encodes for display (exponent 0.45) draws the dark side steep and the bright side long, and puts the edge at
+// another place. Of the two, the one in which the rim of a blurred flat disk fits best; linear when the linear fit
+// leaves nothing to explain or the bead is not flat. Levels are recorded grey levels; level 0 is taken as no light.
+struct ToneFit {
+  double exponent = 1;
+  RimFit linear, chosen;  // `chosen` is in light, not in recorded level
+};
+ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, double bead_level,
+                          double radius_guess_px, double edge_guess_px);
+
+// The profile averaged over the parts of rims that face open background: nothing within several edge widths, each part
+// measured from its own background to its own bead.
+struct FreeRim {
+  std::size_t sectors = 0;
+  BeadProfile profile;
+};
+FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<const std::vector<ModelDisk>*>& disks,
+                       double radius_px, double edge_px);
+
 }  // namespace shakebed::ingest

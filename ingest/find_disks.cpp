@@ -192,6 +192,12 @@ double mean_contrast(const LightField& light) {
   return static_cast<double>(light.contrast[middle]);
 }
 
+double mean_background(const LightField& light) {
+  const std::size_t middle = static_cast<std::size_t>(light.rows / 2) * static_cast<std::size_t>(light.columns) +
+                             static_cast<std::size_t>(light.columns / 2);
+  return static_cast<double>(light.background[middle]);
+}
+
 // Beads hidden in the residual are added; true if there were any.
 bool add_missed(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least_score) {
   const int factor = map_reduction(radius);
@@ -336,7 +342,34 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
         "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but none is filled like a bead";
     return result;
   }
-  calibration.radius_px = radius;
+  calibration.radius_px = calibration.rim_radius_px = radius;
+  // Rims that face open background tell the radius where the packed ones cannot: if the camera's tone curve bends, or
+  // if what lies between packed beads is neither bead nor background.
+  double radius_doubt = 0;
+  const RimFit packed = fit_rim(profile, radius, edge);
+  constexpr double poor_misfit = 0.012;
+  if (!options.hold_radius && (!packed.good || packed.misfit > poor_misfit)) {
+    std::vector<const std::vector<ModelDisk>*> disk_pointers;
+    for (const auto& one : disks) disk_pointers.push_back(&one);
+    const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
+    if (free_rim.sectors >= 20) {
+      const double background = mean_background(light), contrast = mean_contrast(light);
+      const ToneFit tone =
+          fit_tone_exponent(free_rim.profile, background, std::max(0.0, background + contrast), radius, edge);
+      if (tone.chosen.good) {
+        calibration.tone_exponent = tone.exponent;
+        calibration.radius_px = tone.chosen.radius_px;
+        if (tone.exponent != 1) {
+          radius_doubt = 0.25 * std::abs(tone.chosen.radius_px - tone.linear.radius_px);
+          calibration.warnings.push_back(
+              "Rims fall steeper on their dark side, as in pictures encoded for display: the radius is told in "
+              "light, " +
+              std::to_string(tone.chosen.radius_px) + " px; taken from the recorded levels it would be " +
+              std::to_string(tone.linear.radius_px) + " px.");
+        }
+      }
+    }
+  }
   calibration.edge_width_px = edge;
   calibration.profile = profile;
   calibration.light = light;
@@ -346,7 +379,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   // px^2.
   const double information =
       static_cast<double>(total) * 2 * 3.14159265 * radius / (2 * std::sqrt(3.14159265) * std::max(0.3, edge));
-  calibration.radius_std_error_px = std::hypot(spread / std::sqrt(information), 0.002);
+  calibration.radius_std_error_px = std::hypot(spread / std::sqrt(information), 0.002, radius_doubt);
   calibration.frames_used = used.size();
   calibration.disks_used = total;
   if (total < 5)
@@ -365,8 +398,8 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
                          std::to_string(calibration.height) + " px";
     return result;
   }
-  const double radius = calibration.radius_px, edge = calibration.edge_width_px;
-  GrayFrame flat = flatten(frame, calibration.light);
+  const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
+  const GrayFrame flat = flatten(frame, calibration.light);
   const int factor = map_reduction(radius);
   std::vector<ModelDisk> disks =
       disks_at(find_candidates(reduced(flat, factor), factor, radius, 0.3, 2 * radius * least_separation));
@@ -418,7 +451,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     FoundDisk found;
     found.x_px = disk.x;
     found.y_px = disk.y;
-    found.radius_px = radius;
+    found.radius_px = calibration.radius_px;
     const double determinant = disk.hessian_xx * disk.hessian_yy - disk.hessian_xy * disk.hessian_xy;
     if (determinant > 0) {
       found.variance_x = noise * noise * disk.hessian_yy / determinant;
@@ -463,7 +496,7 @@ GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const 
   if (frame.width != calibration.width || frame.height != calibration.height)
     throw std::invalid_argument("residual_frame: the frame has not the size of the film's frames");
   const GrayFrame flat = flatten(frame, calibration.light);
-  const ProfileTable table(calibration.profile, calibration.radius_px, calibration.edge_width_px, 0);
+  const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
   JointFit fit(flat);
   fit.set_table(&table);
   for (const FoundDisk& disk : found.disks) fit.subtract(disk.x_px, disk.y_px, 1.0F);

@@ -43,9 +43,11 @@ struct FinderCalibration {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   double radius_std_error_px = 0;
+  double rim_radius_px = 0;   // where the recorded profile has its edge: radius_px unless the tone curve moves it
   double edge_width_px = 0;   // sigma of the blurred edge, the pixel's own 0.29 px included
   double noise_level = 0;     // sigma of the residuals in grey levels, away from edges
   double contrast_level = 0;  // bead minus background, grey levels, at the middle of the frame
+  double tone_exponent = 1;   // recorded level = light^exponent, told from the rims; 1 for a linear camera
   int width = 0, height = 0;  // of the frames it was learned from
   BeadProfile profile;
   LightField light;

@@ -1,11 +1,9 @@
 #include "ingest/frames.hpp"
 
 #include <fnmatch.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +15,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <utility>
+
+#include "ingest/atomic_file.hpp"
 
 namespace shakebed::ingest {
 
@@ -628,28 +628,7 @@ void write_png(const fs::path& path, const GrayFrame& frame, int compression) {
     parameters.push_back(cv::IMWRITE_PNG_STRATEGY_RLE);
   }
   cv::imencode(".png", picture, bytes, parameters);
-  static std::atomic<unsigned> serial{0};
-  fs::path temporary = path;
-  temporary += ".part" + std::to_string(static_cast<long>(getpid())) + "_" + std::to_string(serial.fetch_add(1));
-  {
-    std::ofstream file(temporary, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    file.flush();
-    if (!file) {
-      std::error_code ignored;
-      file.close();
-      fs::remove(temporary, ignored);
-      throw InputError(path.string(), "the picture cannot be written", "the folder is missing, read-only or full",
-                       "choose another output folder");
-    }
-  }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw InputError(path.string(), "the picture cannot be written", error.message(), "choose another output folder");
-  }
+  write_file_atomically(path, std::string(bytes.begin(), bytes.end()));
 }
 
 }  // namespace shakebed::ingest

@@ -1,0 +1,522 @@
+#include "ingest/measure_bed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+#include <numbers>
+#include <stdexcept>
+#include <thread>
+
+#include "ingest/atomic_file.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// What one frame gave, before heights are known.
+struct FrameFindings {
+  FrameReport report;
+  std::vector<FoundDisk> disks;
+  std::vector<float> coverage_of_row;  // covered px of each row
+};
+
+void check(const MeasureOptions& options) {
+  const auto require = [](bool condition, const std::string& what) {
+    if (!condition) throw std::invalid_argument("measure_bed: " + what);
+  };
+  require(std::isfinite(options.bead_diameter_m) && options.bead_diameter_m > 0, "bead_diameter_m must be positive");
+  require(!options.scale_m_per_px || *options.scale_m_per_px > 0, "scale_m_per_px must be positive");
+  require(options.bin_width > 0 && options.kernel.width > 0, "bin_width and kernel.width must be positive");
+  require(!options.left_wall_px || !options.right_wall_px || *options.left_wall_px < *options.right_wall_px,
+          "the left wall must lie left of the right wall");
+  require(options.shaking_frequency_hz.has_value() <= options.frame_rate_hz.has_value(),
+          "phases need the frame rate beside the shaking frequency");
+  require(options.phase_bins > 0, "phase_bins must be positive");
+}
+
+double quantile(std::vector<double> values, double fraction) {
+  if (values.empty()) return 0;
+  const auto place = static_cast<std::ptrdiff_t>(std::lround(fraction * static_cast<double>(values.size() - 1)));
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  return values[static_cast<std::size_t>(place)];
+}
+
+// Area under a bead's profile over the area of its disk: what turns summed contrast into covered area.
+double contrast_per_area(const FinderCalibration& finder) {
+  double sum = 0;
+  for (std::size_t i = 0; i < finder.profile.level.size(); ++i) {
+    const double r = static_cast<double>(i) * finder.profile.step_px;
+    sum += 2 * std::numbers::pi * r * finder.profile.step_px * static_cast<double>(finder.profile.level[i]);
+  }
+  return sum / (std::numbers::pi * finder.radius_px * finder.radius_px);
+}
+
+FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, const MeasureOptions& options,
+                      double per_area) {
+  FrameFindings findings;
+  findings.report.index = item.index;
+  findings.report.origin = item.origin;
+  GrayFrame frame;
+  try {
+    frame = item.decode();
+  } catch (const InputError& error) {
+    findings.report.status = FrameStatus::unreadable;
+    findings.report.why = error.what();
+    return findings;
+  }
+  if (frame.width != finder.width || frame.height != finder.height) {
+    findings.report.status = FrameStatus::size_changed;
+    findings.report.why = "the frame is " + std::to_string(frame.width) + " x " + std::to_string(frame.height) +
+                          " px, the frames before it " + std::to_string(finder.width) + " x " +
+                          std::to_string(finder.height);
+    return findings;
+  }
+  FindResult found = find_disks(frame, finder, options.find);
+  findings.report.disks = found.disks.size();
+  findings.report.rejected = found.rejected;
+  findings.report.residual_level = found.residual_level;
+  if (found.empty()) {
+    findings.report.status = FrameStatus::nothing_found;
+    findings.report.why = found.why_nothing;
+  }
+  if (options.profile_from_coverage) {
+    const GrayFrame flat = flatten(frame, finder.light);
+    int left = 0, right = frame.width;
+    if (options.left_wall_px)
+      left = std::clamp(static_cast<int>(std::lround(*options.left_wall_px + 0.5)), 0, frame.width);
+    if (options.right_wall_px)
+      right = std::clamp(static_cast<int>(std::lround(*options.right_wall_px + 0.5)), left, frame.width);
+    findings.coverage_of_row.resize(static_cast<std::size_t>(frame.height));
+    for (int row = 0; row < frame.height; ++row) {
+      double sum = 0;
+      const float* line = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width);
+      for (int column = left; column < right; ++column) sum += static_cast<double>(line[column]);
+      findings.coverage_of_row[static_cast<std::size_t>(row)] = static_cast<float>(sum / per_area);
+    }
+  }
+  findings.disks = std::move(found.disks);
+  return findings;
+}
+
+// Straight line y = a + b x through the bottoms of the lowest disks, by Huber's weights.
+struct Line {
+  double offset = 0, slope = 0;
+};
+Line robust_line(const std::vector<std::pair<double, double>>& points) {
+  Line line;
+  if (points.empty()) return line;
+  std::vector<double> heights;
+  for (const auto& point : points) heights.push_back(point.second);
+  line.offset = quantile(heights, 0.5);
+  if (points.size() < 4) return line;
+  for (int round = 0; round < 30; ++round) {
+    std::vector<double> sizes;
+    for (const auto& [x, y] : points) sizes.push_back(std::abs(y - line.offset - line.slope * x));
+    const double spread = std::max(0.02, 1.4826 * quantile(sizes, 0.5));
+    double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
+    for (const auto& [x, y] : points) {
+      const double size = std::abs(y - line.offset - line.slope * x) / spread;
+      const double weight = size < 1.5 ? 1 : size > 6 ? 0 : 1.5 / size;
+      w += weight;
+      wx += weight * x;
+      wy += weight * y;
+      wxx += weight * x * x;
+      wxy += weight * x * y;
+    }
+    const double determinant = w * wxx - wx * wx;
+    if (!(determinant > 1e-9 * w * wxx)) break;
+    line.slope = (w * wxy - wx * wy) / determinant;
+    line.offset = (wy - line.slope * wx) / w;
+  }
+  return line;
+}
+
+// The floor as the disks tell it: per column of the frame, the lowest bottom seen in nearly all frames.
+Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, int width) {
+  const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
+  std::vector<std::vector<std::pair<double, double>>> lowest(columns);  // (bottom, x) per frame
+  for (const FrameFindings& frame : frames) {
+    std::vector<std::pair<double, double>> best(columns, {-1, 0});
+    for (const FoundDisk& disk : frame.disks) {
+      const double bottom = disk.y_px + disk.radius_px;
+      const auto column = std::min(
+          columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
+      if (bottom > best[column].first) best[column] = {bottom, disk.x_px};
+    }
+    for (std::size_t c = 0; c < columns; ++c)
+      if (best[c].first > 0) lowest[c].push_back(best[c]);
+  }
+  std::vector<std::pair<double, double>> points;
+  for (auto& column : lowest) {
+    if (column.empty()) continue;
+    std::sort(column.begin(), column.end());
+    const auto& chosen = column[static_cast<std::size_t>(0.95 * static_cast<double>(column.size() - 1))];
+    points.emplace_back(chosen.second, chosen.first);
+  }
+  // Columns without beads at the floor would pull the line up: start from the lower half.
+  std::vector<double> heights;
+  for (const auto& point : points) heights.push_back(point.second);
+  const double typical = quantile(heights, 0.6);
+  std::vector<std::pair<double, double>> low;
+  for (const auto& point : points)
+    if (point.second > typical - 0.6 * diameter_px) low.push_back(point);
+  return robust_line(low);
+}
+
+}  // namespace
+
+Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
+  check(options);
+  Measurement measurement;
+  FindOptions find = options.find;
+  if (options.scale_m_per_px && !find.radius_px) {
+    find.radius_px =
+        0.5 * options.bead_diameter_m / *options.scale_m_per_px;  // a good first value; refined all the same
+  }
+
+  // Learn the bead from the first frames that show any; one full frame is enough, sparse ones are taken together.
+  constexpr std::size_t enough_disks = 150;
+  constexpr std::size_t most_tried = 40;
+  std::vector<GrayFrame> learned_from;
+  CalibrationResult calibrated;
+  std::string first_reason, first_error;
+  std::size_t read = 0;
+  source.rewind();
+  for (std::size_t tried = 0; tried < most_tried; ++tried) {
+    auto item = source.next_item();
+    if (!item) break;
+    GrayFrame frame;
+    try {
+      frame = item->decode();
+    } catch (const InputError& error) {
+      if (first_error.empty()) first_error = error.what();
+      continue;
+    }
+    ++read;
+    learned_from.push_back(std::move(frame));
+    std::vector<const GrayFrame*> pointers;
+    if (calibrated.found)
+      for (const GrayFrame& one : learned_from) pointers.push_back(&one);
+    else
+      pointers = {&learned_from.back()};
+    CalibrationResult attempt = calibrate_finder(pointers, find);
+    if (!attempt.found) {
+      if (first_reason.empty()) first_reason = attempt.why_not;
+      learned_from.pop_back();
+      continue;
+    }
+    calibrated = std::move(attempt);
+    if (calibrated.calibration.disks_used >= enough_disks || learned_from.size() >= options.calibration_frames) break;
+  }
+  if (!calibrated.found) {
+    if (read == 0)
+      throw InputError("(frames)", "no frame could be read", first_error.empty() ? "the stream is empty" : first_error,
+                       "check the files");
+    throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", first_reason,
+                     "check that the beads are in view, or give their radius and polarity");
+  }
+  learned_from.clear();
+  learned_from.shrink_to_fit();
+  measurement.finder = calibrated.calibration;
+  const FinderCalibration& finder = measurement.finder;
+
+  // Every frame on its own: what a frame gives depends on nothing but the calibration, so threads change nothing.
+  const double per_area = contrast_per_area(finder);
+  source.rewind();
+  std::vector<FrameFindings> findings;
+  std::mutex source_mutex, result_mutex;
+  std::size_t done = 0;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (;;) {
+      std::optional<FrameSource::Item> item;
+      {
+        const std::lock_guard<std::mutex> lock(source_mutex);
+        if (failure) return;
+        try {
+          item = source.next_item();
+        } catch (...) {
+          failure = std::current_exception();
+          return;
+        }
+      }
+      if (!item) return;
+      try {
+        FrameFindings one = examine(*item, finder, options, per_area);
+        const std::lock_guard<std::mutex> lock(result_mutex);
+        if (findings.size() <= one.report.index) findings.resize(one.report.index + 1);
+        const std::size_t index = one.report.index;
+        findings[index] = std::move(one);
+        ++done;
+        if (options.progress) options.progress(done);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(source_mutex);
+        if (!failure) failure = std::current_exception();
+        return;
+      }
+    }
+  };
+  if (options.threads <= 1) {
+    work();
+  } else {
+    std::vector<std::thread> threads;
+    for (unsigned k = 0; k < options.threads; ++k) threads.emplace_back(work);
+    for (std::thread& thread : threads) thread.join();
+  }
+  if (failure) std::rethrow_exception(failure);
+
+  // Geometry.
+  BedCalibration& bed = measurement.calibration;
+  bed.radius_px = finder.radius_px;
+  bed.radius_std_error_px = finder.radius_std_error_px;
+  bed.edge_width_px = finder.edge_width_px;
+  bed.noise_level = finder.noise_level;
+  bed.contrast_level = finder.contrast_level;
+  bed.polarity = finder.polarity;
+  bed.scale_given = options.scale_m_per_px.has_value();
+  bed.scale_m_per_px = bed.scale_given ? *options.scale_m_per_px : options.bead_diameter_m / (2 * finder.radius_px);
+  bed.scale_relative_std_error = bed.scale_given ? 0 : finder.radius_std_error_px / finder.radius_px;
+  const double diameter_px = options.bead_diameter_m / bed.scale_m_per_px;
+  if (bed.scale_given && std::abs(2 * finder.radius_px / diameter_px - 1) > 0.02)
+    measurement.warnings.push_back("The scale given makes a bead " + std::to_string(diameter_px) +
+                                   " px wide, but the frames show " + std::to_string(2 * finder.radius_px) + " px.");
+  bed.floor_given = options.floor_px.has_value();
+  if (bed.floor_given) {
+    bed.floor_px = *options.floor_px;
+    bed.floor_slope = options.floor_slope.value_or(0.0);
+  } else {
+    const Line floor = find_floor(findings, diameter_px, finder.width);
+    bed.floor_px = floor.offset;
+    bed.floor_slope = options.floor_slope.value_or(floor.slope);
+    if (options.floor_slope) {  // keep the line through the middle of the frame
+      bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
+    }
+  }
+  bed.floor_tilt_degrees = std::atan(bed.floor_slope) * 180 / std::numbers::pi;
+
+  const double frame_left = options.find.roi ? options.find.roi->left - 0.5 : -0.5;
+  const double frame_right =
+      options.find.roi ? options.find.roi->left + options.find.roi->width - 0.5 : finder.width - 0.5;
+  bed.walls_given = options.left_wall_px && options.right_wall_px;
+  std::vector<double> leftmost, rightmost;
+  for (const FrameFindings& frame : findings) {
+    double low = 1e9, high = -1e9;
+    for (const FoundDisk& disk : frame.disks) {
+      low = std::min(low, disk.x_px - finder.radius_px);
+      high = std::max(high, disk.x_px + finder.radius_px);
+    }
+    if (frame.disks.empty()) continue;
+    leftmost.push_back(low);
+    rightmost.push_back(high);
+  }
+  const auto side = [&](const std::optional<double>& given, std::vector<double>& seen, double frame_side, bool left) {
+    if (given) return *given;
+    const double extreme = quantile(seen, left ? 0.1 : 0.9);
+    const bool cut = left ? extreme < frame_side - 0.02 * diameter_px : extreme > frame_side + 0.02 * diameter_px;
+    if (!cut) return extreme;
+    // Beads go on beyond the frame: only centres a radius inside are counted, so that each of them is seen whole.
+    bed.walls_are_frame_sides = true;
+    return left ? frame_side + finder.radius_px : frame_side - finder.radius_px;
+  };
+  bed.left_wall_px = side(options.left_wall_px, leftmost, frame_left, true);
+  bed.right_wall_px = side(options.right_wall_px, rightmost, frame_right, false);
+  bed.width = (bed.right_wall_px - bed.left_wall_px) / diameter_px;
+  if (!(bed.width > 0)) {
+    bed.left_wall_px = frame_left;
+    bed.right_wall_px = frame_right;
+    bed.width = (frame_right - frame_left) / diameter_px;
+    measurement.warnings.push_back("The side walls could not be told from the disks: the whole frame's width is used.");
+  }
+  if (bed.walls_are_frame_sides)
+    measurement.warnings.push_back("The bed goes on beyond the frame: the profile is that of the part in view.");
+
+  // Disks in heights.
+  double highest = 0;
+  std::vector<std::vector<double>> heights(findings.size());
+  std::vector<double> counts;
+  std::size_t good = 0, cut_below = 0;
+  const double cosine = std::cos(std::atan(bed.floor_slope));
+  for (std::size_t f = 0; f < findings.size(); ++f) {
+    FrameFindings& frame = findings[f];
+    measurement.frames.push_back(frame.report);
+    if (frame.report.status == FrameStatus::good || frame.report.status == FrameStatus::nothing_found) {
+      ++good;
+      counts.push_back(static_cast<double>(frame.disks.size()));
+    }
+    for (const FoundDisk& disk : frame.disks) {
+      MeasuredDisk measured;
+      measured.frame = frame.report.index;
+      measured.x_px = disk.x_px;
+      measured.y_px = disk.y_px;
+      measured.radius_px = disk.radius_px;
+      measured.z = (bed.floor_px + bed.floor_slope * disk.x_px - disk.y_px) * cosine / diameter_px;
+      measured.x = ((disk.x_px - bed.left_wall_px) * cosine +
+                    (disk.y_px - bed.floor_px - bed.floor_slope * disk.x_px) * cosine * bed.floor_slope) /
+                   diameter_px;
+      measured.quality = disk.quality;
+      measured.std_error_px = std::sqrt(std::max(0.0, 0.5 * (disk.variance_x + disk.variance_y)));
+      measured.cut = disk.cut;
+      measured.half_hidden = disk.half_hidden;
+      measurement.disks.push_back(measured);
+      const bool in_width = disk.x_px >= bed.left_wall_px && disk.x_px < bed.right_wall_px;
+      if (in_width) heights[f].push_back(measured.z);
+      highest = std::max(highest, measured.z);
+      cut_below += disk.cut && disk.y_px > finder.height - finder.radius_px;
+    }
+    frame.disks.clear();
+    frame.disks.shrink_to_fit();
+  }
+
+  // Profiles.
+  HeightBins bins;
+  bins.lowest = options.lowest.value_or(0.0);
+  bins.width = options.bin_width;
+  const double top = options.highest.value_or(highest + 1);
+  if (top > bins.lowest)
+    bins.count = static_cast<std::size_t>(std::clamp(std::ceil((top - bins.lowest) / bins.width - 1e-9), 1.0, 1e5));
+  std::vector<std::vector<double>> densities;
+  std::vector<std::size_t> frame_of;
+  for (std::size_t f = 0; f < findings.size(); ++f) {
+    const FrameStatus status = findings[f].report.status;
+    if (status == FrameStatus::unreadable || status == FrameStatus::size_changed) continue;
+    densities.push_back(density_of_frame(heights[f], bed.width, bins, options.kernel));
+    frame_of.push_back(f);
+  }
+  measurement.profile = average_profile(densities, bins, options.kernel, bed.scale_relative_std_error);
+
+  if (options.profile_from_coverage) {
+    // Rows are laid over the bins; what the centres say is seen through the disk's chord for comparison.
+    const double counted_width = options.left_wall_px && options.right_wall_px
+                                     ? *options.right_wall_px - *options.left_wall_px
+                                 : bed.walls_are_frame_sides ? frame_right - frame_left
+                                                             : bed.right_wall_px - bed.left_wall_px;
+    std::vector<std::vector<double>> covered;
+    std::vector<double> through_chord(bins.count, 0.0);
+    const double middle_floor = bed.floor_px + bed.floor_slope * 0.5 * finder.width;
+    const auto part_below = [](double t) {  // part of a unit-diameter disk's area below t of its centre
+      if (t <= -0.5) return 0.0;
+      if (t >= 0.5) return 1.0;
+      const double s = 2 * t;
+      return 0.5 + (s * std::sqrt(1 - s * s) + std::asin(s)) / std::numbers::pi;
+    };
+    for (const std::size_t f : frame_of) {
+      const auto& rows = findings[f].coverage_of_row;
+      std::vector<double> area(bins.count, 0.0);
+      for (std::size_t row = 0; row < rows.size(); ++row) {
+        const double upper = (middle_floor - static_cast<double>(row) + 0.5) / diameter_px;
+        const double lower = upper - 1 / diameter_px;
+        const double first = std::floor((lower - bins.lowest) / bins.width);
+        for (double bin = std::max(0.0, first); bin < static_cast<double>(bins.count); ++bin) {
+          const double bin_low = bins.lowest + bin * bins.width, bin_high = bin_low + bins.width;
+          if (bin_low >= upper) break;
+          const double overlap = std::min(upper, bin_high) - std::max(lower, bin_low);
+          if (overlap > 0)
+            area[static_cast<std::size_t>(bin)] += static_cast<double>(rows[row]) * overlap * diameter_px;
+        }
+      }
+      for (double& value : area) value *= 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
+      covered.push_back(std::move(area));
+      for (const double height : heights[f])
+        for (std::size_t bin = 0; bin < bins.count; ++bin) {
+          const double low = bins.lowest + static_cast<double>(bin) * bins.width - height;
+          if (low > 0.5 || low + bins.width < -0.5) continue;
+          through_chord[bin] += (part_below(low + bins.width) - part_below(low)) /
+                                (bins.width * bed.width * static_cast<double>(frame_of.size()));
+        }
+    }
+    DensityProfile coverage =
+        average_profile(covered, bins, {KernelKind::disk_chord, 1.0}, bed.scale_relative_std_error);
+    double square = 0;
+    std::size_t compared = 0;
+    for (std::size_t bin = 0; bin < bins.count; ++bin) {
+      if (through_chord[bin] < 0.1) continue;
+      const double difference = through_chord[bin] - coverage.number_density[bin];
+      square += difference * difference;
+      ++compared;
+    }
+    measurement.coverage_disagreement = compared ? std::sqrt(square / static_cast<double>(compared)) : 0;
+    if (measurement.coverage_disagreement > 0.03) {
+      char text[200];
+      std::snprintf(
+          text, sizeof text,
+          "Density from covered area differs from density from centres by %.3f in n D^2 (rms where it exceeds 0.1): "
+          "beads of another kind, walls, dirt or missed beads.",
+          measurement.coverage_disagreement);
+      measurement.warnings.emplace_back(text);
+    }
+    measurement.coverage_profile = std::move(coverage);
+  }
+
+  if (options.shaking_frequency_hz && options.frame_rate_hz) {
+    std::vector<std::vector<std::vector<double>>> by_phase(options.phase_bins);
+    for (std::size_t k = 0; k < densities.size(); ++k) {
+      const double turns = static_cast<double>(frame_of[k]) / *options.frame_rate_hz * *options.shaking_frequency_hz;
+      const double phase = turns - std::floor(turns);
+      const auto bin = std::min(options.phase_bins - 1,
+                                static_cast<std::size_t>((phase + 1e-9) * static_cast<double>(options.phase_bins)));
+      by_phase[bin].push_back(densities[k]);
+    }
+    for (std::size_t bin = 0; bin < options.phase_bins; ++bin) {
+      if (by_phase[bin].empty()) continue;
+      PhaseProfile phase;
+      phase.phase = (static_cast<double>(bin) + 0.5) / static_cast<double>(options.phase_bins);
+      phase.profile = average_profile(by_phase[bin], bins, options.kernel, bed.scale_relative_std_error);
+      measurement.phases.push_back(std::move(phase));
+    }
+  }
+
+  // Bead number against time, and what else deserves a word.
+  for (const double count : counts) measurement.disk_count_mean += count / static_cast<double>(counts.size());
+  for (const double count : counts)
+    measurement.disk_count_std += (count - measurement.disk_count_mean) * (count - measurement.disk_count_mean);
+  measurement.disk_count_std =
+      counts.size() > 1 ? std::sqrt(measurement.disk_count_std / static_cast<double>(counts.size() - 1)) : 0;
+  for (const std::string& warning : finder.warnings) measurement.warnings.push_back(warning);
+  std::size_t bad = 0;
+  for (const FrameReport& report : measurement.frames) bad += report.status != FrameStatus::good;
+  if (bad) {
+    std::string example;
+    for (const FrameReport& report : measurement.frames)
+      if (report.status != FrameStatus::good) {
+        example = report.why;
+        break;
+      }
+    measurement.warnings.push_back(std::to_string(bad) + " of " + std::to_string(measurement.frames.size()) +
+                                   " frames gave nothing; the first: " + example);
+  }
+  if (measurement.disk_count_mean > 0 && measurement.disk_count_std > 0.01 * measurement.disk_count_mean) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "The number of disks found varies by %.1f from frame to frame around %.1f: beads leave the view, or "
+                  "are missed.",
+                  measurement.disk_count_std, measurement.disk_count_mean);
+    measurement.warnings.emplace_back(text);
+  }
+  if (good > 0 && cut_below > good && !bed.floor_given)
+    measurement.warnings.push_back("Beads are cut by the lower border of the frame: the floor is not in view.");
+  if (std::abs(bed.floor_tilt_degrees) > 0.5) {
+    char text[160];
+    std::snprintf(text, sizeof text, "The floor is tilted by %.2f degrees; heights are measured across it.",
+                  bed.floor_tilt_degrees);
+    measurement.warnings.emplace_back(text);
+  }
+  return measurement;
+}
+
+void write_disks_csv(const std::filesystem::path& path, const Measurement& measurement,
+                     const std::vector<std::string>& comments) {
+  std::string text;
+  for (const std::string& comment : comments) text += "# " + comment + "\n";
+  text += "frame,x_px,y_px,radius_px,x,z,quality\n";
+  text.reserve(text.size() + 90 * measurement.disks.size());
+  char line[256];
+  for (const MeasuredDisk& disk : measurement.disks) {
+    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.4f,%.6f,%.6f,%.4f\n", disk.frame, disk.x_px, disk.y_px,
+                  disk.radius_px, disk.x, disk.z, disk.quality);
+    text += line;
+  }
+  write_file_atomically(path, text);
+}
+
+}  // namespace shakebed::ingest
