@@ -59,6 +59,7 @@ BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::u
       layer_bottom_(std::floor(grid.lowest)),
       period_sum_(2 * grid.points + scalar_count),
       means_(2 * grid.points + scalar_count),
+      covariance_(grid.points),
       centre_by_phase_(phases),
       layers_(phases * layer_count_) {
   for (std::size_t i = 0; i < masses_.size(); ++i)
@@ -104,6 +105,7 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
   mean_mass_ = mass / n;
   if (phase + 1 == phases_) {
     means_.add(period_sum_);
+    covariance_.add(std::span(period_sum_).first(grid_.points));
     ++periods_;
   }
 }

@@ -52,6 +52,11 @@ class BedObserver {
 
   std::uint64_t periods() const { return periods_; }
   Profile density(bool floor_frame) const;
+  // Covariance of the lab frame's densities, points first to last-1 of the grid, row by row.
+  std::vector<double> density_covariance(std::size_t first, std::size_t last) const {
+    return covariance_.of_means(first, last);
+  }
+  std::size_t covariance_blocks() const { return covariance_.independent_blocks(); }
   Measured centre_of_mass() const;
   Measured temperature_x() const;        // m <v_x^2>
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
@@ -81,6 +86,7 @@ class BedObserver {
   std::uint64_t periods_ = 0;
   std::vector<double> period_sum_;  // lab profile, floor profile, then scalars: see observe()
   BlockedMean means_;
+  BlockedCovariance covariance_;
   std::vector<double> mean_vz_, mean_vz2_;  // a value a phase and period; the second with the mass
   double mean_mass_ = 1;
   std::vector<double> centre_by_phase_;

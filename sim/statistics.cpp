@@ -43,4 +43,48 @@ double BlockedMean::std_error(std::size_t i) const {
   return largest;
 }
 
+void BlockedCovariance::add(std::span<const double> sample) {
+  constexpr std::size_t most_blocks = 512;
+  if (in_block_ == 0) sum_.assign(size_, 0.0);
+  for (std::size_t i = 0; i < size_; ++i) sum_[i] += sample[i];
+  if (++in_block_ < block_length_) return;
+  for (double& value : sum_) value /= static_cast<double>(block_length_);
+  blocks_.push_back(sum_);
+  in_block_ = 0;
+  if (blocks_.size() < most_blocks) return;
+  for (std::size_t b = 0; b < most_blocks / 2; ++b) {
+    for (std::size_t i = 0; i < size_; ++i) blocks_[b][i] = 0.5 * (blocks_[2 * b][i] + blocks_[2 * b + 1][i]);
+  }
+  blocks_.resize(most_blocks / 2);
+  block_length_ *= 2;
+}
+
+std::size_t BlockedCovariance::independent_blocks() const {
+  const std::size_t joined = std::max<std::size_t>(1, blocks_.size() / 128);
+  return blocks_.size() / joined;
+}
+
+std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t last) const {
+  const std::size_t joined = std::max<std::size_t>(1, blocks_.size() / 128), count = blocks_.size() / joined;
+  const std::size_t n = last - first;
+  std::vector<double> covariance(n * n, 0.0), mean(n, 0.0);
+  if (count < 2) return covariance;
+  std::vector<std::vector<double>> deviations(count, std::vector<double>(n, 0.0));
+  for (std::size_t b = 0; b < count; ++b) {
+    for (std::size_t j = 0; j < joined; ++j) {
+      for (std::size_t i = 0; i < n; ++i)
+        deviations[b][i] += blocks_[b * joined + j][first + i] / static_cast<double>(joined);
+    }
+    for (std::size_t i = 0; i < n; ++i) mean[i] += deviations[b][i] / static_cast<double>(count);
+  }
+  const double divisor = static_cast<double>(count) * static_cast<double>(count - 1);
+  for (std::vector<double>& deviation : deviations) {
+    for (std::size_t i = 0; i < n; ++i) deviation[i] -= mean[i];
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < n; ++k) covariance[i * n + k] += deviation[i] * deviation[k] / divisor;
+    }
+  }
+  return covariance;
+}
+
 }  // namespace shakebed::sim

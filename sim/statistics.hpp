@@ -33,4 +33,23 @@ class BlockedMean {
   std::vector<Level> levels_;
 };
 
+// The covariance of means of correlated quantities: keeps block means, at most 512, and doubles the block length when
+// there are more, so memory does not grow with the samples.
+class BlockedCovariance {
+ public:
+  explicit BlockedCovariance(std::size_t size = 1) : size_(size) {}
+  void add(std::span<const double> sample);  // of `size` values
+  std::size_t blocks() const { return blocks_.size(); }
+  // Of the means of the quantities first to last-1, row by row. Blocks are joined until about 128 are left, so that
+  // neighbouring ones are as good as independent. Zeros with fewer than 2 blocks.
+  std::vector<double> of_means(std::size_t first, std::size_t last) const;
+  std::size_t independent_blocks() const;  // that of_means() rests on
+
+ private:
+  std::size_t size_;
+  std::size_t block_length_ = 1, in_block_ = 0;
+  std::vector<double> sum_;
+  std::vector<std::vector<double>> blocks_;
+};
+
 }  // namespace shakebed::sim

@@ -141,15 +141,23 @@ Simulate::Schedule Simulate::schedule() const {
   return plan;
 }
 
+// The rows from the lowest to the highest that holds anything.
+struct Rows {
+  std::size_t first, last;
+};
+Rows filled_rows(const sim::Profile& profile) {
+  Rows rows{0, profile.height.size()};
+  while (rows.first < rows.last && profile.number_density[rows.first] < 1e-12) ++rows.first;
+  while (rows.last > rows.first && profile.number_density[rows.last - 1] < 1e-12) --rows.last;
+  return rows;
+}
+
 ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
                       const std::vector<std::string>& comments) {
   ProfileTable table;
   table.comments = comments;
-  // Without the empty rows above the highest disk and below the lowest.
-  std::size_t first = 0, last = profile.height.size();
-  while (first < last && profile.number_density[first] < 1e-12) ++first;
-  while (last > first && profile.number_density[last - 1] < 1e-12) --last;
-  for (std::size_t i = first; i < last; ++i) {
+  const Rows rows = filled_rows(profile);
+  for (std::size_t i = rows.first; i < rows.last; ++i) {
     const double phi = profile.number_density[i];
     table.height.push_back(profile.height[i]);
     table.number_density.push_back(phi);
@@ -158,6 +166,24 @@ ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
     table.samples.push_back(std::round(phi * width * spacing * static_cast<double>(profile.samples)));
   }
   return table;
+}
+
+// Of the lab profile: height_i,height_j,covariance for j >= i, only what is not 0.
+std::string covariance_text(const sim::BedObserver& observer) {
+  const sim::Profile profile = observer.density(false);
+  const Rows rows = filled_rows(profile);
+  const std::vector<double> covariance = observer.density_covariance(rows.first, rows.last);
+  const std::size_t n = rows.last - rows.first;
+  std::string text = fmt::format(
+      "# covariance of number_density in profile.csv\n# independent_blocks: {}\nheight_i,height_j,covariance\n",
+      observer.covariance_blocks());
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i; j < n; ++j) {
+      if (covariance[i * n + j] != 0)
+        text += fmt::format("{},{},{}\n", profile.height[rows.first + i], profile.height[rows.first + j], covariance[i * n + j]);
+    }
+  }
+  return text;
 }
 
 void Simulate::run(RunContext& context) const {
@@ -241,7 +267,7 @@ void Simulate::run(RunContext& context) const {
   if (above > 0)
     context.warning(std::to_string(above) +
                     " disk positions lay above the highest bin of the profile and are missing from it");
-  const std::string kernel_name = kernel.kind == sim::KernelKind::gaussian ? "gaussian" : "top_hat";
+  const std::string kernel_name = kernel.kind == sim::KernelKind::gaussian ? "gaussian" : "top-hat";
   const auto comments = [&](const char* frame) {
     return std::vector<std::string>{"heights in D above " + std::string(frame), "kernel: " + kernel_name,
                                     "kernel_width: " + dump_canonical(Json(kernel.width)),
@@ -249,6 +275,7 @@ void Simulate::run(RunContext& context) const {
   };
   write_profile_csv(context.output("profile.csv"), table_of(observer.density(false), scene.box.width, grid.spacing,
                                                             comments("the floor's mean position")));
+  write_file(context.output("covariance.csv"), covariance_text(observer));
   write_profile_csv(context.output("profile_floor_frame.csv"),
                     table_of(observer.density(true), scene.box.width, grid.spacing, comments("the moving floor")));
   if (plan.frames > 0)
