@@ -209,6 +209,17 @@ void SceneOptions::describe(Fields& fields) {
   }
 }
 
+void SceneOptions::set_material(double restitution, double friction, double side_friction) {
+  for (SurfaceOptions* surface : {&disks_.surface, &floor_.surface}) {
+    surface->restitution = restitution;
+    surface->friction = friction;
+  }
+  if (auto* sides = std::get_if<HardSidesOptions>(&box_.sides)) {
+    sides->surface.restitution = restitution;
+    sides->surface.friction = side_friction;
+  }
+}
+
 double SceneOptions::time_unit() const { return gravity_ && !reduced_ ? std::sqrt(disks_.diameter / *gravity_) : 1; }
 
 double SceneOptions::period() const {

@@ -101,6 +101,10 @@ class SceneOptions {
   sim::Scene scene(std::uint64_t seed) const;
   BedDescription description() const;
 
+  // The same bed of another material: disks, floor and sides take the restitution, disks and floor the friction, the
+  // sides theirs.
+  void set_material(double restitution, double friction, double side_friction);
+
   double length_unit() const { return disks_.diameter; }  // D
   double time_unit() const;                               // sqrt(D/g)
   bool weightless() const { return !gravity_; }

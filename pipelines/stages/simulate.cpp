@@ -180,7 +180,8 @@ std::string covariance_text(const sim::BedObserver& observer) {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = i; j < n; ++j) {
       if (covariance[i * n + j] != 0)
-        text += fmt::format("{},{},{}\n", profile.height[rows.first + i], profile.height[rows.first + j], covariance[i * n + j]);
+        text += fmt::format("{},{},{}\n", profile.height[rows.first + i], profile.height[rows.first + j],
+                            covariance[i * n + j]);
     }
   }
   return text;
