@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "fit/value.hpp"
 
@@ -15,6 +16,8 @@
 // where g is positive and vanishes with phi, and the constant K is that of the printed Enskog f (K = c3 + c4) and 0 for
 // the other rows. Only differences of f mean anything. [QuinnHong2000]
 namespace shakebed::fit {
+
+class InverseTable;
 
 // 2/sqrt(3): the number density of close packing.
 inline constexpr double close_packing_density = 1.1547005383792515290;
@@ -77,6 +80,12 @@ class EquationOfState {
   [[nodiscard]] virtual Local local(double number_density) const = 0;
   // g(phi) of the comment at the top.
   [[nodiscard]] virtual double excess(double number_density) const = 0;
+  // chi(phi).
+  [[nodiscard]] virtual double pair_function(double number_density) const;
+  // Densities where Z has a kink or a jump of slope (the ends of a coexistence).
+  [[nodiscard]] virtual std::vector<double> breaks() const { return {}; }
+  // phi against f - f_constant(), to 1e-11: for loops that evaluate whole profiles. Built at the first call.
+  [[nodiscard]] virtual const InverseTable& inverse_table() const = 0;
 
  protected:
   struct Row {

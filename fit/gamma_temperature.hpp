@@ -53,7 +53,8 @@ std::string reading_name(ExpansionReading expansion, JumpHeight jump, ExpansionC
 std::vector<Reading> temperatures_from_gamma(const ShakenBed& bed, const EquationOfState& equation = enskog(),
                                              const WaveForm& wave = WaveForm::sine());
 
-// Backwards: the Gamma at which a reading gives this temperature [m g D]. `bed.gamma` is not read.
+// Backwards: the Gamma at which a reading gives this temperature [m g D]. `bed.gamma` is not read. With a restitution
+// the mean bounce is tabulated in steps of 2 % of Gamma up to 30 and interpolated (about a second).
 struct GammaReading {
   std::string name;
   ValueStatus status = ValueStatus::ok;

@@ -31,18 +31,21 @@ class WaveForm {
 
   [[nodiscard]] ValueStatus status() const { return status_; }
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] double position(double phase) const;           // s
-  [[nodiscard]] double velocity(double phase) const;           // s'
-  [[nodiscard]] double acceleration(double phase) const;       // s''
-  [[nodiscard]] double highest() const { return highest_; }    // max of s over a period
-  [[nodiscard]] double largest_jerk() const { return jerk_; }  // a bound on |s'''|
+  [[nodiscard]] double position(double phase) const;                   // s
+  [[nodiscard]] double velocity(double phase) const;                   // s'
+  [[nodiscard]] double acceleration(double phase) const;               // s''
+  [[nodiscard]] double jerk(double phase) const;                       // s'''
+  [[nodiscard]] double highest() const { return highest_; }            // max of s over a period
+  [[nodiscard]] double largest_jerk() const { return largest_jerk_; }  // a bound on |s'''|
+  [[nodiscard]] double largest_snap() const { return largest_snap_; }  // a bound on |s''''|
 
  private:
   WaveForm() = default;
   std::string name_;
   std::vector<Harmonic> harmonics_;
   double highest_ = 0.0;
-  double jerk_ = 0.0;
+  double largest_jerk_ = 0.0;
+  double largest_snap_ = 0.0;
   ValueStatus status_ = ValueStatus::ok;
 };
 
@@ -68,11 +71,14 @@ struct BounceOptions {
   double restitution = 0.0;
   int transient = 1000;
   int flights = 1000;
-  double initial_phase = 0.0;  // the ball starts at rest on the floor
+  double initial_phase = 0.0;     // the ball starts on the floor here ...
+  double initial_velocity = 0.0;  // ... with this velocity relative to it [g/w]; 0: at rest
 };
 struct BounceStatistics {
   ValueStatus status = ValueStatus::ok;
-  std::array<double, 4> mean_height{};  // over flights, in the order of jump_heights [g/w^2]
+  // Over flights, weighted by their length (so a chattering landing does not drown the jumps), in the order of
+  // jump_heights [g/w^2].
+  std::array<double, 4> mean_height{};
   std::array<double, 4> greatest_height{};
   double mean_flight = 0.0;           // in periods
   double resting_fraction = 0.0;      // of the time, on the floor

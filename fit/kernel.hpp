@@ -27,7 +27,7 @@ bool kernel_kind_from_string(std::string_view name, KernelKind& kind);
 double kernel_density(const Kernel& kernel, double offset);
 // integral_-inf^s K.
 double kernel_cumulative(const Kernel& kernel, double offset);
-// Half the extent beyond which K is nothing (7 standard deviations for a Gaussian: 1e-12 of its weight). [D]
+// Half the extent beyond which K is nothing (6.5 standard deviations for a Gaussian: 1e-10 of its weight). [D]
 double kernel_reach(const Kernel& kernel);
 // Whether the width is finite and not negative.
 bool kernel_is_valid(const Kernel& kernel);

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "fit/convolution.hpp"
+#include "fit/equation_of_state.hpp"
+#include "fit/inverse_table.hpp"
+#include "fit/kernel.hpp"
+
+// A hydrostatic tail over a rectangle, with the derivatives a fit needs. Internal to fit.
+//
+// The tail is phi(h) = phi(F), F = f_reference - (h - reference)/T, for h >= start; the rectangle of
+// `rectangle_density` fills base..start.
+namespace shakebed::fit {
+
+struct Tail {
+  static constexpr std::size_t max_parameters = 3;
+
+  const InverseTable* table = nullptr;
+  double temperature = 0.0;  // T; 0: no tail
+  double base = 0.0;
+  double reference = 0.0;    // a height ...
+  double f_reference = 0.0;  // ... and F = ln phi + g there
+  double start = 0.0;        // max(reference, base)
+  double rectangle_density = 0.0;
+
+  // Derivatives of the above by each parameter.
+  std::array<double, max_parameters> d_temperature{}, d_reference{}, d_f_reference{}, d_rectangle{};
+
+  struct Jump {  // of the density (a coexistence), from `upper` below to `lower` above a height
+    double f, lower, upper;
+  };
+  std::vector<Jump> jumps;
+  std::vector<double> edges;  // heights, ascending from start: see add_convolution
+
+  // To be called when the rest is set: fills edges and jumps.
+  void prepare(const EquationOfState& equation);
+
+  [[nodiscard]] double f_at(double height) const { return f_reference - (height - reference) / temperature; }
+  [[nodiscard]] double height_of_f(double big_f) const { return reference + temperature * (f_reference - big_f); }
+  [[nodiscard]] double density(double height) const;
+
+  // The density through a kernel.
+  [[nodiscard]] double smoothed(double height, const Kernel& kernel) const;
+  // The same and its derivatives by the parameters.
+  [[nodiscard]] std::array<double, 1 + max_parameters> smoothed_with_gradient(double height,
+                                                                              const Kernel& kernel) const;
+
+ private:
+  [[nodiscard]] double rectangle_cover(double height, const Kernel& kernel) const;
+};
+
+}  // namespace shakebed::fit

@@ -1,0 +1,215 @@
+#include "fit/hydrostatic_profile.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "fit/fermi_profile.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+TEST(PublishedProfile, HasThePrintedShape) {
+  const HydrostaticProfile profile = published_profile();
+  ASSERT_TRUE(profile.ok());
+  EXPECT_NEAR(profile.top_of_solid(), 4.41 / 1.10, 1e-14);
+  EXPECT_EQ(profile.density(2.0), 1.10);
+  EXPECT_NEAR(profile.density(4.41 / 1.10 + 1e-9), 1.10, 1e-6);
+  EXPECT_NEAR(profile.column_number(), 11.06, 0.005);  // physics.md
+  EXPECT_NEAR(HydrostaticProfile::tail_over_rectangle(enskog(), 0.36 / 2.99, 4.41, 1.10).column_number(), 11.50, 0.005);
+  EXPECT_NEAR(PublishedFit{}.column().column_number, 11.22, 1e-12);
+}
+
+TEST(HydrostaticProfile, IsInHydrostaticBalance) {
+  for (const EquationOfState* equation : equations_of_state()) {
+    for (const double t : {0.05, 0.12, 0.5, 3.0}) {
+      const auto profile = HydrostaticProfile::of_column(*equation, t, {11.22, 1.10});
+      if (!profile.ok()) {
+        EXPECT_EQ(equation->name(), "kolafa-rottner");  // ends at freezing
+        continue;
+      }
+      // The weight above equals the pressure, by direct quadrature of the density.
+      for (const double height : {0.0, 2.5, 8.0}) {
+        const double top = profile.top_of_solid() + 160.0 * t + 60.0 * t;
+        const double start = std::max(height, profile.top_of_solid());
+        double weight = profile.bottom_density() * std::max(0.0, profile.top_of_solid() - height);
+        const int steps = 400000;
+        const double h = (top - start) / steps;
+        for (int i = 0; i < steps; ++i) weight += h * profile.density(start + (i + 0.5) * h);
+        EXPECT_NEAR(profile.column_above(height), weight, 2e-4) << equation->name() << " " << t << " " << height;
+      }
+      EXPECT_NEAR(profile.column_number(), 11.22, 1e-11) << equation->name() << " " << t;
+    }
+  }
+}
+
+TEST(HydrostaticProfile, HasNoRectangleFromTcOn) {
+  const Column column = column_from_initial_height(20.0, close_packing_density);
+  const double critical = critical_temperature(enskog(), column).value;
+  for (const double t : {0.1, 0.999, 1.0, 1.001, 2.0, 100.0}) {
+    const auto profile = HydrostaticProfile::of_column(enskog(), t * critical, column);
+    ASSERT_TRUE(profile.ok()) << t;
+    EXPECT_NEAR(profile.solid_height(), std::max(0.0, 20.0 * (1.0 - t)), 1e-12);
+    EXPECT_NEAR(profile.column_number() / column.column_number, 1.0, 1e-13) << t;
+    if (t > 1.0) {
+      EXPECT_LT(profile.bottom_density(), close_packing_density);
+    }
+  }
+  const auto cold = HydrostaticProfile::of_column(enskog(), 0.0, column);
+  EXPECT_EQ(cold.solid_height(), 20.0);
+  EXPECT_EQ(cold.density(19.9), close_packing_density);
+  EXPECT_EQ(cold.density(20.1), 0.0);
+  const auto cold_disks = HydrostaticProfile::of_column(best_of(), 0.0, column);
+  EXPECT_NEAR(cold_disks.solid_height(), 20.0, 1e-12);
+}
+
+TEST(HydrostaticProfile, BottomDensityOfTrueDisksIsThatOfPhysics) {
+  // physics.md, mu = 20: 1.131 at T_c, 1.143 at 0.5, 1.150 at 0.2 T_c.
+  const Column column = column_from_initial_height(20.0, close_packing_density);
+  const double critical = critical_temperature(enskog(), column).value;
+  const std::pair<double, double> rows[] = {{1.0, 1.131}, {0.5, 1.143}, {0.2, 1.150}};
+  for (const auto& [t, density] : rows) {
+    EXPECT_NEAR(HydrostaticProfile::of_column(best_of(), t * critical, column).bottom_density(), density, 6e-4) << t;
+  }
+}
+
+TEST(HydrostaticProfile, CenterOfMassFollowsTheRise) {
+  const Column column = column_from_initial_height(20.0, close_packing_density);
+  const double critical = critical_temperature(enskog(), column).value;
+  for (const EquationOfState* equation : {&enskog(), &best_of()}) {
+    for (const double t : {0.2, 0.5, 1.0, 3.0}) {
+      const auto profile = HydrostaticProfile::of_column(*equation, t * critical, column);
+      EXPECT_NEAR(profile.center_of_mass() - 10.0,
+                  hydrostatic_center_of_mass_rise(*equation, column, t * critical).value, 1e-11);
+    }
+  }
+}
+
+// The kernel integral by a fine midpoint rule.
+template <class Profile>
+double brute_force(const Profile& profile, const Kernel& kernel, double height) {
+  const double reach = kernel_reach(kernel);
+  const int steps = 200000;
+  const double h = 2.0 * reach / steps;
+  double sum = 0.0;
+  double weight = 0.0;
+  for (int i = 0; i < steps; ++i) {
+    const double s = -reach + (i + 0.5) * h;
+    const double k = kernel_density(kernel, s);
+    sum += k * profile.density(height + s);
+    weight += k;
+  }
+  return sum / weight;
+}
+
+TEST(Kernels, SmoothTheProfileAsDirectIntegrationDoes) {
+  const Kernel kernels[] = {{KernelKind::top_hat, 0.25},
+                            {KernelKind::top_hat, 3.0},
+                            {KernelKind::gaussian, 0.3},
+                            {KernelKind::gaussian, 1.5},
+                            {KernelKind::disk_chord, 1.0}};
+  const HydrostaticProfile profiles[] = {
+      published_profile(), HydrostaticProfile::of_column(enskog(), 2.0, {11.22, 1.10}),
+      HydrostaticProfile::of_column(enskog(), 1e-3, {11.22, 1.10}),
+      HydrostaticProfile::of_column(best_of(), 0.2, {11.22, 1.10}),
+      HydrostaticProfile::of_column(*find_equation_of_state("luding"), 0.1, {23.0, 1.10})};
+  for (const HydrostaticProfile& profile : profiles) {
+    for (const Kernel& kernel : kernels) {
+      for (const double height : {-0.2, 0.1, 3.9, 4.3, 9.0, 10.15, 12.0, 15.0}) {
+        double smooth = 0.0;
+        profile.sample({&height, 1}, kernel, {&smooth, 1});
+        // 2e-5: the midpoint rule on the steps (the floor, a coexistence) and the square-root ends of the chord.
+        EXPECT_NEAR(smooth, brute_force(profile, kernel, height), 2e-5)
+            << profile.equation().name() << " T " << profile.temperature() << " " << to_string(kernel.kind) << " "
+            << kernel.width << " at " << height;
+      }
+    }
+  }
+}
+
+TEST(Kernels, ConserveTheColumn) {
+  for (const Kernel kernel :
+       {Kernel{KernelKind::top_hat, 0.7}, Kernel{KernelKind::gaussian, 0.4}, Kernel{KernelKind::disk_chord, 1.0}}) {
+    const HydrostaticProfile profile = HydrostaticProfile::of_column(enskog(), 0.12, {11.22, 1.10});
+    std::vector<double> heights;
+    const double h = 0.01;
+    for (double z = -4.0; z < 30.0; z += h) heights.push_back(z);
+    std::vector<double> smooth(heights.size());
+    profile.sample(heights, kernel, smooth);
+    double sum = 0.0;
+    for (const double phi : smooth) sum += h * phi;
+    EXPECT_NEAR(sum, 11.22, kernel.kind == KernelKind::top_hat ? 1e-5 : 1e-6);
+  }
+}
+
+TEST(Kernels, AreNormalisedAndNamed) {
+  for (const Kernel kernel :
+       {Kernel{KernelKind::top_hat, 0.7}, Kernel{KernelKind::gaussian, 0.4}, Kernel{KernelKind::disk_chord, 1.0}}) {
+    for (double s = -3.0; s < 3.0; s += 0.173) {
+      const int steps = 20000;
+      double sum = 0.0;
+      for (int i = 0; i < steps; ++i)
+        sum += kernel_density(kernel, -4.0 + (i + 0.5) * (s + 4.0) / steps) * (s + 4.0) / steps;
+      // a step of the sum at each edge of a top hat
+      EXPECT_NEAR(kernel_cumulative(kernel, s), sum, (s + 4.0) / steps / kernel.width);
+    }
+    KernelKind back = KernelKind::none;
+    EXPECT_TRUE(kernel_kind_from_string(to_string(kernel.kind), back));
+    EXPECT_EQ(back, kernel.kind);
+  }
+  KernelKind kind = KernelKind::none;
+  EXPECT_FALSE(kernel_kind_from_string("boxcar", kind));
+}
+
+TEST(FermiProfile, CenterOfMassRisesAsTheLowTemperatureForm) {
+  const double mu = 20.0;
+  for (const double theta : {0.1, 0.5, 1.0}) {
+    const FermiProfile profile{1.1, mu, theta};
+    EXPECT_NEAR(profile.center_of_mass().value - 0.5 * mu, fermi_center_of_mass_rise(theta, mu), 1e-7);
+  }
+  // Exact at any theta: against direct integration.
+  for (const double theta : {5.0, 20.0, 200.0}) {
+    const FermiProfile profile{1.1, mu, theta};
+    double mass = 0.0;
+    double moment = 0.0;
+    const double h = (mu + 45.0 * theta) / 400000;
+    for (int i = 0; i < 400000; ++i) {
+      const double z = (i + 0.5) * h;
+      mass += h * profile.density(z);
+      moment += h * z * profile.density(z);
+    }
+    EXPECT_NEAR(profile.column_number() / mass, 1.0, 1e-7);
+    EXPECT_NEAR(profile.center_of_mass().value / (moment / mass), 1.0, 1e-7);
+  }
+}
+
+TEST(FermiProfile, KeepsTheColumnAsked) {
+  for (const double theta : {0.0, 0.1, 3.0, 50.0}) {
+    EXPECT_NEAR(fermi_profile_of_column(11.22, 1.1, theta).column_number(), 11.22, 1e-12) << theta;
+  }
+}
+
+TEST(FermiProfile, IsSmoothedAsDirectIntegrationDoes) {
+  const FermiProfile profile{1.1, 8.0, 0.4};
+  for (const Kernel kernel :
+       {Kernel{KernelKind::top_hat, 0.7}, Kernel{KernelKind::gaussian, 0.8}, Kernel{KernelKind::disk_chord, 1.0}}) {
+    for (const double height : {0.2, 7.0, 8.3, 11.0}) {
+      double smooth = 0.0;
+      profile.sample({&height, 1}, kernel, {&smooth, 1});
+      EXPECT_NEAR(smooth, brute_force(profile, kernel, height), 2e-5);
+    }
+  }
+}
+
+TEST(HydrostaticProfile, GivesAStatusForNonsense) {
+  EXPECT_FALSE(HydrostaticProfile::of_column(enskog(), -1.0, {11.22, 1.10}).ok());
+  EXPECT_FALSE(HydrostaticProfile::of_column(enskog(), 1.0, {-1.0, 1.10}).ok());
+  EXPECT_FALSE(HydrostaticProfile::tail_over_rectangle(enskog(), 0.1, 4.0, 1.3).ok());
+  EXPECT_EQ(HydrostaticProfile::tail_over_rectangle(best_of(), 0.1, 4.0, close_packing_density).status(),
+            ValueStatus::pole);
+  EXPECT_EQ(HydrostaticProfile::of_column(enskog(), -1.0, {11.22, 1.10}).density(1.0), 0.0);
+}
+
+}  // namespace
+}  // namespace shakebed::fit

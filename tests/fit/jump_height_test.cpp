@@ -1,0 +1,172 @@
+#include "fit/jump_height.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace shakebed::fit {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+TEST(JumpHeight, MatchesTheTableOfPhysics) {
+  struct Row {
+    double gamma, relative_max, above_launch, above_mean_floor, above_highest_floor;
+  };
+  for (const Row& row : {Row{2, 2.53152, 1.5, 2.5, 0.5}, Row{3, 7.10875, 4, 5, 2}, Row{4, 12.36233, 7.5, 8.5, 4.5}}) {
+    EXPECT_NEAR(jump_height(JumpHeight::relative_max, row.gamma).value, row.relative_max, 5.1e-6);
+    EXPECT_NEAR(jump_height(JumpHeight::above_launch, row.gamma).value, row.above_launch, 1e-12);
+    EXPECT_NEAR(jump_height(JumpHeight::above_mean_floor, row.gamma).value, row.above_mean_floor, 1e-12);
+    EXPECT_NEAR(jump_height(JumpHeight::above_highest_floor, row.gamma).value, row.above_highest_floor, 1e-12);
+  }
+}
+
+TEST(JumpHeight, IsNothingWhileTheFloorHoldsTheBall) {
+  for (const JumpHeight kind : jump_heights) {
+    EXPECT_EQ(jump_height(kind, 0.0).value, 0.0);
+    EXPECT_EQ(jump_height(kind, 1.0).value, 0.0);
+    EXPECT_EQ(jump_height(kind, -1.0).status, ValueStatus::invalid_argument);
+  }
+}
+
+TEST(JumpHeight, IsInverted) {
+  for (const JumpHeight kind : jump_heights) {
+    for (const double gamma : {1.2, 2.0, 4.0, 10.0}) {
+      const double height = jump_height(kind, gamma).value;
+      EXPECT_NEAR(gamma_for_jump_height(kind, height).value / gamma, 1.0, 1e-9) << to_string(kind) << " " << gamma;
+    }
+  }
+  // Above the mean floor the ball is at least Gamma = 1 high as soon as it leaves.
+  EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_mean_floor, 0.5).status, ValueStatus::outside_range);
+}
+
+TEST(WaveForm, IsScaledToItsPeakAcceleration) {
+  const WaveForm sine = WaveForm::series("big", {{1, 7.0, 0.0}});
+  const WaveForm cosine = WaveForm::series("turned", {{1, 0.0, 3.0}});
+  for (const JumpHeight kind : jump_heights) {
+    EXPECT_NEAR(jump_height(kind, 3.0, sine).value, jump_height(kind, 3.0).value, 1e-12);
+    EXPECT_NEAR(jump_height(kind, 3.0, cosine).value, jump_height(kind, 3.0).value, 1e-9);
+  }
+  const WaveForm mixed = WaveForm::series("mixed", {{1, 1.0, 0.0}, {2, 0.2, 0.1}});
+  double peak = 0.0;
+  for (int i = 0; i < 100000; ++i) peak = std::max(peak, std::abs(mixed.acceleration(2.0 * pi * i / 100000)));
+  EXPECT_NEAR(peak, 1.0, 1e-8);
+  EXPECT_EQ(WaveForm::series("flat", {}).status(), ValueStatus::invalid_argument);
+  EXPECT_EQ(WaveForm::series("flat", {{1, 0.0, 0.0}}).status(), ValueStatus::invalid_argument);
+  EXPECT_EQ(jump_height(JumpHeight::relative_max, 3.0, WaveForm::series("flat", {})).status,
+            ValueStatus::invalid_argument);
+}
+
+TEST(WaveForm, FromSamplesIsTheSampledMotion) {
+  std::vector<double> positions;
+  for (int i = 0; i < 64; ++i)
+    positions.push_back(0.3 + 2.0 * std::sin(2.0 * pi * i / 64) + 0.2 * std::cos(6.0 * pi * i / 64));
+  const WaveForm wave = WaveForm::samples("table", positions, 8);
+  const WaveForm same = WaveForm::series("same", {{1, 2.0, 0.0}, {3, 0.0, 0.2}});
+  for (double phase = 0.0; phase < 6.3; phase += 0.1) EXPECT_NEAR(wave.position(phase), same.position(phase), 1e-9);
+}
+
+// A flight computed with small steps, independently of the event finder.
+double stepped_flight_time(double gamma, const WaveForm& wave, double phase) {
+  const double dt = 1e-5;
+  const double p0 = gamma * wave.position(phase);
+  const double v0 = gamma * wave.velocity(phase);
+  for (double t = 0.05;; t += dt) {
+    if (p0 + v0 * t - 0.5 * t * t < gamma * wave.position(phase + t)) return t;
+  }
+}
+
+TEST(Bounce, DeadBallFliesAsSteppedIntegrationSays) {
+  // Up to sqrt(1 + pi^2) = 3.297 the ball lands while the floor still holds it, and waits for the next launch.
+  for (const double gamma : {1.5, 2.0, 3.0, 3.29}) {
+    const BounceStatistics s = bounce(gamma, {.restitution = 0.0, .transient = 20, .flights = 10});
+    ASSERT_EQ(s.status, ValueStatus::ok);
+    EXPECT_EQ(s.period, 1);
+    EXPECT_NEAR(s.launch_phases.back(), std::asin(1.0 / gamma), 1e-9);
+    EXPECT_NEAR(s.flight_times.back(), stepped_flight_time(gamma, WaveForm::sine(), std::asin(1.0 / gamma)), 2e-5);
+    for (std::size_t i = 0; i < jump_heights.size(); ++i) {
+      EXPECT_NEAR(s.mean_height[i], jump_height(jump_heights[i], gamma).value, 1e-8);
+    }
+  }
+}
+
+TEST(Bounce, DeadBallBouncesOnWithoutRestUpToTheDoubling) {
+  // From 3.297 on it lands where the floor falls away and leaves at once: flights of one period from cos(phase) =
+  // pi/Gamma.
+  for (const double gamma : {3.35, 3.5, 3.6}) {
+    const BounceStatistics s = bounce(gamma, {.restitution = 0.0, .transient = 500, .flights = 200});
+    EXPECT_EQ(s.period, 1);
+    EXPECT_NEAR(s.launch_phases.back(), std::acos(pi / gamma), 1e-9);
+    EXPECT_NEAR(s.flight_times.back(), 2.0 * pi, 1e-9);
+    EXPECT_NEAR(s.resting_fraction, 0.0, 1e-9);
+  }
+}
+
+TEST(Bounce, DeadBallDoublesItsPeriodAtTheKnownGamma) {
+  const double doubling = std::sqrt(4.0 + pi * pi);  // 3.72419
+  EXPECT_NEAR(doubling, 3.72419, 5e-6);
+  EXPECT_EQ(bounce(doubling - 0.005, {.restitution = 0.0, .transient = 5000, .flights = 256}).period, 1);
+  EXPECT_EQ(bounce(doubling + 0.005, {.restitution = 0.0, .transient = 5000, .flights = 256}).period, 2);
+}
+
+TEST(Bounce, InelasticBallKeepsPeriodOneInItsRange) {
+  const ModeRange range = period_one_mode(1, 0.5);
+  EXPECT_NEAR(range.exists_from, 1.04720, 5e-6);
+  EXPECT_NEAR(range.stable_to, 1.52682, 5e-6);
+  // Started on the mode, the ball stays while the mode is stable: flights of one period, launched at the phase where
+  // cos(phase) = n pi (1 - e)/((1 + e) Gamma).
+  const auto period_near = [&](double gamma) {
+    BounceOptions options{.restitution = 0.5, .transient = 4000, .flights = 256};
+    options.initial_phase = std::acos(std::min(1.0, range.exists_from / gamma)) + 1e-3;  // a nudge to grow or die
+    options.initial_velocity = 2.0 * pi * 0.5 / 1.5;  // e/(1 + e) of the relative velocity 2 pi
+    return bounce(gamma, options);
+  };
+  for (const double gamma : {1.10, 1.25, 1.40, 1.52}) {
+    const BounceStatistics s = period_near(gamma);
+    EXPECT_EQ(s.period, 1) << gamma;
+    EXPECT_NEAR(s.mean_flight, 1.0, 1e-6) << gamma;
+  }
+  EXPECT_NE(period_near(1.54).period, 1);
+}
+
+TEST(Bounce, NearlyElasticBallAndQuietFloorEnd) {
+  for (const double e : {0.0, 0.3, 0.9, 0.99}) {
+    const BounceStatistics rest = bounce(0.9, {.restitution = e});
+    EXPECT_EQ(rest.status, ValueStatus::ok);
+    EXPECT_EQ(rest.resting_fraction, 1.0);
+    const BounceStatistics moving = bounce(4.0, {.restitution = e, .transient = 300, .flights = 300});
+    EXPECT_EQ(moving.status, ValueStatus::ok);
+    EXPECT_EQ(moving.flight_times.size(), 300U);
+    EXPECT_GT(moving.mean_height[0], 0.0);
+    for (const double t : moving.flight_times) EXPECT_GT(t, 0.0);
+  }
+  EXPECT_EQ(bounce(4.0, {.restitution = 1.0}).status, ValueStatus::invalid_argument);
+  EXPECT_EQ(bounce(4.0, {.restitution = -0.1}).status, ValueStatus::invalid_argument);
+}
+
+TEST(Bounce, EnergyOfEveryFlightIsKept) {
+  // Consecutive launches: the landing velocity relative to the floor times e is the next launch velocity, so the flight
+  // times and phases of the map fit together.
+  const double gamma = 4.0;
+  const double e = 0.8;
+  const BounceStatistics s = bounce(gamma, {.restitution = e, .transient = 100, .flights = 200});
+  for (std::size_t i = 1; i + 1 < s.flight_times.size(); ++i) {
+    const double phase = s.launch_phases[i];
+    const double t = s.flight_times[i];
+    // From the two positions and the time, the launch velocity in the laboratory ...
+    const double velocity = (gamma * std::sin(phase + t) - gamma * std::sin(phase)) / t + 0.5 * t;
+    const double impact = velocity - t - gamma * std::cos(phase + t);
+    const double t2 = s.flight_times[i + 1];
+    const double phase2 = s.launch_phases[i + 1];
+    const double velocity2 = (gamma * std::sin(phase2 + t2) - gamma * std::sin(phase2)) / t2 + 0.5 * t2;
+    const bool rested = std::abs(std::remainder(phase2 - phase - t, 2.0 * pi)) > 1e-9;
+    if (!rested && t2 > 1e-3 && t > 1e-3) {
+      EXPECT_NEAR(velocity2 - gamma * std::cos(phase2), -e * impact, 1e-9) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace shakebed::fit
