@@ -77,6 +77,10 @@ void Fields::finish() {
 
 bool Fields::has(std::string_view key) const { return node_ != nullptr && node_->find(key) != nullptr; }
 
+bool Fields::has_upstream(std::string_view kind) const {
+  return std::find(source_.upstream.begin(), source_.upstream.end(), kind) != source_.upstream.end();
+}
+
 const JsonNode* Fields::take(std::string_view key, const About& about, std::string_view expected) {
   known_.emplace_back(key);
   const JsonNode* node = node_->find(key);
@@ -369,35 +373,53 @@ void Fields::texts(std::string_view key, std::vector<std::string>& values, const
 void Fields::input_files(std::string_view key, InputFiles& files, const About& about) {
   namespace fs = std::filesystem;
   if (mode_ == Mode::schema) {
-    property(key, about, Json{{"type", "string"}});
+    Json list;
+    list["type"] = "array";
+    list["items"]["type"] = "string";
+    Json either;
+    either["anyOf"] = Json::array({Json{{"type", "string"}}, std::move(list)});
+    property(key, about, std::move(either));
     return;
   }
   if (mode_ == Mode::encode) {
-    if (!files.empty()) (*out_)[std::string(key)] = files.text;
+    if (files.texts.size() == 1) (*out_)[std::string(key)] = files.texts.front();
+    if (files.texts.size() > 1) (*out_)[std::string(key)] = files.texts;
     return;
   }
   const JsonNode* node = take(key, about, "a file");
   if (node == nullptr) return;
-  if (!node->is_string() || node->text.empty()) return wrong_type(*node, key, "the path of a file", about);
-  files.text = node->text;
+  files.texts.clear();
   files.paths.clear();
-  const fs::path path = source_.directory / node->text;  // an absolute path replaces the directory
-  const std::string pattern = path.filename().string();
-  std::error_code error;
-  if (pattern.find_first_of("*?") == std::string::npos) {
-    if (fs::is_regular_file(path, error)) files.paths.push_back(path);
-  } else {
-    for (const fs::directory_entry& entry : fs::directory_iterator(path.parent_path(), error)) {
-      if (entry.is_regular_file() && fnmatch(pattern.c_str(), entry.path().filename().c_str(), FNM_PERIOD) == 0) {
-        files.paths.push_back(entry.path());
+  const auto expand = [&](const JsonNode& item, const std::string& where) {
+    if (!item.is_string() || item.text.empty()) return wrong_type(item, where, "the path of a file", about);
+    files.texts.push_back(item.text);
+    const fs::path path = source_.directory / item.text;  // an absolute path replaces the directory
+    const std::string pattern = path.filename().string();
+    std::vector<fs::path> found;
+    std::error_code error;
+    const bool folder = fs::is_directory(path, error);
+    const bool wildcards = pattern.find_first_of("*?") != std::string::npos;
+    if (fs::is_regular_file(path, error)) {
+      found.push_back(path);
+    } else if (folder || wildcards) {
+      for (const fs::directory_entry& entry : fs::directory_iterator(folder ? path : path.parent_path(), error)) {
+        const fs::path& name = entry.path().filename();
+        if (entry.is_regular_file(error) && fnmatch(folder ? "*" : pattern.c_str(), name.c_str(), FNM_PERIOD) == 0) {
+          found.push_back(entry.path());
+        }
       }
+      std::sort(found.begin(), found.end());
     }
-    std::sort(files.paths.begin(), files.paths.end());
-  }
-  if (files.paths.empty()) {
-    complain(*node, key, fmt::format("there is no file \"{}\"", node->text),
-             fs::path(node->text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
-    return;
+    if (found.empty()) {
+      complain(item, where, fmt::format("there is no file \"{}\"", item.text),
+               fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
+    }
+    files.paths.insert(files.paths.end(), found.begin(), found.end());
+  };
+  if (node->is_array()) {
+    for (std::size_t i = 0; i < node->items.size(); ++i) expand(node->items[i], fmt::format("{}/{}", key, i));
+  } else {
+    expand(*node, std::string(key));
   }
   if (source_.input_files != nullptr) {
     for (const fs::path& found : files.paths) source_.input_files->emplace_back(pointer_join(pointer_, key), found);

@@ -63,12 +63,12 @@ struct About {
   std::string_view example = {};  // shown in messages and in the schema
 };
 
-// A file, or several by wildcards (* and ? in the last part of the path), that the user names in a recipe. Paths are
-// relative to the recipe.
+// A file, or several (an array, wildcards * and ? in the last part of a path, all files of a folder), that the user
+// names in a recipe. Paths are relative to the recipe.
 struct InputFiles {
-  std::string text;                          // as written
-  std::vector<std::filesystem::path> paths;  // what it names, sorted; filled when a recipe is read
-  bool empty() const { return text.empty(); }
+  std::vector<std::string> texts;            // as written
+  std::vector<std::filesystem::path> paths;  // what they name, in order; filled when a recipe is read
+  bool empty() const { return texts.empty(); }
 };
 
 class Fields;
@@ -101,6 +101,7 @@ class Fields {
     std::vector<Problem>* problems = nullptr;
     // Every input file that was named: pointer and file.
     std::vector<std::pair<std::string, std::filesystem::path>>* input_files = nullptr;
+    std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
   };
 
   // Reads an object. After describing, call finish(): it reports the keys that nobody asked for.
@@ -117,6 +118,10 @@ class Fields {
   // equal to 1) and a string with a unit is a mistake. Options structs then hold reduced numbers instead of SI.
   bool reduced() const { return reduced_; }
   void set_reduced(bool reduced) { reduced_ = reduced; }
+
+  // Kinds of the stages that "from" names, in its order (decoding only).
+  const std::vector<std::string>& upstream() const { return source_.upstream; }
+  bool has_upstream(std::string_view kind) const;
 
   // --- one method a type. `value` holds the default before and what was read after.
   void number(std::string_view key, double& value, const About& about = {});

@@ -611,7 +611,9 @@ void write_string(std::string& out, const std::string& text) {
   out += Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-void write_compact(std::string& out, const Json& json, bool spaces) {
+using NumberText = std::string (*)(double);
+
+void write_compact(std::string& out, const Json& json, bool spaces, NumberText number) {
   if (json.is_object()) {
     out += '{';
     bool first = true;
@@ -620,18 +622,18 @@ void write_compact(std::string& out, const Json& json, bool spaces) {
       first = false;
       write_string(out, key);
       out += spaces ? ": " : ":";
-      write_compact(out, value, spaces);
+      write_compact(out, value, spaces, number);
     }
     out += '}';
   } else if (json.is_array()) {
     out += '[';
     for (std::size_t i = 0; i < json.size(); ++i) {
       if (i > 0) out += spaces ? ", " : ",";
-      write_compact(out, json[i], spaces);
+      write_compact(out, json[i], spaces, number);
     }
     out += ']';
   } else if (json.is_number_float()) {
-    out += number_text(json.get<double>());
+    out += number(json.get<double>());
   } else if (json.is_string()) {
     write_string(out, json.get_ref<const std::string&>());
   } else {
@@ -639,11 +641,11 @@ void write_compact(std::string& out, const Json& json, bool spaces) {
   }
 }
 
-void write_pretty(std::string& out, const Json& json, std::size_t indent) {
+void write_pretty(std::string& out, const Json& json, std::size_t indent, NumberText number) {
   constexpr std::size_t width = 118;
-  if (!json.is_structured() || json.empty()) return write_compact(out, json, true);
+  if (!json.is_structured() || json.empty()) return write_compact(out, json, true, number);
   std::string line;
-  write_compact(line, json, true);
+  write_compact(line, json, true, number);
   if (indent + line.size() <= width) {
     out += line;
     return;
@@ -660,7 +662,7 @@ void write_pretty(std::string& out, const Json& json, std::size_t indent) {
       write_string(out, item.key());
       out += ": ";
     }
-    write_pretty(out, *item, indent + 2);
+    write_pretty(out, *item, indent + 2, number);
   }
   out += '\n' + std::string(indent, ' ');
   out += object ? "}" : "]";
@@ -669,14 +671,22 @@ void write_pretty(std::string& out, const Json& json, std::size_t indent) {
 
 std::string dump(const Json& json) {
   std::string out;
-  write_pretty(out, json, 0);
+  write_pretty(out, json, 0, number_text);
+  out += '\n';
+  return out;
+}
+
+std::string dump_17_digits(const Json& json) {
+  std::string out;
+  write_pretty(out, json, 0,
+               [](double value) { return std::isfinite(value) ? fmt::format("{:.17g}", value) : std::string("null"); });
   out += '\n';
   return out;
 }
 
 std::string dump_canonical(const Json& json) {
   std::string out;
-  write_compact(out, json, false);
+  write_compact(out, json, false, number_text);
   return out;
 }
 

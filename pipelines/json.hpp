@@ -76,6 +76,8 @@ void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value);
 // Text of a document: two-space indent, short arrays and objects on one line, a final newline. Doubles: the fewest
 // digits that give the same double back (at most 17). NaN and infinities become null.
 std::string dump(const Json& json);
+// The same with all doubles in 17 significant digits.
+std::string dump_17_digits(const Json& json);
 // One line, no spaces: for hashes.
 std::string dump_canonical(const Json& json);
 // A double alone.

@@ -1,0 +1,13 @@
+# Writes a C++ file that holds the text of files: cmake -DOUTPUT=... -DNAMES="a;b" -DPATHS="/x/a;/x/b" -P embed_files.cmake
+string(REPLACE "|" ";" NAMES "${NAMES}")
+string(REPLACE "|" ";" PATHS "${PATHS}")
+set(text "#include \"pipelines/embedded.hpp\"\n\nnamespace shakebed::pipelines {\n\nconst std::vector<EmbeddedFile>& embedded_files() {\n  static const std::vector<EmbeddedFile> files = {\n")
+foreach(name path IN ZIP_LISTS NAMES PATHS)
+  file(READ "${path}" content)
+  if(content MATCHES "\\)=embedded=")
+    message(FATAL_ERROR "${path} holds the delimiter )=embedded=")
+  endif()
+  string(APPEND text "      {\"${name}\", R\"=embedded=(${content})=embedded=\"},\n")
+endforeach()
+string(APPEND text "  };\n  return files;\n}\n\nconst EmbeddedFile* find_embedded(std::string_view name) {\n  for (const EmbeddedFile& file : embedded_files()) {\n    if (file.name == name) return &file;\n  }\n  return nullptr;\n}\n\n}  // namespace shakebed::pipelines\n")
+file(WRITE "${OUTPUT}" "${text}")

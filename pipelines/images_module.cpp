@@ -1,0 +1,69 @@
+#include "pipelines/images_module.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "pipelines/errors.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/version.hpp"
+
+namespace shakebed::pipelines {
+
+Json FrameGeometry::to_json() const {
+  Json out;
+  out["scale"] = quantity_json(scale, "m/px");
+  out["diameter"] = quantity_json(diameter, "m");
+  out["floor"] = quantity_json(floor, "px");
+  out["left_wall"] = quantity_json(left_wall, "px");
+  out["right_wall"] = quantity_json(right_wall, "px");
+  out["lowest"] = quantity_json(lowest, "D");
+  out["width"] = width;
+  out["height"] = height;
+  return out;
+}
+
+FrameGeometry FrameGeometry::read(const std::filesystem::path& path) {
+  const Json json = read_json(path);
+  const auto value = [&](const std::string& key) {
+    const Json* found = find_pointer(json, "/" + key + "/value");
+    if (found == nullptr || !found->is_number())
+      throw InputError(fmt::format("{}: /{}: a quantity is missing here", path.string(), key));
+    return found->get<double>();
+  };
+  return {.scale = value("scale"),
+          .diameter = value("diameter"),
+          .floor = value("floor"),
+          .left_wall = value("left_wall"),
+          .right_wall = value("right_wall"),
+          .lowest = value("lowest"),
+          .width = json.value("width", 0),
+          .height = json.value("height", 0)};
+}
+
+const ImagesModule& images_module() {
+  static const ImagesModule* const module = [] {
+    namespace fs = std::filesystem;
+    constexpr const char* name = "libshakebed_images.so";
+    std::error_code error;
+    const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+    std::vector<fs::path> places = {program / name, program / SHAKEBED_MODULE_FROM_PROGRAM / name,
+                                    SHAKEBED_BUILD_MODULE_DIR "/" + std::string(name)};
+    for (const fs::path& place : places) {
+      if (!fs::is_regular_file(place, error)) continue;
+      void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+      if (handle == nullptr) throw StageError(fmt::format("the images module cannot be loaded: {}", ::dlerror()));
+      using Entry = const ImagesModule* (*)(const char* revision);
+      const auto entry = reinterpret_cast<Entry>(::dlsym(handle, "shakebed_images"));
+      const ImagesModule* found = entry != nullptr ? entry(SHAKEBED_VERSION) : nullptr;
+      if (found == nullptr)
+        throw StageError(fmt::format("{} belongs to another version of shakebed; install both together", name));
+      return found;
+    }
+    throw StageError(fmt::format("{} is missing: it belongs beside the program; install both together", name));
+  }();
+  return *module;
+}
+
+}  // namespace shakebed::pipelines

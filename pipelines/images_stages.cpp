@@ -1,0 +1,440 @@
+// The images module: the bodies of the stages that touch images. Compiled into libshakebed_images.so, never into the
+// program (see images_module.hpp).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <thread>
+
+#include "ingest/measure_bed.hpp"
+#include "ingest/overlay.hpp"
+#include "ingest/synthetic_frames.hpp"
+#include "pipelines/bed.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/images_module.hpp"
+#include "pipelines/trajectory.hpp"
+#include "pipelines/version.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+constexpr double largest_view_pixels = 100e6;
+
+std::filesystem::path trajectory_of(const Input& bed) {
+  return bed.has("trajectory.extxyz.zst") ? bed.file("trajectory.extxyz.zst") : bed.file("trajectory.extxyz");
+}
+
+void render_frames(const RenderOptions& options, RunContext& context) {
+  const Input& input = context.input("simulate");
+  const BedDescription bed = BedDescription::read(input.file("bed.json"));
+  if (bed.reduced) {
+    throw InputError(
+        "the bed is in reduced units and has no size: a camera needs metres. Give the simulate stage a diameter in SI "
+        "units");
+  }
+  if (!(bed.gravity > 0)) throw InputError("the bed has no gravity, so no floor and no time scale for a camera");
+  const std::filesystem::path path = trajectory_of(input);
+
+  // First pass: what the view must hold.
+  std::size_t count = 0;
+  double highest = 0, lowest = 0, width = 0;
+  {
+    TrajectoryReader reader(path);
+    TrajectoryFrame frame;
+    while ((options.frames == 0 || count < options.frames) && reader.read(frame)) {
+      context.check_interrupted();
+      for (std::size_t i = 0; i < frame.size(); ++i) {
+        highest = std::max(highest, frame.z[i] + frame.radius[i]);
+        lowest = std::min(lowest, frame.z[i]);
+      }
+      width = frame.width;
+      ++count;
+    }
+  }
+  if (count == 0)
+    throw InputError(path.string() + ": holds no frame. Ask the simulate stage for some: \"frames\": {\"count\": 640}");
+  const double pixels_per_diameter = bed.diameter / options.scale;
+  if (options.height) highest = *options.height / bed.diameter;
+  const double below = std::max(0.0, bed.amplitude / bed.diameter);
+  const double floor_depth = std::ceil(below * pixels_per_diameter) + options.margin;
+  ingest::Camera camera;
+  const double columns = std::ceil(width * pixels_per_diameter) + 2 * options.margin;
+  const double rows = std::ceil(highest * pixels_per_diameter) + floor_depth + options.margin;
+  if (!(columns * rows <= largest_view_pixels)) {
+    throw StageError(fmt::format(
+        "frames of {:.0f} x {:.0f} pixels are too large; choose a coarser scale or a lower height", columns, rows));
+  }
+  camera.width = static_cast<int>(columns), camera.height = static_cast<int>(rows);
+  camera.background_level = options.background_level, camera.bead_level = options.bead_level;
+  camera.shading = options.shading == Shading::flat     ? ingest::BeadShading::flat
+                   : options.shading == Shading::shaded ? ingest::BeadShading::shaded
+                                                        : ingest::BeadShading::highlight;
+  camera.shading_depth = options.shading_depth;
+  camera.blur_px = options.blur, camera.exposure_s = options.exposure, camera.read_noise = options.noise;
+  camera.gradient_x = options.gradient_x, camera.gradient_y = options.gradient_y, camera.vignette = options.vignette;
+  camera.seed = context.seed();
+  const ingest::FrameRenderer renderer(camera);
+  FrameGeometry geometry{.scale = options.scale, .diameter = bed.diameter};
+  geometry.left_wall = options.margin - 0.5;
+  geometry.right_wall = geometry.left_wall + width * pixels_per_diameter;
+  geometry.floor = camera.height - 0.5 - floor_depth;
+  geometry.lowest = lowest;
+  geometry.width = camera.width, geometry.height = camera.height;
+  const double velocity_px = std::sqrt(bed.gravity * bed.diameter) / options.scale;
+
+  // Second pass: read in order, draw on all threads, write the truth in order.
+  std::filesystem::create_directory(context.output("frames"));
+  TrajectoryReader reader(path);
+  std::mutex reading, failing;
+  std::size_t next = 0;
+  std::vector<std::string> truth(count);
+  std::exception_ptr failure;
+  std::atomic<bool> stop{false};
+  std::atomic<std::size_t> done{0};
+  const auto work = [&] {
+    try {
+      TrajectoryFrame frame;
+      while (!stop && !context.interrupted()) {
+        std::size_t index = 0;
+        {
+          const std::lock_guard lock(reading);
+          if (next == count || !reader.read(frame)) return;
+          index = next++;
+        }
+        std::vector<ingest::RenderedDisk> disks(frame.size());
+        std::string& text = truth[index];
+        for (std::size_t i = 0; i < frame.size(); ++i) {
+          disks[i] = {.x_px = geometry.left_wall + frame.x[i] * pixels_per_diameter,
+                      .y_px = geometry.floor - frame.z[i] * pixels_per_diameter,
+                      .radius_px = frame.radius[i] * pixels_per_diameter,
+                      .velocity_x_px_per_s = frame.vx[i] * velocity_px,
+                      .velocity_y_px_per_s = -frame.vz[i] * velocity_px};
+          text +=
+              fmt::format("{},{},{:.6f},{:.6f},{:.6f}\n", index, i, disks[i].x_px, disks[i].y_px, disks[i].radius_px);
+        }
+        ingest::write_png(context.output("frames") / fmt::format("{:06d}.png", index), renderer.render(disks, index));
+        context.progress(static_cast<double>(++done) / static_cast<double>(count), "drawing");
+      }
+    } catch (...) {
+      const std::lock_guard lock(failing);
+      if (!failure) failure = std::current_exception();
+      stop = true;
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int i = 1; i < context.jobs(); ++i) threads.emplace_back(work);
+  work();
+  for (std::thread& thread : threads) thread.join();
+  context.check_interrupted();
+  if (failure) std::rethrow_exception(failure);
+
+  std::string table =
+      "# true centres at the middle of the exposure; pixels from the centre of the top-left one, y downwards\n"
+      "frame,disk,x_px,y_px,radius_px\n";
+  for (const std::string& text : truth) table += text;
+  write_file(context.output("truth.csv"), table);
+  write_file(context.output("geometry.json"), dump(geometry.to_json()));
+  write_file(context.output("bed.json"), dump(bed.to_json()));
+  Json result;
+  result["frames"] = count;
+  result["width"] = quantity_json(camera.width, "px");
+  result["height"] = quantity_json(camera.height, "px");
+  result["scale"] = quantity_json(options.scale, "m/px");
+  result["radius"] = quantity_json(pixels_per_diameter / 2, "px");
+  write_file(context.output("render.json"), dump(result));
+}
+
+// --- extract
+
+Json profile_numbers(const ingest::DensityProfile& profile) {
+  double greatest = 0;
+  for (const double density : profile.number_density) greatest = std::max(greatest, density);
+  return Json{{"greatest_density", quantity_json(greatest, "1/D^2")},
+              {"frames", profile.samples},
+              {"block_frames", profile.block_frames},
+              {"correlation_frames", profile.correlation_frames}};
+}
+
+ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::vector<std::string> comments) {
+  ProfileTable table;
+  table.comments = std::move(comments);
+  // Without the empty rows at both ends.
+  std::size_t first = 0, last = profile.number_density.size();
+  while (first < last && profile.number_density[first] < 1e-12) ++first;
+  while (last > first && profile.number_density[last - 1] < 1e-12) --last;
+  for (std::size_t i = first; i < last; ++i) {
+    const double height = profile.bins.middle(i);
+    table.height.push_back(std::abs(height) < 1e-12 ? 0 : height);
+    table.number_density.push_back(profile.number_density[i]);
+    table.std_error.push_back(profile.std_error[i]);
+    table.area_fraction.push_back(profile.area_fraction[i]);
+    table.samples.push_back(
+        std::round(profile.number_density[i] * width * profile.bins.width * static_cast<double>(profile.samples)));
+  }
+  return table;
+}
+
+void extract_disks(const ExtractOptions& options, RunContext& context) {
+  const Input* rendered = context.find_input("render");
+  ingest::MeasureOptions measure;
+  measure.bead_diameter_m = options.diameter;
+  measure.scale_m_per_px = options.scale;
+  measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
+  measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
+  measure.find.polarity = options.polarity == BeadPolarity::dark     ? ingest::Polarity::dark_beads
+                          : options.polarity == BeadPolarity::bright ? ingest::Polarity::bright_beads
+                                                                     : ingest::Polarity::automatic;
+  measure.find.radius_px = options.radius;
+  measure.find.keep_half_hidden = options.keep_half_hidden;
+  if (options.roi.size() == 4) {
+    measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
+                                              static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
+  }
+  measure.kernel = {
+      options.kernel == DensityKernel::gaussian ? ingest::KernelKind::gaussian : ingest::KernelKind::top_hat,
+      options.kernel_width};
+  measure.bin_width = options.spacing;
+  measure.lowest = options.lowest, measure.highest = options.highest;
+  measure.shaking_frequency_hz = options.frequency, measure.frame_rate_hz = options.frame_rate;
+  measure.threads = static_cast<unsigned>(context.jobs());
+
+  std::vector<std::string> paths;
+  if (rendered != nullptr) {
+    const FrameGeometry geometry = FrameGeometry::read(rendered->file("geometry.json"));
+    if (options.use_geometry) {
+      if (!measure.scale_m_per_px) measure.scale_m_per_px = geometry.scale;
+      if (!measure.floor_px) measure.floor_px = geometry.floor;
+      if (!measure.left_wall_px) measure.left_wall_px = geometry.left_wall, measure.right_wall_px = geometry.right_wall;
+    }
+    if (!measure.lowest) {
+      // Heights at multiples of the spacing, low enough for what lies below the floor's mean while it is down.
+      const double reach = options.kernel == DensityKernel::gaussian ? 6 * options.kernel_width : options.kernel_width;
+      measure.lowest = (std::floor((std::min(0.0, geometry.lowest) - reach) / options.spacing) - 0.5) * options.spacing;
+    }
+    paths.push_back((rendered->directory / "frames").string());
+  } else {
+    for (const auto& path : options.images.paths) paths.push_back(path.string());
+  }
+  ingest::FrameSourceOptions source_options;
+  source_options.stride = options.stride;
+  ingest::FrameSource source = ingest::FrameSource::open(paths, source_options);
+  const std::optional<std::size_t> total = source.count_if_known();
+  measure.progress = [&](std::size_t done) {
+    context.check_interrupted();
+    if (total && *total > 0) context.progress(static_cast<double>(done) / static_cast<double>(*total), "finding disks");
+  };
+  const ingest::Measurement found = ingest::measure_bed(source, measure);
+  context.check_interrupted();
+
+  const ingest::BedCalibration& bed = found.calibration;
+  for (const std::string& warning : found.warnings) context.warning(warning);
+  std::size_t bad = 0;
+  for (const ingest::FrameReport& frame : found.frames) {
+    if (frame.status == ingest::FrameStatus::good) continue;
+    if (++bad <= 5)
+      context.warning(fmt::format("frame {} ({}): {}", frame.index,
+                                  std::filesystem::path(frame.origin.path).filename().string(), frame.why));
+  }
+  if (bad > 5) context.warning(fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - 5));
+  if (bed.walls_are_frame_sides) {
+    context.warning(
+        "no side walls were seen: the density is that of the part of the bed in view, and N D/W is not that of the "
+        "whole bed");
+  }
+
+  const std::string kernel = options.kernel == DensityKernel::gaussian ? "gaussian" : "top_hat";
+  const double column_number = found.disk_count_mean / bed.width;
+  write_profile_csv(
+      context.output("profile.csv"),
+      table_of(found.profile, bed.width,
+               {"heights in D above the floor's mean position", "kernel: " + kernel,
+                "kernel_width: " + number_text(options.kernel_width), "column_number: " + number_text(column_number)}));
+  if (found.coverage_profile) {
+    write_profile_csv(context.output("coverage_profile.csv"),
+                      table_of(*found.coverage_profile, bed.width,
+                               {"from covered area, heights in D above the floor's mean position", "kernel: disk_chord",
+                                "kernel_width: 1"}));
+  }
+  for (std::size_t i = 0; i < found.phases.size(); ++i) {
+    write_profile_csv(context.output(fmt::format("profile_phase_{:02d}.csv", i)),
+                      table_of(found.phases[i].profile, bed.width,
+                               {"phase: " + number_text(found.phases[i].phase), "kernel: " + kernel,
+                                "kernel_width: " + number_text(options.kernel_width)}));
+  }
+  {
+    const std::size_t n = found.profile.number_density.size();
+    std::string text =
+        "# covariance of number_density: height_i,height_j,covariance (j >= i, only what is not "
+        "0)\nheight_i,height_j,covariance\n";
+    for (std::size_t i = 0; i < n && found.profile.covariance.size() == n * n; ++i) {
+      for (std::size_t j = i; j < n; ++j) {
+        const double value = found.profile.covariance[i * n + j];
+        if (value != 0)
+          text += fmt::format("{},{},{}\n", number_text(found.profile.bins.middle(i)),
+                              number_text(found.profile.bins.middle(j)), number_text(value));
+      }
+    }
+    write_file(context.output("covariance.csv"), text);
+  }
+  ingest::write_disks_csv(context.output("disks.csv"), found);
+  {
+    std::string text = "frame,file,page,status,disks,rejected,residual_level\n";
+    constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
+    for (const ingest::FrameReport& frame : found.frames) {
+      text += fmt::format("{},{},{},{},{},{},{}\n", frame.index,
+                          std::filesystem::path(frame.origin.path).filename().string(), frame.origin.page,
+                          names[static_cast<std::size_t>(frame.status)], frame.disks, frame.rejected,
+                          number_text(frame.residual_level));
+    }
+    write_file(context.output("frames.csv"), text);
+  }
+
+  Json result;
+  result["frames"] = found.frames.size();
+  result["frames_used"] = found.profile.samples;
+  result["disks_per_frame"] = quantity_json(found.disk_count_mean, "1");
+  result["disks_per_frame_scatter"] = found.disk_count_std;
+  result["diameter"] = quantity_json(options.diameter, "m");
+  result["scale"] = quantity_json(bed.scale_m_per_px, "m/px", bed.scale_m_per_px * bed.scale_relative_std_error);
+  result["scale_given"] = bed.scale_given;
+  result["radius"] = quantity_json(bed.radius_px, "px", bed.radius_std_error_px);
+  result["edge_width"] = quantity_json(bed.edge_width_px, "px");
+  result["noise"] = quantity_json(bed.noise_level, "grey levels");
+  result["contrast"] = quantity_json(bed.contrast_level, "grey levels");
+  result["polarity"] = bed.polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
+  result["floor"] = quantity_json(bed.floor_px, "px");
+  result["floor_given"] = bed.floor_given;
+  result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg");
+  result["left_wall"] = quantity_json(bed.left_wall_px, "px");
+  result["right_wall"] = quantity_json(bed.right_wall_px, "px");
+  result["walls_given"] = bed.walls_given;
+  result["walls_are_frame_sides"] = bed.walls_are_frame_sides;
+  result["width"] = quantity_json(bed.width, "D");
+  result["column_number"] = quantity_json(
+      column_number, "1",
+      found.disk_count_std / bed.width / std::sqrt(std::max<double>(1, static_cast<double>(found.profile.samples))));
+  result["kernel"] = Json{{"kind", kernel}, {"width", options.kernel_width}};
+  result["profile"] = profile_numbers(found.profile);
+  if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
+
+  // Where the truth is known, say how near we came.
+  if (rendered != nullptr && rendered->has("truth.csv")) {
+    const std::string text = read_file(rendered->file("truth.csv"));
+    std::vector<std::vector<std::pair<double, double>>> truth;
+    std::size_t begin = 0;
+    while (begin < text.size()) {
+      const std::size_t end = std::min(text.find('\n', begin), text.size());
+      const std::string_view line = std::string_view(text).substr(begin, end - begin);
+      begin = end + 1;
+      if (line.empty() || !std::isdigit(static_cast<unsigned char>(line.front()))) continue;
+      const auto cells = split_csv_line(line);
+      if (cells.size() < 4) continue;
+      const auto frame = static_cast<std::size_t>(std::stoull(cells[0]));
+      if (frame >= truth.size()) truth.resize(frame + 1);
+      truth[frame].emplace_back(std::stod(cells[2]), std::stod(cells[3]));
+    }
+    // Nearest true centre of each disk found, each true centre used once.
+    std::vector<std::vector<const ingest::MeasuredDisk*>> disks(truth.size());
+    for (const ingest::MeasuredDisk& disk : found.disks) {
+      const std::size_t frame = disk.frame * options.stride;
+      if (frame < disks.size()) disks[frame].push_back(&disk);
+    }
+    std::size_t matched = 0, reported = 0, real = 0;
+    double squares = 0;
+    const double reach = bed.radius_px / 2;
+    for (std::size_t f = 0; f < truth.size(); f += options.stride) {
+      real += truth[f].size(), reported += disks[f].size();
+      std::sort(truth[f].begin(), truth[f].end());
+      std::vector<bool> used(truth[f].size(), false);
+      for (const ingest::MeasuredDisk* disk : disks[f]) {
+        auto at = std::lower_bound(truth[f].begin(), truth[f].end(), std::pair(disk->x_px - reach, -1e300));
+        std::ptrdiff_t best = -1;
+        double best_distance = reach * reach;
+        for (; at != truth[f].end() && at->first <= disk->x_px + reach; ++at) {
+          const double dx = at->first - disk->x_px, dy = at->second - disk->y_px;
+          if (dx * dx + dy * dy < best_distance && !used[static_cast<std::size_t>(at - truth[f].begin())]) {
+            best_distance = dx * dx + dy * dy, best = at - truth[f].begin();
+          }
+        }
+        if (best < 0) continue;
+        used[static_cast<std::size_t>(best)] = true;
+        ++matched;
+        squares += best_distance;
+      }
+    }
+    if (real > 0 && matched > 0) {
+      result["truth"] =
+          Json{{"recall", static_cast<double>(matched) / static_cast<double>(real)},
+               {"precision", static_cast<double>(matched) / static_cast<double>(std::max<std::size_t>(reported, 1))},
+               {"center_rms_error", quantity_json(std::sqrt(squares / static_cast<double>(matched)), "px")}};
+    }
+  }
+  write_file(context.output("extract.json"), dump(result));
+  if (rendered != nullptr && rendered->has("bed.json"))
+    write_file(context.output("bed.json"), read_file(rendered->file("bed.json")));
+
+  // Overlays, spread over the film.
+  if (options.overlays > 0 && !found.frames.empty()) {
+    ingest::FrameSource again = ingest::FrameSource::open(paths, source_options);
+    const std::size_t frames = found.frames.size();
+    const std::size_t wanted = std::min<std::size_t>(options.overlays, frames);
+    std::size_t drawn = 0;
+    for (std::size_t index = 0; index < frames && drawn < wanted; ++index) {
+      auto item = again.next_item();
+      if (!item) break;
+      if (index < drawn * frames / wanted || found.frames[index].status != ingest::FrameStatus::good) continue;
+      const ingest::GrayFrame frame = item->decode();
+      std::vector<ingest::FoundDisk> disks;
+      for (const ingest::MeasuredDisk& disk : found.disks) {
+        if (disk.frame != found.frames[index].index) continue;
+        ingest::FoundDisk circle;
+        circle.x_px = disk.x_px, circle.y_px = disk.y_px, circle.radius_px = disk.radius_px,
+        circle.quality = disk.quality;
+        circle.cut = disk.cut, circle.half_hidden = disk.half_hidden;
+        disks.push_back(circle);
+      }
+      ingest::OverlayOptions overlay;
+      overlay.magnification = frame.width <= 700 ? 2 : 1;
+      overlay.floor_px = bed.floor_px, overlay.floor_slope = bed.floor_slope;
+      if (!bed.walls_are_frame_sides)
+        overlay.left_wall_px = bed.left_wall_px, overlay.right_wall_px = bed.right_wall_px;
+      ingest::write_overlay(context.output(fmt::format("overlay_{:06d}.png", found.frames[index].index)), frame, disks,
+                            overlay);
+      ++drawn;
+    }
+  }
+}
+
+// ingest's own errors become ours.
+template <class Work>
+void translated(const Work& work) {
+  try {
+    work();
+  } catch (const ingest::InputError& error) {
+    throw InputError(error.what());
+  } catch (const std::invalid_argument& error) {
+    throw StageError(error.what());
+  }
+}
+
+class Module : public ImagesModule {
+ public:
+  void render(const RenderOptions& options, RunContext& context) const override {
+    translated([&] { render_frames(options, context); });
+  }
+  void extract(const ExtractOptions& options, RunContext& context) const override {
+    translated([&] { extract_disks(options, context); });
+  }
+};
+
+}  // namespace
+}  // namespace shakebed::pipelines
+
+extern "C" __attribute__((visibility("default"))) const shakebed::pipelines::ImagesModule* shakebed_images(
+    const char* version) {
+  static const shakebed::pipelines::Module module;
+  return std::strcmp(version, SHAKEBED_VERSION) == 0 ? &module : nullptr;
+}

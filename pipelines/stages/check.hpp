@@ -1,0 +1,15 @@
+// check: results against expected values with tolerances → a verdict, JUnit XML for CI, and exit code 6 when one fails.
+//
+// Files: check.json, junit.xml, summary.md.
+#pragma once
+
+#include "pipelines/stages.hpp"
+
+namespace shakebed::pipelines {
+
+StageRow check_stage();
+
+// Text inside XML and HTML.
+std::string escape_markup(std::string_view text);
+
+}  // namespace shakebed::pipelines

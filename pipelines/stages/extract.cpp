@@ -1,0 +1,86 @@
+#include "pipelines/stages/extract.hpp"
+
+#include "pipelines/images_module.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+class Extract : public Stage {
+ public:
+  void describe(Fields& fields) override {
+    ExtractOptions& o = options_;
+    fields.quantity("diameter", o.diameter, dimension::length,
+                    {.help = "diameter of a bead", .required = true, .range = positive, .example = "\"2.99 mm\""});
+    fields.input_files("images", o.images,
+                       {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
+                        .example = "\"photos/*.tif\""});
+    fields.boolean(
+        "use_geometry", o.use_geometry,
+        {.help = "take scale, floor and walls of rendered frames from the render stage instead of finding them"});
+    fields.quantity("scale", o.scale, dimension::length_per_pixel,
+                    {.help = "length of a pixel; found from the diameter if left out", .range = positive});
+    fields.number("floor", o.floor,
+                  {.help = "row of the floor's surface at the left edge, pixels from the top; found if left out"});
+    fields.number("floor_slope", o.floor_slope, {.help = "pixels down per pixel right", .range = from_to(-1, 1)});
+    fields.number("left_wall", o.left_wall,
+                  {.help = "column of the left wall's inner face in pixels; found if left out"});
+    fields.number("right_wall", o.right_wall,
+                  {.help = "column of the right wall's inner face in pixels; found if left out"});
+    fields.numbers("roi", o.roi, {.help = "region of interest in pixels: left, top, width, height"});
+    fields.choice(
+        "polarity", o.polarity,
+        {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},
+        {.help = "whether beads are darker or brighter than what is behind them"});
+    fields.number("radius", o.radius,
+                  {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
+    fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
+    fields.choice("kernel", o.kernel, {{DensityKernel::gaussian, "gaussian"}, {DensityKernel::top_hat, "top_hat"}},
+                  {.help = "the window through which density is measured"});
+    fields.number("kernel_width", o.kernel_width,
+                  {.help = "standard deviation (gaussian) or full width (top_hat) in D", .range = from_to(1e-3, 100)});
+    fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
+    fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
+    fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
+    fields.quantity("frequency", o.frequency, dimension::frequency,
+                    {.help = "of the shaking, for profiles by phase (needs frame_rate)", .range = positive});
+    fields.quantity("frame_rate", o.frame_rate, dimension::frequency, {.help = "of the film", .range = positive});
+    fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
+    fields.integer("overlays", o.overlays,
+                   {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
+    if (!fields.decoding()) return;
+    const bool from_render = fields.has_upstream("render");
+    fields.require(from_render != fields.has("images"), from_render ? "images" : "",
+                   from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
+                               : "there are no frames: neither \"images\" nor a render stage in \"from\"",
+                   "Give one of the two");
+    fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
+    if (o.roi.size() == 4)
+      fields.require(o.roi[2] >= 8 && o.roi[3] >= 8, "roi", "width and height must be at least 8 pixels");
+    fields.require(o.left_wall.has_value() == o.right_wall.has_value(), "left_wall",
+                   "both walls or none must be given");
+    if (o.left_wall && o.right_wall)
+      fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
+    fields.require(o.frequency.has_value() == o.frame_rate.has_value(), "frequency",
+                   "profiles by phase need both frequency and frame_rate");
+  }
+  void run(RunContext& context) const override { images_module().extract(options_, context); }
+
+ private:
+  ExtractOptions options_;
+};
+
+}  // namespace
+
+StageRow extract_stage() {
+  return {.name = "extract",
+          .version = 1,
+          .summary = "finds the disks in frames and measures the density profile",
+          .accepts = {"render", "simulate"},
+          .fewest_inputs = 0,
+          .most_inputs = 2,
+          .uses_images = true,
+          .result = "extract.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Extract>(); }};
+}
+
+}  // namespace shakebed::pipelines

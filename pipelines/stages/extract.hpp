@@ -1,0 +1,14 @@
+// extract: frames (rendered, photographed, filmed) → disks → density profile.
+//
+// Files: disks.csv (frame,x_px,y_px,radius_px,x,z,quality), profile.csv, coverage_profile.csv (from covered area),
+// covariance.csv (of the profile), frames.csv (what was found in each), extract.json, overlay_<frame>.png, bed.json (of
+// the simulated bed, passed on).
+#pragma once
+
+#include "pipelines/stages.hpp"
+
+namespace shakebed::pipelines {
+
+StageRow extract_stage();
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,372 @@
+#include "pipelines/stages/figure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fit/hydrostatic_profile.hpp"
+#include "pipelines/bed.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/process.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+// Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
+constexpr std::array palette = {"#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
+enum Color { black, blue, vermilion, green, purple, orange, sky };
+
+// gnuplot strings in double quotes.
+std::string gnuplot_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (c == '\n') {
+      out += "\\n";
+      continue;
+    }
+    out += c;
+  }
+  return out + "\"";
+}
+
+// Text from the user, in a terminal with enhanced markup: its special characters mean themselves.
+std::string plain(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '_' || c == '^' || c == '{' || c == '}' || c == '@' || c == '&' || c == '~') out += '\\';
+    out += c;
+  }
+  return out;
+}
+
+}  // namespace
+
+void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name) {
+  std::string data;
+  for (const Series& series : picture.series) {
+    data += fmt::format("# {}\n# x y{}\n", series.label, series.error.empty() ? "" : " std_error");
+    for (std::size_t i = 0; i < series.x.size(); ++i) {
+      data += number_text(series.x[i]) + ' ' + number_text(series.y[i]);
+      if (!series.error.empty()) data += ' ' + number_text(std::max(0.0, series.error[i]));
+      data += '\n';
+    }
+    data += "\n\n";
+  }
+  write_file(directory / (name + ".dat"), data);
+
+  std::string script =
+      "set encoding utf8\nset terminal svg size 860,560 enhanced font 'Helvetica,16' background '#ffffff' linewidth "
+      "1.4\n";
+  script += fmt::format("set output {}\n", gnuplot_text(name + ".svg"));
+  script += fmt::format("set xlabel {}\nset ylabel {}\n", gnuplot_text(picture.x_label), gnuplot_text(picture.y_label));
+  if (!picture.title.empty()) script += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
+  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
+  script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
+                        bound(picture.y_low), bound(picture.y_high));
+  script +=
+      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset key top right "
+      "spacing 1.25 samplen 2.5 opaque\nset bars 0.6\n";
+  int object = 1;
+  for (const auto& [low, high] : picture.bands) {
+    script += fmt::format(
+        "set object {} rectangle from {}, graph 0 to {}, graph 1 behind fillcolor rgb '#f0f0f0' fillstyle solid "
+        "noborder\n",
+        object++, number_text(low), number_text(high));
+  }
+  script += "plot ";
+  bool first = true;
+  if (!picture.band_label.empty()) {
+    script += fmt::format("NaN with boxes fillcolor rgb '#e4e4e4' fillstyle solid noborder title {}",
+                          gnuplot_text(plain(picture.band_label)));
+    first = false;
+  }
+  constexpr std::array points = {7, 5, 9, 13, 11};  // filled circle, square, triangle, diamond, triangle down
+  std::size_t point = 0;
+  for (std::size_t i = 0; i < picture.series.size(); ++i) {
+    const Series& series = picture.series[i];
+    if (series.x.empty()) continue;
+    script += first ? "" : ", \\\n     ";
+    first = false;
+    const char* color = palette[static_cast<std::size_t>(series.color) % palette.size()];
+    script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), i);
+    switch (series.style) {
+      case Series::Style::points:
+        script += fmt::format("{} with {} pt {} ps 0.55 lw 1 lc rgb '{}'", series.error.empty() ? "1:2" : "1:2:3",
+                              series.error.empty() ? "points" : "yerrorbars", points[point++ % points.size()], color);
+        break;
+      case Series::Style::line:
+        script += fmt::format("1:2 with lines lw 2 lc rgb '{}'", color);
+        break;
+      case Series::Style::dashed:
+        script += fmt::format("1:2 with lines lw 2 dashtype 2 lc rgb '{}'", color);
+        break;
+      case Series::Style::dotted:
+        script += fmt::format("1:2 with lines lw 1.6 dashtype 3 lc rgb '{}'", color);
+        break;
+    }
+    script += fmt::format(" title {}", gnuplot_text(plain(series.label)));
+  }
+  script += "\n";
+  if (first) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
+  write_file(directory / (name + ".gp"), script);
+  ProcessResult result;
+  try {
+    result = run_process({"gnuplot", name + ".gp"}, directory);
+  } catch (const StageError& error) {
+    throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", error.what()));
+  }
+  std::error_code error;
+  const auto size = std::filesystem::file_size(directory / (name + ".svg"), error);
+  if (result.exit_code != 0 || error || size == 0) {
+    throw StageError(
+        fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
+  }
+}
+
+namespace {
+
+enum class Reference { none, clement_rajchenbach };
+
+struct Curve {
+  std::vector<double> x, y, error;
+  bool empty() const { return x.empty(); }
+};
+
+// Linear between the points; nothing outside.
+std::optional<double> at(const Curve& curve, double x) {
+  const auto upper = std::lower_bound(curve.x.begin(), curve.x.end(), x);
+  if (upper == curve.x.end()) return std::nullopt;
+  const auto i = static_cast<std::size_t>(upper - curve.x.begin());
+  if (curve.x[i] == x) return curve.y[i];
+  if (i == 0) return std::nullopt;
+  const double u = (x - curve.x[i - 1]) / (curve.x[i] - curve.x[i - 1]);
+  return curve.y[i - 1] + u * (curve.y[i] - curve.y[i - 1]);
+}
+
+Curve curve_of(const ProfileTable& table) {
+  Curve curve{table.height, table.number_density, table.std_error};
+  if (std::any_of(curve.error.begin(), curve.error.end(), [](double e) { return e < 0; })) curve.error.clear();
+  return curve;
+}
+
+// Two columns of one of our own CSV files.
+Curve read_columns(const std::filesystem::path& path, const std::string& x, const std::string& y,
+                   const std::string& error = "") {
+  const std::string text = read_file(path);
+  Curve curve;
+  std::vector<std::string> header;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    begin = end + 1;
+    if (line.empty() || line.front() == '#') continue;
+    const auto cells = split_csv_line(line);
+    if (header.empty()) {
+      header = cells;
+      continue;
+    }
+    const auto number = [&](const std::string& name) {
+      const auto found = std::find(header.begin(), header.end(), name);
+      const auto index = static_cast<std::size_t>(found - header.begin());
+      if (found == header.end() || index >= cells.size())
+        throw InputError(fmt::format("{}: has no column \"{}\"", path.string(), name));
+      return std::strtod(cells[index].c_str(), nullptr);
+    };
+    curve.x.push_back(number(x)), curve.y.push_back(number(y));
+    if (!error.empty()) curve.error.push_back(number(error));
+  }
+  return curve;
+}
+
+// How far `a` is from `b` where both are known and a's density is above the threshold.
+Json comparison(const std::string& of, const std::string& with, const Curve& a, const Curve& b, double above) {
+  double squares = 0, sum = 0, largest = 0;
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < a.x.size(); ++i) {
+    if (!(a.y[i] > above)) continue;
+    const auto other = at(b, a.x[i]);
+    if (!other) continue;
+    const double difference = a.y[i] - *other;
+    squares += difference * difference, sum += difference, largest = std::max(largest, std::abs(difference));
+    ++points;
+  }
+  Json out{{"of", of}, {"with", with}, {"points", points}};
+  if (points == 0) return out;
+  const auto n = static_cast<double>(points);
+  out["rms_difference"] = quantity_json(std::sqrt(squares / n), "1/D^2");
+  out["mean_difference"] = quantity_json(sum / n, "1/D^2");
+  out["largest_difference"] = quantity_json(largest, "1/D^2");
+  return out;
+}
+
+class Figure : public Stage {
+ public:
+  void describe(Fields& fields) override {
+    fields.choice("reference", reference_,
+                  {{Reference::none, "none"}, {Reference::clement_rajchenbach, "clement-rajchenbach-1991"}},
+                  {.help = "also draw the published fit, from its printed parameters"});
+    fields.input_files("data", data_,
+                       {.help = "points of your own (CSV with height and number_density), drawn and compared"});
+    fields.text("title", title_, {.help = "above the figure"});
+    fields.number("highest", highest_, {.help = "where the axis of heights ends, in D", .range = positive});
+  }
+  void run(RunContext& context) const override;
+
+ private:
+  Reference reference_ = Reference::none;
+  InputFiles data_;
+  std::string title_;
+  std::optional<double> highest_;
+};
+
+void Figure::run(RunContext& context) const {
+  Picture picture{.x_label = "height above the floor's mean position,  z/D",
+                  .y_label = "number density,  φ = n D^2",
+                  .title = title_};
+  Json comparisons = Json::array();
+  Json named = Json::object();  // for checks: by a name that is easy to point at
+  Curve frames, simulated, fitted, bare;
+  std::string fitted_label;
+
+  if (const Input* extract = context.find_input("extract")) {
+    frames = curve_of(read_profile_csv(extract->file("profile.csv")));
+    picture.series.push_back({"from the frames", Series::Style::points, black, frames.x, frames.y, frames.error});
+  }
+  if (const Input* simulate = context.find_input("simulate")) {
+    simulated = curve_of(read_profile_csv(simulate->file("profile.csv")));
+    picture.series.push_back({"the simulation itself", frames.empty() ? Series::Style::points : Series::Style::line,
+                              sky, simulated.x, simulated.y, frames.empty() ? simulated.error : std::vector<double>{}});
+    // The same moments as the frames, where the simulation kept them apart.
+    const Curve same_moments = simulate->has("profile_frames.csv")
+                                   ? curve_of(read_profile_csv(simulate->file("profile_frames.csv")))
+                                   : simulated;
+    if (!frames.empty()) {
+      Json row = comparison("frames", "simulation", frames, simulated, 0.1);
+      if (row.contains("rms_difference")) named["frames_against_simulation"] = row["rms_difference"];
+      comparisons.push_back(std::move(row));
+      Json same = comparison("frames", "simulation at the moments of the frames", frames, same_moments, 0.1);
+      if (same.contains("rms_difference")) named["frames_against_simulation_same_moments"] = same["rms_difference"];
+      comparisons.push_back(std::move(same));
+    }
+  }
+  const Input* fit = context.find_input("fit");
+  Json fit_result;
+  if (fit != nullptr) {
+    fit_result = fit->result();
+    fitted = read_columns(fit->file("curve.csv"), "height", "smoothed_density");
+    bare = read_columns(fit->file("curve.csv"), "height", "number_density");
+    const Json* t = find_pointer(fit_result, "/temperature_over_mg/value");
+    const Json* reduced = find_pointer(fit_result, "/temperature/value");
+    fitted_label = "our fit";
+    if (t != nullptr && t->is_number())
+      fitted_label += fmt::format(", T/mg = {:.3g} mm", t->get<double>() * 1e3);
+    else if (reduced != nullptr && reduced->is_number())
+      fitted_label += fmt::format(", T = {:.3g} mgD", reduced->get<double>());
+    if (!fitted.empty()) {
+      picture.series.push_back({fitted_label, Series::Style::line, vermilion, fitted.x, fitted.y, {}});
+      const Json* low = find_pointer(fit_result, "/window/low/value");
+      const Json* high = find_pointer(fit_result, "/window/high/value");
+      if (low != nullptr && high != nullptr) {
+        picture.bands.emplace_back(low->get<double>(), high->get<double>());
+        picture.band_label = "window of the fit";
+      }
+    }
+  }
+  double end = 0;
+  for (const Series& series : picture.series) {
+    for (std::size_t i = 0; i < series.x.size(); ++i) {
+      if (series.y[i] > 2e-3) end = std::max(end, series.x[i]);
+    }
+  }
+  Curve published;
+  if (reference_ == Reference::clement_rajchenbach) {
+    const fit::PublishedFit parameters;
+    const fit::HydrostaticProfile profile = fit::published_profile(parameters);
+    const double top = std::max(end, parameters.shift() + 3);
+    for (int i = 0; i <= 800; ++i) {
+      const double height = top * i / 800;
+      published.x.push_back(height), published.y.push_back(profile.density(height));
+    }
+    picture.series.push_back({fmt::format("published fit, T/mg = {:g} mm", parameters.temperature_over_mg_in_mm),
+                              Series::Style::dashed,
+                              blue,
+                              published.x,
+                              published.y,
+                              {}});
+    end = std::max(end, parameters.shift() + 2);
+    if (!fitted.empty())
+      comparisons.push_back(comparison("our fit", "published fit", bare.empty() ? fitted : bare, published, 0.0));
+    if (!frames.empty())
+      comparisons.push_back(comparison("frames", "published fit", frames, published, 0.0));
+    else if (!simulated.empty())
+      comparisons.push_back(comparison("simulation", "published fit", simulated, published, 0.0));
+  }
+  int color = green;
+  for (const auto& path : data_.paths) {
+    const Curve data = curve_of(read_profile_csv(path));
+    const std::string label = path.filename().string();
+    picture.series.push_back({label, Series::Style::points, color, data.x, data.y, data.error});
+    color = color == green ? purple : color == purple ? orange : green;
+    for (const double x : data.x) end = std::max(end, x);
+    for (const auto& [name, curve] : {std::pair<std::string, const Curve*>{"our fit", &fitted},
+                                      {"frames", &frames},
+                                      {"simulation", &simulated},
+                                      {"published fit", &published}}) {
+      if (!curve->empty()) comparisons.push_back(comparison(label, name, data, *curve, 0.0));
+    }
+  }
+  if (picture.series.empty()) throw InputError("there is nothing to draw: \"from\" names no profile and no fit");
+  picture.x_low = 0;
+  picture.x_high = highest_ ? *highest_ : std::ceil(end + 0.5);
+  picture.y_low = 0;
+  context.progress(0.3, "drawing");
+  draw_picture(picture, context.output_directory(), "profile");
+
+  if (fit != nullptr) {
+    const Curve windows = [&] {
+      // Only windows whose fit succeeded.
+      const Curve all = read_columns(fit->file("windows.csv"), "low", "temperature", "std_error");
+      Curve good;
+      for (std::size_t i = 0; i < all.x.size(); ++i) {
+        if (all.y[i] > 0) good.x.push_back(all.x[i]), good.y.push_back(all.y[i]), good.error.push_back(all.error[i]);
+      }
+      return good;
+    }();
+    if (windows.x.size() >= 2) {
+      Picture sweep{.x_label = "lower edge of the window,  z/D", .y_label = "T / (m g D)"};
+      sweep.series.push_back({"fitted temperature", Series::Style::points, black, windows.x, windows.y, windows.error});
+      if (const Json* t = find_pointer(fit_result, "/temperature/value"); t != nullptr && t->is_number()) {
+        sweep.series.push_back({"the window used",
+                                Series::Style::line,
+                                vermilion,
+                                {windows.x.front(), windows.x.back()},
+                                {t->get<double>(), t->get<double>()},
+                                {}});
+      }
+      draw_picture(sweep, context.output_directory(), "windows");
+    }
+  }
+  Json out;
+  for (const auto& [name, value] : named.items()) out[name] = value;
+  out["comparisons"] = std::move(comparisons);
+  write_file(context.output("figure.json"), dump(out));
+}
+
+}  // namespace
+
+StageRow figure_stage() {
+  return {.name = "figure",
+          .version = 1,
+          .summary = "draws profiles, fits and published curves",
+          .accepts = {"extract", "simulate", "fit"},
+          .fewest_inputs = 1,
+          .most_inputs = 3,
+          .result = "figure.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Figure>(); }};
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,12 @@
+// map: Gamma → T/T_c by every named reading, beside the temperature that was measured.
+//
+// Files: map.json, map.csv.
+#pragma once
+
+#include "pipelines/stages.hpp"
+
+namespace shakebed::pipelines {
+
+StageRow map_stage();
+
+}  // namespace shakebed::pipelines

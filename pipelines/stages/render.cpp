@@ -1,0 +1,61 @@
+#include "pipelines/stages/render.hpp"
+
+#include "pipelines/images_module.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+class Render : public Stage {
+ public:
+  void describe(Fields& fields) override {
+    RenderOptions& o = options_;
+    fields.quantity("scale", o.scale, dimension::length_per_pixel,
+                    {.help = "length of a pixel", .range = positive, .example = "\"0.15 mm/px\""});
+    fields.number("blur", o.blur, {.help = "optical blur: standard deviation in pixels", .range = from_to(0, 50)});
+    fields.number("noise", o.noise,
+                  {.help = "noise: standard deviation in grey levels of 255", .range = from_to(0, 127)});
+    fields.quantity("exposure", o.exposure, dimension::time,
+                    {.help = "exposure time: disks are smeared along their velocity", .range = non_negative});
+    fields.number("background_level", o.background_level,
+                  {.help = "grey level without a bead", .range = from_to(0, 255)});
+    fields.number("bead_level", o.bead_level, {.help = "grey level of a bead", .range = from_to(0, 255)});
+    fields.choice("shading", o.shading,
+                  {{Shading::flat, "flat"}, {Shading::shaded, "shaded"}, {Shading::highlight, "highlight"}},
+                  {.help = "flat: one level; shaded: like a sphere; highlight: with a bright spot"});
+    fields.number("shading_depth", o.shading_depth,
+                  {.help = "(centre - rim) as a part of the contrast", .range = from_to(-2, 2)});
+    fields.number("gradient_x", o.gradient_x,
+                  {.help = "relative change of the light from left to right", .range = from_to(-1, 1)});
+    fields.number("gradient_y", o.gradient_y,
+                  {.help = "relative change of the light from top to bottom", .range = from_to(-1, 1)});
+    fields.number("vignette", o.vignette, {.help = "relative loss of light in the corners", .range = from_to(0, 0.9)});
+    fields.integer("margin", o.margin, {.help = "pixels around the box", .range = from_to(0, 2000)});
+    fields.quantity("height", o.height, dimension::length,
+                    {.help = "height of the view above the floor's mean position; up to the highest disk if left out",
+                     .range = positive});
+    fields.integer("frames", o.frames, {.help = "at most so many frames; 0 for all"});
+    fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
+                   "Choose another level");
+  }
+  void run(RunContext& context) const override { images_module().render(options_, context); }
+
+ private:
+  RenderOptions options_;
+};
+
+}  // namespace
+
+StageRow render_stage() {
+  return {.name = "render",
+          .version = 1,
+          .summary = "photographs a simulated bed: frames with blur, noise, uneven light, and the true centres",
+          .accepts = {"simulate"},
+          .fewest_inputs = 1,
+          .most_inputs = 1,
+          .uses_seed = true,
+          .uses_images = true,
+          .result = "render.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Render>(); }};
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,532 @@
+#include "pipelines/sweep.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <thread>
+
+#include "pipelines/files.hpp"
+#include "pipelines/manifest.hpp"
+#include "pipelines/process.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// SplitMix64: the points of a random sweep and the seeds of replicas are the same everywhere.
+std::uint64_t mixed(std::uint64_t z) {
+  z += 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31);
+}
+double uniform(std::uint64_t seed, std::uint64_t a, std::uint64_t b) {
+  return static_cast<double>(mixed(mixed(mixed(seed) ^ a) ^ b) >> 11) * 0x1.0p-53;
+}
+
+struct Shard {
+  std::uint64_t number = 1, of = 1;  // 1 to of
+};
+Shard parse_shard(const std::optional<std::string>& text) {
+  if (!text) return {};
+  Shard shard;
+  const std::size_t slash = text->find('/');
+  const auto read = [](std::string_view part, std::uint64_t& value) {
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+    return error == std::errc() && end == part.data() + part.size();
+  };
+  const bool good = slash != std::string::npos && read(std::string_view(*text).substr(0, slash), shard.number) &&
+                    read(std::string_view(*text).substr(slash + 1), shard.of);
+  if (!good || shard.number < 1 || shard.number > shard.of)
+    throw UsageError(fmt::format("--shard {}: expected K/N with K from 1 to N", *text));
+  return shard;
+}
+
+std::string csv_cell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"') out += '"';
+    out += c;
+  }
+  return out + "\"";
+}
+std::string value_text(const Json& value) {
+  return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : dump_canonical(value);
+}
+
+// A point's state, in its folder: what it is made from and how it ended.
+struct PointResult {
+  bool done = false;
+  ExitCode code = exit_ok;
+  std::string error;
+  std::vector<std::string> cells;  // of the collected numbers: value and std_error each
+  double seconds = 0;
+};
+
+// The numbers to gather; all top-level quantities of fit and check results where the recipe names none.
+std::vector<std::string> collected(const Plan& plan) {
+  if (!plan.sweep->collect.empty()) return plan.sweep->collect;
+  std::vector<std::string> pointers;
+  for (const PlannedStage& stage : plan.stages) {
+    if (stage.row->name == "fit") {
+      for (const char* key :
+           {"temperature", "temperature_over_mg", "solid_height", "reduced_temperature", "chi2_per_dof"})
+        pointers.push_back("/" + stage.id + "/" + key);
+    } else if (stage.row->name == "simulate") {
+      for (const char* key : {"center_of_mass_rise", "temperature_x", "temperature_z"})
+        pointers.push_back("/" + stage.id + "/" + key);
+    }
+  }
+  return pointers;
+}
+
+std::vector<std::string> gather_cells(const Plan& plan, const fs::path& directory,
+                                      const std::vector<std::string>& pointers) {
+  std::vector<std::string> cells;
+  std::map<std::string, Json> results;
+  for (const std::string& pointer : pointers) {
+    const std::vector<std::string> tokens = split_pointer(pointer);
+    std::string value, error;
+    if (const PlannedStage* stage = tokens.empty() ? nullptr : plan.find(tokens.front());
+        stage != nullptr && !stage->row->result.empty()) {
+      if (!results.contains(stage->id)) {
+        std::error_code ignored;
+        const fs::path path = directory / stage->id / stage->row->result;
+        results[stage->id] = fs::is_regular_file(path, ignored) ? read_json(path) : Json();
+      }
+      const Json* found = find_pointer(
+          results[stage->id], std::string_view(pointer).substr(1 + escape_pointer_token(tokens.front()).size()));
+      if (found != nullptr && found->is_object() && found->contains("value")) {
+        value = value_text((*found)["value"]);
+        if (found->contains("std_error")) error = value_text((*found)["std_error"]);
+      } else if (found != nullptr && !found->is_structured()) {
+        value = value_text(*found);
+      }
+    }
+    cells.push_back(value), cells.push_back(error);
+  }
+  return cells;
+}
+
+std::string sweep_header(const Plan& plan, const std::vector<std::string>& pointers) {
+  std::string line = "point,replica,status";
+  for (const SweepAxis& axis : plan.sweep->axes) line += "," + csv_cell(axis.pointer);
+  for (const std::string& pointer : pointers)
+    line += fmt::format(",{},{}", csv_cell(pointer), csv_cell(pointer + "/std_error"));
+  return line + "\n";
+}
+
+// A point is done when this file says so for the same recipe at the same values.
+constexpr std::string_view point_record = ".point";
+
+std::string point_key(const Plan& plan, const SweepPoint& point) {
+  // Everything that decides the point's results: the point's own resolved recipe and the fingerprints of external
+  // files.
+  const Plan at = plan_at(plan, point);
+  std::string text = dump_canonical(at.resolved["stages"]);
+  for (const PlannedStage& stage : at.stages) {
+    for (const auto& [pointer, path] : stage.input_files) text += pointer + fast_hash_of_file(path);
+  }
+  return fast_hash(text);
+}
+
+std::optional<Json> read_point(const fs::path& directory) {
+  const fs::path path = directory / point_record;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
+  try {
+    Json json = read_json(path);
+    if (json.is_object() && json.contains("key") && json.contains("code")) return json;
+  } catch (const InputError&) {}
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<SweepPoint> sweep_points(const Plan& plan) {
+  const SweepOptions& sweep = *plan.sweep;
+  std::vector<std::vector<Json>> values;
+  std::vector<Problem> problems;
+  for (const SweepAxis& axis : sweep.axes) {
+    const std::string where = "/sweep/over/" + escape_pointer_token(axis.pointer);
+    try {
+      // The pointer must lead to a stage; what is below it is checked when the point's recipe is read.
+      const auto tokens = split_pointer(axis.pointer);
+      if (tokens.size() < 3 || tokens[0] != "stages" ||
+          find_pointer(plan.document, "/stages/" + escape_pointer_token(tokens[1])) == nullptr) {
+        problems.push_back({plan.file,
+                            {},
+                            where,
+                            fmt::format("\"{}\" leads to no stage of this recipe", axis.pointer),
+                            "Write /stages/<id or number>/<key>"});
+      }
+    } catch (const UsageError& error) {
+      problems.push_back({plan.file, {}, where, error.what(), ""});
+    }
+  }
+  double total = 1;
+  if (sweep.kind == SweepKind::grid) {
+    for (const SweepAxis& axis : sweep.axes) total *= static_cast<double>(axis.values.size());
+  } else if (sweep.kind == SweepKind::random) {
+    total = static_cast<double>(sweep.count);
+  } else {
+    total = sweep.axes.empty() ? 0 : static_cast<double>(sweep.axes.front().values.size());
+  }
+  if (total * static_cast<double>(sweep.replicas) > 1e7) {
+    problems.push_back(
+        {plan.file,
+         {},
+         "/sweep",
+         fmt::format("{:.3g} points are too many (at most 10,000,000)", total * static_cast<double>(sweep.replicas)),
+         ""});
+  }
+  if (!problems.empty()) throw ConfigError(std::move(problems));
+  const auto count = static_cast<std::uint64_t>(total);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    std::vector<Json> row(sweep.axes.size());
+    std::uint64_t rest = i;
+    for (std::size_t a = sweep.axes.size(); a-- > 0;) {  // the last axis runs fastest
+      const SweepAxis& axis = sweep.axes[a];
+      if (sweep.kind == SweepKind::grid) {
+        row[a] = axis.values[rest % axis.values.size()];
+        rest /= axis.values.size();
+      } else if (sweep.kind == SweepKind::random) {
+        if (!axis.values.empty()) {
+          row[a] = axis.values[static_cast<std::size_t>(uniform(sweep.seed, i, a) *
+                                                        static_cast<double>(axis.values.size()))];
+        } else {
+          const double u = uniform(sweep.seed, i, a);
+          const double value =
+              axis.logarithmic ? axis.low * std::pow(axis.high / axis.low, u) : axis.low + (axis.high - axis.low) * u;
+          row[a] = axis.unit.empty() ? Json(value) : Json(number_text(value) + " " + axis.unit);
+        }
+      } else {
+        row[a] = axis.values[i];
+      }
+    }
+    values.push_back(std::move(row));
+  }
+  std::vector<SweepPoint> points;
+  points.reserve(values.size() * sweep.replicas);
+  for (const auto& row : values) {
+    for (std::uint64_t replica = 0; replica < sweep.replicas; ++replica) {
+      points.push_back({points.size(), fmt::format("{:06d}", points.size()), replica, row});
+    }
+  }
+  return points;
+}
+
+Plan plan_at(const Plan& plan, const SweepPoint& point) {
+  JsonNode document = plan.document;
+  document.members.erase(std::remove_if(document.members.begin(), document.members.end(),
+                                        [](const JsonMember& m) { return m.key == "sweep"; }),
+                         document.members.end());
+  for (std::size_t a = 0; a < plan.sweep->axes.size(); ++a) {
+    if (!point.values[a].is_null()) set_pointer(document, plan.sweep->axes[a].pointer, to_node(point.values[a]));
+  }
+  if (plan.sweep->replicas > 1) {
+    // Replicas differ in the seeds of all stages that have one; the first keeps the recipe's own.
+    JsonNode* stages = document.find("stages");
+    for (JsonNode& stage : stages->items) {
+      const JsonNode* kind = stage.find("stage");
+      const StageRow* row = kind != nullptr ? find_stage(kind->text) : nullptr;
+      if (row == nullptr || !row->uses_seed || point.replica == 0) continue;
+      const JsonNode* seed = stage.find("seed");
+      const auto own = seed != nullptr && seed->is_number() ? static_cast<std::uint64_t>(seed->number) : 1u;
+      // Below 2^53, so that any JSON reader sees the same number.
+      set_pointer(stage, "/seed", to_node(Json(mixed(mixed(own) ^ point.replica) >> 11)));
+    }
+  }
+  return make_plan(std::move(document), plan.file, plan.directory);
+}
+
+int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepArguments& arguments, Console& console) {
+  const Shard shard = parse_shard(arguments.shard);
+  const std::vector<SweepPoint> all = sweep_points(plan);
+  if (all.empty()) throw UsageError("the sweep has no points");
+  const std::vector<std::string> pointers = collected(plan);
+  std::vector<const SweepPoint*> points;
+  for (const SweepPoint& point : all) {
+    if (point.index % shard.of == shard.number - 1) points.push_back(&point);
+  }
+  // Every point's recipe is read before any runs: a mistake in the last one is found now, not tomorrow.
+  const fs::path root = options.out / "points";
+  std::vector<std::string> keys(points.size());
+  std::vector<std::uint8_t> done(points.size(), 0);
+  std::vector<std::optional<int>> earlier(points.size());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    keys[i] = point_key(plan, *points[i]);
+    const auto record = read_point(root / points[i]->name);
+    if (record && (*record)["key"] == keys[i]) {
+      earlier[i] = (*record)["code"].get<int>();
+      done[i] = !options.force && (*earlier[i] == exit_ok || *earlier[i] == exit_check_failed);
+    }
+    kept += done[i];
+  }
+  if (arguments.dry_run) {
+    if (arguments.json) {
+      Json rows = Json::array();
+      for (std::size_t i = 0; i < points.size(); ++i)
+        rows.push_back(Json{{"point", points[i]->name}, {"runs", done[i] == 0}, {"values", points[i]->values}});
+      const std::string text = dump(rows);
+      std::fwrite(text.data(), 1, text.size(), stdout);
+    } else {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        std::string values;
+        for (std::size_t a = 0; a < plan.sweep->axes.size(); ++a)
+          values += fmt::format(" {}={}", plan.sweep->axes[a].pointer, value_text(points[i]->values[a]));
+        fmt::print("{}:{}: {}\n", points[i]->name, values,
+                   done[i]      ? "up to date"
+                   : earlier[i] ? "runs again: it failed or was asked for"
+                                : "runs");
+      }
+      fmt::print("{} of {} points to run\n", points.size() - kept, points.size());
+    }
+    return exit_ok;
+  }
+  try {
+    fs::create_directories(root);
+  } catch (const fs::filesystem_error& error) {
+    throw StageError(fmt::format("{}: cannot be made: {}", options.out.string(), error.code().message()));
+  }
+  install_interrupt_handler();
+  const auto start = std::chrono::steady_clock::now();
+  const int workers =
+      std::max(1, options.jobs > 0 ? options.jobs : static_cast<int>(std::thread::hardware_concurrency()));
+  console.message(fmt::format("{} points, {} up to date, {} to run on {} threads", points.size(), kept,
+                              points.size() - kept, workers));
+
+  std::atomic<std::size_t> next{0}, finished{0}, failed{0}, checks{0}, busy{0};
+  std::mutex failures_mutex;
+  std::vector<std::string> failures;
+  std::string stop;  // what ends the whole sweep: a full disk, say
+  const std::size_t to_run = points.size() - kept;
+  const auto work = [&] {
+    while (!interrupt_requested()) {
+      const std::size_t i = next++;
+      if (i >= points.size()) return;
+      if (done[i]) continue;
+      const SweepPoint& point = *points[i];
+      RunOutcome outcome;
+      try {
+        const Plan at = plan_at(plan, point);
+        RunOptions one = options;
+        one.out = outcome.out = root / point.name;
+        one.jobs = 1;
+        fs::create_directories(one.out);
+        std::optional<FolderLock> lock;
+        try {
+          lock.emplace(one.out);
+        } catch (const StageError&) {
+          ++busy;  // another shard or run is at it
+          continue;
+        }
+        // It may have been finished by whoever held the lock a moment ago.
+        if (const auto record = read_point(one.out);
+            !options.force && record && (*record)["key"] == keys[i] &&
+            ((*record)["code"] == 0 || (*record)["code"] == exit_check_failed)) {
+          ++finished;
+          continue;
+        }
+        remove_leftovers(one.out);
+        const auto point_start = std::chrono::steady_clock::now();
+        run_stages(at, one, nullptr, outcome);
+        if (outcome.code == exit_interrupted) return;
+        Json record;
+        record["key"] = keys[i];
+        record["code"] = static_cast<int>(outcome.code);
+        if (!outcome.error.empty()) record["error"] = outcome.error;
+        record["warnings"] = outcome.warnings;
+        record["failed_checks"] = outcome.failed_checks;
+        record["cells"] = gather_cells(at, one.out, pointers);
+        record["pointers"] = pointers;
+        record["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - point_start).count();
+        write_file_atomically(one.out / point_record, dump(record));
+      } catch (const std::exception& error) {
+        outcome.code = exit_stage_failed;
+        outcome.error = error.what();
+      }
+      ++finished;
+      if (outcome.code == exit_check_failed) ++checks;
+      if (outcome.code != exit_ok && outcome.code != exit_check_failed) {
+        ++failed;
+        const std::lock_guard lock(failures_mutex);
+        if (failures.size() < 20) failures.push_back(fmt::format("point {}: {}", point.name, outcome.error));
+      }
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      console.progress("points", static_cast<double>(finished) / static_cast<double>(to_run),
+                       fmt::format("({}/{}, {:.3g}/s{})", finished.load(), to_run,
+                                   static_cast<double>(finished) / std::max(seconds, 1e-3),
+                                   failed > 0 ? fmt::format(", {} failed", failed.load()) : ""));
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int i = 1; i < workers && static_cast<std::size_t>(i) < to_run; ++i) threads.emplace_back(work);
+  work();
+  for (std::thread& thread : threads) thread.join();
+  console.end_progress();
+
+  // Gather: every point of the whole sweep that is there, whoever ran it.
+  std::string csv = sweep_header(plan, pointers);
+  std::size_t there = 0;
+  for (const SweepPoint& point : all) {
+    const auto record = read_point(root / point.name);
+    const bool counts = record && (*record)["code"].is_number() && (*record)["pointers"] == Json(pointers) &&
+                        (*record)["key"] == (shard.of == 1 ? Json(keys[point.index]) : (*record)["key"]);
+    std::string status = "missing";
+    if (counts)
+      status = (*record)["code"] == 0 ? "ok" : (*record)["code"] == exit_check_failed ? "check failed" : "failed";
+    there += counts && status != "failed";
+    csv += fmt::format("{},{},{}", point.name, point.replica, status);
+    for (const Json& value : point.values) csv += "," + csv_cell(value_text(value));
+    for (std::size_t k = 0; k < 2 * pointers.size(); ++k)
+      csv += "," + (counts && status != "failed" ? csv_cell((*record)["cells"][k].get<std::string>()) : std::string());
+    csv += "\n";
+  }
+  const bool interrupted = interrupt_requested();
+  // Shards that end at the same time write the same bytes; the last one sees all points.
+  write_file_atomically(options.out / "sweep.csv", csv);
+  write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
+  for (const std::string& failure : failures) console.error(failure);
+  if (failed > failures.size()) console.error(fmt::format("and {} more points", failed - failures.size()));
+  if (busy > 0) console.warning(fmt::format("{} points are being run by somebody else", busy.load()));
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const ExitCode code = interrupted  ? exit_interrupted
+                        : failed > 0 ? exit_stage_failed
+                        : checks > 0 ? exit_check_failed
+                                     : exit_ok;
+  Json summary;
+  summary["pipeline"] = plan.name;
+  summary["points"] = all.size();
+  summary["done"] = there;
+  summary["missing"] = all.size() - there;
+  summary["failed"] = failed.load();
+  summary["failed_checks"] = checks.load();
+  write_file_atomically(options.out / "summary.json", dump(summary));
+  Json manifest;
+  manifest["pipeline"] = plan.name;
+  manifest["shakebed"] = program_version();
+  manifest["git"] = source_revision();
+  manifest["compiler"] = compiler_text();
+  manifest["command_line"] = options.command_line;
+  manifest["finished"] = utc_now();
+  manifest["wall_seconds"] = seconds;
+  manifest["exit_code"] = static_cast<int>(code);
+  manifest["document"] = plan.document.to_json();
+  manifest["stages"] = Json::array();
+  manifest["outputs"] = Json::array({Json{{"file", "sweep.csv"}, {"bytes", csv.size()}, {"sha256", sha256(csv)}}});
+  write_file_atomically(options.out / "manifest.json", dump(manifest));
+  if (arguments.json) {
+    summary["exit_code"] = static_cast<int>(code);
+    summary["table"] = (options.out / "sweep.csv").string();
+    const std::string text = dump(summary);
+    std::fwrite(text.data(), 1, text.size(), stdout);
+  } else {
+    fmt::print("{} of {} points done{} in {}\ntable: {}\n", there, all.size(),
+               failed > 0 ? fmt::format(", {} failed: run again to retry them alone", failed.load()) : "",
+               duration_text(seconds), (options.out / "sweep.csv").string());
+  }
+  return code;
+}
+
+Json sweep_status(const fs::path& out) {
+  std::error_code error;
+  if (!fs::is_directory(out / "points", error)) return nullptr;
+  std::uint64_t points = 0, done = 0, failed = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out / "points", error)) {
+    ++points;
+    if (const auto record = read_point(entry.path())) {
+      const int code = (*record)["code"].get<int>();
+      if (code == exit_ok || code == exit_check_failed)
+        ++done;
+      else
+        ++failed;
+    }
+  }
+  // The recipe knows how many there should be.
+  if (fs::is_regular_file(out / "summary.json", error))
+    points = std::max(points, read_json(out / "summary.json").value("points", std::uint64_t{0}));
+  return Json{{"points", points}, {"done", done}, {"failed", failed}};
+}
+
+namespace {
+// For a POSIX shell.
+std::string shell_quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? "'\\''" : std::string(1, c);
+  return out + "'";
+}
+}  // namespace
+
+int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console) {
+  if (!plan.sweep)
+    throw UsageError("this recipe has no \"sweep\": there is only one point, and nothing to spread over a cluster");
+  const std::vector<SweepPoint> points = sweep_points(plan);
+  const int shards = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size()));
+  std::error_code error;
+  const fs::path folder = options.out / "slurm";
+  try {
+    fs::create_directories(folder);
+  } catch (const fs::filesystem_error& problem) {
+    throw StageError(fmt::format("{}: cannot be made: {}", folder.string(), problem.code().message()));
+  }
+  const std::string program = fs::read_symlink("/proc/self/exe", error).string();
+  std::string command =
+      fmt::format("{} run {} --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\"", shell_quoted(program),
+                  shell_quoted(fs::absolute(plan.file).string()), shell_quoted(fs::absolute(options.out).string()));
+  for (const std::string& setting : options.settings) command += " --set " + shell_quoted(setting);
+  const std::string head = "#!/bin/sh\n#SBATCH --job-name=shakebed-" + plan.name + "\n";
+  write_file_atomically(
+      folder / "array.sh",
+      head + fmt::format("# One task is one shard. What is up to date is skipped, so submitting again runs only what "
+                         "is missing.\nexec {} --quiet --shard \"$SLURM_ARRAY_TASK_ID/{}\"\n",
+                         command, shards));
+  write_file_atomically(folder / "gather.sh",
+                        head + fmt::format("# Runs when all shards have ended, however they ended: points left out are "
+                                           "run here, then all are gathered.\nexec {}\n",
+                                           command));
+  const std::string logs = (fs::absolute(folder) / "%x-%A-%a.log").string();
+  std::vector<std::string> array{"sbatch", "--parsable", fmt::format("--array=1-{}", shards), "--output=" + logs};
+  std::vector<std::string> gather{"sbatch", "--parsable",
+                                  "--output=" + (fs::absolute(folder) / "%x-%j-gather.log").string()};
+  array.insert(array.end(), options.sbatch.begin(), options.sbatch.end());
+  gather.insert(gather.end(), options.sbatch.begin(), options.sbatch.end());
+  array.push_back((fs::absolute(folder) / "array.sh").string());
+  if (options.dry_run) {
+    fmt::print("{}\n{}\n", fmt::join(array, " "), fmt::join(gather, " "));
+    return exit_ok;
+  }
+  const auto submit = [&](const std::vector<std::string>& arguments) {
+    const ProcessResult result = run_process(arguments, fs::current_path());
+    std::string id = result.output.substr(0, result.output.find_first_of(";\n"));
+    if (result.exit_code != 0 || id.empty() ||
+        !std::all_of(id.begin(), id.end(), [](unsigned char c) { return std::isdigit(c); })) {
+      throw StageError(fmt::format("sbatch refused (exit code {}): {}", result.exit_code, result.output));
+    }
+    return id;
+  };
+  const std::string id = submit(array);
+  gather.push_back("--dependency=afterany:" + id);
+  gather.push_back((fs::absolute(folder) / "gather.sh").string());
+  const std::string gather_id = submit(gather);
+  console.message(fmt::format("{} points in {} tasks", points.size(), shards));
+  if (options.json)
+    fmt::print("{}", dump(Json{{"job", id}, {"gather_job", gather_id}, {"tasks", shards}, {"points", points.size()}}));
+  else
+    fmt::print("job {} (array of {}), then job {} gathers\nlogs: {}\n", id, shards, gather_id, folder.string());
+  return exit_ok;
+}
+
+}  // namespace shakebed::pipelines
