@@ -69,6 +69,8 @@ class Engine final : public Simulation {
 
   // --- prediction
   Lanes contact_times(const std::uint32_t* ids, const Motion& motion, double radius) const;
+  Candidate earliest_in(const NeighbourBlock& block, const Motion& motion, double radius) const;
+  Candidate next_of_many(std::uint32_t i, const Motion& motion, Candidate best) const;
   Candidate next_contact(std::uint32_t i, const Motion& motion) const;
   Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best) const;
   Candidate next_event(std::uint32_t i, const Motion& motion) const;

@@ -110,14 +110,14 @@ template <class Space, class Rule, class Sizes>
 
   const Lanes time = all_lanes(now_);
   const Lanes dt = time - own_time;
-  Lanes dx = x + vx * dt - all_lanes(motion.x);
+  Lanes dx = fused(vx, dt, x) - all_lanes(motion.x);
   Lanes dz;
   if constexpr (Space::falls) {
     const Lanes fall = all_lanes(gravity_) * dt;
-    dz = z + (vz - all_lanes(0.5) * fall) * dt - all_lanes(motion.z);
+    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(motion.z);
     vz = vz - fall;
   } else {
-    dz = z + vz * dt - all_lanes(motion.z);
+    dz = fused(vz, dt, z) - all_lanes(motion.z);
   }
   if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
@@ -131,27 +131,42 @@ template <class Space, class Rule, class Sizes>
   }
   // As time_to_disk() in contact_time.hpp.
   const Lanes zero = all_lanes(0);
-  const Lanes b = dx * dvx + dz * dvz;
-  const Lanes c = larger(dx * dx + dz * dz - contact_squared, zero);
-  const Lanes discriminant = b * b - (dvx * dvx + dvz * dvz) * c;
+  const Lanes b = fused(dx, dvx, dz * dvz);
+  const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), zero);
+  const Lanes discriminant = fused(b, b, -(fused(dvx, dvx, dvz * dvz) * c));
   const Lanes contact = time + c / (sqrt_lanes(larger(discriminant, zero)) - b);
   const LaneMask meets = (b < zero) & (discriminant >= zero) & (contact < event_time);
   return select(meets, contact, all_lanes(never));
 }
 
+// The earliest contact with the eight of a block.
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i, const Motion& motion) const -> Candidate {
-  const double radius = sizes_.radius(i);
-  Candidate best{never, nobody};
-  const auto consider = [&](const NeighbourBlock& block) [[gnu::always_inline]] {
-    const Lanes first = contact_times(block.disk.data(), motion, radius);
-    const Lanes second = contact_times(block.disk.data() + 4, motion, radius);
-    const EarliestLane earliest = earliest_of_eight(first, second);
-    if (earliest.time < best.time) best = {earliest.time, static_cast<std::int32_t>(block.disk[earliest.lane])};
-  };
-  consider(shells_.first_block(i));
+[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::earliest_in(const NeighbourBlock& block,
+                                                                           const Motion& motion, double radius) const
+    -> Candidate {
+  const Lanes first = contact_times(block.disk.data(), motion, radius);
+  const Lanes second = contact_times(block.disk.data() + 4, motion, radius);
+  const EarliestLane earliest = earliest_of_eight(first, second);
+  return {earliest.time, static_cast<std::int32_t>(block.disk[earliest.lane])};
+}
+
+template <class Space, class Rule, class Sizes>
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_of_many(std::uint32_t i, const Motion& motion,
+                                                                Candidate best) const -> Candidate {
+  shells_.further_blocks(i, [&](const NeighbourBlock& block) {
+    const Candidate other = earliest_in(block, motion, sizes_.radius(i));
+    if (other.time < best.time) best = other;
+  });
+  return best;
+}
+
+// The next contact with another disk; its time is `never` where there is none.
+template <class Space, class Rule, class Sizes>
+[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i, const Motion& motion) const
+    -> Candidate {
+  const Candidate best = earliest_in(shells_.first_block(i), motion, sizes_.radius(i));
   if (disks_[i].neighbours > inline_neighbours) [[unlikely]]
-    shells_.further_blocks(i, consider);
+    return next_of_many(i, motion, best);
   return best;
 }
 
@@ -172,7 +187,8 @@ auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion
 }
 
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const -> Candidate {
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const
+    -> Candidate {
   const Candidate next = next_contact(i, motion);
   if constexpr (Space::has_walls) {
     if (disks_[i].near != 0) return next_wall(i, motion, next);
@@ -206,12 +222,14 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, c
   }
   disk.event_time = next.time;
   disk.partner = next.partner;
-  if (next.partner >= 0) {
+  if (!(next.time < never)) [[unlikely]] {
+    disk.partner = nobody;
+  } else if (next.partner >= 0) {
     Disk& partner = disks_[static_cast<std::uint32_t>(next.partner)];
     partner.event_time = next.time;
     partner.partner = static_cast<std::int32_t>(i);
     queue_.push(next.time, i, static_cast<std::uint32_t>(next.partner));
-  } else if (next.partner != nobody) {
+  } else {
     queue_.push(next.time, i, i);
   }
 }
@@ -385,7 +403,7 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   write_down(i, first);
   write_down(j, second);
   commit(i, first, next_first);
-  const bool taken = next_second.partner >= 0 &&
+  const bool taken = next_second.partner >= 0 && next_second.time < never &&
                      !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
   if (taken) [[unlikely]]
     next_second = next_event(j, second);

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "sim/disk.hpp"
+#include "sim/lanes.hpp"
 
 namespace shakebed::sim {
 
@@ -23,7 +24,7 @@ class EventQueue {
   // Forgets everything. disks: the records that the entries refer to; events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
-    const double events_a_bucket = count > 20'000 ? 24 : 12;
+    const double events_a_bucket = count > 20'000 ? 24 : 16;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
     const auto wanted =
         static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket * 1.5, 256.0, 1e8));
@@ -33,15 +34,15 @@ class EventQueue {
     chunks_.resize(1);
     free_chunk_ = 0;
     current_ = bucket_of(start) - 1;
-    run_.clear();
-    next_ = 0;
+    next_ = end_ = 0;
+    grow(256);
   }
 
   // The event of disk a (with b; a itself when alone) now stands at `time`, which both records say already.
   void push(double time, std::uint32_t a, std::uint32_t b) {
     const std::int64_t bucket = bucket_of(time);
     if (bucket <= current_) [[unlikely]] {
-      insert_into_run({time, a, b});
+      insert_into_run(time, a, b);
       return;
     }
     put(static_cast<std::size_t>(bucket) & mask_, a, b);
@@ -50,33 +51,28 @@ class EventQueue {
   // The earliest valid event at or before `until`: its disk, and its time in disks[disk].event_time. False if none.
   bool pop(double until, std::uint32_t& disk) {
     for (;;) {
-      if (next_ == run_.size()) [[unlikely]] {
+      if (next_ == end_) [[unlikely]] {
         if (!load_next_bucket(until)) return false;
       }
-      const Entry& entry = run_[next_];
-      if (entry.time > until) return false;
+      const double time = times_[next_];
+      const std::uint64_t pair = pairs_[next_];
+      if (time > until) [[unlikely]]
+        return false;
       ++next_;
-      if (disks_[entry.a].event_time == entry.time) [[likely]] {
-        disk = entry.a;
+      disk = static_cast<std::uint32_t>(pair);
+      if (disks_[disk].event_time == time) [[likely]]
         return true;
-      }
-      if (disks_[entry.b].event_time == entry.time) {
-        disk = entry.b;
-        return true;
-      }
+      disk = static_cast<std::uint32_t>(pair >> 32);
+      if (disks_[disk].event_time == time) return true;
     }
   }
 
   std::size_t bytes() const {
     return heads_.capacity() * sizeof(std::uint32_t) + chunks_.capacity() * sizeof(Chunk) +
-           (run_.capacity() + unsorted_.capacity()) * sizeof(Entry);
+           2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
-  struct Entry {
-    double time;
-    std::uint32_t a, b;
-  };
   static constexpr std::uint32_t pairs_a_chunk = 15;
   struct alignas(128) Chunk {
     std::uint32_t next = 0, unused = 0;
@@ -84,8 +80,10 @@ class EventQueue {
   };
 
   std::int64_t bucket_of(double time) const {
-    return static_cast<std::int64_t>(std::min(time * buckets_a_time_, 4e18));
+    const double bucket = time * buckets_a_time_;
+    return bucket < 4e18 ? static_cast<std::int64_t>(bucket) : std::int64_t{4'000'000'000'000'000'000};
   }
+  static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
 
   // A head holds the number of its first chunk times 16 plus how many pairs that one holds; 0: empty. The chunks that
   // follow are full.
@@ -109,83 +107,117 @@ class EventQueue {
     head = chunk << 4 | (used + 1);
   }
 
-  void insert_into_run(const Entry& entry) {
-    std::size_t place = run_.size();
-    run_.push_back(entry);
-    while (place > next_ && run_[place - 1].time > entry.time) {
-      run_[place] = run_[place - 1];
+  void grow(std::size_t size) {
+    if (times_.size() >= size) return;
+    size = std::bit_ceil(size);
+    times_.resize(size);
+    pairs_.resize(size);
+    unsorted_times_.resize(size);
+    unsorted_pairs_.resize(size);
+  }
+
+  void insert_into_run(double time, std::uint32_t a, std::uint32_t b) {
+    grow(end_ + 1);
+    std::size_t place = end_++;
+    while (place > next_ && times_[place - 1] > time) {
+      times_[place] = times_[place - 1];
+      pairs_[place] = pairs_[place - 1];
       --place;
     }
-    run_[place] = entry;
+    times_[place] = time;
+    pairs_[place] = pair_of(a, b);
   }
 
   // Makes the next bucket that holds a valid event the current one. False when every bucket up to `until` is empty.
-  bool load_next_bucket(double until) {
+  [[gnu::noinline]] bool load_next_bucket(double until) {
     const std::int64_t last = bucket_of(until);
-    run_.clear();
-    next_ = 0;
-    while (run_.empty()) {
+    next_ = end_ = 0;
+    while (end_ == 0) {
       if (current_ >= last) return false;
       ++current_;
-      const std::size_t slot = static_cast<std::size_t>(current_) & mask_;
-      const std::uint32_t head = heads_[slot];
+      std::uint32_t& slot = heads_[static_cast<std::size_t>(current_) & mask_];
+      const std::uint32_t head = slot;
       if (head == 0) continue;
-      heads_[slot] = 0;
-      collect(head);
-      sort_run();
+      slot = 0;
+      sort_run(collect(head));
     }
     return true;
   }
 
-  // Empties a bucket's chunks: events due now go to the run; those a whole turn of the ring or more away go back.
-  void collect(std::uint32_t head) {
+  // Empties a bucket's chunks: events due now are collected unsorted, and counted; those a whole turn of the ring or
+  // more away go back.
+  std::size_t collect(std::uint32_t head) {
     std::uint32_t chunk = head >> 4, used = head & 15;
-    unsorted_.clear();
+    std::size_t count = 0;
+    again_.clear();
     while (chunk != 0) {
+      grow(count + 2 * pairs_a_chunk);
+      const Chunk& full = chunks_[chunk];
       for (std::uint32_t pair = 0; pair < used; ++pair) {
-        const std::uint32_t a = chunks_[chunk].ids[2 * pair], b = chunks_[chunk].ids[2 * pair + 1];
+        const std::uint32_t a = full.ids[2 * pair], b = full.ids[2 * pair + 1];
         const double time_a = disks_[a].event_time, time_b = disks_[b].event_time;
         const std::int64_t bucket_a = bucket_of(time_a), bucket_b = bucket_of(time_b);
-        if (bucket_a == current_) run_.push_back({time_a, a, b});
-        if (bucket_b == current_ && time_b != time_a) run_.push_back({time_b, b, a});
-        const bool later_a = bucket_a > current_ && ((bucket_a ^ current_) & static_cast<std::int64_t>(mask_)) == 0;
-        const bool later_b = bucket_b > current_ && ((bucket_b ^ current_) & static_cast<std::int64_t>(mask_)) == 0;
-        if (later_a || later_b) [[unlikely]]
-          unsorted_.push_back({0, a, b});
+        unsorted_times_[count] = time_a;
+        unsorted_pairs_[count] = pair_of(a, b);
+        count += bucket_a == current_;
+        unsorted_times_[count] = time_b;
+        unsorted_pairs_[count] = pair_of(b, a);
+        count += static_cast<std::size_t>(bucket_b == current_) & static_cast<std::size_t>(time_b != time_a);
+        if (bucket_a > current_ || bucket_b > current_) {
+          const auto mask = static_cast<std::int64_t>(mask_);
+          const bool later_a = bucket_a > current_ && ((bucket_a ^ current_) & mask) == 0;
+          const bool later_b = bucket_b > current_ && ((bucket_b ^ current_) & mask) == 0;
+          if (later_a || later_b) again_.push_back(pair_of(a, b));
+        }
       }
-      const std::uint32_t following = chunks_[chunk].next;
+      const std::uint32_t following = full.next;
       chunks_[chunk].next = free_chunk_;
       free_chunk_ = chunk;
       chunk = following;
       used = pairs_a_chunk;
     }
-    const std::size_t slot = static_cast<std::size_t>(current_) & mask_;
-    for (const Entry& entry : unsorted_) put(slot, entry.a, entry.b);
+    for (std::uint64_t pair : again_) {
+      put(static_cast<std::size_t>(current_) & mask_, static_cast<std::uint32_t>(pair),
+          static_cast<std::uint32_t>(pair >> 32));
+    }
+    return count;
   }
 
-  // Small runs by rank: every entry's place is the number of entries before it, counted without a branch.
-  void sort_run() {
-    const std::size_t size = run_.size();
-    if (size < 2) return;
-    if (size > 48) {
-      std::stable_sort(run_.begin(), run_.end(), [](const Entry& l, const Entry& r) { return l.time < r.time; });
-      return;
+  // Sorts what collect() found into the run. Small ones by rank: an entry's place is the number of entries before it,
+  // counted without a branch. Equal times keep their order.
+  void sort_run(std::size_t count) {
+    end_ = count;
+    if (count <= largest_ranked) {
+      std::array<std::int64_t, largest_ranked> ranks;
+      for (std::size_t i = count; i % 4 != 0; ++i) unsorted_times_[i] = never;
+      for (std::size_t i = 0; i < count; i += 4) {
+        Lanes mine;
+        std::memcpy(&mine, &unsorted_times_[i], sizeof mine);
+        LaneMask before{};
+        for (std::size_t j = 0; j < count; ++j) before -= all_lanes(unsorted_times_[j]) < mine;
+        std::memcpy(&ranks[i], &before, sizeof before);
+      }
+      for (std::size_t i = 0; i < count; ++i) times_[i] = -1;
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto rank = static_cast<std::size_t>(ranks[i]);
+        times_[rank] = unsorted_times_[i];
+        pairs_[rank] = unsorted_pairs_[i];
+      }
+      bool tied = false;  // two of one rank leave a place empty
+      for (std::size_t i = 0; i < count; ++i) tied |= times_[i] < 0;
+      if (!tied) return;
     }
-    std::array<double, 48> times;
-    std::array<std::int64_t, 48> ranks{};
-    for (std::size_t i = 0; i < size; ++i) times[i] = run_[i].time;
-    for (std::size_t j = 0; j < size; ++j) {
-      for (std::size_t i = 0; i < size; ++i) ranks[i] += times[j] < times[i];
+    order_.resize(count);
+    for (std::uint32_t i = 0; i < count; ++i) order_[i] = i;
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](std::uint32_t l, std::uint32_t r) { return unsorted_times_[l] < unsorted_times_[r]; });
+    for (std::size_t i = 0; i < count; ++i) {
+      times_[i] = unsorted_times_[order_[i]];
+      pairs_[i] = unsorted_pairs_[order_[i]];
     }
-    unsorted_.assign(size, Entry{-1, 0, 0});
-    for (std::size_t i = 0; i < size; ++i) {
-      auto rank = static_cast<std::size_t>(ranks[i]);
-      while (unsorted_[rank].time >= 0) ++rank;  // equal times keep their order
-      unsorted_[rank] = run_[i];
-    }
-    run_.swap(unsorted_);
   }
 
+  static constexpr std::size_t largest_ranked = 64;
   const Disk* disks_ = nullptr;
   double buckets_a_time_ = 1;
   std::vector<std::uint32_t> heads_;
@@ -193,8 +225,11 @@ class EventQueue {
   std::vector<Chunk> chunks_;
   std::uint32_t free_chunk_ = 0;
   std::int64_t current_ = -1;
-  std::vector<Entry> run_, unsorted_;  // the current bucket, sorted; scratch
-  std::size_t next_ = 0;
+  // The current bucket's events from next_ to end_, in order; the second id in a pair's upper half.
+  std::vector<double> times_, unsorted_times_;
+  std::vector<std::uint64_t> pairs_, unsorted_pairs_, again_;
+  std::vector<std::uint32_t> order_;
+  std::size_t next_ = 0, end_ = 0;
 };
 
 }  // namespace shakebed::sim

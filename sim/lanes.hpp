@@ -1,5 +1,6 @@
 // Four doubles at a time, in the compilers' own vector types: one instruction each where the machine has it, the same
-// bytes where it has not (add, subtract, multiply, divide and square root are all correctly rounded).
+// bytes where it has not (add, subtract, multiply, divide, square root and fused multiply-add are all correctly
+// rounded).
 #pragma once
 
 #include <cmath>
@@ -37,7 +38,22 @@ inline Lanes nearest_integer(Lanes value) {
   return Lanes{std::nearbyint(value[0]), std::nearbyint(value[1]), std::nearbyint(value[2]), std::nearbyint(value[3])};
 #endif
 }
-inline Lanes larger(Lanes a, Lanes b) { return select(a > b, a, b); }
+// a b + c, rounded once; the same bytes by instruction or by library.
+inline Lanes fused(Lanes a, Lanes b, Lanes c) {
+#if defined(__FMA__)
+  return _mm256_fmadd_pd(a, b, c);
+#else
+  return Lanes{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1]), std::fma(a[2], b[2], c[2]),
+               std::fma(a[3], b[3], c[3])};
+#endif
+}
+inline Lanes larger(Lanes a, Lanes b) {
+#if defined(__AVX__)
+  return _mm256_max_pd(a, b);
+#else
+  return select(a > b, a, b);
+#endif
+}
 
 // Bit k set where words[k] == value, k = 0 to 7. words: 32-byte aligned.
 inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {

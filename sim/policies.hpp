@@ -29,11 +29,11 @@ struct PeriodicSidesBox {
 
 // Periods of a space; where a direction does not wrap, the period counts as 0 and nearest() changes nothing.
 struct Period {
-  double length = 0, inverse = 0;
-  explicit Period(double period = 0) : length(period), inverse(period > 0 ? 1 / period : 0) {}
+  double length = 0, minus_length = 0, inverse = 0;
+  explicit Period(double period = 0) : length(period), minus_length(-period), inverse(period > 0 ? 1 / period : 0) {}
   double nearest(double difference) const { return difference - length * std::nearbyint(difference * inverse); }
   Lanes nearest(Lanes difference) const {
-    return difference - all_lanes(length) * nearest_integer(difference * all_lanes(inverse));
+    return fused(all_lanes(minus_length), nearest_integer(difference * all_lanes(inverse)), difference);
   }
   double wrapped(double position) const { return position - length * std::floor(position * inverse); }
 };

@@ -29,13 +29,13 @@ Scene fluid(std::uint32_t nx, double phi) {
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottner) {
   const struct { double phi, z; } table[] = {{0.40, 2.1514393}, {0.50, 2.7601235}, {0.60, 3.663691}, {0.70, 5.082362}};
   for (const auto& row : table) {
-    const Scene scene = fluid(32, row.phi);
+    const Scene scene = fluid(64, row.phi);  // 1,024 disks would be 0.05 % low: the correction goes as 1/N
     const auto simulation = simulate(scene);
     const double n = scene.count(), interval = 5;
     simulation->advance_to(100);
     double virial = simulation->counters().virial;
     BlockedMean z;
-    for (int i = 1; i <= 500; ++i) {
+    for (int i = 1; i <= 160; ++i) {
       simulation->advance_to(100 + interval * i);
       const double now = simulation->counters().virial;
       const double temperature = simulation->energy().kinetic / (n - 1);  // N - 1 free momenta
