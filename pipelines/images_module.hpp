@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipelines/config.hpp"
+#include "pipelines/frame_geometry.hpp"
 #include "pipelines/stages.hpp"
 
 namespace shakebed::pipelines {
@@ -53,18 +54,6 @@ struct ExtractOptions {
   std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles
   std::uint64_t stride = 1;                     // every so many frames
   std::uint64_t overlays = 1;                   // frames drawn with what was found
-};
-
-// geometry.json beside rendered frames: where things are in them.
-struct FrameGeometry {
-  double scale = 0;                      // [m/px]
-  double diameter = 0;                   // [m]
-  double floor = 0;                      // row of the floor's mean position [px]
-  double left_wall = 0, right_wall = 0;  // columns [px]
-  double lowest = 0;                     // of any disk's centre [D]
-  int width = 0, height = 0;             // of the frames [px]
-  Json to_json() const;
-  static FrameGeometry read(const std::filesystem::path& path);  // throws InputError
 };
 
 class ImagesModule {

@@ -6,6 +6,7 @@
 #include "pipelines/stages/extract.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "pipelines/stages/fit.hpp"
+#include "pipelines/stages/infer.hpp"
 #include "pipelines/stages/map.hpp"
 #include "pipelines/stages/render.hpp"
 #include "pipelines/stages/simulate.hpp"
@@ -13,8 +14,8 @@
 namespace shakebed::pipelines {
 
 const std::vector<StageRow>& stage_table() {
-  static const std::vector<StageRow> table = {simulate_stage(), render_stage(), extract_stage(), fit_stage(),
-                                              map_stage(),      figure_stage(), check_stage()};
+  static const std::vector<StageRow> table = {simulate_stage(), infer_stage(), render_stage(), extract_stage(),
+                                              fit_stage(),      map_stage(),   figure_stage(), check_stage()};
   return table;
 }
 
