@@ -24,12 +24,14 @@ class EventQueue {
   // Forgets everything. disks: the records that the entries refer to; events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
-    const double events_a_bucket = count > 20'000 ? 24 : 16;
+    const double events_a_bucket = 16;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
     const auto wanted =
-        static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket * 1.5, 256.0, 1e8));
+        static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket, 256.0, 1e8));
     const std::size_t size = std::bit_ceil(wanted);
     heads_.assign(size, 0);
+    held_.assign(size, 0);
+    slots_.resize(size * pairs_a_bucket);
     mask_ = size - 1;
     chunks_.resize(1);
     free_chunk_ = 0;
@@ -68,15 +70,16 @@ class EventQueue {
   }
 
   std::size_t bytes() const {
-    return heads_.capacity() * sizeof(std::uint32_t) + chunks_.capacity() * sizeof(Chunk) +
+    return (heads_.capacity() + held_.capacity()) * sizeof(std::uint32_t) + slots_.capacity() * sizeof(std::uint64_t) +
+           chunks_.capacity() * sizeof(Chunk) +
            2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
-  static constexpr std::uint32_t pairs_a_chunk = 15;
+  static constexpr std::uint32_t pairs_a_bucket = 32, pairs_a_chunk = 15;
   struct alignas(128) Chunk {
-    std::uint32_t next = 0, unused = 0;
-    std::array<std::uint32_t, 2 * pairs_a_chunk> ids{};
+    std::uint32_t next = 0;
+    std::array<std::uint64_t, pairs_a_chunk> pairs{};
   };
 
   std::int64_t bucket_of(double time) const {
@@ -85,9 +88,20 @@ class EventQueue {
   }
   static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
 
+  // A bucket's first pairs stand in its own slots, the rest in a list of chunks.
+  void put(std::size_t bucket, std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t held = held_[bucket];
+    if (held == pairs_a_bucket) [[unlikely]] {
+      put_in_chunk(bucket, pair_of(a, b));
+      return;
+    }
+    slots_[bucket * pairs_a_bucket + held] = pair_of(a, b);
+    held_[bucket] = held + 1;
+  }
+
   // A head holds the number of its first chunk times 16 plus how many pairs that one holds; 0: empty. The chunks that
   // follow are full.
-  void put(std::size_t bucket, std::uint32_t a, std::uint32_t b) {
+  [[gnu::noinline]] void put_in_chunk(std::size_t bucket, std::uint64_t pair) {
     std::uint32_t& head = heads_[bucket];
     std::uint32_t chunk = head >> 4, used = head & 15;
     if (chunk == 0 || used == pairs_a_chunk) {
@@ -102,8 +116,7 @@ class EventQueue {
       chunk = fresh;
       used = 0;
     }
-    chunks_[chunk].ids[2 * used] = a;
-    chunks_[chunk].ids[2 * used + 1] = b;
+    chunks_[chunk].pairs[used] = pair;
     head = chunk << 4 | (used + 1);
   }
 
@@ -135,52 +148,56 @@ class EventQueue {
     while (end_ == 0) {
       if (current_ >= last) return false;
       ++current_;
-      std::uint32_t& slot = heads_[static_cast<std::size_t>(current_) & mask_];
-      const std::uint32_t head = slot;
-      if (head == 0) continue;
-      slot = 0;
-      sort_run(collect(head));
+      const std::size_t bucket = static_cast<std::size_t>(current_) & mask_;
+      if (held_[bucket] != 0) sort_run(collect(bucket));
     }
     return true;
   }
 
-  // Empties a bucket's chunks: events due now are collected unsorted, and counted; those a whole turn of the ring or
-  // more away go back.
-  std::size_t collect(std::uint32_t head) {
-    std::uint32_t chunk = head >> 4, used = head & 15;
+  // Empties a bucket: events due now are collected unsorted, and counted; those a whole turn of the ring or more away
+  // go back.
+  std::size_t collect(std::size_t bucket) {
     std::size_t count = 0;
     again_.clear();
+    grow(2 * pairs_a_bucket);
+    const std::uint32_t held = held_[bucket];
+    for (std::uint32_t k = 0; k < held; ++k) count = consider(slots_[bucket * pairs_a_bucket + k], count);
+    held_[bucket] = 0;
+    std::uint32_t chunk = heads_[bucket] >> 4, used = heads_[bucket] & 15;
+    heads_[bucket] = 0;
     while (chunk != 0) {
       grow(count + 2 * pairs_a_chunk);
-      const Chunk& full = chunks_[chunk];
-      for (std::uint32_t pair = 0; pair < used; ++pair) {
-        const std::uint32_t a = full.ids[2 * pair], b = full.ids[2 * pair + 1];
-        const double time_a = disks_[a].event_time, time_b = disks_[b].event_time;
-        const std::int64_t bucket_a = bucket_of(time_a), bucket_b = bucket_of(time_b);
-        unsorted_times_[count] = time_a;
-        unsorted_pairs_[count] = pair_of(a, b);
-        count += bucket_a == current_;
-        unsorted_times_[count] = time_b;
-        unsorted_pairs_[count] = pair_of(b, a);
-        count += static_cast<std::size_t>(bucket_b == current_) & static_cast<std::size_t>(time_b != time_a);
-        if (bucket_a > current_ || bucket_b > current_) {
-          const auto mask = static_cast<std::int64_t>(mask_);
-          const bool later_a = bucket_a > current_ && ((bucket_a ^ current_) & mask) == 0;
-          const bool later_b = bucket_b > current_ && ((bucket_b ^ current_) & mask) == 0;
-          if (later_a || later_b) again_.push_back(pair_of(a, b));
-        }
-      }
-      const std::uint32_t following = full.next;
+      for (std::uint32_t k = 0; k < used; ++k) count = consider(chunks_[chunk].pairs[k], count);
+      const std::uint32_t following = chunks_[chunk].next;
       chunks_[chunk].next = free_chunk_;
       free_chunk_ = chunk;
       chunk = following;
       used = pairs_a_chunk;
     }
-    for (std::uint64_t pair : again_) {
-      put(static_cast<std::size_t>(current_) & mask_, static_cast<std::uint32_t>(pair),
-          static_cast<std::uint32_t>(pair >> 32));
-    }
+    for (std::uint64_t pair : again_)
+      put(bucket, static_cast<std::uint32_t>(pair), static_cast<std::uint32_t>(pair >> 32));
     return count;
+  }
+
+  // Takes up the events that a pair stands for: that of each disk whose next event is still with the other one. (With
+  // itself: an event alone.)
+  std::size_t consider(std::uint64_t pair, std::size_t count) {
+    const auto a = static_cast<std::uint32_t>(pair), b = static_cast<std::uint32_t>(pair >> 32);
+    const Disk &first = disks_[a], &second = disks_[b];
+    const bool first_stands = first.partner == static_cast<std::int32_t>(b) || (a == b && first.partner < 0);
+    const bool second_stands =
+        second.partner == static_cast<std::int32_t>(a) && !(first_stands && second.event_time == first.event_time);
+    if (first_stands) count = take_up(first.event_time, pair, count);
+    if (second_stands) count = take_up(second.event_time, pair_of(b, a), count);
+    return count;
+  }
+  std::size_t take_up(double time, std::uint64_t pair, std::size_t count) {
+    const std::int64_t bucket = bucket_of(time);
+    unsorted_times_[count] = time;
+    unsorted_pairs_[count] = pair;
+    if (bucket > current_ && ((bucket ^ current_) & static_cast<std::int64_t>(mask_)) == 0) [[unlikely]]
+      again_.push_back(pair);
+    return count + (bucket == current_);
   }
 
   // Sorts what collect() found into the run. Small ones by rank: an entry's place is the number of entries before it,
@@ -220,7 +237,9 @@ class EventQueue {
   static constexpr std::size_t largest_ranked = 64;
   const Disk* disks_ = nullptr;
   double buckets_a_time_ = 1;
-  std::vector<std::uint32_t> heads_;
+  std::vector<std::uint32_t> held_;   // pairs in a bucket's slots
+  std::vector<std::uint64_t> slots_;  // pairs_a_bucket a bucket
+  std::vector<std::uint32_t> heads_;  // of its chunks
   std::size_t mask_ = 0;
   std::vector<Chunk> chunks_;
   std::uint32_t free_chunk_ = 0;

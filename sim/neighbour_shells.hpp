@@ -19,7 +19,7 @@
 namespace shakebed::sim {
 
 inline constexpr std::uint32_t inline_neighbours = 8;
-inline constexpr int rings = 2;  // of cells round one's own in which others are searched
+inline constexpr int rings = 1;  // of cells round one's own in which others are searched
 
 struct alignas(32) NeighbourBlock {
   std::array<std::uint32_t, inline_neighbours> disk;
@@ -28,7 +28,7 @@ struct alignas(32) NeighbourBlock {
 class NeighbourShells {
  public:
   // disks: the records, one more than count (the last is the sentinel that fills empty places of lists).
-  // reach: the largest distance of centres that can make a pair; cells are half as wide. width, height: of the periodic
+  // reach: the largest distance of centres that can make a pair; cells are that wide. width, height: of the periodic
   // box, or of the region to grid when it is not.
   void reset(Disk* disks, std::uint32_t count, double reach, double width, double height) {
     const double cell = reach / rings;
