@@ -136,8 +136,11 @@ class TabulatedEquation : public EquationOfState {
   using EquationOfState::EquationOfState;
 
   virtual std::vector<InverseTable::Piece> pieces() const { return {piece(0.0, largest_invertible_density())}; }
-  InverseTable::Piece piece(double lowest, double highest) const {
-    return {lowest, highest, has_pole() ? largest_density() : 0.0,
+  InverseTable::Piece piece(double lowest, double highest, double spacing = 1.0 / 16.0) const {
+    return {lowest,
+            highest,
+            has_pole() ? largest_density() : 0.0,
+            spacing,
             [this](double phi) { return std::log(phi) + excess(phi); },
             [this](double phi) { return local(phi).stiffness; }};
   }
@@ -422,10 +425,27 @@ double kolafa_rottner_pair_function(double phi) {
   return 0.5 * sum / (1.0 - per_density * phi);
 }
 
-class KolafaRottner final : public TabulatedEquation {
+// Its stiffness almost vanishes at freezing, where the density therefore follows f like a square root: nodes gather
+// there.
+class KolafaRottnerFluid : public TabulatedEquation {
+ protected:
+  using TabulatedEquation::TabulatedEquation;
+  [[nodiscard]] std::vector<InverseTable::Piece> fluid_pieces() const {
+    constexpr std::array<double, 5> ends{0.0, 0.66, 0.69, 0.697, freezing_area_fraction};
+    constexpr std::array<double, 4> spacing{1.0 / 16.0, 1.0 / 256.0, 1.0 / 1024.0, 1.0 / 4096.0};
+    std::vector<InverseTable::Piece> all;
+    for (std::size_t i = 0; i < spacing.size(); ++i) {
+      all.push_back(piece(ends[i] / per_density, ends[i + 1] / per_density, spacing[i]));
+      all.back().pole = 0.0;
+    }
+    return all;
+  }
+};
+
+class KolafaRottner final : public KolafaRottnerFluid {
  public:
   KolafaRottner()
-      : TabulatedEquation(
+      : KolafaRottnerFluid(
             {"kolafa-rottner", "Kolafa and Rottner", "KolafaRottner2006",
              "fluid branch to freezing (area fraction 0.70); a loop inside the transition, no number above "
              "phi = 0.90",
@@ -434,6 +454,9 @@ class KolafaRottner final : public TabulatedEquation {
   Local local(double phi) const override { return KolafaRottnerForm::local(phi); }
   double pair_function(double phi) const override { return kolafa_rottner_pair_function(phi); }
   double excess(double phi) const override { return form_.excess(phi); }
+
+ protected:
+  std::vector<InverseTable::Piece> pieces() const override { return fluid_pieces(); }
 
  private:
   const KolafaRottnerForm& form_;
@@ -511,6 +534,13 @@ class Luding final : public TabulatedEquation {
     return local(phi).compressibility_factor - 1.0 + (sums_[edge] + partial);
   }
 
+ protected:
+  // Across the transition the density changes fast with f.
+  std::vector<InverseTable::Piece> pieces() const override {
+    return {piece(0.0, 0.64 / per_density), piece(0.64 / per_density, 0.76 / per_density, 1.0 / 400.0),
+            piece(0.76 / per_density, just_below_close_packing)};
+  }
+
  private:
   static double integrand(double phi) {
     const double nu = per_density * phi;
@@ -529,12 +559,12 @@ class Luding final : public TabulatedEquation {
 // Kolafa-Rottner up to freezing at nu = 0.700, its pressure there held across the transition, then the dense branch of
 // Luding from where it has that pressure. True disks coexist from 0.700 to 0.716 and the hexatic above is nearly flat
 // [Bernard2011] [Engel2013]; the dense branch meets the coexistence pressure at 0.7227.
-class BestOf final : public TabulatedEquation {
+class BestOf final : public KolafaRottnerFluid {
  public:
   BestOf()
-      : TabulatedEquation({"best-of", "Kolafa-Rottner, coexistence, Luding's dense branch", "KolafaRottner2006",
-                           "fluid, coexistence and solid; pole at close packing", 1.15, close_packing_density,
-                           just_below_close_packing, true, 0.0}),
+      : KolafaRottnerFluid({"best-of", "Kolafa-Rottner, coexistence, Luding's dense branch", "KolafaRottner2006",
+                            "fluid, coexistence and solid; pole at close packing", 1.15, close_packing_density,
+                            just_below_close_packing, true, 0.0}),
         form_(kolafa_rottner_form()) {
     freezing_ = freezing_area_fraction / per_density;
     scaled_pressure_ = freezing_ * KolafaRottnerForm::local(freezing_).compressibility_factor;
@@ -545,6 +575,7 @@ class BestOf final : public TabulatedEquation {
       (middle * DenseForm::local(middle).compressibility_factor < scaled_pressure_ ? below : above) = middle;
     }
     melting_ = above;
+    breaks_ = {freezing_, melting_};
     f_coexistence_ = std::log(freezing_) + form_.excess(freezing_);
     dense_offset_ = f_coexistence_ - DenseForm::f(melting_);
   }
@@ -561,18 +592,19 @@ class BestOf final : public TabulatedEquation {
   double pair_function(double phi) const override {
     return phi <= freezing_ ? kolafa_rottner_pair_function(phi) : EquationOfState::pair_function(phi);
   }
-  std::vector<double> breaks() const override { return {freezing_, melting_}; }
+  std::span<const double> breaks() const override { return breaks_; }
 
  protected:
   std::vector<InverseTable::Piece> pieces() const override {
-    InverseTable::Piece fluid = piece(0.0, freezing_);
-    fluid.pole = 0.0;
-    InverseTable::Piece solid = piece(melting_, just_below_close_packing);
-    return {fluid, solid};
+    std::vector<InverseTable::Piece> all = fluid_pieces();
+    all.push_back(piece(melting_, just_below_close_packing));
+    all.back().pole = close_packing_density;
+    return all;
   }
 
  private:
   const KolafaRottnerForm& form_;
+  std::array<double, 2> breaks_{};
   double freezing_ = 0.0, melting_ = 0.0, scaled_pressure_ = 0.0, f_coexistence_ = 0.0, dense_offset_ = 0.0;
 };
 

@@ -2,7 +2,6 @@
 
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include "fit/value.hpp"
 
@@ -83,7 +82,7 @@ class EquationOfState {
   // chi(phi).
   [[nodiscard]] virtual double pair_function(double number_density) const;
   // Densities where Z has a kink or a jump of slope (the ends of a coexistence).
-  [[nodiscard]] virtual std::vector<double> breaks() const { return {}; }
+  [[nodiscard]] virtual std::span<const double> breaks() const { return {}; }
   // phi against f - f_constant(), to 1e-11: for loops that evaluate whole profiles. Built at the first call.
   [[nodiscard]] virtual const InverseTable& inverse_table() const = 0;
 

@@ -103,8 +103,10 @@ Value hydrostatic_center_of_mass_rise(const EquationOfState& equation, const Col
   }
   if (temperature == 0.0) return {0.0};
   const Value critical = critical_temperature(equation, column);
-  if (critical.ok() && temperature <= critical.value) return center_of_mass_rise(equation, column, temperature);
-  if (!critical.ok() && critical.status != ValueStatus::pole) return critical;
+  if (!equation.has_pole()) {
+    if (!critical.ok()) return critical;
+    if (temperature <= critical.value) return center_of_mass_rise(equation, column, temperature);
+  }
   const Value bottom = equation.density_from_scaled_pressure(column.column_number / temperature);
   if (!bottom.ok()) return bottom;
   const ExpansionConstants constants = expansion_constants(equation, bottom.value);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include "fit/convolution.hpp"
 
@@ -56,16 +55,14 @@ void FermiProfile::sample(std::span<const double> heights, const Kernel& kernel,
     }
     return;
   }
-  // Panels: the function varies on the scale theta about the edge (poles i pi theta off the axis).
-  std::vector<double> edges{0.0};
-  for (int step = -16; step <= 16; ++step) {
-    const double height = edge + 2.5 * temperature * step;
-    if (height > edges.back()) edges.push_back(height);
-  }
+  // The function varies on the scale theta about the edge (poles i pi theta off the axis).
+  const auto panel_at = [this](double h) { return std::max(2.2 * temperature, 0.5 * std::abs(h - edge)); };
+  const CurveShape<decltype(panel_at)> shape{0.0, edge + 40.0 * temperature, {}, panel_at};
+  const KernelRule rule(kernel);
   for (std::size_t i = 0; i < count; ++i) {
     std::array<double, 1> sum{};
     add_convolution<1>(
-        kernel, heights[i], edges, [&](double h) { return std::array<double, 1>{density(h)}; }, sum);
+        rule, heights[i], shape, [&](double h) { return std::array<double, 1>{density(h)}; }, sum);
     densities[i] = sum[0];
   }
 }

@@ -38,9 +38,9 @@ class RectangleWithTail final : public FitModel {
     return true;
   }
   double density(double height) const override { return tail_.density(height); }
-  double smoothed(double height, const Kernel& kernel) const override { return tail_.smoothed(height, kernel); }
-  std::array<double, 4> smoothed_with_gradient(double height, const Kernel& kernel) const override {
-    return tail_.smoothed_with_gradient(height, kernel);
+  double smoothed(double height, const KernelRule& rule) const override { return tail_.smoothed(height, rule); }
+  std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
+    return tail_.smoothed_with_gradient(height, rule);
   }
   double shift() const override { return tail_.reference; }
   double solid_height() const override { return std::max(0.0, tail_.reference - base_); }
@@ -119,9 +119,9 @@ class WholeColumn final : public FitModel {
     return true;
   }
   double density(double height) const override { return tail_.density(height); }
-  double smoothed(double height, const Kernel& kernel) const override { return tail_.smoothed(height, kernel); }
-  std::array<double, 4> smoothed_with_gradient(double height, const Kernel& kernel) const override {
-    return tail_.smoothed_with_gradient(height, kernel);
+  double smoothed(double height, const KernelRule& rule) const override { return tail_.smoothed(height, rule); }
+  std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
+    return tail_.smoothed_with_gradient(height, rule);
   }
   // Above T_c the shift is where the curve would reach phi_0 below the floor; the floor itself when it never would.
   double shift() const override {
@@ -174,24 +174,24 @@ class Fermi final : public FitModel {
       return false;
     }
     profile_ = {p[plateau], p[place], p[temperature]};
-    edges_.assign(1, base_);
-    for (int step = -16; step <= 16; ++step) {
-      const double height = p[place] + 2.5 * p[temperature] * step;
-      if (height > edges_.back()) edges_.push_back(height);
-    }
     return true;
   }
   double density(double height) const override { return height < base_ ? 0.0 : at(height)[0]; }
-  double smoothed(double height, const Kernel& kernel) const override {
-    return smoothed_with_gradient(height, kernel)[0];
+  double smoothed(double height, const KernelRule& rule) const override {
+    return smoothed_with_gradient(height, rule)[0];
   }
-  std::array<double, 4> smoothed_with_gradient(double height, const Kernel& kernel) const override {
-    if (kernel.kind == KernelKind::none || !(kernel.width > 0.0)) {
+  std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
+    if (rule.is_point()) {
       return height < base_ ? std::array<double, 4>{} : at(height);
     }
     std::array<double, 4> sum{};
+    const auto panel_at = [this](double h) {
+      return std::max(2.2 * profile_.temperature, 0.5 * std::abs(h - profile_.edge));
+    };
+    const CurveShape<decltype(panel_at)> shape{
+        base_, std::max(base_, profile_.edge + 40.0 * profile_.temperature), {}, panel_at};
     add_convolution<4>(
-        kernel, height, edges_, [&](double h) { return at(h); }, sum);
+        rule, height, shape, [&](double h) { return at(h); }, sum);
     return sum;
   }
   double shift() const override { return profile_.edge; }
@@ -213,7 +213,6 @@ class Fermi final : public FitModel {
     return {phi, slope * x, slope, filled};
   }
   FermiProfile profile_;
-  std::vector<double> edges_;
 };
 
 // A rectangle, parameters (-, top, phi_0).
@@ -228,11 +227,11 @@ class Rectangle final : public FitModel {
     return true;
   }
   double density(double height) const override { return height >= base_ && height <= top_ ? plateau_ : 0.0; }
-  double smoothed(double height, const Kernel& kernel) const override {
-    return smoothed_with_gradient(height, kernel)[0];
+  double smoothed(double height, const KernelRule& rule) const override {
+    return smoothed_with_gradient(height, rule)[0];
   }
-  std::array<double, 4> smoothed_with_gradient(double height, const Kernel& kernel) const override {
-    const Kernel& used = kernel.kind == KernelKind::none || !(kernel.width > 0.0) ? stand_in_ : kernel;
+  std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
+    const Kernel& used = rule.is_point() ? stand_in_ : rule.kernel();
     const double cover = kernel_cumulative(used, height - base_) - kernel_cumulative(used, height - top_);
     return {plateau_ * cover, 0.0, plateau_ * kernel_density(used, height - top_), cover};
   }

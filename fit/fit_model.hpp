@@ -36,8 +36,8 @@ class FitModel {
   virtual bool set(const Parameters& parameters) = 0;
   // Of the curve set last.
   [[nodiscard]] virtual double density(double height) const = 0;
-  [[nodiscard]] virtual double smoothed(double height, const Kernel& kernel) const = 0;
-  [[nodiscard]] virtual std::array<double, 4> smoothed_with_gradient(double height, const Kernel& kernel) const = 0;
+  [[nodiscard]] virtual double smoothed(double height, const KernelRule& rule) const = 0;
+  [[nodiscard]] virtual std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const = 0;
   [[nodiscard]] virtual double shift() const = 0;          // where the tail reaches phi_0 [D]
   [[nodiscard]] virtual double solid_height() const = 0;   // [D]
   [[nodiscard]] virtual double column_number() const = 0;  // N D/W under the curve

@@ -352,8 +352,8 @@ struct Setup {
   int parameters = 0;
 };
 
-double chi2_of(const Bins& bins, const FitModel& model, const Kernel& kernel) {
-  return weighted_residuals(bins, model, kernel).squaredNorm();
+double chi2_of(const Bins& bins, const FitModel& model, const KernelRule& rule) {
+  return weighted_residuals(bins, model, rule).squaredNorm();
 }
 
 // Starts that need no guess: temperatures on a logarithmic grid, each with the place that puts the curve through the
@@ -383,6 +383,7 @@ std::vector<FitModel::Parameters> find_starts(const Cleaned& cleaned, const Bins
   const double lowest = std::max(setup.least_squares.lowest_temperature, 1e-3 * cleaned.spacing / 100.0);
   const double highest = std::max(30.0 * range, 10.0 * lowest);
   const int temperatures = free_t ? 36 : 1;
+  const KernelRule points{Kernel{}};
   std::vector<std::pair<double, FitModel::Parameters>> candidates;
   for (int i = 0; i < temperatures; ++i) {
     FitModel::Parameters p = setup.start;
@@ -391,7 +392,7 @@ std::vector<FitModel::Parameters> find_starts(const Cleaned& cleaned, const Bins
     for (std::size_t place = 0; place < places; ++place) {
       if (free_place) p[1] = model.place_through(p, through[place].first, through[place].second);
       if (!model.set(p)) continue;
-      const double chi2 = chi2_of(thin, model, Kernel{});
+      const double chi2 = chi2_of(thin, model, points);
       if (std::isfinite(chi2)) candidates.emplace_back(chi2, p);
     }
   }
@@ -418,7 +419,10 @@ Solution fit_from(const Bins& bins, Setup& setup, const std::vector<FitModel::Pa
         solution.has_curve && (!best.has_curve || (solution.converged && !best.converged) ||
                                (solution.converged == best.converged && solution.objective < best.objective));
     if (better) best = std::move(solution);
-    if (best.converged && !best.temperature_at_bound) break;
+    // A good fit needs no second opinion; a poor one may be a side valley.
+    const double dof = std::max(1.0, static_cast<double>(bins.size()) - setup.parameters);
+    const bool good = setup.least_squares.errors_known && best.objective < 3.0 * dof;
+    if (best.converged && !best.temperature_at_bound && good) break;
   }
   if (best.has_curve) setup.model->set(best.parameters);
   best.evaluations = evaluations;
@@ -472,7 +476,7 @@ FitStatus make_setup(const FitOptions& options, const Cleaned& cleaned, Setup& s
   } else if (options.fixed_shift) {
     ls.free[FitModel::place] = false;
   }
-  ls.kernel = options.kernel;
+  ls.kernel = KernelRule(options.kernel);
   ls.robust = options.robust;
   ls.robust_threshold = options.robust_threshold;
   ls.errors_known = cleaned.errors_known;
@@ -878,11 +882,12 @@ void warn_about_fit(const Cleaned& cleaned, const FitOptions& options, const Set
 
 void fill_curve(const Cleaned& cleaned, const FitOptions& options, const FitModel& model, FitResult& result) {
   if (options.curve_points < 2) return;
+  const KernelRule rule(options.kernel);
   const double low = std::min(cleaned.height.front(), options.base);
   const double high = cleaned.height.back();
   for (int i = 0; i < options.curve_points; ++i) {
     const double height = low + (high - low) * i / (options.curve_points - 1);
-    result.curve.push_back({height, model.density(height), model.smoothed(height, options.kernel)});
+    result.curve.push_back({height, model.density(height), model.smoothed(height, rule)});
   }
 }
 
@@ -1036,7 +1041,7 @@ FitResult fit_profile(const Profile& profile, const FitOptions& options) {
         "the profile falls more sharply than its bins and kernel can tell: the temperature is only bounded above";
   }
 
-  for (Residual& r : result.residuals) r.model = model.smoothed(r.height, options.kernel);
+  for (Residual& r : result.residuals) r.model = model.smoothed(r.height, setup.least_squares.kernel);
   {
     std::size_t next = 0;
     for (std::size_t i = 0; i < cleaned.size(); ++i) {
@@ -1072,7 +1077,8 @@ ModelCurve evaluate_model(const FitOptions& options, double temperature, double 
     curve.status = FitStatus::undefined_model;
     return curve;
   }
-  for (const double height : heights) curve.densities.push_back(model->smoothed(height, options.kernel));
+  const KernelRule rule(options.kernel);
+  for (const double height : heights) curve.densities.push_back(model->smoothed(height, rule));
   return curve;
 }
 

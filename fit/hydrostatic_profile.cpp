@@ -144,7 +144,8 @@ void HydrostaticProfile::sample(std::span<const double> heights, const Kernel& k
     return;
   }
   const Tail tail = tail_of(*equation_, temperature_, base_, top_, f_top_, bottom_density_);
-  for (std::size_t i = 0; i < count; ++i) densities[i] = tail.smoothed(heights[i], kernel);
+  const KernelRule rule(kernel);
+  for (std::size_t i = 0; i < count; ++i) densities[i] = tail.smoothed(heights[i], rule);
 }
 
 HydrostaticProfile published_profile(const PublishedFit& published) {

@@ -35,7 +35,7 @@ InverseTable::InverseTable(const std::vector<Piece>& pieces) {
     const double first = piece.lowest_density > 0.0 ? piece.f_of_density(piece.lowest_density) : lowest_f;
     const double last = piece.f_of_density(piece.highest_density);
     if (first < logarithmic_from) {
-      add_segment(piece, first, std::min(last, logarithmic_from), false, 1.0 / 16.0);
+      add_segment(piece, first, std::min(last, logarithmic_from), false, piece.spacing);
     }
     if (last > logarithmic_from) add_segment(piece, std::max(first, logarithmic_from), last, true, 1.0 / 16.0);
     largest_f_ = last;

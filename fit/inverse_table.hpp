@@ -18,7 +18,8 @@ class InverseTable {
   struct Piece {
     double lowest_density = 0.0;  // 0: from F = -40
     double highest_density = 0.0;
-    double pole = 0.0;  // 0: none; else the density where F diverges, just above highest_density
+    double pole = 0.0;            // 0: none; else the density where F diverges, just above highest_density
+    double spacing = 1.0 / 16.0;  // of the nodes, in F
     std::function<double(double)> f_of_density;  // F(phi)
     std::function<double(double)> stiffness;     // kappa = phi F'(phi)
   };

@@ -173,7 +173,7 @@ class Solver {
       const Matrix old_jacobian = jacobian_;
       // What this step and the undamped one promise to gain.
       const double promise = -g.dot(step);
-      const bool worth = promise > 1e-15 * solution.objective / dof + 1e-30 * signal;
+      const bool worth = promise > (1e-13 / dof + 1e-15) * solution.objective + 1e-30 * signal;
       if (!moved || !worth || !step.allFinite()) {
         if (damping <= 1e-3 || !moved) return true;
         damping = 1e-6;  // only the damping made the step small
@@ -195,6 +195,8 @@ class Solver {
       } else {
         residual_ = old_residual;
         jacobian_ = old_jacobian;
+        // A step of less than 1e-4 standard errors that gains nothing: rounding error is all that is left.
+        if (has_curve && promise <= 1e-8 * solution.objective / dof + 1e-24 * signal) return true;
         damping *= growth;
         growth *= 2.0;
         // No step, however short, lowers the sum: a minimum to rounding error.
@@ -276,10 +278,10 @@ Solution least_squares(const Bins& bins, FitModel& model, const FitModel::Parame
   return Solver(bins, model, options).run(start);
 }
 
-Eigen::VectorXd weighted_residuals(const Bins& bins, const FitModel& model, const Kernel& kernel) {
+Eigen::VectorXd weighted_residuals(const Bins& bins, const FitModel& model, const KernelRule& rule) {
   Matrix residual(static_cast<Eigen::Index>(bins.size()), 1);
   for (std::size_t i = 0; i < bins.size(); ++i) {
-    residual(static_cast<Eigen::Index>(i), 0) = model.smoothed(bins.height[i], kernel) - bins.density[i];
+    residual(static_cast<Eigen::Index>(i), 0) = model.smoothed(bins.height[i], rule) - bins.density[i];
   }
   whiten(bins, residual);
   return residual.col(0);

@@ -20,7 +20,7 @@ struct Bins {
 
 struct LeastSquaresOptions {
   std::array<bool, 3> free{true, true, false};
-  Kernel kernel;
+  KernelRule kernel{Kernel{}};
   bool robust = false;
   double robust_threshold = 1.345;
   bool errors_known = true;  // robust only: the scale of the residuals is 1, else their median absolute deviation
@@ -47,6 +47,6 @@ Solution least_squares(const Bins& bins, FitModel& model, const FitModel::Parame
                        const LeastSquaresOptions& options);
 
 // Weighted residuals (model - data) of the curve set in the model.
-Eigen::VectorXd weighted_residuals(const Bins& bins, const FitModel& model, const Kernel& kernel);
+Eigen::VectorXd weighted_residuals(const Bins& bins, const FitModel& model, const KernelRule& rule);
 
 }  // namespace shakebed::fit

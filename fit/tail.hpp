@@ -3,8 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <span>
-#include <vector>
 
 #include "fit/convolution.hpp"
 #include "fit/equation_of_state.hpp"
@@ -31,27 +29,32 @@ struct Tail {
   // Derivatives of the above by each parameter.
   std::array<double, max_parameters> d_temperature{}, d_reference{}, d_f_reference{}, d_rectangle{};
 
-  struct Jump {  // of the density (a coexistence), from `upper` below to `lower` above a height
-    double f, lower, upper;
+  // A jump of the density (a coexistence), from `upper` below to `lower` above the height `at`; none when upper is 0.
+  struct Jump {
+    double f = 0.0, lower = 0.0, upper = 0.0, at = 0.0;
   };
-  std::vector<Jump> jumps;
-  std::vector<double> edges;  // heights, ascending from start: see add_convolution
+  Jump jump;
+  double end = 0.0;  // above, the density is below 1e-17
 
-  // To be called when the rest is set: fills edges and jumps.
+  // To be called when the rest is set.
   void prepare(const EquationOfState& equation);
 
-  [[nodiscard]] double f_at(double height) const { return f_reference - (height - reference) / temperature; }
+  [[nodiscard]] double f_at(double height) const { return f_reference - (height - reference) * inverse_temperature_; }
   [[nodiscard]] double height_of_f(double big_f) const { return reference + temperature * (f_reference - big_f); }
   [[nodiscard]] double density(double height) const;
 
   // The density through a kernel.
-  [[nodiscard]] double smoothed(double height, const Kernel& kernel) const;
+  [[nodiscard]] double smoothed(double height, const KernelRule& rule) const;
   // The same and its derivatives by the parameters.
   [[nodiscard]] std::array<double, 1 + max_parameters> smoothed_with_gradient(double height,
-                                                                              const Kernel& kernel) const;
+                                                                              const KernelRule& rule) const;
 
  private:
   [[nodiscard]] double rectangle_cover(double height, const Kernel& kernel) const;
+  template <std::size_t Components, class Curve>
+  void add_tail(double height, const KernelRule& rule, Curve&& curve, std::array<double, Components>& sum) const;
+
+  double inverse_temperature_ = 0.0;
 };
 
 }  // namespace shakebed::fit
