@@ -239,12 +239,6 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
                                   std::filesystem::path(frame.origin.path).filename().string(), frame.why));
   }
   if (bad > 5) context.warning(fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - 5));
-  if (bed.walls_are_frame_sides) {
-    context.warning(
-        "no side walls were seen: the density is that of the part of the bed in view, and N D/W is not that of the "
-        "whole bed");
-  }
-
   const std::string kernel = options.kernel == DensityKernel::gaussian ? "gaussian" : "top_hat";
   const double column_number = found.disk_count_mean / bed.width;
   write_profile_csv(

@@ -100,8 +100,8 @@ std::string shown(const Json& quantity) {
   } else {
     text = fmt::format("{:.5g}", value);
   }
-  if (quantity.value("fixed", false)) text += " (fixed)";
-  return text + (unit.empty() || unit == "1" ? "" : " " + html(unit));
+  if (!unit.empty() && unit != "1") text += " " + html(unit);
+  return text + (quantity.value("fixed", false) ? " (fixed)" : "");
 }
 
 // "temperature_over_mg" → "temperature over mg".

@@ -69,6 +69,8 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   script +=
       "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset key top right "
       "spacing 1.25 samplen 2.5 opaque\nset bars 0.6\n";
+  script += picture.key_above ? "set key above horizontal spacing 1.25 samplen 2.5\n"
+                              : "set key top right spacing 1.25 samplen 2.5\n";
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     script += fmt::format(
@@ -338,12 +340,14 @@ void Figure::run(RunContext& context) const {
     }();
     if (windows.x.size() >= 2) {
       Picture sweep{.x_label = "lower edge of the window,  z/D", .y_label = "T / (m g D)"};
+      sweep.key_above = true;
       sweep.series.push_back({"fitted temperature", Series::Style::points, black, windows.x, windows.y, windows.error});
       if (const Json* t = find_pointer(fit_result, "/temperature/value"); t != nullptr && t->is_number()) {
-        sweep.series.push_back({"the window used",
+        const auto [low, high] = std::minmax_element(windows.x.begin(), windows.x.end());
+        sweep.series.push_back({"in the window used",
                                 Series::Style::line,
                                 vermilion,
-                                {windows.x.front(), windows.x.back()},
+                                {*low, *high},
                                 {t->get<double>(), t->get<double>()},
                                 {}});
       }
