@@ -25,6 +25,9 @@ double value_at(const std::vector<float>& samples, double step, double r) {
   return static_cast<double>(samples[cell]) * (1 - part) + static_cast<double>(samples[cell + 1]) * part;
 }
 
+// The first row from `top` on that a pass over every `step`-th row visits.
+int first_row(int top, int step) { return (top + step - 1) / step * step; }
+
 }  // namespace
 
 BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px) {
@@ -43,7 +46,7 @@ BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px) {
 
 BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
                           const std::vector<const std::vector<ModelDisk>*>& disks, const BeadProfile& current,
-                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic) {
+                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic, int row_step) {
   // Coefficient k belongs to the spline centred at knot k - 1, k = 0 .. cells + 2. The three that reach past the last
   // knot are held at 0; coefficient 0 is folded onto 2, so that p'(0) = 0.
   const std::size_t cells = std::max<std::size_t>(4, static_cast<std::size_t>(std::ceil(reach_px / knot_px)));
@@ -58,6 +61,32 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
   };
   const double inverse_knot = 1 / knot;
   const double reach_squared = reach_px * reach_px;
+  // Coefficients of the current profile: for a smooth curve, its value less a sixth of its second difference.
+  std::vector<double> present(free_count);
+  for (std::size_t i = 0; i < free_count; ++i) {
+    const double r = static_cast<double>(i) * knot;  // coefficient i + 1 is centred at knot i
+    const auto at = [&](double distance) { return value_at(current.level, current.step_px, std::abs(distance)); };
+    present[i] = at(r) - (at(r + knot) - 2 * at(r) + at(r - knot)) / 6;
+  }
+  // What the splines cannot follow of the current profile stays in the data.
+  const auto spline_value = [&](const std::vector<double>& coefficients, double r) {
+    const double place = r * inverse_knot;
+    const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
+    const auto splines = cubic_b_splines(place - static_cast<double>(cell));
+    double value = 0;
+    for (std::size_t a = 0; a < 4; ++a) {
+      const std::size_t k = slot(cell + a);
+      if (k < free_count) value += splines[a] * coefficients[k];
+    }
+    return value;
+  };
+  const double fine = knot / 16;
+  std::vector<float> left_over(static_cast<std::size_t>(std::ceil(reach_px / fine)) + 2);
+  for (std::size_t i = 0; i < left_over.size(); ++i) {
+    const double r = static_cast<double>(i) * fine;
+    left_over[i] =
+        static_cast<float>(value_at(current.level, current.step_px, r) - (r < reach_px ? spline_value(present, r) : 0));
+  }
   // p4 lives on cells around the rim.
   const double ring_low = std::max(0.0, radius_px - 2.5), ring_high = radius_px + 2.5;
   const std::size_t ring_cells = static_cast<std::size_t>(std::ceil((ring_high - ring_low) / 0.25));
@@ -69,7 +98,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
     for (const ModelDisk& bead : beads) {
       const int top = std::max(0, static_cast<int>(std::ceil(bead.y - reach_px)));
       const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(bead.y + reach_px)));
-      for (int row = top; row <= bottom; ++row) {
+      for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
         const double dy = row - bead.y;
         const double half = std::sqrt(std::max(0.0, reach_squared - dy * dy));
         const int left = std::max(0, static_cast<int>(std::ceil(bead.x - half)));
@@ -81,7 +110,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
           const double place = r * inverse_knot;
           const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
           const auto splines = cubic_b_splines(place - static_cast<double>(cell));
-          const double e = static_cast<double>(line[column]);
+          const double e = static_cast<double>(line[column]) + value_at(left_over, fine, r);
           std::array<std::size_t, 4> at;
           for (std::size_t a = 0; a < 4; ++a) at[a] = slot(cell + a);
           for (std::size_t a = 0; a < 4; ++a) {
@@ -118,7 +147,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
         if (std::abs(other.x - one.x) > 2 * reach_px) continue;
         const int top = std::max(0, static_cast<int>(std::ceil(other.y - reach_px)));
         const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(one.y + reach_px)));
-        for (int row = top; row <= bottom; ++row) {
+        for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
           const double dy1 = row - one.y, dy2 = row - other.y;
           const double half1 = std::sqrt(std::max(0.0, reach_squared - dy1 * dy1));
           const double half2 = std::sqrt(std::max(0.0, reach_squared - dy2 * dy2));
@@ -146,23 +175,31 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
     }
   }
 
-  // A touch of smoothness (second differences of the change) where few pixels speak, and 0 in the swallowing slots.
+  // A touch of smoothness (second differences of the whole profile): in a crystal, pixels far out of one bead lie
+  // inside another, and what is added to the one can be taken from the other.
   double trace = 0;
   for (std::size_t i = 0; i < free_count; ++i) trace += matrix[i * size + i];
-  const double smoothness = 1e-7 * trace / static_cast<double>(free_count);
+  const double mean_weight = trace / static_cast<double>(free_count);
+  const double smoothness = 2e-4 * mean_weight;
   std::vector<double> system(free_count * free_count), change(free_count);
   for (std::size_t i = 0; i < free_count; ++i) {
     change[i] = right[i];
     for (std::size_t j = 0; j < free_count; ++j) system[i * free_count + j] = matrix[i * size + j];
-    system[i * free_count + i] += smoothness;
+    system[i * free_count + i] += 1e-7 * mean_weight;
   }
-  for (std::size_t i = 0; i + 2 < free_count; ++i) {
+  for (std::size_t i = 0; i + 1 < free_count; ++i) {
     const std::array<double, 3> difference = {1, -2, 1};
-    for (std::size_t a = 0; a < 3; ++a)
+    double bend = 0;
+    for (std::size_t a = 0; a < 3; ++a) bend += i + a < free_count ? difference[a] * present[i + a] : 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (i + a >= free_count) continue;
+      change[i + a] -= smoothness * difference[a] * bend;
       for (std::size_t b = 0; b < 3; ++b)
-        system[(i + a) * free_count + i + b] += 10 * smoothness * difference[a] * difference[b];
+        if (i + b < free_count) system[(i + a) * free_count + i + b] += smoothness * difference[a] * difference[b];
+    }
   }
   const bool solved = solve_symmetric(system, change, free_count);
+  for (std::size_t i = 0; i < free_count; ++i) change[i] += present[i];
 
   BeadProfile learned;
   learned.step_px = std::min(current.step_px, knot / 8);
@@ -171,16 +208,11 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
   learned.fourth_harmonic.assign(count, 0.0F);
   for (std::size_t i = 0; i < count; ++i) {
     const double r = static_cast<double>(i) * learned.step_px;
-    double value = value_at(current.level, current.step_px, r);
-    if (solved && r < reach_px) {
-      const double place = r * inverse_knot;
-      const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
-      const auto splines = cubic_b_splines(place - static_cast<double>(cell));
-      for (std::size_t a = 0; a < 4; ++a) {
-        const std::size_t k = slot(cell + a);
-        if (k < free_count) value += splines[a] * change[k];
-      }
-    }
+    double value = 0;
+    if (!solved)
+      value = value_at(current.level, current.step_px, r);
+    else if (r < reach_px)
+      value = spline_value(change, r);
     learned.level[i] = static_cast<float>(value);
     double harmonic = value_at(current.fourth_harmonic, current.step_px, r);
     if (fourth_harmonic && r > ring_low && r < ring_high) {
@@ -196,47 +228,82 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
   return learned;
 }
 
-RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
-  RimFit best;
-  const double reach = profile.reach_px();
-  const double low = std::max(0.0, std::min(0.55 * radius_guess_px, radius_guess_px - 2.5 * edge_guess_px));
-  const double spacing = std::max(0.2, (reach - low) / 60);
-  std::vector<double> distance, level;
-  for (double r = low + 0.5 * spacing; r < reach; r += spacing) {
-    distance.push_back(r);
-    level.push_back(value_at(profile.level, profile.step_px, r));
-  }
-  if (distance.size() < 6) return best;
-  // For a given radius and edge, the three shapes enter linearly.
-  const auto misfit_of = [&](double radius, double edge, std::vector<double>& residual) {
-    std::vector<double> matrix(9, 0.0), right(3, 0.0);
-    std::vector<std::array<double, 3>> rows(distance.size());
+namespace {
+
+// The three shapes of a bead, blurred, at each of the distances given. Where the optical blur is smaller than the
+// pixel, the pixel's own square window is laid over it (averaged over directions) instead of being counted as a
+// Gaussian.
+std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const std::vector<double>& distance) {
+  std::vector<std::array<double, 3>> shapes(distance.size());
+  constexpr double pixel_variance = 1.0 / 12, gaussian_enough = 0.7;
+  if (edge > gaussian_enough) {
     for (std::size_t i = 0; i < distance.size(); ++i) {
-      const BlurredShapes shapes = blurred_disk_shapes(radius, edge, distance[i]);
-      rows[i] = {shapes.flat, shapes.sphere, shapes.parabola};
+      const BlurredShapes one = blurred_disk_shapes(radius, edge, distance[i]);
+      shapes[i] = {one.flat, one.sphere, one.parabola};
+    }
+    return shapes;
+  }
+  const double optical = std::sqrt(std::max(0.08 * 0.08, edge * edge - pixel_variance));
+  const double low = std::max(0.0, distance.front() - 0.8), high = distance.back() + 0.8;
+  const auto count = static_cast<std::size_t>(std::ceil((high - low) / (optical / 5))) + 2;
+  const double step = (high - low) / static_cast<double>(count - 1);
+  std::vector<std::array<double, 3>> table(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const BlurredShapes one = blurred_disk_shapes(radius, optical, low + static_cast<double>(k) * step);
+    table[k] = {one.flat, one.sphere, one.parabola};
+  }
+  static const GaussLegendre rule = gauss_legendre(6);
+  constexpr int directions = 4;
+  for (std::size_t i = 0; i < distance.size(); ++i) {
+    std::array<double, 3> sum{};
+    for (int d = 0; d < directions; ++d) {
+      const double angle = (d + 0.5) / directions * 0.25 * 3.14159265358979;
+      const double x = distance[i] * std::cos(angle), y = distance[i] * std::sin(angle);
+      for (std::size_t a = 0; a < rule.node.size(); ++a)
+        for (std::size_t b = 0; b < rule.node.size(); ++b) {
+          const double r = std::hypot(x + rule.node[a] - 0.5, y + rule.node[b] - 0.5);
+          const double place = std::clamp((r - low) / step, 0.0, static_cast<double>(count) - 1.001);
+          const auto cell = static_cast<std::size_t>(place);
+          const double part = place - static_cast<double>(cell);
+          const double weight = rule.weight[a] * rule.weight[b] / directions;
+          for (std::size_t k = 0; k < 3; ++k)
+            sum[k] += weight * ((1 - part) * table[cell][k] + part * table[cell + 1][k]);
+        }
+    }
+    shapes[i] = sum;
+  }
+  return shapes;
+}
+
+// Radius and edge by damped least squares; `use` tells which of the three shapes take part.
+RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<double>& level, double radius_guess,
+                    double edge_guess, std::array<bool, 3> use) {
+  RimFit best;
+  const auto misfit_of = [&](double radius, double edge, std::vector<double>& residual) {
+    const auto rows = shapes_at(radius, edge, distance);
+    std::vector<double> matrix(9, 0.0), right(3, 0.0);
+    for (std::size_t i = 0; i < distance.size(); ++i) {
       const double weight = distance[i];  // pixels at this distance
       for (std::size_t a = 0; a < 3; ++a) {
+        if (!use[a]) continue;
         right[a] += weight * rows[i][a] * level[i];
-        for (std::size_t b = 0; b < 3; ++b) matrix[a * 3 + b] += weight * rows[i][a] * rows[i][b];
+        for (std::size_t b = 0; b < 3; ++b)
+          if (use[b]) matrix[a * 3 + b] += weight * rows[i][a] * rows[i][b];
       }
     }
-    const double ridge = 1e-5 * matrix[0];
-    matrix[0] += 1e-3 * ridge;
-    matrix[4] += ridge;
-    matrix[8] += ridge;
+    for (std::size_t a = 0; a < 3; ++a) matrix[a * 4] += use[a] ? 1e-9 * matrix[0] : 1.0;
     if (!solve_symmetric(matrix, right, 3)) return 1e30;
     residual.resize(distance.size());
     double sum = 0, weights = 0;
     for (std::size_t i = 0; i < distance.size(); ++i) {
-      residual[i] =
-          std::sqrt(distance[i]) * (level[i] - right[0] * rows[i][0] - right[1] * rows[i][1] - right[2] * rows[i][2]);
+      const double model = right[0] * rows[i][0] + right[1] * rows[i][1] + right[2] * rows[i][2];
+      residual[i] = std::sqrt(distance[i]) * (level[i] - model);
       sum += residual[i] * residual[i];
       weights += distance[i];
     }
-    const double shrink = ridge * (right[1] * right[1] + right[2] * right[2]);
-    return (sum + shrink) / weights;
+    return sum / weights;
   };
-  double radius = radius_guess_px, edge = std::max(0.2, edge_guess_px);
+  double radius = radius_guess, edge = std::max(0.3, edge_guess);
   std::vector<double> residual, shifted;
   double misfit = misfit_of(radius, edge, residual);
   double damping = 1e-3;
@@ -263,7 +330,7 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
       if (!(determinant > 0)) break;
       const double step_radius = std::clamp((c * br - re * be) / determinant, -0.5, 0.5);
       const double step_edge = std::clamp((a * be - re * br) / determinant, -0.3, 0.3);
-      const double new_radius = std::max(0.5, radius + step_radius), new_edge = std::max(0.15, edge + step_edge);
+      const double new_radius = std::max(0.5, radius + step_radius), new_edge = std::max(0.295, edge + step_edge);
       const double new_misfit = misfit_of(new_radius, new_edge, shifted);
       if (new_misfit <= misfit) {
         moved = std::abs(new_radius - radius) + std::abs(new_edge - edge);
@@ -277,12 +344,36 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
         damping = std::max(1e-6, damping * 10);
       }
     }
-    if (!improved || moved < 1e-5) break;
+    if (!improved || moved < 3e-5) break;
   }
-  best.good = std::isfinite(radius) && misfit < 0.01;
+  best.misfit = std::sqrt(misfit);
+  best.good = std::isfinite(radius) && best.misfit < 0.1;
   best.radius_px = radius;
   best.edge_px = edge;
-  best.misfit = std::sqrt(misfit);
+  return best;
+}
+
+}  // namespace
+
+RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
+  const double reach = profile.reach_px();
+  const double low = std::max(0.0, std::min(0.55 * radius_guess_px, radius_guess_px - 2.5 * edge_guess_px));
+  const double spacing = std::clamp(edge_guess_px / 4, 0.08, (reach - low) / 30);
+  std::vector<double> distance, level;
+  for (double r = low + 0.5 * spacing; r < reach; r += spacing) {
+    distance.push_back(r);
+    level.push_back(value_at(profile.level, profile.step_px, r));
+  }
+  if (distance.size() < 6) return {};
+  // The simplest shading that will do: flat, then a sphere's, then both with a parabola.
+  RimFit best = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, {true, false, false});
+  for (const std::array<bool, 3>& use : {std::array<bool, 3>{true, true, false}, {true, true, true}}) {
+    // Both shapes together can imitate another radius: they are asked only when nothing simpler comes near.
+    const double negligible_misfit = use[2] ? 0.008 : 0.0015, clearly_better = use[2] ? 0.5 : 0.7;
+    if (best.good && best.misfit < negligible_misfit) break;
+    const RimFit richer = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, use);
+    if (richer.good && (!best.good || richer.misfit < clearly_better * best.misfit)) best = richer;
+  }
   return best;
 }
 
@@ -352,6 +443,9 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
   const double middle = value_at(profile.level, profile.step_px, 0.6 * radius_guess_px);
   const double nearer_rim = value_at(profile.level, profile.step_px, radius_guess_px - 3 * edge_guess_px);
   const bool flat = std::abs(middle - nearer_rim) < 0.03 * std::abs(middle);
+  if (getenv("DBG"))
+    printf("tone lin R %.3f misfit %.4f middle %.4f near %.4f\n", fit.linear.radius_px, fit.linear.misfit, middle,
+           nearer_rim);
   if (!fit.linear.good || fit.linear.misfit < already_good || !flat) return fit;
   const double brightest = std::max({background_level, bead_level, 1.0});
   const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
@@ -363,6 +457,9 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
     level = static_cast<float>((light(recorded) - background) / (bead - background));
   }
   const RimFit encoded = fit_flat_rim(straightened, radius_guess_px, edge_guess_px);
+  if (getenv("DBG"))
+    printf("tone lin R %.3f e %.3f misfit %.5f enc R %.3f e %.3f misfit %.5f\n", fit.linear.radius_px,
+           fit.linear.edge_px, fit.linear.misfit, encoded.radius_px, encoded.edge_px, encoded.misfit);
   if (encoded.good && encoded.misfit < 0.98 * fit.linear.misfit) {
     fit.exponent = display_exponent;
     fit.chosen = encoded;
@@ -377,7 +474,7 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
   FreeRim rim;
   const double inner = std::max(0.0, radius_px - std::max(5 * edge_px, 0.35 * radius_px));
   const double open_from = radius_px + 2.5 * edge_px + 0.7, open_to = radius_px + 5.5 * edge_px + 2;
-  const double core_to = std::max(0.5 * inner + 0.3 * radius_px, inner + 0.1);
+  const double core_to = inner + std::max(1.0, 0.12 * radius_px);
   const auto bins = static_cast<std::size_t>(std::ceil(open_to / spacing)) + 1;
   std::vector<double> sums(bins, 0.0), weights(bins, 0.0);
   struct Sample {

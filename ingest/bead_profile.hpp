@@ -20,10 +20,10 @@ BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px);
 
 // Least squares of p(r), a cubic spline with knots `knot_px` apart that vanishes from `reach_px` on, over all pixels
 // within reach of any bead of any frame, overlaps taken into account. `fits` hold the residuals with `current` as the
-// model of `disks`. With `fourth_harmonic` also p4(r) around the rim.
+// model of `disks`. With `fourth_harmonic` also p4(r) around the rim. Only every `row_step`-th row of pixels is used.
 BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
                           const std::vector<const std::vector<ModelDisk>*>& disks, const BeadProfile& current,
-                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic);
+                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic, int row_step);
 
 // Radius and edge of a learned profile, started from a guess. Shading is fitted along with them: a sum of a flat disk,
 // a sphere's sqrt(1 - rho^2) and a parabola.

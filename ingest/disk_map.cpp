@@ -11,18 +11,23 @@ int map_reduction(double radius_px) { return std::max(1, static_cast<int>(radius
 
 std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
                                            double least_distance_px) {
+  // Score: 1 - chi^2/area of the ideal disk over its surroundings, plus the contrast between the ring just inside the
+  // rim and the ring just outside. The first alone cannot tell a shaded bead of a crystal from the void between three
+  // of them, the second alone is lost in a strongly blurred crystal.
   const double radius = radius_px / factor;
-  const double support = radius + 1.2;
+  const double ring = std::clamp(0.25 * radius, 1.0, 2.0);
+  const double outer_radius = radius + ring, inner_radius = std::max(0.4, radius - ring);
   const int margin = static_cast<int>(std::ceil(0.8 * radius));  // centres this far outside are still looked at
-  const int pad = margin + static_cast<int>(std::ceil(support)) + 1;
+  const int reach = static_cast<int>(std::floor(outer_radius));
+  const int pad = margin + reach + 2;
   const int wide = small.width + 2 * pad, high = small.height + 2 * pad;
   const std::size_t stride = static_cast<std::size_t>(wide) + 1;
-  // Running sums along rows of the level and of its square, so that a chord costs two look-ups.
+  // Running sums along rows, so that a chord costs two look-ups.
   std::vector<float> levels(stride * static_cast<std::size_t>(high), 0.0F), squares(levels.size(), 0.0F);
   for (int row = 0; row < small.height; ++row) {
     const float* from = small.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(small.width);
     float* level = levels.data() + static_cast<std::size_t>(row + pad) * stride + static_cast<std::size_t>(pad);
-    float* square = squares.data() + static_cast<std::size_t>(row + pad) * stride + static_cast<std::size_t>(pad);
+    float* square = squares.data() + (level - levels.data());
     float sum = 0, sum_of_squares = 0;
     for (int column = 0; column < small.width; ++column) {
       const float value = std::min(1.6F, std::max(-0.6F, from[column]));
@@ -36,39 +41,55 @@ std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, d
       square[column] = sum_of_squares;
     }
   }
-  const int reach = static_cast<int>(std::floor(support));
-  std::vector<int> half_inner, half_outer;  // half chords in whole pixels, -1 where there is none
-  double area = 0;
-  for (int dy = -reach; dy <= reach; ++dy) {
-    const double inner = radius * radius - dy * dy, outer = support * support - dy * dy;
-    half_inner.push_back(inner >= 0 ? static_cast<int>(std::lround(std::sqrt(inner) - 0.25)) : -1);
-    half_outer.push_back(static_cast<int>(std::floor(std::sqrt(std::max(0.0, outer)))));
-    if (inner >= 0) area += 2 * half_inner.back() + 1;
-  }
+  // Half chords in whole pixels of the three circles, -1 where there is none, and their areas.
+  const auto half_chords = [&](double circle, double& area) {
+    std::vector<int> half;
+    area = 0;
+    for (int dy = -reach; dy <= reach; ++dy) {
+      const double squared = circle * circle - dy * dy;
+      half.push_back(squared >= 0 ? static_cast<int>(std::floor(std::sqrt(squared))) : -1);
+      if (half.back() >= 0) area += 2 * half.back() + 1;
+    }
+    return half;
+  };
+  double inner_area = 0, area = 0, outer_area = 0;
+  const auto half_inner = half_chords(inner_radius, inner_area), half = half_chords(radius, area),
+             half_outer = half_chords(outer_radius, outer_area);
   const int map_width = small.width + 2 * margin, map_height = small.height + 2 * margin;
   const std::size_t map_stride = static_cast<std::size_t>(map_width);
   std::vector<float> map(map_stride * static_cast<std::size_t>(map_height));
-  const float scale = static_cast<float>(1 / area);
+  const float inner_weight = static_cast<float>(1 / std::max(1.0, area - inner_area));
+  const float outer_weight = static_cast<float>(1 / std::max(1.0, outer_area - area));
+  const float square_weight = static_cast<float>(1 / area);
+  const float disk_weight = inner_weight + outer_weight + 2 * square_weight;
   const int shift = pad - margin;
   for (int row = 0; row < map_height; ++row) {
     float* to = map.data() + static_cast<std::size_t>(row) * map_stride;
     std::fill(to, to + map_width, 0.0F);
     for (int dy = -reach; dy <= reach; ++dy) {
       const std::size_t source = static_cast<std::size_t>(row + shift + dy) * stride + static_cast<std::size_t>(shift);
-      const int inner = half_inner[static_cast<std::size_t>(dy + reach)],
-                outer = half_outer[static_cast<std::size_t>(dy + reach)];
-      const float* square_low = squares.data() + source - outer;
-      const float* square_high = squares.data() + source + outer + 1;
-      if (inner >= 0) {
-        const float* level_low = levels.data() + source - inner;
-        const float* level_high = levels.data() + source + inner + 1;
-        for (int column = 0; column < map_width; ++column)
-          to[column] += 2 * (level_high[column] - level_low[column]) - (square_high[column] - square_low[column]);
-      } else {
-        for (int column = 0; column < map_width; ++column) to[column] -= square_high[column] - square_low[column];
+      const auto at = static_cast<std::size_t>(dy + reach);
+      // Only what changes with the column is left in the inner loops: chords as differences of running sums.
+      const float* outer_low = levels.data() + source - half_outer[at];
+      const float* outer_high = levels.data() + source + half_outer[at] + 1;
+      const float* square_low = squares.data() + source - half_outer[at];
+      const float* square_high = squares.data() + source + half_outer[at] + 1;
+      for (int column = 0; column < map_width; ++column)
+        to[column] -= outer_weight * (outer_high[column] - outer_low[column]) +
+                      square_weight * (square_high[column] - square_low[column]);
+      if (half[at] < 0) continue;
+      const float* low = levels.data() + source - half[at];
+      const float* high_end = levels.data() + source + half[at] + 1;
+      if (half_inner[at] < 0) {
+        for (int column = 0; column < map_width; ++column) to[column] += disk_weight * (high_end[column] - low[column]);
+        continue;
       }
+      const float* inner_low = levels.data() + source - half_inner[at];
+      const float* inner_high = levels.data() + source + half_inner[at] + 1;
+      for (int column = 0; column < map_width; ++column)
+        to[column] +=
+            disk_weight * (high_end[column] - low[column]) - inner_weight * (inner_high[column] - inner_low[column]);
     }
-    for (int column = 0; column < map_width; ++column) to[column] *= scale;
   }
 
   std::vector<DiskCandidate> maxima;

@@ -1,5 +1,6 @@
 #pragma once
-// The chi-squared map of an ideal disk, at the scale where the disk is a few pixels wide.
+// A map of where disks may be: chi-squared of an ideal disk and rim contrast, at the scale where a disk is a few pixels
+// wide.
 
 #include <vector>
 
@@ -10,7 +11,7 @@ namespace shakebed::ingest {
 // A place where an ideal disk fits.
 struct DiskCandidate {
   double x = 0, y = 0;  // px of the full frame
-  double score = 0;     // 1 - chi^2/area: 1 for a perfect disk, 0 on empty background
+  double score = 0;     // 2 for a perfect lone disk, about 1 for one among touching ones, 0 on empty background
 };
 
 // Factor by which a frame is reduced for the map of disks of this radius (their radius becomes 4.5 to 9 px, or stays).

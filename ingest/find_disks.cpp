@@ -18,6 +18,8 @@ namespace {
 
 // Two beads of one film are never seen nearer than this share of a diameter (beads a little in front of one another).
 constexpr double least_separation = 0.72;
+// What a place in the map must score to be tried: a strongly blurred bead in a crystal scores 0.7.
+constexpr double least_score = 0.35;
 // A bead explains at least this share of the contrast around its place, relative to the median bead.
 constexpr double least_explained = 0.72;
 // Below this share it is nothing at all.
@@ -37,7 +39,7 @@ double median_of(std::vector<double> values) {
 }
 
 // How far the edge's blur reaches beyond the radius.
-double reach_of(double radius, double edge) { return radius + 3.6 * edge + 0.7; }
+double reach_of(double radius, double edge) { return radius + 3.2 * edge + 0.4; }
 
 // Steps use a gradient widened to about this edge while beads may still be off by half a pixel.
 double softening_for(double edge) { return edge < 0.8 ? std::sqrt(0.8 * 0.8 - edge * edge) : 0.0; }
@@ -198,26 +200,91 @@ double mean_background(const LightField& light) {
   return static_cast<double>(light.background[middle]);
 }
 
-// Beads hidden in the residual are added; true if there were any.
-bool add_missed(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least_score) {
+// The frame the map is made of: reduced, and smoothed where disks are wide enough to bear it.
+GrayFrame map_frame(const GrayFrame& flat, double radius) {
   const int factor = map_reduction(radius);
-  const GrayFrame small = reduced(fit.residual_image(), factor);
-  auto candidates = find_candidates(small, factor, radius, least_score, 2 * radius * least_separation);
-  std::vector<ModelDisk> fresh = disks_at(candidates);
-  bool added = false;
-  for (ModelDisk& disk : fresh) {
-    bool free = true;
-    for (const ModelDisk& other : disks)
-      if (std::abs(other.y - disk.y) < 2 * radius && std::hypot(other.x - disk.x, other.y - disk.y) < 1.2 * radius) {
-        free = false;
-        break;
-      }
-    if (!free) continue;
-    fit.subtract(disk.x, disk.y, 1.0F);
-    disks.push_back(disk);
-    added = true;
+  if (radius / factor < 3.5) return reduced(flat, factor);
+  return smoothed(reduced(flat, factor));
+}
+
+std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double score) {
+  return find_candidates(map_frame(flat, radius), map_reduction(radius), radius, score, 2 * radius * least_separation);
+}
+
+// Beads that leave much more unexplained than the others are taken out; then all beads that show in the residual are
+// put in. A bead taken out in whose place nothing better shows goes back. Returns how many places were looked at again.
+std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
+  fit.judge(disks, radius + 1);
+  std::vector<double> unexplained;
+  for (const ModelDisk& disk : disks) unexplained.push_back(1 - disk.explained);
+  constexpr double suspicious_share = 1.5, always_tolerated = 0.03;
+  const double limit = std::max(always_tolerated, suspicious_share * median_of(unexplained));
+  std::vector<ModelDisk> kept, suspects;
+  for (const ModelDisk& disk : disks) {
+    const bool cut =
+        disk.x < radius || disk.y < radius || disk.x > fit.width() - 1 - radius || disk.y > fit.height() - 1 - radius;
+    if (1 - disk.explained > limit && !cut) {
+      suspects.push_back(disk);
+      fit.subtract(disk.x, disk.y, -1.0F);
+    } else {
+      kept.push_back(disk);
+    }
   }
-  return added;
+  constexpr double clear_score = 0.5;
+  std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, clear_score));
+  const double near = 2 * radius * least_separation;
+  const auto taken = [&](const std::vector<ModelDisk>& among, const ModelDisk& disk, double distance) {
+    for (const ModelDisk& other : among)
+      if (std::abs(other.y - disk.y) < distance && std::hypot(other.x - disk.x, other.y - disk.y) < distance)
+        return true;
+    return false;
+  };
+  std::vector<ModelDisk> added;
+  for (ModelDisk& disk : fresh) {
+    if (taken(kept, disk, near)) continue;
+    double nearest = near;
+    for (const ModelDisk& suspect : suspects) {
+      const double distance = std::hypot(suspect.x - disk.x, suspect.y - disk.y);
+      if (distance >= nearest) continue;
+      nearest = distance;
+      disk.former_x = suspect.x;
+      disk.former_y = suspect.y;
+      disk.former_unexplained = 1 - suspect.explained;
+    }
+    added.push_back(disk);
+  }
+  for (const ModelDisk& disk : suspects)
+    if (!taken(added, disk, near)) added.push_back(disk);
+  for (ModelDisk& disk : added) {
+    disk.quiet_sweeps = 0;
+    fit.subtract(disk.x, disk.y, 1.0F);
+  }
+  const std::size_t changed = std::max(suspects.size(), added.size());
+  if (changed)
+    for (ModelDisk& disk : kept) disk.quiet_sweeps = 0;
+  kept.insert(kept.end(), added.begin(), added.end());
+  std::sort(kept.begin(), kept.end(), [](const ModelDisk& one, const ModelDisk& other) {
+    if (one.y != other.y) return one.y < other.y;
+    return one.x < other.x;
+  });
+  disks = std::move(kept);
+  return changed;
+}
+
+// After a few sweeps: beads moved by repair() that explain no more than before go back where they were.
+void settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
+  constexpr double must_fall_to = 0.7;
+  fit.judge(disks, radius + 1);
+  for (ModelDisk& disk : disks) {
+    if (disk.former_unexplained >= 0 && 1 - disk.explained > must_fall_to * disk.former_unexplained) {
+      fit.subtract(disk.x, disk.y, -1.0F);
+      disk.x = disk.former_x;
+      disk.y = disk.former_y;
+      disk.quiet_sweeps = 0;
+      fit.subtract(disk.x, disk.y, 1.0F);
+    }
+    disk.former_unexplained = -1;
+  }
 }
 
 }  // namespace
@@ -266,27 +333,46 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   std::vector<GrayFrame> flats(used.size());
   std::vector<std::unique_ptr<JointFit>> fits(used.size());
   std::vector<std::vector<ModelDisk>> disks(used.size());
+  // Votes fall a little outside the rim of a shaded bead: of two radii, the one whose disks fit better.
+  if (!options.hold_radius && !options.radius_px) {
+    const GrayFrame flat = flatten(*used.front(), light);
+    double best_sum = -1, best_radius = radius;
+    for (const double share : {1.0, 0.95}) {
+      const double trial = share * radius;
+      double sum = 0;
+      for (const DiskCandidate& candidate : candidates_in(flat, trial, 0.5)) sum += candidate.score;
+      if (getenv("DBG")) printf("trial %.3f sum %.1f\n", trial, sum);
+      if (sum > best_sum) {
+        best_sum = sum;
+        best_radius = trial;
+      }
+    }
+    radius = best_radius;
+  }
   double spread = 0.1;
   double typical_explained = 1;
   constexpr int rounds = 5;
   for (int round = 0; round < rounds; ++round) {
     const bool search = round <= 1;
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
-    const int factor = map_reduction(radius);
     std::size_t total = 0;
     for (std::size_t f = 0; f < used.size(); ++f) {
       flats[f] = flatten(*used[f], light);
       if (!fits[f]) fits[f] = std::make_unique<JointFit>(flats[f]);
       fits[f]->set_table(&table);
       if (search) {
-        const GrayFrame small = reduced(flats[f], factor);
-        disks[f] = disks_at(find_candidates(small, factor, radius, 0.3, 2 * radius * least_separation));
+        disks[f] = disks_at(candidates_in(flats[f], radius, least_score));
       }
       for (ModelDisk& disk : disks[f]) disk.quiet_sweeps = 0;
       fits[f]->reset(flats[f], disks[f]);
-      const int sweeps = round == 0 ? 2 : 3;
+      const int sweeps = round == 0 ? 0 : 3;
       for (int sweep = 0; sweep < sweeps; ++sweep)
         fits[f]->sweep(disks[f], search && sweep == 0 ? 0.3 * radius : 0.5, 1e-5);
+      if ((round == 1 || round == 2) && repair(*fits[f], disks[f], radius) > 0) {
+        for (int sweep = 0; sweep < 2; ++sweep) fits[f]->sweep(disks[f], 0.2 * radius, 1e-5);
+        settle(*fits[f], disks[f], radius);
+        fits[f]->sweep(disks[f], 0.5, 1e-5);
+      }
       fits[f]->judge(disks[f], radius + 1);
       total += disks[f].size();
     }
@@ -302,7 +388,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     std::sort(explained.begin(), explained.end());
     typical_explained = explained[explained.size() * 3 / 4];
     for (std::size_t f = 0; f < used.size(); ++f)
-      prune(*fits[f], disks[f], radius, (round == 0 ? 0.5 : least_explained) * typical_explained);
+      prune(*fits[f], disks[f], radius, (round == 0 ? 0.3 : least_explained) * typical_explained);
     spread = std::max(1e-3, residual_spread(*fits.front()));
     if (round + 1 == rounds) break;
 
@@ -314,13 +400,20 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     }
     if (options.learn_profile || round < 2) {
       const double reach = std::max(reach_of(radius, edge), round == 0 ? 1.12 * radius + 2 : 0.0);
-      const double knot = std::clamp(round == 0 ? 0.05 * radius : 0.55 * edge, 0.25, std::max(0.25, radius / 8));
+      const double knot = std::clamp(round == 0 ? 0.05 * radius : 0.4 * edge, 0.2, std::max(0.25, radius / 8));
       const bool sharp = edge < 0.6 && round >= 2;
-      const BeadProfile learned = learn_profile(fit_pointers, disk_pointers, profile, reach, knot, radius, sharp);
+      const BeadProfile learned =
+          learn_profile(fit_pointers, disk_pointers, profile, reach, knot, radius, sharp, round < 2 ? 3 : 1);
       const RimFit rim = fit_rim(learned, radius, edge);
-      if (rim.good && rim.radius_px > 0.5 * radius && rim.radius_px < 2 * radius) {
-        if (!options.hold_radius) radius = rim.radius_px;
-        edge = std::clamp(rim.edge_px, 0.2, 0.6 * radius);
+      if (getenv("DBG")) {
+        printf("round %d N %zu R %.4f e %.4f misfit %.5f spread %.4f\n", round, total, rim.radius_px, rim.edge_px,
+               rim.misfit, spread);
+      }
+      if (rim.good) {  // the first estimate is good to some 5 %: a fit far from it has gone astray
+        const double bound = round == 0 ? 0.05 : 0.12;
+        if (!options.hold_radius)
+          radius = std::clamp(rim.radius_px, (1 - bound) * estimate.radius_px, (1 + bound) * estimate.radius_px);
+        edge = std::clamp(rim.edge_px, 0.29, std::max(0.5, 0.3 * radius));
       }
       profile = options.learn_profile ? learned : ideal_profile(radius, edge, reach_of(radius, edge));
     }
@@ -347,11 +440,13 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   // if what lies between packed beads is neither bead nor background.
   double radius_doubt = 0;
   const RimFit packed = fit_rim(profile, radius, edge);
+  if (getenv("DBG")) printf("packed R %.4f misfit %.5f\n", packed.radius_px, packed.misfit);
   constexpr double poor_misfit = 0.012;
   if (!options.hold_radius && (!packed.good || packed.misfit > poor_misfit)) {
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
     for (const auto& one : disks) disk_pointers.push_back(&one);
     const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
+    if (getenv("DBG")) printf("sectors %zu\n", free_rim.sectors);
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
       const ToneFit tone =
@@ -400,9 +495,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   }
   const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
   const GrayFrame flat = flatten(frame, calibration.light);
-  const int factor = map_reduction(radius);
-  std::vector<ModelDisk> disks =
-      disks_at(find_candidates(reduced(flat, factor), factor, radius, 0.3, 2 * radius * least_separation));
+  std::vector<ModelDisk> disks = disks_at(candidates_in(flat, radius, least_score));
   const double contrast = std::abs(calibration.contrast_level);
   if (disks.empty()) {
     result.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius) + " px";
@@ -416,20 +509,21 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, contrast));
   const double tolerance = std::clamp(0.004 * noise / 0.1, 2e-4, 4e-3);
   std::size_t dropped = 0;
-  bool searched = false;
+  bool repaired = false;
   double largest = 1;
   for (int sweep = 0; sweep < options.joint_fit_sweeps; ++sweep) {
     fit.set_table(sweep < 2 ? &soft : &exact);
     largest = fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance);
-    if (sweep == 1) {
+    if (sweep == 1 || (sweep == 4 && repaired)) {
       dropped += prune(fit, disks, radius, faintly_explained);
-      searched = true;
-      add_missed(fit, disks, radius, 0.35);
+      repaired = repair(fit, disks, radius) > 0;
+    } else if (sweep == 3 && repaired) {
+      settle(fit, disks, radius);
     }
     if (largest < tolerance && sweep >= 2) break;
   }
-  if (!searched) dropped += prune(fit, disks, radius, faintly_explained);
-  fit.judge(disks, radius + 1);
+  dropped += prune(fit, disks, radius, faintly_explained);
+  settle(fit, disks, radius);
 
   std::vector<double> explained;
   for (const ModelDisk& disk : disks) explained.push_back(disk.explained);

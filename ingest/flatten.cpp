@@ -84,6 +84,22 @@ GrayFrame reduced(const GrayFrame& frame, int factor) {
   return small;
 }
 
+GrayFrame smoothed(const GrayFrame& frame) {
+  GrayFrame smooth = frame;
+  const std::size_t width = static_cast<std::size_t>(frame.width);
+  std::vector<float> column_sum(width);
+  for (int row = 1; row + 1 < frame.height; ++row) {
+    const float* a = frame.pixels.data() + static_cast<std::size_t>(row - 1) * width;
+    const float* b = a + width;
+    const float* c = b + width;
+    for (std::size_t k = 0; k < width; ++k) column_sum[k] = a[k] + 2 * b[k] + c[k];
+    float* to = smooth.pixels.data() + static_cast<std::size_t>(row) * width;
+    for (std::size_t k = 1; k + 1 < width; ++k)
+      to[k] = 0.0625F * (column_sum[k - 1] + 2 * column_sum[k] + column_sum[k + 1]);
+  }
+  return smooth;
+}
+
 namespace {
 
 GrayFrame box3(const GrayFrame& frame) {

@@ -17,7 +17,9 @@ struct ModelDisk {
   double hessian_xx = 0, hessian_xy = 0, hessian_yy = 0;  // of half the sum of squares, contrast^2/px^2
   double explained = 0;                                   // share of the contrast around it that it explains, 1 at best
   double amplitude = 1;                                   // its own contrast over the typical one
-  double rim_explained = 1;                               // the worst eighth of its rim, likewise
+  double former_x = 0, former_y = 0;                      // where it was before it was moved elsewhere on suspicion ...
+  double former_unexplained = -1;  // ... and what it left unexplained there; negative: was not moved
+  double rim_explained = 1;        // the worst eighth of its rim, likewise
 };
 
 // A bead's profile tabulated against the squared distance, so that no square root is taken per pixel.

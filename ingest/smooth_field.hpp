@@ -19,4 +19,7 @@ bool solve_symmetric(std::vector<double>& matrix, std::vector<double>& right, st
 // The frame averaged over factor x factor px. Pixel (i, j) has its centre at factor (i + 1/2) - 1/2 of the frame's px.
 GrayFrame reduced(const GrayFrame& frame, int factor);
 
+// The frame smoothed by the weights 1 2 1 along rows and columns (sigma 0.7 px); its outermost pixels are kept.
+GrayFrame smoothed(const GrayFrame& frame);
+
 }  // namespace shakebed::ingest
