@@ -875,6 +875,9 @@ void warn_about_fit(const Cleaned& cleaned, const FitOptions& options, const Set
                                 number(std::max(0.0, result.solid_height_by_sum_rule)) + " D");
     }
   }
+  if (setup.least_squares.free[2] && result.plateau_density.std_error > 0.1 * result.plateau_density.value) {
+    result.warnings.emplace_back("the plateau density is not determined: no part of the window lies on the plateau");
+  }
   if (setup.least_squares.free[2] && result.plateau_density.value >= setup.model->largest_plateau()) {
     result.warnings.emplace_back("the plateau density ran to close packing, the end of its range");
   }

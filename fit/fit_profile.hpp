@@ -205,8 +205,8 @@ struct FrameAverage {
   Profile profile;
 };
 FrameAverage average_frames(const ProfileFrames& frames, int block = 1);
-// The block length after which frames are independent: twice the integrated correlation time of the area-weighted
-// height, at least 1.
+// A block length whose means are nearly independent: four times the statistical inefficiency 1 + 2 sum of correlations
+// [Sokal1997] of the area-weighted height (errors of the mean are then some 6 % too small at most), at least 1.
 int independent_block(const ProfileFrames& frames);
 
 // Bootstrap over blocks of frames: refits resampled means (diagonal errors of the whole sample).

@@ -51,8 +51,8 @@ HydrostaticProfile HydrostaticProfile::of_column(const EquationOfState& equation
     return profile;
   }
   const Value critical = critical_temperature(equation, column);
-  const bool reaches_plateau =
-      critical.ok() && column.plateau_density <= equation.largest_invertible_density() * (1.0 + 4e-16);
+  const bool reaches_plateau = critical.ok() && !equation.has_pole() &&
+                               column.plateau_density <= equation.largest_invertible_density() * (1.0 + 4e-16);
   if (reaches_plateau && temperature <= critical.value) {
     const double solid = fit::solid_height(equation, column, temperature).value;
     return tail_over_rectangle(equation, temperature, base + solid, column.plateau_density, base);

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/fit/synthetic.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+// Frames of a known profile whose noise is correlated in time (first order, coefficient `memory`).
+ProfileFrames make_frames(int count, double memory, double noise, std::uint64_t seed) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.5, {11.22, 1.10});
+  ProfileFrames frames;
+  for (int i = 0; i < 60; ++i) frames.height.push_back(0.1 + 0.3 * i);
+  synthetic::Normal normal(seed);
+  std::vector<double> state(frames.height.size());
+  for (double& x : state) x = normal();
+  for (int f = 0; f < count; ++f) {
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      state[i] = memory * state[i] + std::sqrt(1.0 - memory * memory) * normal();
+      const double density = truth.density(frames.height[i]);
+      frames.number_density.push_back(density + synthetic::bin_error(density, noise) * state[i]);
+    }
+  }
+  return frames;
+}
+
+FitOptions plain_options() {
+  FitOptions options;
+  options.plateau_density = 1.10;
+  options.interval = options.sweep = options.compare = false;
+  return options;
+}
+
+TEST(Frames, AverageHasTheErrorOfTheMean) {
+  const ProfileFrames frames = make_frames(2000, 0.0, 0.3, 3);
+  const FrameAverage average = average_frames(frames);
+  ASSERT_EQ(average.status, FitStatus::ok);
+  EXPECT_EQ(average.blocks, 2000);
+  EXPECT_EQ(average.profile.covariance_samples, 2000);
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.5, {11.22, 1.10});
+  for (std::size_t i = 0; i < frames.height.size(); ++i) {
+    const double expected = synthetic::bin_error(truth.density(frames.height[i]), 0.3) / std::sqrt(2000.0);
+    EXPECT_NEAR(average.profile.std_error[i] / expected, 1.0, 4.5 / std::sqrt(2.0 * 2000.0));
+    EXPECT_NEAR(average.profile.covariance[i * frames.height.size() + i], std::pow(average.profile.std_error[i], 2),
+                1e-15);
+  }
+}
+
+TEST(Frames, BlocksCureCorrelatedFrames) {
+  EXPECT_LE(independent_block(make_frames(2000, 0.0, 0.3, 3)), 3);
+  const ProfileFrames frames = make_frames(4000, 0.9, 0.3, 4);
+  const int block = independent_block(frames);
+  // 1 + 2 sum 0.9^k = 19; the block is four times that.
+  EXPECT_GE(block, 50);
+  EXPECT_LE(block, 110);
+  const FrameAverage naive = average_frames(frames, 1);
+  const FrameAverage blocked = average_frames(frames, block);
+  double ratio = 0.0;
+  for (std::size_t i = 0; i < frames.height.size(); ++i) {
+    ratio += std::pow(blocked.profile.std_error[i] / naive.profile.std_error[i], 2) /
+             static_cast<double>(frames.height.size());
+  }
+  // Exactly, for this noise: 19 - 2 0.9/(0.1^2 block); about 50 blocks of 60 bins, 2.6 % of statistical error, 4 of
+  // them.
+  const double expected = 19.0 - 2.0 * 0.9 / (0.01 * block);
+  EXPECT_NEAR(ratio / expected, 1.0, 0.105);
+}
+
+TEST(Frames, BootstrapAgreesWithTheFittedError) {
+  const ProfileFrames frames = make_frames(400, 0.0, 0.3, 5);
+  const FitOptions options = plain_options();
+  const BootstrapResult bootstrap = bootstrap_fit(frames, options, {.resamples = 400, .block = 1, .seed = 9});
+  ASSERT_EQ(bootstrap.status, FitStatus::ok) << bootstrap.message;
+  EXPECT_EQ(bootstrap.succeeded, 400);
+  Profile profile = average_frames(frames).profile;
+  profile.covariance.clear();
+  const FitResult fit = fit_profile(profile, options);
+  ASSERT_TRUE(fit.ok());
+  // 400 resamples: 3.5 % each, 4 sigma; and 400 frames.
+  EXPECT_NEAR(bootstrap.temperature.std_error / fit.temperature.std_error, 1.0, 0.25);
+  EXPECT_LT(bootstrap.temperature_interval.low, fit.temperature.value);
+  EXPECT_GT(bootstrap.temperature_interval.high, fit.temperature.value);
+  EXPECT_NEAR(fit.temperature.value, 0.5, 4.0 * bootstrap.temperature.std_error);
+  // The same seed, the same numbers.
+  const BootstrapResult again = bootstrap_fit(frames, options, {.resamples = 400, .block = 1, .seed = 9});
+  EXPECT_EQ(again.temperatures, bootstrap.temperatures);
+}
+
+TEST(Frames, FullCovarianceOfFramesFits) {
+  const FrameAverage average = average_frames(make_frames(1000, 0.0, 0.3, 6));
+  const FitResult fit = fit_profile(average.profile, plain_options());
+  ASSERT_TRUE(fit.ok()) << fit.message;
+  EXPECT_NEAR(fit.temperature.value, 0.5, 4.0 * fit.temperature.std_error);
+}
+
+TEST(Frames, GiveAStatusForNonsense) {
+  EXPECT_EQ(average_frames({}).status, FitStatus::bad_input);
+  ProfileFrames frames = make_frames(10, 0.0, 0.1, 1);
+  EXPECT_EQ(average_frames(frames, 0).status, FitStatus::bad_input);
+  EXPECT_EQ(average_frames(frames, 9).status, FitStatus::bad_input);
+  frames.number_density.pop_back();
+  EXPECT_EQ(average_frames(frames).status, FitStatus::bad_input);
+  EXPECT_EQ(bootstrap_fit(frames, plain_options(), {}).status, FitStatus::bad_input);
+  EXPECT_EQ(independent_block(frames), 1);
+}
+
+}  // namespace
+}  // namespace shakebed::fit
