@@ -22,6 +22,8 @@ constexpr double least_separation = 0.72;
 constexpr double least_score = 0.35;
 // A bead explains at least this share of the contrast around its place, relative to the median bead.
 constexpr double least_explained = 0.72;
+// Residuals pull at a bead with at most this, in units of its contrast, or four times the noise.
+constexpr double residual_bound = 0.4;
 // Below this share it is nothing at all.
 constexpr double faintly_explained = 0.35;
 
@@ -200,20 +202,36 @@ double mean_background(const LightField& light) {
   return static_cast<double>(light.background[middle]);
 }
 
-// The frame the map is made of: reduced, and smoothed where disks are wide enough to bear it.
-GrayFrame map_frame(const GrayFrame& flat, double radius) {
+// Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.
+double noise_of(const GrayFrame& flat) {
+  std::vector<float> sizes;
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(flat.pixels.size()) / 20000)));
+  for (int row = 0; row < flat.height; row += step)
+    for (int column = 1; column + 1 < flat.width; column += step)
+      sizes.push_back(std::abs(flat.at(column - 1, row) - 2 * flat.at(column, row) + flat.at(column + 1, row)));
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return 1.4826 * static_cast<double>(*middle) / std::sqrt(6.0);
+}
+
+// The frame the map is made of: reduced, and smoothed where noise asks for it and disks are wide enough to bear it.
+// (Smoothing blurs the rims by which a bead is told from the darkness around it.)
+GrayFrame map_frame(const GrayFrame& flat, double radius, double noise) {
   const int factor = map_reduction(radius);
-  if (radius / factor < 3.5) return reduced(flat, factor);
+  constexpr double noisy = 0.04;  // contrast units, after reduction
+  if (noise / factor < noisy || radius / factor < 3.5) return reduced(flat, factor);
   return smoothed(reduced(flat, factor));
 }
 
-std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double score) {
-  return find_candidates(map_frame(flat, radius), map_reduction(radius), radius, score, 2 * radius * least_separation);
+std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double noise, double score) {
+  return find_candidates(map_frame(flat, radius, noise), map_reduction(radius), radius, score,
+                         2 * radius * least_separation);
 }
 
 // Beads that leave much more unexplained than the others are taken out; then all beads that show in the residual are
 // put in. A bead taken out in whose place nothing better shows goes back. Returns how many places were looked at again.
-std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
+std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double noise) {
   fit.judge(disks, radius + 1);
   std::vector<double> unexplained;
   for (const ModelDisk& disk : disks) unexplained.push_back(1 - disk.explained);
@@ -231,7 +249,7 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius) 
     }
   }
   constexpr double clear_score = 0.5;
-  std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, clear_score));
+  std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, noise, clear_score));
   const double near = 2 * radius * least_separation;
   const auto taken = [&](const std::vector<ModelDisk>& among, const ModelDisk& disk, double distance) {
     for (const ModelDisk& other : among)
@@ -336,11 +354,12 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   // Votes fall a little outside the rim of a shaded bead: of two radii, the one whose disks fit better.
   if (!options.hold_radius && !options.radius_px) {
     const GrayFrame flat = flatten(*used.front(), light);
+    const double noise = noise_of(flat);
     double best_sum = -1, best_radius = radius;
     for (const double share : {1.0, 0.95}) {
       const double trial = share * radius;
       double sum = 0;
-      for (const DiskCandidate& candidate : candidates_in(flat, trial, 0.5)) sum += candidate.score;
+      for (const DiskCandidate& candidate : candidates_in(flat, trial, noise, 0.5)) sum += candidate.score;
       if (getenv("DBG")) printf("trial %.3f sum %.1f\n", trial, sum);
       if (sum > best_sum) {
         best_sum = sum;
@@ -361,17 +380,17 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       if (!fits[f]) fits[f] = std::make_unique<JointFit>(flats[f]);
       fits[f]->set_table(&table);
       if (search) {
-        disks[f] = disks_at(candidates_in(flats[f], radius, least_score));
+        disks[f] = disks_at(candidates_in(flats[f], radius, noise_of(flats[f]), least_score));
       }
       for (ModelDisk& disk : disks[f]) disk.quiet_sweeps = 0;
       fits[f]->reset(flats[f], disks[f]);
       const int sweeps = round == 0 ? 0 : 3;
       for (int sweep = 0; sweep < sweeps; ++sweep)
-        fits[f]->sweep(disks[f], search && sweep == 0 ? 0.3 * radius : 0.5, 1e-5);
-      if ((round == 1 || round == 2) && repair(*fits[f], disks[f], radius) > 0) {
-        for (int sweep = 0; sweep < 2; ++sweep) fits[f]->sweep(disks[f], 0.2 * radius, 1e-5);
+        fits[f]->sweep(disks[f], search && sweep == 0 ? 0.3 * radius : 0.5, 1e-5, residual_bound);
+      if ((round == 1 || round == 2) && repair(*fits[f], disks[f], radius, noise_of(flats[f])) > 0) {
+        for (int sweep = 0; sweep < 2; ++sweep) fits[f]->sweep(disks[f], 0.2 * radius, 1e-5, residual_bound);
         settle(*fits[f], disks[f], radius);
-        fits[f]->sweep(disks[f], 0.5, 1e-5);
+        fits[f]->sweep(disks[f], 0.5, 1e-5, residual_bound);
       }
       fits[f]->judge(disks[f], radius + 1);
       total += disks[f].size();
@@ -495,7 +514,8 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   }
   const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
   const GrayFrame flat = flatten(frame, calibration.light);
-  std::vector<ModelDisk> disks = disks_at(candidates_in(flat, radius, least_score));
+  const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, std::abs(calibration.contrast_level)));
+  std::vector<ModelDisk> disks = disks_at(candidates_in(flat, radius, noise, least_score));
   const double contrast = std::abs(calibration.contrast_level);
   if (disks.empty()) {
     result.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius) + " px";
@@ -506,17 +526,16 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   JointFit fit(flat);
   fit.set_table(&exact);
   fit.reset(flat, disks);
-  const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, contrast));
   const double tolerance = std::clamp(0.004 * noise / 0.1, 2e-4, 4e-3);
   std::size_t dropped = 0;
   bool repaired = false;
   double largest = 1;
   for (int sweep = 0; sweep < options.joint_fit_sweeps; ++sweep) {
     fit.set_table(sweep < 2 ? &soft : &exact);
-    largest = fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance);
+    largest = fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance, std::max(residual_bound, 4 * noise));
     if (sweep == 1 || (sweep == 4 && repaired)) {
       dropped += prune(fit, disks, radius, faintly_explained);
-      repaired = repair(fit, disks, radius) > 0;
+      repaired = repair(fit, disks, radius, noise) > 0;
     } else if (sweep == 3 && repaired) {
       settle(fit, disks, radius);
     }

@@ -174,7 +174,8 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
   }
 }
 
-double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance) {
+double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound) {
+  const float most = static_cast<float>(bound);
   const ProfileTable& table = *table_;
   const double reach = table.reach_;
   const float inverse = table.inverse_step_;
@@ -205,7 +206,7 @@ double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, doubl
           const int cell = k + l < count ? std::min(static_cast<int>(place), last) : last;
           const float d = rise[cell];
           const float ddx = d * dx;
-          const float e = line[k + l];
+          const float e = std::min(most, std::max(-most, line[k + l]));
           s_dd[lane] += d * d;
           s_ddx[lane] += d * ddx;
           s_ddxx[lane] += ddx * ddx;

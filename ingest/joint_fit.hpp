@@ -53,8 +53,9 @@ class JointFit {
   // Residual := flat frame minus all beads.
   void reset(const GrayFrame& flat, const std::vector<ModelDisk>& disks);
   // One Gauss-Seidel sweep of Newton steps, each at most `largest_step` px. Beads that moved less than `tolerance`
-  // twice are left alone. Returns the largest move.
-  double sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance);
+  // twice are left alone. Residuals count at most `bound` in size (contrast
+  // units), so that what is no bead at all, a dark base say, hardly pulls. Returns the largest move.
+  double sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound);
   // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
   void judge(std::vector<ModelDisk>& disks, double radius) const;
   // Residual (flat frame minus model) at a pixel.
