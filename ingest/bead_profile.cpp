@@ -443,9 +443,6 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
   const double middle = value_at(profile.level, profile.step_px, 0.6 * radius_guess_px);
   const double nearer_rim = value_at(profile.level, profile.step_px, radius_guess_px - 3 * edge_guess_px);
   const bool flat = std::abs(middle - nearer_rim) < 0.03 * std::abs(middle);
-  if (getenv("DBG"))
-    printf("tone lin R %.3f misfit %.4f middle %.4f near %.4f\n", fit.linear.radius_px, fit.linear.misfit, middle,
-           nearer_rim);
   if (!fit.linear.good || fit.linear.misfit < already_good || !flat) return fit;
   const double brightest = std::max({background_level, bead_level, 1.0});
   const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
@@ -457,9 +454,6 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
     level = static_cast<float>((light(recorded) - background) / (bead - background));
   }
   const RimFit encoded = fit_flat_rim(straightened, radius_guess_px, edge_guess_px);
-  if (getenv("DBG"))
-    printf("tone lin R %.3f e %.3f misfit %.5f enc R %.3f e %.3f misfit %.5f\n", fit.linear.radius_px,
-           fit.linear.edge_px, fit.linear.misfit, encoded.radius_px, encoded.edge_px, encoded.misfit);
   if (encoded.good && encoded.misfit < 0.98 * fit.linear.misfit) {
     fit.exponent = display_exponent;
     fit.chosen = encoded;

@@ -146,7 +146,8 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
   std::vector<float> sizes;
   sizes.reserve(gradient.x.size() / 2);
   const std::size_t step = std::max<std::size_t>(1, gradient.x.size() / 200000);
-  for (std::size_t i = 0; i < gradient.x.size(); i += step) sizes.push_back(std::hypot(gradient.x[i], gradient.y[i]));
+  for (std::size_t i = 0; i < gradient.x.size(); i += step)
+    sizes.push_back(std::sqrt(gradient.x[i] * gradient.x[i] + gradient.y[i] * gradient.y[i]));
   const float strong = quantile(sizes, 0.98);
   const float quiet = quantile(sizes, 0.25) / 0.7585F;  // quantile of a Rayleigh law
   // A noise-free frame can have 98 % of its pixels without gradient: then its edges are the rest.
@@ -158,14 +159,14 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
   for (int row = 1; row + 1 < frame.height; ++row)
     for (int column = 1; column + 1 < frame.width; ++column) {
       const std::size_t at = gradient.at(column, row);
-      const float size = std::hypot(gradient.x[at], gradient.y[at]);
+      const float size = std::sqrt(gradient.x[at] * gradient.x[at] + gradient.y[at] * gradient.y[at]);
       if (size < threshold) continue;
       edges.push_back({static_cast<float>(column), static_cast<float>(row), gradient.x[at] / size,
                        gradient.y[at] / size, std::min(size, reference)});
     }
   if (edges.size() < 12) return;
   for (const EdgePixel& edge : edges) edge_length += static_cast<double>(edge.weight);
-  constexpr std::size_t most_edges = 25000;
+  constexpr std::size_t most_edges = 14000;
   std::vector<EdgePixel> chosen;
   if (edges.size() > most_edges) {  // every k-th in a shuffled-looking order keeps a share of every rim
     const std::size_t stride = edges.size() / most_edges + 1;
@@ -295,7 +296,7 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
   while (low < largest_radius_px && level.width >= 5 && level.height >= 5) {
     const double high = std::min(largest_radius_px, 8.5 * scale);
     if (high > low) {
-      const GrayFrame window = busiest_window(level, 420);
+      const GrayFrame window = busiest_window(level, 340);
       vote(window, scale, low / scale, high / scale, polarity, candidates);
     }
     low = 7.5 * scale;

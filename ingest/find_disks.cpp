@@ -248,7 +248,14 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
       kept.push_back(disk);
     }
   }
+  // A bead that was missed darkens the residual over its whole area: without such pixels there is nothing to search.
   constexpr double clear_score = 0.5;
+  const double bead_area = 3.14159265358979 * radius * radius;
+  const bool something = !suspects.empty() || fit.strong_pixels(0.5F) > 0.4 * bead_area;
+  if (!something) {
+    disks = std::move(kept);
+    return 0;
+  }
   std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, noise, clear_score));
   const double near = 2 * radius * least_separation;
   const auto taken = [&](const std::vector<ModelDisk>& among, const ModelDisk& disk, double distance) {
@@ -360,7 +367,6 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       const double trial = share * radius;
       double sum = 0;
       for (const DiskCandidate& candidate : candidates_in(flat, trial, noise, 0.5)) sum += candidate.score;
-      if (getenv("DBG")) printf("trial %.3f sum %.1f\n", trial, sum);
       if (sum > best_sum) {
         best_sum = sum;
         best_radius = trial;
@@ -424,10 +430,6 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       const BeadProfile learned =
           learn_profile(fit_pointers, disk_pointers, profile, reach, knot, radius, sharp, round < 2 ? 3 : 1);
       const RimFit rim = fit_rim(learned, radius, edge);
-      if (getenv("DBG")) {
-        printf("round %d N %zu R %.4f e %.4f misfit %.5f spread %.4f\n", round, total, rim.radius_px, rim.edge_px,
-               rim.misfit, spread);
-      }
       if (rim.good) {  // the first estimate is good to some 5 %: a fit far from it has gone astray
         const double bound = round == 0 ? 0.05 : 0.12;
         if (!options.hold_radius)
@@ -459,13 +461,11 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   // if what lies between packed beads is neither bead nor background.
   double radius_doubt = 0;
   const RimFit packed = fit_rim(profile, radius, edge);
-  if (getenv("DBG")) printf("packed R %.4f misfit %.5f\n", packed.radius_px, packed.misfit);
   constexpr double poor_misfit = 0.012;
   if (!options.hold_radius && (!packed.good || packed.misfit > poor_misfit)) {
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
     for (const auto& one : disks) disk_pointers.push_back(&one);
     const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
-    if (getenv("DBG")) printf("sectors %zu\n", free_rim.sectors);
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
       const ToneFit tone =

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 
+#include "ingest/vector_lanes.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
-
-constexpr int lanes = 8;
 
 double interpolate(const std::vector<float>& samples, double step, double r) {
   const double place = r / step;
@@ -16,12 +16,6 @@ double interpolate(const std::vector<float>& samples, double step, double r) {
   if (cell + 1 >= samples.size()) return 0;
   const double part = place - static_cast<double>(cell);
   return static_cast<double>(samples[cell]) * (1 - part) + static_cast<double>(samples[cell + 1]) * part;
-}
-
-// cos(4 theta) r^4
-float fourth_shape(float dx, float dy) {
-  const float a = dx * dx, b = dy * dy;
-  return a * a - 6 * a * b + b * b;
 }
 
 }  // namespace
@@ -112,24 +106,23 @@ void JointFit::subtract(double x, double y, float sign) {
     const float dx0 = static_cast<float>(left - x);
     float* line = residual_row(row) + left;
     for (int k = 0; k < count; k += lanes) {
-      std::array<float, lanes> value;
-      for (int l = 0; l < lanes; ++l) {
-        const float dx = dx0 + static_cast<float>(k + l);
-        const float place = (dx * dx + dy_squared) * inverse;
-        const int cell = std::min(static_cast<int>(place), last);
-        value[static_cast<std::size_t>(l)] = level[cell] + (place - static_cast<float>(cell)) * rise[cell];
+      const Floats dx = dx0 + (static_cast<float>(k) + lane_numbers);
+      const Floats place = (dx * dx + dy_squared) * inverse;
+      Ints cell = __builtin_convertvector(place, Ints);
+      cell = cell < last ? cell : last;
+      Floats base, slope, present;
+      gather(level, cell, base);
+      gather(rise, cell, slope);
+      const Floats part = place - __builtin_convertvector(cell, Floats);
+      Floats value = base + part * slope;
+      if (table.fourth_) {
+        gather(table.fourth_level_.data(), cell, base);
+        gather(table.fourth_rise_.data(), cell, slope);
+        const Floats a = dx * dx;
+        value += (base + part * slope) * (a * a - 6 * a * dy_squared + dy_squared * dy_squared);
       }
-      if (table.fourth_)
-        for (int l = 0; l < lanes; ++l) {
-          const float dx = dx0 + static_cast<float>(k + l);
-          const float place = (dx * dx + dy_squared) * inverse;
-          const int cell = std::min(static_cast<int>(place), last);
-          value[static_cast<std::size_t>(l)] +=
-              (table.fourth_level_[static_cast<std::size_t>(cell)] +
-               (place - static_cast<float>(cell)) * table.fourth_rise_[static_cast<std::size_t>(cell)]) *
-              fourth_shape(dx, static_cast<float>(dy));
-        }
-      for (int l = 0; l < lanes; ++l) line[k + l] -= sign * value[static_cast<std::size_t>(l)];
+      load(line + k, present);
+      store(present - sign * value, line + k);
     }
   }
 }
@@ -159,17 +152,21 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
     const float old_dx0 = static_cast<float>(left - old_x), new_dx0 = static_cast<float>(left - new_x);
     float* line = residual_row(row) + left;
     for (int k = 0; k < count; k += lanes) {
-      std::array<float, lanes> change;
-      for (int l = 0; l < lanes; ++l) {
-        const float a = old_dx0 + static_cast<float>(k + l), b = new_dx0 + static_cast<float>(k + l);
-        const float old_place = (a * a + old_squared) * inverse, new_place = (b * b + new_squared) * inverse;
-        const int old_cell = std::min(static_cast<int>(old_place), last);
-        const int new_cell = std::min(static_cast<int>(new_place), last);
-        const float before = level[old_cell] + (old_place - static_cast<float>(old_cell)) * rise[old_cell];
-        const float after = level[new_cell] + (new_place - static_cast<float>(new_cell)) * rise[new_cell];
-        change[static_cast<std::size_t>(l)] = before - after;
-      }
-      for (int l = 0; l < lanes; ++l) line[k + l] += change[static_cast<std::size_t>(l)];
+      const Floats column = static_cast<float>(k) + lane_numbers;
+      const Floats a = old_dx0 + column, b = new_dx0 + column;
+      const Floats old_place = (a * a + old_squared) * inverse, new_place = (b * b + new_squared) * inverse;
+      Ints old_cell = __builtin_convertvector(old_place, Ints), new_cell = __builtin_convertvector(new_place, Ints);
+      old_cell = old_cell < last ? old_cell : last;
+      new_cell = new_cell < last ? new_cell : last;
+      Floats old_base, old_slope, new_base, new_slope, present;
+      gather(level, old_cell, old_base);
+      gather(rise, old_cell, old_slope);
+      gather(level, new_cell, new_base);
+      gather(rise, new_cell, new_slope);
+      const Floats before = old_base + (old_place - __builtin_convertvector(old_cell, Floats)) * old_slope;
+      const Floats after = new_base + (new_place - __builtin_convertvector(new_cell, Floats)) * new_slope;
+      load(line + k, present);
+      store(present + (before - after), line + k);
     }
   }
 }
@@ -197,30 +194,26 @@ double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, doubl
       const float dy_squared = static_cast<float>(dy * dy);
       const float dx0 = static_cast<float>(left - disk.x);
       const float* line = residual_row(row) + left;
-      std::array<float, lanes> s_dd{}, s_ddx{}, s_ddxx{}, s_e{}, s_ex{};
-      for (int k = 0; k < count; k += lanes)
-        for (int l = 0; l < lanes; ++l) {
-          const auto lane = static_cast<std::size_t>(l);
-          const float dx = dx0 + static_cast<float>(k + l);
-          const float place = (dx * dx + dy_squared) * inverse;
-          const int cell = k + l < count ? std::min(static_cast<int>(place), last) : last;
-          const float d = rise[cell];
-          const float ddx = d * dx;
-          const float e = std::min(most, std::max(-most, line[k + l]));
-          s_dd[lane] += d * d;
-          s_ddx[lane] += d * ddx;
-          s_ddxx[lane] += ddx * ddx;
-          s_e[lane] += e * d;
-          s_ex[lane] += e * ddx;
-        }
-      float dd = 0, ddx = 0, ddxx = 0, e = 0, ex = 0;
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        dd += s_dd[lane];
-        ddx += s_ddx[lane];
-        ddxx += s_ddxx[lane];
-        e += s_e[lane];
-        ex += s_ex[lane];
+      Floats s_dd = {}, s_ddx = {}, s_ddxx = {}, s_e = {}, s_ex = {};
+      for (int k = 0; k < count; k += lanes) {
+        const Floats dx = dx0 + (static_cast<float>(k) + lane_numbers);
+        const Floats place = (dx * dx + dy_squared) * inverse;
+        Ints cell = __builtin_convertvector(place, Ints);
+        cell = cell < last ? cell : last;
+        cell = lane_indices < count - k ? cell : last;  // beyond the chord or the frame
+        Floats d, e;
+        gather(rise, cell, d);
+        load(line + k, e);
+        e = e < most ? e : most;
+        e = e > -most ? e : -most;
+        const Floats d_dx = d * dx;
+        s_dd += d * d;
+        s_ddx += d * d_dx;
+        s_ddxx += d_dx * d_dx;
+        s_e += e * d;
+        s_ex += e * d_dx;
       }
+      const float dd = sum_of(s_dd), ddx = sum_of(s_ddx), ddxx = sum_of(s_ddxx), e = sum_of(s_e), ex = sum_of(s_ex);
       xx += static_cast<double>(ddxx);
       xy += dy * static_cast<double>(ddx);
       yy += dy * dy * static_cast<double>(dd);
@@ -268,46 +261,69 @@ void JointFit::judge(std::vector<ModelDisk>& disks, double radius) const {
   for (ModelDisk& disk : disks) {
     const int top = std::max(0, static_cast<int>(std::ceil(disk.y - radius)));
     const int bottom = std::min(height_ - 1, static_cast<int>(std::floor(disk.y + radius)));
-    std::array<double, 8> left_over{}, contrast{};
-    double cross = 0, square = 0;
+    std::array<double, 4> left_over{}, contrast{};  // by quarters of the disk
+    double cross = 0;
     for (int row = top; row <= bottom; ++row) {
       const double dy = row - disk.y;
       const double half = std::sqrt(std::max(0.0, limit - dy * dy));
       const int left = std::max(0, static_cast<int>(std::ceil(disk.x - half)));
       const int right = std::min(width_ - 1, static_cast<int>(std::floor(disk.x + half)));
-      const float* line = residual_row(row);
-      std::array<float, 4> row_left{}, row_contrast{};
-      float row_cross = 0, row_square = 0;
+      const int count = right - left + 1;
+      if (count <= 0) continue;
       const float dy_squared = static_cast<float>(dy * dy);
-      for (int column = left; column <= right; ++column) {
-        const float dx = static_cast<float>(column - disk.x);
-        const float place = (dx * dx + dy_squared) * table.inverse_step_;
-        const int cell = std::min(static_cast<int>(place), table.last_);
-        const float own = table.level_[static_cast<std::size_t>(cell)];
-        const float e = line[column];
-        const std::size_t octant = (dx < 0 ? 1U : 0U) + (dx * dx > dy_squared ? 2U : 0U);
-        row_left[octant] += e * e;
-        row_contrast[octant] += own * own;
-        row_cross += (e + own) * own;
-        row_square += own * own;
+      const float dx0 = static_cast<float>(left - disk.x);
+      const float* line = residual_row(row) + left;
+      Floats left_side = {}, right_side = {}, own_left = {}, own_right = {}, both = {};
+      for (int k = 0; k < count; k += lanes) {
+        const Floats dx = dx0 + (static_cast<float>(k) + lane_numbers);
+        const Floats place = (dx * dx + dy_squared) * table.inverse_step_;
+        Ints cell = __builtin_convertvector(place, Ints);
+        cell = cell < table.last_ ? cell : table.last_;
+        Floats own, e;
+        gather(table.level_.data(), cell, own);
+        load(line + k, e);
+        const Ints inside = lane_indices < count - k;
+        const Floats nothing = {};
+        own = inside ? own : nothing;
+        e = inside ? e : nothing;
+        const Ints on_left = dx < 0.0F;
+        const Floats e_squared = e * e, own_squared = own * own;
+        left_side += on_left ? e_squared : nothing;
+        right_side += on_left ? nothing : e_squared;
+        own_left += on_left ? own_squared : nothing;
+        own_right += on_left ? nothing : own_squared;
+        both += (e + own) * own;
       }
-      for (std::size_t k = 0; k < 4; ++k) {
-        left_over[k + (dy < 0 ? 4U : 0U)] += static_cast<double>(row_left[k]);
-        contrast[k + (dy < 0 ? 4U : 0U)] += static_cast<double>(row_contrast[k]);
-      }
-      cross += static_cast<double>(row_cross);
-      square += static_cast<double>(row_square);
+      const std::size_t quarter = dy < 0 ? 2 : 0;
+      left_over[quarter] += static_cast<double>(sum_of(left_side));
+      left_over[quarter + 1] += static_cast<double>(sum_of(right_side));
+      contrast[quarter] += static_cast<double>(sum_of(own_left));
+      contrast[quarter + 1] += static_cast<double>(sum_of(own_right));
+      cross += static_cast<double>(sum_of(both));
     }
     double all_left = 0, all_contrast = 0, worst = 1;
-    for (std::size_t k = 0; k < 8; ++k) {
+    for (std::size_t k = 0; k < 4; ++k) {
       all_left += left_over[k];
       all_contrast += contrast[k];
       if (contrast[k] > 0) worst = std::min(worst, 1 - left_over[k] / contrast[k]);
     }
     disk.explained = all_contrast > 0 ? 1 - all_left / all_contrast : 0;
     disk.rim_explained = worst;
-    disk.amplitude = square > 0 ? cross / square : 0;
+    disk.amplitude = all_contrast > 0 ? cross / all_contrast : 0;
   }
+}
+
+double JointFit::strong_pixels(float level) const {
+  std::size_t count = 0;
+  for (int row = 0; row + 1 < height_; row += 2) {
+    const float* a = residual_row(row);
+    const float* b = residual_row(row + 1);
+    int strong = 0;
+    for (int column = 0; column + 1 < width_; column += 2)
+      strong += a[column] + a[column + 1] + b[column] + b[column + 1] > 4 * level;
+    count += static_cast<std::size_t>(strong);
+  }
+  return 4.0 * static_cast<double>(count);
 }
 
 GrayFrame JointFit::residual_image() const {

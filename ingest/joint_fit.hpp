@@ -19,7 +19,7 @@ struct ModelDisk {
   double amplitude = 1;                                   // its own contrast over the typical one
   double former_x = 0, former_y = 0;                      // where it was before it was moved elsewhere on suspicion ...
   double former_unexplained = -1;  // ... and what it left unexplained there; negative: was not moved
-  double rim_explained = 1;        // the worst eighth of its rim, likewise
+  double rim_explained = 1;        // the worst quarter of it, likewise
 };
 
 // A bead's profile tabulated against the squared distance, so that no square root is taken per pixel.
@@ -69,6 +69,8 @@ class JointFit {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] GrayFrame residual_image() const;
+  // Number of pixels whose residual, averaged over 2 x 2, exceeds `level`.
+  [[nodiscard]] double strong_pixels(float level) const;
 
  private:
   void move(double old_x, double old_y, double new_x, double new_y);
