@@ -1,0 +1,355 @@
+// Running pipelines: what is kept, what runs again and why, locks, interrupts, exit codes, files.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+#include <thread>
+
+#include "fit/hydrostatic_profile.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/json.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using shakebed::pipelines::find_pointer;
+using shakebed::pipelines::Json;
+using shakebed::pipelines::read_json;
+using testing::HasSubstr;
+using testing::Not;
+namespace fs = std::filesystem;
+
+class Pipeline : public testing::Test {
+ protected:
+  Pipeline() { write_text(folder_ / "r.json", small_recipe()); }
+  ProgramResult run(std::vector<std::string> arguments) { return run_shakebed(arguments, folder_.path()); }
+  ProgramResult run_recipe(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments{"run", "r.json", "--out", "o"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  std::string dry_run(std::vector<std::string> more = {}) {
+    more.push_back("--dry-run");
+    return run_recipe(more).out;
+  }
+  ScratchFolder folder_;
+};
+
+TEST_F(Pipeline, WritesTheFixedResultFiles) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  for (const char* name :
+       {"manifest.json", "resolved.json", "summary.json", "report.html", "bed/profile.csv", "bed/observables.json",
+        "bed/trajectory.extxyz.zst", "simulate/profile.csv", "fit/fit.json", "check/check.json", "check/junit.xml"}) {
+    EXPECT_TRUE(fs::is_regular_file(folder_ / "o" / name)) << name;
+  }
+  const Json manifest = read_json(folder_ / "o" / "manifest.json");
+  for (const char* key :
+       {"shakebed", "git", "compiler", "host", "command_line", "started", "finished", "exit_code", "stages", "outputs"})
+    EXPECT_TRUE(manifest.contains(key)) << key;
+  EXPECT_EQ(manifest["stages"][0]["seed"], 7);
+  EXPECT_EQ(manifest["stages"][0]["outputs"][0]["sha256"].get<std::string>().size(), 64u);
+  const Json summary = read_json(folder_ / "o" / "summary.json");
+  EXPECT_TRUE(summary["bed"]["temperature_x_over_mg"].contains("value"));
+  EXPECT_EQ(summary["bed"]["temperature_x_over_mg"]["unit"], "m");
+}
+
+TEST_F(Pipeline, KeepsWhatIsUpToDate) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  const auto written = fs::last_write_time(folder_ / "o/bed/profile.csv");
+  const ProgramResult again = run_recipe();
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.err, HasSubstr("bed: up to date"));
+  EXPECT_THAT(again.err, HasSubstr("fit: up to date"));
+  EXPECT_EQ(fs::last_write_time(folder_ / "o/bed/profile.csv"), written);
+}
+
+TEST_F(Pipeline, SaysWhyAStageRunsAgain) {
+  EXPECT_THAT(dry_run(), HasSubstr("bed: runs: it has not run yet"));
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  EXPECT_THAT(dry_run(), HasSubstr("bed: up to date"));
+  EXPECT_THAT(dry_run({"--set", "/stages/bed/seed=8"}), HasSubstr("bed: runs: seed changed 7 → 8"));
+  const std::string amplitude = dry_run({"--set", "/stages/bed/floor/amplitude=1.6 mm"});
+  EXPECT_THAT(amplitude, HasSubstr("floor/amplitude changed \"0.0015 m\" → \"0.0016 m\""));
+  EXPECT_THAT(amplitude, HasSubstr("fit: runs: bed runs before it"));
+  const std::string density = dry_run({"--set", "/stages/fit/plateau_density=1.0"});
+  EXPECT_THAT(density, HasSubstr("bed: up to date"));
+  EXPECT_THAT(density, HasSubstr("fit: runs: plateau_density changed 1.1 → 1"));
+  EXPECT_THAT(dry_run({"--force"}), HasSubstr("bed: runs: --force asks for it"));
+  // The same value in other words is the same option.
+  EXPECT_THAT(dry_run({"--set", "/stages/bed/floor/amplitude=0.15 cm"}), HasSubstr("bed: up to date"));
+  // explain is the same thing.
+  EXPECT_EQ(run({"explain", "r.json", "--out", "o"}).out, dry_run());
+}
+
+TEST_F(Pipeline, NoticesOutputsThatWereTouched) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  write_text(folder_ / "o/bed/profile.csv", read_text(folder_ / "o/bed/profile.csv") + "# mine\n");
+  EXPECT_THAT(dry_run(), HasSubstr("bed: runs: its output profile.csv was changed since"));
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  EXPECT_THAT(dry_run(), HasSubstr("bed: up to date"));
+  fs::remove(folder_ / "o/fit/fit.json");
+  EXPECT_THAT(dry_run(), HasSubstr("fit: runs: its output fit.json is missing"));
+  EXPECT_THAT(dry_run(), HasSubstr("bed: up to date"));
+}
+
+TEST_F(Pipeline, RunsOnlyWhatIsSelected) {
+  const ProgramResult early = run_recipe({"--only", "fit"});
+  EXPECT_EQ(early.exit_code, 4);
+  EXPECT_THAT(early.err, HasSubstr("has not run here"));
+  ASSERT_EQ(run_recipe({"--until", "bed"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "o/fit"));
+  ASSERT_EQ(run_recipe({"--only", "fit"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "o/fit/fit.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "o/check"));
+  ASSERT_EQ(run_recipe({"--from", "fit", "--force"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "o/check/check.json"));
+  const ProgramResult unknown = run_recipe({"--only", "fitt"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("did you mean \"fit\""));
+}
+
+// Every CSV and JSON of two runs, but the manifest. The measured speeds in observables.json are the host's, not the
+// bed's.
+std::map<std::string, std::string> results_of(const fs::path& out) {
+  std::map<std::string, std::string> texts;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(out)) {
+    const std::string extension = entry.path().extension().string(), name = entry.path().filename().string();
+    if (entry.is_symlink() || !entry.is_regular_file() || name == "manifest.json" ||
+        (extension != ".csv" && extension != ".json"))
+      continue;
+    std::string text = read_text(entry.path());
+    if (name == "observables.json") {
+      Json json = Json::parse(text);
+      json.erase("cpu_seconds"), json.erase("collisions_per_second");
+      text = json.dump();
+    }
+    texts[entry.path().lexically_relative(out).string()] = text;
+  }
+  return texts;
+}
+
+TEST_F(Pipeline, SameSeedGivesTheSameBytes) {
+  ASSERT_EQ(run({"run", "r.json", "--out", "a", "--jobs", "1"}).exit_code, 0);
+  ASSERT_EQ(run({"run", "r.json", "--out", "b", "--jobs", "2"}).exit_code, 0);
+  const auto a = results_of(folder_ / "a"), b = results_of(folder_ / "b");
+  EXPECT_GE(a.size(), 8u);
+  EXPECT_EQ(a, b);
+  ASSERT_EQ(run({"run", "r.json", "--out", "c", "--set", "/stages/bed/seed=8"}).exit_code, 0);
+  EXPECT_NE(results_of(folder_ / "c").at("bed/profile.csv"), a.at("bed/profile.csv"));
+}
+
+TEST_F(Pipeline, ResolvedRecipeGivesTheSameResults) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  ASSERT_EQ(run({"run", "o/resolved.json", "--out", "again"}).exit_code, 0);
+  EXPECT_EQ(read_text(folder_ / "o/bed/profile.csv"), read_text(folder_ / "again/bed/profile.csv"));
+  EXPECT_EQ(read_text(folder_ / "o/fit/fit.json"), read_text(folder_ / "again/fit/fit.json"));
+  EXPECT_EQ(read_text(folder_ / "o/resolved.json"), read_text(folder_ / "again/resolved.json"));
+}
+
+TEST_F(Pipeline, AFailedCheckEndsWith6AndAReport) {
+  const ProgramResult result = run_recipe({"--set", "/stages/check/expect/~1bed~1column_number/value=5"});
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_THAT(result.err, HasSubstr("check failed: /bed/column_number"));
+  EXPECT_THAT(read_text(folder_ / "o/check/junit.xml"), HasSubstr("failures=\"1\""));
+  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("failed"));
+  EXPECT_EQ(run_recipe({"--set", "/stages/check/expect/~1bed~1column_number/value=5"}).exit_code, 6)
+      << "also when nothing has to run";
+}
+
+TEST_F(Pipeline, VerifyNoticesEveryChangedFile) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  EXPECT_EQ(run({"verify", "o"}).exit_code, 0);
+  write_text(folder_ / "o/fit/curve.csv", "height\n");
+  fs::remove(folder_ / "o/bed/layers.csv");
+  const ProgramResult result = run({"verify", "o"});
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_THAT(result.err, HasSubstr("fit/curve.csv: changed"));
+  EXPECT_THAT(result.err, HasSubstr("bed/layers.csv: missing"));
+  EXPECT_EQ(run({"verify", "nowhere"}).exit_code, 4);
+}
+
+TEST_F(Pipeline, ARunningPipelineHoldsTheFolderAndADeadOneDoesNot) {
+  const int process =
+      start_shakebed({"run", "r.json", "--out", "o", "--set", "/stages/bed/measure=1000 s"}, folder_.path());
+  for (int i = 0; i < 500 && !fs::exists(folder_ / "o/.lock"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const ProgramResult second = run_recipe();
+  EXPECT_EQ(second.exit_code, 5);
+  EXPECT_THAT(second.err, HasSubstr("another shakebed works there"));
+  EXPECT_THAT(second.err, HasSubstr(std::to_string(process)));
+  ::kill(process, SIGKILL);
+  EXPECT_EQ(wait_for(process), 128 + SIGKILL);
+  EXPECT_EQ(run_recipe().exit_code, 0) << "a killed run leaves no lock";
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "o")) {
+    EXPECT_THAT(entry.path().filename().string(), Not(testing::StartsWith(".partial"))) << "nor half a stage";
+  }
+}
+
+TEST_F(Pipeline, CtrlCEndsWith130AndKeepsWhatWasFinished) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  const std::string profile = read_text(folder_ / "o/bed/profile.csv");
+  const int process =
+      start_shakebed({"run", "r.json", "--out", "o", "--set", "/stages/bed/measure=1000 s"}, folder_.path());
+  for (int i = 0; i < 500; ++i) {
+    bool working = false;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "o"))
+      working = working || entry.path().filename().string().starts_with(".partial");
+    if (working) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ::kill(process, SIGINT);
+  EXPECT_EQ(wait_for(process), 130);
+  EXPECT_EQ(read_text(folder_ / "o/bed/profile.csv"), profile);
+  EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 130);
+  EXPECT_EQ(run_recipe().exit_code, 0);
+}
+
+TEST_F(Pipeline, AFolderThatCannotBeWrittenIsSaid) {
+  write_text(folder_ / "file", "not a folder");
+  const ProgramResult result = run({"run", "r.json", "--out", "file/o"});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, HasSubstr("file/o"));
+}
+
+TEST_F(Pipeline, RerunGivesTheSameFiles) {
+  // Without the one file that holds a measured speed.
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  const ProgramResult result = run({"rerun", "o", "--out", "again", "--json"});
+  const Json json = Json::parse(result.out);
+  for (const Json& name : json["different"]) EXPECT_EQ(name, "bed/observables.json");
+  EXPECT_GE(json["files"].get<int>(), 10);
+}
+
+TEST_F(Pipeline, JsonAndQuietSpeakAsAsked) {
+  const ProgramResult result = run_recipe({"--json", "--quiet"});
+  EXPECT_EQ(result.exit_code, 0);
+  const Json json = Json::parse(result.out);
+  EXPECT_EQ(json["exit_code"], 0);
+  EXPECT_EQ(json["stages"].size(), 3u);
+  EXPECT_THAT(result.err, Not(HasSubstr("runs")));
+}
+
+TEST(Commands, UsageMistakesEndWith2) {
+  ScratchFolder folder;
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
+                                                    {"rnu", "x"},
+                                                    {"run"},
+                                                    {"run", "x", "--nonsense"},
+                                                    {"theory", "--plateau-density", "2"},
+                                                    {"theory", "--diameter", "3 Hz"},
+                                                    {"theory", "--eos", "enskgo"},
+                                                    {"map"}}) {
+    const ProgramResult result = run_shakebed(arguments, folder.path());
+    EXPECT_EQ(result.exit_code, 2) << (arguments.empty() ? "" : arguments.back()) << result.err;
+    EXPECT_FALSE(result.err.empty());
+  }
+  EXPECT_THAT(run_shakebed({"rnu"}, folder.path()).err, HasSubstr("did you mean \"run\""));
+  EXPECT_EQ(run_shakebed({"--help"}, folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shakebed({"--version"}, folder.path()).exit_code, 0);
+}
+
+TEST(Commands, TheoryGivesTheConstantsAt110) {  // physics.md, computed by two independent routes
+  ScratchFolder folder;
+  const ProgramResult result = run_shakebed({"theory", "--plateau-density", "1.10", "--diameter", "2.99 mm",
+                                             "--initial-height", "10.2", "--temperature", "0.36 mm", "--json"},
+                                            folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  const auto close = [&](const char* name, double expected, double relative) {
+    ASSERT_TRUE(json[name].is_number()) << name;
+    EXPECT_NEAR(json[name].get<double>(), expected, relative * std::abs(expected)) << name;
+  };
+  close("f_plateau", 59.6676730322, 1e-11);
+  close("mu_0", 55.2382744295, 1e-11);
+  close("lambda_1", 1467.07052093, 1e-11);
+  close("k", 0.0577754048718, 1e-11);
+  close("critical_temperature_over_mg", 0.6073e-3, 1e-4);
+  close("reduced_temperature", 0.5928, 1e-4);
+  close("solid_height", 4.154, 1e-4);
+  EXPECT_EQ(json["units"]["critical_temperature_over_mg"], "m");
+  EXPECT_THAT(result.out, HasSubstr("1.1000000000000001")) << "17 digits";
+}
+
+TEST(Commands, APoleIsAStatusNotANumber) {
+  ScratchFolder folder;
+  const ProgramResult result =
+      run_shakebed({"theory", "--eos", "santos-lopez-yuste", "--initial-height", "20", "--json"}, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  EXPECT_TRUE(json["mu_0"].is_null());
+  EXPECT_TRUE(json["critical_temperature"].is_null());
+  EXPECT_THAT(json["status"]["mu_0"].get<std::string>(), HasSubstr("pole"));
+}
+
+TEST(Commands, InitWritesARecipeThatIsGood) {
+  ScratchFolder folder;
+  ASSERT_EQ(run_shakebed({"init", "mine.json"}, folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shakebed({"validate", "mine.json"}, folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shakebed({"init", "mine.json"}, folder.path()).exit_code, 2) << "never overwrites";
+}
+
+TEST(Commands, FitProfileRecoversATemperatureItDrew) {
+  ScratchFolder folder;
+  // A profile drawn from the model itself: T = 0.12 m g D, plateau 1.1, shift 4 D.
+  const auto profile = shakebed::fit::HydrostaticProfile::tail_over_rectangle(shakebed::fit::enskog(), 0.12, 4.0, 1.1);
+  std::string text = "# kernel: none\nheight,number_density,std_error\n";
+  for (int i = 2; i < 80; ++i)
+    text += std::to_string(0.1 * i) + "," + std::to_string(profile.density(0.1 * i)) + ",0.001\n";
+  write_text(folder / "p.csv", text);
+  const ProgramResult result = run_shakebed(
+      {"fit-profile", "p.csv", "--plateau-density", "1.1", "--diameter", "2.99 mm", "--json"}, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  EXPECT_NEAR(json["temperature"]["value"].get<double>(), 0.12, 1e-3);
+  EXPECT_NEAR(json["shift"]["value"].get<double>(), 4.0, 1e-2);
+  EXPECT_NEAR(json["temperature_over_mg"]["value"].get<double>(), 0.12 * 2.99e-3, 1e-5);
+  EXPECT_TRUE(json["describes_data"].get<bool>());
+}
+
+TEST(ReferenceData, IsThatOfThePublishedFit) {
+  const Json data =
+      read_json(fs::path(SHAKEBED_SOURCE_DIR) / "reference-data/quinn-hong-2000/clement-rajchenbach-1991.json");
+  const auto number = [&](const std::string& name) {
+    for (const char* list : {"numbers", "derived"}) {
+      for (const Json& row : data[list]) {
+        if (row["name"] == name) return row["value"].get<double>();
+      }
+    }
+    ADD_FAILURE() << name;
+    return 0.0;
+  };
+  const shakebed::fit::PublishedFit fit;
+  EXPECT_EQ(number("diameter"), fit.diameter_in_mm);
+  EXPECT_EQ(number("initial_height"), fit.initial_height);
+  EXPECT_EQ(number("plateau_density"), fit.plateau_density);
+  EXPECT_EQ(number("temperature_over_mg"), fit.temperature_over_mg_in_mm);
+  EXPECT_EQ(number("shift_times_plateau"), fit.shift_times_plateau);
+  for (const Json& row : data["numbers"]) EXPECT_FALSE(row["place"].get<std::string>().empty());
+}
+
+TEST(Recipes, AllShippedOnesAreGood) {
+  ScratchFolder folder;
+  int recipes = 0;
+  for (const fs::directory_entry& entry :
+       fs::recursive_directory_iterator(fs::path(SHAKEBED_SOURCE_DIR) / "pipelines/recipes")) {
+    if (entry.path().extension() != ".json") continue;
+    const ProgramResult result = run_shakebed({"validate", entry.path().string()}, folder.path());
+    EXPECT_EQ(result.exit_code, 0) << entry.path() << result.err;
+    ++recipes;
+  }
+  EXPECT_GE(recipes, 3);
+}
+
+TEST(Schema, TheOneInTheTreeIsTheProgramsOwn) {
+  ScratchFolder folder;
+  EXPECT_EQ(run_shakebed({"schema"}, folder.path()).out,
+            read_text(fs::path(SHAKEBED_SOURCE_DIR) / "pipelines/schema/pipeline.schema.json"))
+      << "run: shakebed schema pipelines/schema/pipeline.schema.json";
+}
+
+}  // namespace
