@@ -254,14 +254,13 @@ class Enskog final : public TabulatedEquation {
     const double carry = difference - high;
     const double difference_low = ((high - (difference - carry)) - (g + carry)) + low;
     const double e = std::exp(difference);
-    const double epsilon = (e - guess) / guess + e / guess * difference_low;
     const double numerator = 1.0 - enskog_a1 * guess + enskog_a2 * guess * guess;
     const double chi = numerator * inverse * inverse;
     const double chi_slope =
         ((2.0 * enskog_a2 * guess - enskog_a1) + 2.0 * enskog_a * numerator * inverse) * inverse * inverse;
     const double kappa = 1.0 + 0.5 * pi * guess * (2.0 * chi + guess * chi_slope);
-    // ln(1 + epsilon), |epsilon| < 1e-8.
-    return guess + guess * (epsilon * (1.0 - 0.5 * epsilon)) / kappa;
+    // ln(E/phi) = (E - phi)/phi: the table leaves 1e-11, whose square is nothing.
+    return guess + ((e - guess) + e * difference_low) / kappa;
   }
 };
 

@@ -120,14 +120,12 @@ void clean_errors(const Profile& profile, const std::vector<std::size_t>& order,
   }
   // An empty bin without an error says nothing; a filled one gets the median error.
   const double typical = median_of(good);
-  std::size_t empty = 0;
   std::size_t filled = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (cleaned.error[i] > 0.0) continue;
     cleaned.error[i] = typical;
     if (cleaned.density[i] == 0.0) {
       cleaned.usable[i] = false;
-      ++empty;
     } else {
       ++filled;
     }
@@ -138,7 +136,6 @@ void clean_errors(const Profile& profile, const std::vector<std::size_t>& order,
                               "median error, " +
                               number(typical));
   }
-  (void)empty;
 }
 
 void clean_covariance(const Profile& profile, const std::vector<std::size_t>& order, Cleaned& cleaned) {
@@ -398,7 +395,8 @@ std::vector<FitModel::Parameters> find_starts(const Cleaned& cleaned, const Bins
   }
   std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<FitModel::Parameters> starts;
-  for (const auto& [chi2, p] : candidates) {
+  for (const auto& candidate : candidates) {
+    const FitModel::Parameters& p = candidate.second;
     // Distinct in temperature by more than a grid step.
     const bool known = std::any_of(starts.begin(), starts.end(), [&](const FitModel::Parameters& q) {
       return std::abs(std::log(q[0] / p[0])) < 1.0 || !free_t;
