@@ -305,10 +305,20 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
   }
   const Candidate* best = nullptr;
   const auto merit = [](const Candidate& c) { return c.explained * c.support * c.support; };
-  // Rims of a crystal are explained as well by the small bright voids between beads: larger circles are preferred.
-  const auto preference = [&](const Candidate& c) { return merit(c) * std::sqrt(c.radius); };
   for (const Candidate& candidate : candidates)
-    if (!best || preference(candidate) > preference(*best)) best = &candidate;
+    if (!best || merit(candidate) > merit(*best)) best = &candidate;
+  // The rims of a crystal are explained as well by the small voids between its beads, of the other polarity: if circles
+  // a few times larger do nearly as well, they are the beads.
+  if (best) {
+    constexpr double least_ratio = 2.2, most_ratio = 7, nearly = 0.4;
+    const Candidate* beads = nullptr;
+    for (const Candidate& candidate : candidates) {
+      const double ratio = candidate.radius / best->radius;
+      if (candidate.sign == best->sign || ratio < least_ratio || ratio > most_ratio) continue;
+      if (merit(candidate) > nearly * merit(*best) && (!beads || merit(candidate) > merit(*beads))) beads = &candidate;
+    }
+    if (beads) best = beads;
+  }
   constexpr double least_merit = 0.02;  // of all edges in the frame; white noise reaches 0.002
   if (!best || merit(*best) < least_merit) {
     estimate.why_not = "no circle of any radius: no rim in the frame points to a common centre";

@@ -121,6 +121,8 @@ GrayFrame box3(const GrayFrame& frame) {
 
 struct BlockValue {
   double u, v, value;
+  double median = 0;   // of the block
+  bool exact = false;  // not an envelope: to be met from both sides
 };
 
 // A polynomial that hugs the values from above (side = +1) or below (side = -1): points on the inner side hardly count.
@@ -142,8 +144,9 @@ std::vector<double> hugging_polynomial(const std::vector<BlockValue>& blocks, in
       for (std::size_t i = 0; i < terms; ++i) predicted += coefficients[i] * basis[i];
       const double gap = side * (block.value - predicted);  // > 0: outside, must be followed
       const double tolerance = 0.03 * spread;
-      const double weight =
-          gap > -tolerance ? 1.0 : 0.0005 + 0.9995 * std::exp(-std::pow((gap + tolerance) / tolerance, 2));
+      const double weight = block.exact || gap > -tolerance
+                                ? 1.0
+                                : 0.0005 + 0.9995 * std::exp(-std::pow((gap + tolerance) / tolerance, 2));
       for (std::size_t i = 0; i < terms; ++i) {
         right[i] += weight * basis[i] * block.value;
         for (std::size_t j = 0; j <= i; ++j) matrix[i * terms + j] += weight * basis[i] * basis[j];
@@ -182,11 +185,34 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
         return static_cast<double>(levels[static_cast<std::size_t>(place)]);
       };
       const double u = 2 * (0.5 * (left + right)) / small.width - 1, v = 2 * (0.5 * (top + bottom)) / small.height - 1;
-      upper.push_back({u, v, pick(0.97)});
-      lower.push_back({u, v, pick(0.03)});
+      const double median = pick(0.5);
+      upper.push_back({u, v, pick(0.97), median, false});
+      lower.push_back({u, v, pick(0.03), median, false});
     }
-  const int order = upper.size() >= 40 ? 2 : upper.size() >= 9 ? 1 : 0;
-  const auto high = hugging_polynomial(upper, order, 1), low = hugging_polynomial(lower, order, -1);
+  // The beads' envelope is told by the blocks that hold beads: those with a fair share of the largest contrast.
+  std::vector<double> spans;
+  for (std::size_t k = 0; k < upper.size(); ++k) spans.push_back(upper[k].value - lower[k].value);
+  std::vector<double> sorted_spans = spans;
+  std::sort(sorted_spans.begin(), sorted_spans.end());
+  const double largest_span =
+      sorted_spans[static_cast<std::size_t>(0.98 * static_cast<double>(sorted_spans.size() - 1))];
+  constexpr double fair_share = 0.3;
+  const bool dark = polarity != Polarity::bright_beads;
+  std::vector<BlockValue>& bead_side = dark ? lower : upper;
+  std::vector<BlockValue> with_beads;
+  for (std::size_t k = 0; k < spans.size(); ++k)
+    if (spans[k] >= fair_share * largest_span) with_beads.push_back(bead_side[k]);
+  // Blocks without beads tell the background by their median, noise or not.
+  std::vector<BlockValue> background_side = dark ? upper : lower;
+  for (std::size_t k = 0; k < spans.size(); ++k)
+    if (spans[k] < fair_share * largest_span) {
+      background_side[k].value = background_side[k].median;
+      background_side[k].exact = true;
+    }
+  const auto order_for = [](std::size_t blocks) { return blocks >= 40 ? 2 : blocks >= 12 ? 1 : 0; };
+  const int background_order = order_for(upper.size()), bead_order = order_for(with_beads.size());
+  const auto background_fit = hugging_polynomial(background_side, background_order, dark ? 1 : -1);
+  const auto bead_fit = hugging_polynomial(with_beads, bead_order, dark ? -1 : 1);
 
   LightField light;
   light.spacing_px = 32;
@@ -195,24 +221,21 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
   const std::size_t nodes = static_cast<std::size_t>(light.columns) * static_cast<std::size_t>(light.rows);
   light.background.resize(nodes);
   light.contrast.resize(nodes);
-  std::vector<double> basis(polynomial_terms(order));
+  std::vector<double> basis(polynomial_terms(2));
   std::vector<double> contrasts;
-  const bool dark = polarity != Polarity::bright_beads;
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.columns; ++column) {
       const double u = std::min(1.0, 2 * column * light.spacing_px / frame.width - 1);
       const double v = std::min(1.0, 2 * row * light.spacing_px / frame.height - 1);
-      polynomial_values(u, v, order, basis.data());
-      double top = 0, bottom = 0;
-      for (std::size_t i = 0; i < basis.size(); ++i) {
-        top += high[i] * basis[i];
-        bottom += low[i] * basis[i];
-      }
+      polynomial_values(u, v, 2, basis.data());
+      double background = 0, bead = 0;
+      for (std::size_t i = 0; i < background_fit.size(); ++i) background += background_fit[i] * basis[i];
+      for (std::size_t i = 0; i < bead_fit.size(); ++i) bead += bead_fit[i] * basis[i];
       const std::size_t at =
           static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
-      light.background[at] = static_cast<float>(dark ? top : bottom);
-      light.contrast[at] = static_cast<float>(dark ? bottom - top : top - bottom);
-      contrasts.push_back(top - bottom);
+      light.background[at] = static_cast<float>(background);
+      light.contrast[at] = static_cast<float>(bead - background);
+      contrasts.push_back(std::abs(bead - background));
     }
   std::sort(contrasts.begin(), contrasts.end());
   const float least = static_cast<float>(std::max(0.5, 0.1 * contrasts[contrasts.size() / 2]));

@@ -276,7 +276,7 @@ FrameRenderer::FrameRenderer(const Camera& camera) : state_(std::make_unique<Sta
     return 0.12 + 0.7 * rho4 * rho4;
   };
   const double blur = camera.blur_px;
-  state.pixel_rule = gauss_legendre(blur >= 0.7 ? 2 : blur >= 0.35 ? 3 : 6);
+  state.pixel_rule = gauss_legendre(blur >= 0.7 ? 2 : blur >= 0.35 ? 4 : 10);
 
   const bool even =
       camera.gradient_x == 0 && camera.gradient_y == 0 && camera.vignette == 0 && camera.dust_fraction == 0;

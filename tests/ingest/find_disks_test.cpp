@@ -1,0 +1,234 @@
+#include "ingest/find_disks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "ingest/synthetic_frames.hpp"
+#include "tests/ingest/test_files.hpp"
+#include "tests/ingest/truth.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+std::vector<RenderedDisk> bed_of(double radius, int width, int height, int rows, int gas, double jitter = 0.1) {
+  SyntheticBed bed;
+  bed.left_wall_px = 7.3;
+  bed.right_wall_px = width - 8.2;
+  bed.floor_px = height - 9.4;
+  bed.radius_px = radius;
+  bed.rows = rows;
+  bed.gas_count = gas;
+  bed.gas_height_px = 0.25 * height;
+  bed.jitter_px = jitter;
+  return make_synthetic_bed(bed);
+}
+
+struct Look {
+  const char* name;
+  BeadShading shading;
+  double blur, noise, tolerance_px, radius_tolerance_px;
+};
+
+class Looks : public testing::TestWithParam<Look> {};
+
+// Limits: 1.3 to 1.5 times the Cramer-Rao bound of an isolated disk, sigma/(contrast) / sqrt(pi R / (2 sqrt(pi)
+// b_eff)), b_eff^2 = b^2 + 1/12, with room for touching neighbours; a floor of 0.01 px without noise.
+TEST_P(Looks, TouchingAndFlyingDisksAreAllFoundNearTheBound) {
+  const Look& look = GetParam();
+  Camera camera;
+  camera.width = 500;
+  camera.height = 500;
+  camera.shading = look.shading;
+  camera.blur_px = look.blur;
+  camera.read_noise = look.noise;
+  const auto truth = bed_of(10, 500, 500, 10, 100);
+  FinderCalibration calibration;
+  const FindResult result = find_disks(render_frame(truth, camera), {}, &calibration);
+  const test::Score score = test::score(result.disks, truth, 500, 500);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+  EXPECT_LT(score.rms_px, look.tolerance_px);
+  EXPECT_EQ(calibration.polarity, Polarity::dark_beads);
+  EXPECT_NEAR(calibration.radius_px, 10, look.radius_tolerance_px);
+}
+
+INSTANTIATE_TEST_SUITE_P(Finder, Looks,
+                         testing::Values(Look{"flat_b0_n0", BeadShading::flat, 0, 0, 0.01, 0.005},
+                                         Look{"flat_b0_n5", BeadShading::flat, 0, 5, 0.015, 0.02},
+                                         Look{"flat_b1_n0", BeadShading::flat, 1, 0, 0.01, 0.005},
+                                         Look{"flat_b1_n5", BeadShading::flat, 1, 5, 0.017, 0.02},
+                                         Look{"flat_b1_n15", BeadShading::flat, 1, 15, 0.051, 0.02},
+                                         Look{"flat_b2_n5", BeadShading::flat, 2, 5, 0.030, 0.02},
+                                         Look{"flat_b2_n15", BeadShading::flat, 2, 15, 0.085, 0.04},
+                                         Look{"shaded_b0_n5", BeadShading::shaded, 0, 5, 0.018, 0.02},
+                                         Look{"shaded_b1_n0", BeadShading::shaded, 1, 0, 0.015, 0.01},
+                                         Look{"shaded_b1_n5", BeadShading::shaded, 1, 5, 0.024, 0.02},
+                                         Look{"shaded_b1_n15", BeadShading::shaded, 1, 15, 0.070, 0.04},
+                                         Look{"shaded_b2_n5", BeadShading::shaded, 2, 5, 0.042, 0.03}),
+                         [](const auto& test_info) { return std::string(test_info.param.name); });
+
+TEST(Finder, BrightBeadsAreFoundAsWellAsDarkOnes) {
+  Camera camera;
+  camera.width = 400;
+  camera.height = 400;
+  camera.background_level = 40;
+  camera.bead_level = 190;
+  camera.shading = BeadShading::shaded;
+  camera.blur_px = 0.8;
+  camera.read_noise = 5;
+  const auto truth = bed_of(10, 400, 400, 7, 60);
+  FinderCalibration calibration;
+  const FindResult result = find_disks(render_frame(truth, camera), {}, &calibration);
+  const test::Score score = test::score(result.disks, truth, 400, 400);
+  EXPECT_EQ(calibration.polarity, Polarity::bright_beads);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+}
+
+TEST(Finder, StatedVarianceIsTheScatterOfLoneDisks) {
+  Camera camera;
+  camera.width = 700;
+  camera.height = 700;
+  camera.blur_px = 1;
+  camera.read_noise = 6;
+  std::vector<RenderedDisk> truth;
+  for (int k = 0; k < 144; ++k) truth.push_back({40.3 + 55.17 * (k % 12), 40.7 + 55.31 * (k / 12), 10, 0, 0});
+  FinderCalibration calibration;
+  const FindResult result = find_disks(render_frame(truth, camera), {}, &calibration);
+  const test::Score score = test::score(result.disks, truth, 700, 700);
+  ASSERT_EQ(score.hits, 144U);
+  double stated = 0;
+  for (const FoundDisk& disk : result.disks) stated += 0.5 * (disk.variance_x + disk.variance_y) / 144;
+  // chi^2 with 288 degrees of freedom: 5 standard errors are 5 sqrt(2/288) = 42 % of the variance.
+  EXPECT_NEAR(score.rms_px * score.rms_px / stated, 1.0, 0.42);
+}
+
+TEST(Finder, TransparentBeadsAreNotTaken) {
+  Camera camera;
+  camera.width = 500;
+  camera.height = 500;
+  camera.blur_px = 1;
+  camera.read_noise = 4;
+  camera.transparent_fraction = 0.2;
+  const auto truth = bed_of(10, 500, 500, 8, 80);
+  std::vector<DrawnAs> drawn;
+  const GrayFrame frame = FrameRenderer(camera).render(truth, 0, &drawn);
+  std::vector<RenderedDisk> opaque;
+  for (std::size_t k = 0; k < truth.size(); ++k)
+    if (drawn[k] == DrawnAs::opaque) opaque.push_back(truth[k]);
+  ASSERT_LT(opaque.size(), truth.size());
+  const test::Score score = test::score(find_disks(frame).disks, opaque, 500, 500);
+  EXPECT_GE(score.recall(), 0.995);
+  EXPECT_GE(score.precision(), 0.995);
+}
+
+TEST(Finder, ResultDoesNotDependOnOrderOrRepetition) {
+  Camera camera;
+  camera.width = 300;
+  camera.height = 300;
+  camera.blur_px = 1;
+  camera.read_noise = 5;
+  const GrayFrame frame = render_frame(bed_of(10, 300, 300, 5, 20), camera);
+  const FindResult one = find_disks(frame), other = find_disks(frame);
+  ASSERT_EQ(one.disks.size(), other.disks.size());
+  for (std::size_t k = 0; k < one.disks.size(); ++k) {
+    EXPECT_EQ(one.disks[k].x_px, other.disks[k].x_px);
+    EXPECT_EQ(one.disks[k].y_px, other.disks[k].y_px);
+  }
+}
+
+TEST(Finder, ResidualOfAFoundFrameIsItsNoise) {
+  Camera camera;
+  camera.width = 400;
+  camera.height = 400;
+  camera.blur_px = 1;
+  camera.read_noise = 5;
+  const GrayFrame frame = render_frame(bed_of(10, 400, 400, 8, 50), camera);
+  FinderCalibration calibration;
+  const FindResult found = find_disks(frame, {}, &calibration);
+  const GrayFrame residual = residual_frame(frame, found, calibration);
+  double square = 0;
+  std::size_t count = 0;
+  for (int row = 20; row < 380; ++row)
+    for (int column = 20; column < 380; ++column, ++count)
+      square += static_cast<double>(residual.at(column, row)) * static_cast<double>(residual.at(column, row));
+  EXPECT_NEAR(std::sqrt(square / static_cast<double>(count)), 5, 0.35);
+  EXPECT_NEAR(calibration.noise_level, 5, 0.5);
+}
+
+TEST(RealFrames, BlackBeadsAllFoundNoneFalseScaleFromTheDiameter) {
+  const auto folder = test::real_images() / "beadtracking";
+  if (test::real_images().empty() || !std::filesystem::exists(folder / "truth.csv"))
+    GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
+  std::vector<std::vector<RenderedDisk>> truth;
+  std::ifstream in(folder / "truth.csv");
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::stringstream fields(line);
+    std::vector<std::string> field;
+    for (std::string one; std::getline(fields, one, ',');) field.push_back(one);
+    const auto frame = static_cast<std::size_t>(std::stoul(field[1]));
+    if (truth.size() <= frame) truth.resize(frame + 1);
+    if (field[3] == "black") truth[frame].push_back({std::stod(field[4]), std::stod(field[5]), 14.6, 0, 0});
+  }
+  FrameSource source = FrameSource::open({folder.string() + "/*.tif"});
+  const std::clock_t start = std::clock();
+  CalibrationResult calibrated;
+  std::size_t truths = 0, hits = 0, false_ones = 0, frames = 0;
+  while (auto frame = source.next()) {
+    if (!calibrated.found) calibrated = calibrate_finder({&*frame});
+    ASSERT_TRUE(calibrated.found) << calibrated.why_not;
+    const FindResult result = find_disks(*frame, calibrated.calibration);
+    // The truth stops at y = 305 and holds no bead cut by the sides; those it does hold within a radius of a side
+    // are left out on both hands.
+    const auto judged = [&](double x, double y, double margin) {
+      return y <= 305 + margin && x >= 14.6 && x <= frame->width - 1 - 14.6;
+    };
+    std::vector<RenderedDisk> whole;
+    for (const RenderedDisk& disk : truth.at(frames))
+      if (judged(disk.x_px, disk.y_px, 0)) whole.push_back(disk);
+    for (const RenderedDisk& disk : whole) {
+      ++truths;
+      for (const FoundDisk& found : result.disks)
+        if (std::hypot(found.x_px - disk.x_px, found.y_px - disk.y_px) < 4) {
+          ++hits;
+          break;
+        }
+    }
+    for (const FoundDisk& found : result.disks) {
+      if (!judged(found.x_px, found.y_px, -1)) continue;
+      bool real = false;
+      for (const RenderedDisk& disk : truth.at(frames))
+        real = real || std::hypot(found.x_px - disk.x_px, found.y_px - disk.y_px) < 4;
+      false_ones += !real;
+    }
+    ++frames;
+  }
+  const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  EXPECT_EQ(frames, 8U);
+  EXPECT_GT(truths, 2400U);
+  EXPECT_EQ(hits, truths);
+  EXPECT_EQ(false_ones, 0U);
+  EXPECT_NEAR(6.0 / (2 * calibrated.calibration.radius_px), 0.2056, 0.01 * 0.2056) << "mm per px";
+#ifdef NDEBUG
+  EXPECT_LT(seconds, 1.0);
+#else
+  (void)seconds;
+#endif
+}
+
+TEST(RealFrames, FiveRingsOnAnEmptyFieldAndNothingElse) {
+  const auto path = test::real_images() / "trackpy_bf_0000.png";
+  if (test::real_images().empty() || !std::filesystem::exists(path))
+    GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
+  EXPECT_EQ(find_disks(read_frame(path)).disks.size(), 5U);
+}
+
+}  // namespace
+}  // namespace shakebed::ingest

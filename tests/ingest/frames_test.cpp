@@ -1,0 +1,218 @@
+#include "ingest/frames.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/ingest/test_files.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+using test::ScratchFolder;
+
+GrayFrame ramp(int width, int height, float first) {
+  GrayFrame frame;
+  frame.width = width;
+  frame.height = height;
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column)
+      frame.pixels.push_back(std::min(255.0F, first + static_cast<float>(column + 2 * row)));
+  return frame;
+}
+
+void append(std::string& bytes, std::uint32_t value, int size) {
+  for (int k = 0; k < size; ++k) bytes.push_back(static_cast<char>(value >> (8 * k) & 0xffU));
+}
+
+// A little-endian TIFF, uncompressed, one strip a page: written here byte by byte so that nothing but the format is
+// trusted. `bits` 16 (unsigned) or 32 (float).
+void write_tiff(const std::string& path, int width, int height, const std::vector<std::vector<double>>& pages,
+                int bits) {
+  std::string bytes = "II";
+  append(bytes, 42, 2);
+  std::size_t link = bytes.size();
+  append(bytes, 0, 4);
+  for (const auto& page : pages) {
+    const auto data_at = static_cast<std::uint32_t>(bytes.size());
+    for (const double level : page) {
+      if (bits == 16) {
+        append(bytes, static_cast<std::uint32_t>(level), 2);
+      } else {
+        const float single = static_cast<float>(level);
+        std::uint32_t word = 0;
+        std::memcpy(&word, &single, 4);
+        append(bytes, word, 4);
+      }
+    }
+    const auto directory_at = static_cast<std::uint32_t>(bytes.size());
+    std::string patch;
+    append(patch, directory_at, 4);
+    bytes.replace(link, 4, patch);
+    const std::vector<std::array<std::uint32_t, 3>> entries = {
+        {256, 4, static_cast<std::uint32_t>(width)},
+        {257, 4, static_cast<std::uint32_t>(height)},
+        {258, 3, static_cast<std::uint32_t>(bits)},
+        {259, 3, 1},
+        {262, 3, 1},
+        {273, 4, data_at},
+        {277, 3, 1},
+        {278, 4, static_cast<std::uint32_t>(height)},
+        {279, 4, static_cast<std::uint32_t>(page.size() * static_cast<std::size_t>(bits) / 8)},
+        {339, 3, bits == 32 ? 3U : 1U}};
+    append(bytes, static_cast<std::uint32_t>(entries.size()), 2);
+    for (const auto& entry : entries) {
+      append(bytes, entry[0], 2);
+      append(bytes, entry[1], 2);
+      append(bytes, 1, 4);
+      append(bytes, entry[2], 4);
+    }
+    link = bytes.size();
+    append(bytes, 0, 4);
+  }
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST(Frames, PngComesBackAsItWasWritten) {
+  const ScratchFolder folder;
+  const GrayFrame frame = ramp(31, 17, 3);
+  write_png(folder / "a.png", frame);
+  const GrayFrame back = read_frame(folder / "a.png");
+  EXPECT_EQ(back.width, 31);
+  EXPECT_EQ(back.height, 17);
+  EXPECT_EQ(back.pixels, frame.pixels);
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) files += entry.exists();
+  EXPECT_EQ(files, 1) << "a temporary file was left behind";
+}
+
+TEST(Frames, FolderAndGlobAreReadInNaturalOrder) {
+  const ScratchFolder folder;
+  for (const int k : {10, 2, 1})
+    write_png(folder / ("frame" + std::to_string(k) + ".png"), ramp(8, 8, static_cast<float>(k)));
+  for (const std::string& path : {folder.path(), folder / "frame*.png"}) {
+    FrameSource source = FrameSource::open({path});
+    EXPECT_EQ(source.count_if_known(), 3U);
+    std::vector<float> seen;
+    while (auto frame = source.next()) seen.push_back(frame->pixels[0]);
+    EXPECT_EQ(seen, (std::vector<float>{1, 2, 10}));
+    source.rewind();
+    EXPECT_EQ(source.next()->pixels[0], 1.0F);
+  }
+}
+
+TEST(Frames, StrideKeepsEveryKth) {
+  FrameSource source = FrameSource::from_generator(7, [](std::size_t k) { return ramp(4, 4, static_cast<float>(k)); });
+  std::size_t count = 0;
+  while (source.next()) ++count;
+  EXPECT_EQ(count, 7U);
+}
+
+TEST(Frames, SixteenBitsOfWhichTwelveAreUsedFillTheRange) {
+  const ScratchFolder folder;
+  write_tiff(folder / "deep.tif", 4, 2, {{0, 1000, 2000, 3000, 4095, 10, 20, 30}}, 16);
+  const GrayFrame frame = read_frame(folder / "deep.tif");
+  EXPECT_FLOAT_EQ(frame.pixels[4], 255.0F);
+  EXPECT_NEAR(frame.pixels[2], 2000 * 255.0 / 4095, 1e-3);
+}
+
+TEST(Frames, FloatTiffWithHolesStaysFinite) {
+  const ScratchFolder folder;
+  write_tiff(folder / "f.tif", 2, 2, {{0.0, 0.5, 1.0, std::nan("")}}, 32);
+  const GrayFrame frame = read_frame(folder / "f.tif");
+  EXPECT_FLOAT_EQ(frame.pixels[1], 127.5F);
+  for (const float level : frame.pixels) EXPECT_TRUE(std::isfinite(level));
+  write_tiff(folder / "none.tif", 1, 1, {{std::nan("")}}, 32);
+  EXPECT_THROW(read_frame(folder / "none.tif"), InputError);
+}
+
+TEST(Frames, PagesOfATiffAreFrames) {
+  const ScratchFolder folder;
+  write_tiff(folder / "pages.tif", 2, 1, {{100, 65535}, {200, 65535}, {300, 65535}}, 16);
+  FrameSource source = FrameSource::open({folder / "pages.tif"});
+  EXPECT_EQ(source.count_if_known(), 3U);
+  FrameOrigin origin;
+  for (std::size_t page = 0; page < 3; ++page) {
+    const auto frame = source.next(&origin);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(origin.page, page);
+    EXPECT_NEAR(frame->pixels[0], static_cast<double>(page + 1) * 100 * 255 / 65535, 1e-4);
+  }
+  EXPECT_FALSE(source.next());
+}
+
+TEST(Frames, ErrorsNameTheFileTheProblemAndTheCure) {
+  const ScratchFolder folder;
+  const auto expect_error = [](const std::string& path, const std::string& part) {
+    try {
+      FrameSource source = FrameSource::open({path});
+      source.next();
+      FAIL() << path << " was accepted";
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.path(), path);
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      EXPECT_FALSE(error.suggestion().empty());
+    }
+  };
+  expect_error(folder / "absent.png", "no such file");
+  expect_error(folder / "absent*.png", "nothing matches");
+  std::ofstream(folder / "empty.png").flush();
+  expect_error(folder / "empty.png", "empty");
+  std::ofstream(folder / "text.png") << "this is not a picture";
+  expect_error(folder / "text.png", "cannot be read");
+  std::ofstream(folder / "notes.txt") << "hello";
+  expect_error(folder / "notes.txt", "neither a picture nor a film");
+  std::ofstream(folder / "film.mp4") << "no film";
+  expect_error(folder / "film.mp4", "cannot be opened");
+  std::filesystem::create_directory(folder / "void");
+  expect_error(folder / "void", "no picture or film");
+  EXPECT_THROW(FrameSource::open({}), InputError);
+}
+
+TEST(Frames, TruncatedFilesAreRefused) {
+  const ScratchFolder folder;
+  write_png(folder / "whole.png", ramp(200, 200, 0));
+  std::string bytes;
+  {
+    std::ifstream in(folder / "whole.png", std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  for (const std::size_t part : {std::size_t{1}, std::size_t{20}, bytes.size() / 2}) {
+    std::ofstream(folder / "cut.png", std::ios::binary) << bytes.substr(0, part);
+    EXPECT_THROW(read_frame(folder / "cut.png"), InputError) << part << " bytes";
+  }
+}
+
+TEST(Frames, EnormousPictureIsRefusedBeforeItIsDecoded) {
+  const ScratchFolder folder;
+  write_png(folder / "small.png", ramp(8, 8, 0));
+  std::string bytes;
+  {
+    std::ifstream in(folder / "small.png", std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  // The header says 20,000 x 20,000 (0x4e20).
+  bytes.replace(16, 8, std::string("\0\0\x4e\x20\0\0\x4e\x20", 8));
+  std::ofstream(folder / "large.png", std::ios::binary) << bytes;
+  try {
+    read_frame(folder / "large.png");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("20000 x 20000"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Frames, WritingWhereNothingCanBeWrittenSaysSo) {
+  EXPECT_THROW(write_png("/nonexistent_folder/a.png", ramp(4, 4, 0)), InputError);
+  EXPECT_THROW(write_png("a.png", GrayFrame{}), InputError);
+}
+
+}  // namespace
+}  // namespace shakebed::ingest

@@ -1,0 +1,243 @@
+// Inputs that break disk finders. None may crash, hang, return NaN or a silent nothing.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "ingest/find_disks.hpp"
+#include "ingest/measure_bed.hpp"
+#include "ingest/random_stream.hpp"
+#include "ingest/synthetic_frames.hpp"
+#include "tests/ingest/test_files.hpp"
+#include "tests/ingest/truth.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+Camera camera_of(int width, int height) {
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.blur_px = 0.8;
+  camera.read_noise = 4;
+  return camera;
+}
+
+std::vector<RenderedDisk> bed_of(double radius, int width, int height, int rows, int gas) {
+  SyntheticBed bed;
+  bed.left_wall_px = 6;
+  bed.right_wall_px = width - 6.5;
+  bed.floor_px = height - 7.3;
+  bed.radius_px = radius;
+  bed.rows = rows;
+  bed.gas_count = gas;
+  bed.gas_height_px = 0.25 * height;
+  bed.jitter_px = 0.01 * radius;
+  return make_synthetic_bed(bed);
+}
+
+void expect_sane(const FindResult& result) {
+  for (const FoundDisk& disk : result.disks) {
+    ASSERT_TRUE(std::isfinite(disk.x_px) && std::isfinite(disk.y_px) && std::isfinite(disk.radius_px));
+    ASSERT_TRUE(std::isfinite(disk.variance_x) && std::isfinite(disk.variance_y) && std::isfinite(disk.quality));
+  }
+  EXPECT_NE(result.disks.empty(), result.why_nothing.empty());
+}
+
+test::Score found_in(const std::vector<RenderedDisk>& truth, const Camera& camera) {
+  const FindResult result = find_disks(render_frame(truth, camera));
+  expect_sane(result);
+  return test::score(result.disks, truth, camera.width, camera.height);
+}
+
+TEST(HardCases, TouchingPairAtAnyAngle) {
+  for (int k = 0; k < 12; ++k) {
+    const double angle = std::numbers::pi * k / 12 + 0.05;
+    const double dx = 12 * std::cos(angle), dy = 12 * std::sin(angle);
+    const std::vector<RenderedDisk> pair = {{64.2 - dx, 63.6 - dy, 12, 0, 0}, {64.2 + dx, 63.6 + dy, 12, 0, 0}};
+    const test::Score score = found_in(pair, camera_of(128, 128));
+    EXPECT_EQ(score.hits, 2U) << k;
+    EXPECT_EQ(score.found, 2U) << k;
+    EXPECT_LT(score.rms_px, 0.05) << k;
+  }
+}
+
+TEST(HardCases, DisksCutByTheBorderAreFlagged) {
+  std::vector<RenderedDisk> disks = {
+      {2.5, 60, 12, 0, 0}, {64, 124.5, 12, 0, 0}, {60, 60, 12, 0, 0}, {100, 40, 12, 0, 0}};
+  const GrayFrame frame = render_frame(disks, camera_of(128, 128));
+  const FindResult result = find_disks(frame);
+  const test::Score score = test::score(result.disks, disks, 128, 128);
+  EXPECT_EQ(score.hits, 4U);
+  EXPECT_EQ(score.found, 4U);
+  for (const FoundDisk& disk : result.disks)
+    EXPECT_EQ(disk.cut, disk.x_px < 11.5 || disk.y_px > 115.5) << disk.x_px << " " << disk.y_px;
+}
+
+TEST(HardCases, DisksOfThreePixels) {
+  std::vector<RenderedDisk> disks;
+  RandomStream random(1);
+  for (int k = 0; k < 400; ++k)
+    disks.push_back({12 + 10 * (k % 20) + random.uniform(), 12 + 10 * (k / 20) + random.uniform(), 1.5, 0, 0});
+  Camera camera = camera_of(224, 224);
+  camera.blur_px = 0.5;
+  const test::Score score = found_in(disks, camera);
+  EXPECT_GE(score.recall(), 0.99);
+  EXPECT_GE(score.precision(), 0.99);
+  EXPECT_LT(score.rms_px, 0.1);
+}
+
+TEST(HardCases, DisksOfThreeHundredPixels) {
+  const std::vector<RenderedDisk> disks = {{200, 200, 150, 0, 0},
+                                           {520, 240, 150, 0, 0},
+                                           {820, 180, 150, 0, 0},
+                                           {350, 600, 150, 0, 0},
+                                           {760, 580, 150, 0, 0}};
+  const test::Score score = found_in(disks, camera_of(1000, 800));
+  EXPECT_EQ(score.hits, 5U);
+  EXPECT_EQ(score.found, 5U);
+  EXPECT_LT(score.rms_px, 0.05);
+}
+
+TEST(HardCases, SaturatedUnderExposedAndFaint) {
+  const auto truth = bed_of(10, 360, 360, 6, 50);
+  for (const auto& [background, bead] : {std::pair{330.0, 90.0}, {26.0, 4.0}, {140.0, 126.0}}) {
+    Camera camera = camera_of(360, 360);
+    camera.background_level = background;
+    camera.bead_level = bead;
+    camera.read_noise = 1.5;
+    const test::Score score = found_in(truth, camera);
+    EXPECT_GE(score.recall(), 0.99) << background;
+    EXPECT_GE(score.precision(), 0.99) << background;
+  }
+}
+
+TEST(HardCases, LightFallingByFourFifths) {
+  const auto truth = bed_of(10, 500, 400, 7, 80);
+  Camera camera = camera_of(500, 400);
+  camera.gradient_x = 0.8;
+  camera.vignette = 0.3;
+  const test::Score score = found_in(truth, camera);
+  EXPECT_GE(score.recall(), 0.99);
+  EXPECT_GE(score.precision(), 0.99);
+}
+
+TEST(HardCases, StreaksOfHalfADiameter) {
+  auto truth = bed_of(10, 400, 400, 0, 90);
+  RandomStream random(5);
+  for (RenderedDisk& disk : truth) {
+    const double angle = 2 * std::numbers::pi * random.uniform();
+    disk.velocity_x_px_per_s = 1e4 * std::cos(angle);
+    disk.velocity_y_px_per_s = 1e4 * std::sin(angle);
+  }
+  Camera camera = camera_of(400, 400);
+  camera.exposure_s = 1e-3;  // 10 px
+  const test::Score score = found_in(truth, camera);
+  EXPECT_GE(score.recall(), 0.97);
+  EXPECT_GE(score.precision(), 0.97);
+}
+
+TEST(HardCases, DustOnTheGlass) {
+  const auto truth = bed_of(10, 400, 400, 6, 60);
+  Camera camera = camera_of(400, 400);
+  camera.dust_fraction = 0.05;
+  const test::Score score = found_in(truth, camera);
+  EXPECT_GE(score.recall(), 0.99);
+  EXPECT_GE(score.precision(), 0.99);
+}
+
+TEST(HardCases, JpegArtefacts) {
+  const auto truth = bed_of(10, 400, 400, 6, 60);
+  Camera camera = camera_of(400, 400);
+  camera.jpeg_quality = 60;
+  const test::Score score = found_in(truth, camera);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+  EXPECT_LT(score.rms_px, 0.1);
+}
+
+TEST(HardCases, BedTurnedByThreeDegreesGivesItsTilt) {
+  auto truth = bed_of(10, 500, 400, 7, 60);
+  const double angle = 3 * std::numbers::pi / 180;
+  for (RenderedDisk& disk : truth) {
+    const double x = disk.x_px - 250, y = disk.y_px - 230;
+    disk.x_px = 260 + x * std::cos(angle) - y * std::sin(angle);
+    disk.y_px = 215 + x * std::sin(angle) + y * std::cos(angle);
+  }
+  Camera camera = camera_of(520, 430);
+  FrameSource source = FrameSource::from_frames({render_frame(truth, camera)});
+  MeasureOptions options;
+  options.bead_diameter_m = 3e-3;
+  const Measurement measured = measure_bed(source, options);
+  EXPECT_NEAR(measured.calibration.floor_tilt_degrees, 3, 0.1);
+  double lowest = 100;
+  for (const MeasuredDisk& disk : measured.disks) lowest = std::min(lowest, disk.z);
+  EXPECT_NEAR(lowest, 0.5, 0.05);
+}
+
+TEST(HardCases, BlankNoiseAndOtherThingsGiveAReason) {
+  GrayFrame blank;
+  blank.width = 300;
+  blank.height = 200;
+  blank.pixels.assign(60000, 128.0F);
+  const FindResult in_blank = find_disks(blank);
+  EXPECT_TRUE(in_blank.disks.empty());
+  EXPECT_FALSE(in_blank.why_nothing.empty());
+
+  Camera camera = camera_of(300, 200);
+  camera.read_noise = 20;
+  const FindResult in_noise = find_disks(render_frame({}, camera));
+  EXPECT_TRUE(in_noise.disks.empty());
+  EXPECT_FALSE(in_noise.why_nothing.empty());
+
+  GrayFrame stripes = blank;  // something else: stripes that curve
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 300; ++column)
+      stripes.pixels[static_cast<std::size_t>(row * 300 + column)] =
+          static_cast<float>(128 + 60 * std::sin(0.15 * column + 0.002 * row * row));
+  expect_sane(find_disks(stripes));
+}
+
+TEST(HardCases, TinyFramesAndSingleDisks) {
+  for (const int size : {1, 2, 4, 7, 12}) {
+    GrayFrame frame;
+    frame.width = frame.height = size;
+    frame.pixels.assign(static_cast<std::size_t>(size * size), 77.0F);
+    frame.pixels[0] = 10.0F;
+    expect_sane(find_disks(frame));
+  }
+  const test::Score score = found_in({{33.3, 30.8, 11, 0, 0}}, camera_of(70, 64));
+  EXPECT_EQ(score.hits, 1U);
+  EXPECT_EQ(score.found, 1U);
+}
+
+TEST(HardCases, MalformedFrameIsAnError) {
+  GrayFrame frame;
+  frame.width = 10;
+  frame.height = 10;
+  frame.pixels.assign(99, 0.0F);
+  EXPECT_THROW(find_disks(frame), std::invalid_argument);
+}
+
+TEST(HardCases, AFilmWhoseSizeChangesIsReported) {
+  const auto truth = bed_of(10, 300, 300, 5, 20);
+  const GrayFrame large = render_frame(truth, camera_of(300, 300)), other = render_frame(truth, camera_of(310, 300));
+  FrameSource source = FrameSource::from_frames({large, other, large});
+  MeasureOptions options;
+  options.bead_diameter_m = 1e-3;
+  const Measurement measured = measure_bed(source, options);
+  EXPECT_EQ(measured.frames[1].status, FrameStatus::size_changed);
+  EXPECT_EQ(measured.frames[2].status, FrameStatus::good);
+}
+
+TEST(HardCases, HalfAMillionPixelsFullOfNothingEndsSoon) {
+  Camera camera = camera_of(1000, 800);
+  camera.read_noise = 0;
+  camera.dust_fraction = 0.3;  // specks, no beads
+  expect_sane(find_disks(render_frame({}, camera)));
+}
+
+}  // namespace
+}  // namespace shakebed::ingest

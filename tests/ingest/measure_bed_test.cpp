@@ -1,0 +1,177 @@
+#include "ingest/measure_bed.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "ingest/overlay.hpp"
+#include "ingest/random_stream.hpp"
+#include "ingest/synthetic_frames.hpp"
+#include "tests/ingest/test_files.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+// 337 beads of 20 px: touching layers, gas above, shaded, blurred, noisy, moving while the shutter is open.
+struct Film {
+  std::vector<std::vector<RenderedDisk>> truth;
+  std::vector<GrayFrame> frames;
+};
+Film film_of(std::size_t count) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 520;
+  camera.shading = BeadShading::shaded;
+  camera.blur_px = 0.8;
+  camera.read_noise = 5;
+  camera.exposure_s = 5e-4;
+  camera.gradient_x = 0.1;
+  const FrameRenderer renderer(camera);
+  Film film;
+  RandomStream random(3);
+  for (std::size_t k = 0; k < count; ++k) {
+    SyntheticBed bed;
+    bed.left_wall_px = 20;
+    bed.right_wall_px = 620;
+    bed.floor_px = 500;
+    bed.rows = 8;
+    bed.gas_count = 101;
+    bed.gas_height_px = 60;
+    bed.jitter_px = 0.1;
+    bed.seed = k + 1;
+    auto disks = make_synthetic_bed(bed);
+    for (RenderedDisk& disk : disks) {
+      disk.velocity_x_px_per_s = 600 * random.normal();
+      disk.velocity_y_px_per_s = 600 * random.normal();
+    }
+    film.frames.push_back(renderer.render(disks, k));
+    film.truth.push_back(std::move(disks));
+  }
+  return film;
+}
+
+MeasureOptions options_of() {
+  MeasureOptions options;
+  options.bead_diameter_m = 2.99e-3;
+  options.kernel = {KernelKind::gaussian, 0.25};
+  return options;
+}
+
+TEST(MeasureBed, DensityOfRenderedBedWithKnownGeometryIsTheTrueOne) {
+  const Film film = film_of(6);
+  MeasureOptions options = options_of();
+  options.floor_px = 500;
+  options.left_wall_px = 20;
+  options.right_wall_px = 620;
+  options.scale_m_per_px = 2.99e-3 / 20;
+  FrameSource source = FrameSource::from_frames(film.frames);
+  const Measurement measured = measure_bed(source, options);
+  std::vector<std::vector<double>> densities;
+  std::size_t in_view = 0;
+  for (const auto& disks : film.truth) {
+    std::vector<double> heights;
+    for (const RenderedDisk& disk : disks)
+      if (disk.y_px >= -0.5) heights.push_back((500 - disk.y_px) / 20);
+    in_view += heights.size();
+    densities.push_back(density_of_frame(heights, 30, measured.profile.bins, options.kernel));
+  }
+  EXPECT_EQ(measured.disks.size(), in_view);
+  const DensityProfile truth = average_profile(densities, measured.profile.bins, options.kernel);
+  for (std::size_t bin = 0; bin < truth.bins.count; ++bin)
+    EXPECT_NEAR(measured.profile.number_density[bin], truth.number_density[bin], 0.002) << truth.bins.middle(bin);
+  EXPECT_LT(measured.coverage_disagreement, 0.04);
+}
+
+TEST(MeasureBed, GeometryIsFoundWhenNotGiven) {
+  const Film film = film_of(4);
+  FrameSource source = FrameSource::from_frames(film.frames);
+  const Measurement measured = measure_bed(source, options_of());
+  const BedCalibration& bed = measured.calibration;
+  EXPECT_NEAR(bed.scale_m_per_px, 2.99e-3 / 20, 0.002 * 2.99e-3 / 20);
+  EXPECT_NEAR(bed.floor_px, 500, 0.1);
+  EXPECT_NEAR(bed.floor_tilt_degrees, 0, 0.02);
+  EXPECT_NEAR(bed.left_wall_px, 20, 0.2);
+  EXPECT_NEAR(bed.right_wall_px, 620, 0.2);
+  EXPECT_NEAR(bed.width, 30, 0.07);
+  EXPECT_EQ(bed.polarity, Polarity::dark_beads);
+}
+
+TEST(MeasureBed, ThreadsChangeNothing) {
+  const Film film = film_of(6);
+  FrameSource one_source = FrameSource::from_frames(film.frames), two_source = FrameSource::from_frames(film.frames);
+  MeasureOptions options = options_of();
+  const Measurement one = measure_bed(one_source, options);
+  options.threads = 3;
+  const Measurement two = measure_bed(two_source, options);
+  ASSERT_EQ(one.disks.size(), two.disks.size());
+  for (std::size_t k = 0; k < one.disks.size(); ++k) {
+    EXPECT_EQ(one.disks[k].x_px, two.disks[k].x_px);
+    EXPECT_EQ(one.disks[k].z, two.disks[k].z);
+  }
+  EXPECT_EQ(one.profile.number_density, two.profile.number_density);
+  EXPECT_EQ(one.profile.covariance, two.profile.covariance);
+}
+
+TEST(MeasureBed, BadFramesAreReportedAndTheOthersUsed) {
+  Film film = film_of(4);
+  GrayFrame blank = film.frames[0];
+  std::fill(blank.pixels.begin(), blank.pixels.end(), 200.0F);
+  film.frames[1] = blank;
+  GrayFrame small;
+  small.width = small.height = 50;
+  small.pixels.assign(2500, 100.0F);
+  film.frames.push_back(small);
+  FrameSource source = FrameSource::from_frames(film.frames);
+  const Measurement measured = measure_bed(source, options_of());
+  ASSERT_EQ(measured.frames.size(), 5U);
+  EXPECT_EQ(measured.frames[1].status, FrameStatus::nothing_found);
+  EXPECT_FALSE(measured.frames[1].why.empty());
+  EXPECT_EQ(measured.frames[4].status, FrameStatus::size_changed);
+  EXPECT_EQ(measured.frames[2].status, FrameStatus::good);
+  EXPECT_FALSE(measured.warnings.empty());
+}
+
+TEST(MeasureBed, AFilmWithoutBeadsIsAnErrorThatSaysWhy) {
+  GrayFrame blank;
+  blank.width = blank.height = 100;
+  blank.pixels.assign(10000, 100.0F);
+  FrameSource source = FrameSource::from_frames({blank, blank});
+  try {
+    measure_bed(source, options_of());
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("no disks"), std::string::npos) << error.what();
+  }
+  FrameSource none = FrameSource::from_frames({});
+  EXPECT_THROW(measure_bed(none, options_of()), InputError);
+  EXPECT_THROW(measure_bed(source, MeasureOptions{}), std::invalid_argument);
+}
+
+TEST(MeasureBed, PhasesAreSortedByTheShakersClock) {
+  const Film film = film_of(4);
+  FrameSource source = FrameSource::from_frames(film.frames);
+  MeasureOptions options = options_of();
+  options.shaking_frequency_hz = 20;
+  options.frame_rate_hz = 80;
+  options.phase_bins = 4;
+  const Measurement measured = measure_bed(source, options);
+  ASSERT_EQ(measured.phases.size(), 4U);
+  for (const PhaseProfile& phase : measured.phases) EXPECT_EQ(phase.profile.samples, 1U);
+}
+
+TEST(MeasureBed, TablesAndOverlayAreWritten) {
+  const test::ScratchFolder folder;
+  const Film film = film_of(1);
+  FrameSource source = FrameSource::from_frames(film.frames);
+  const Measurement measured = measure_bed(source, options_of());
+  write_disks_csv(folder / "disks.csv", measured);
+  EXPECT_GT(std::filesystem::file_size(folder / "disks.csv"), 1000U);
+  const FindResult found = find_disks(film.frames[0], measured.finder);
+  write_overlay(folder / "overlay.png", film.frames[0], found.disks);
+  const GrayFrame overlay = read_frame(folder / "overlay.png");
+  EXPECT_EQ(overlay.width, 1280);
+}
+
+}  // namespace
+}  // namespace shakebed::ingest
