@@ -251,6 +251,12 @@ Window choose_window(Cleaned& cleaned, const FitOptions& options) {
   if (w.low) {
     window.low = *w.low;
     window.rule = "from the given height " + number(window.low, 4) + " D";
+  } else if (w.below_density) {
+    std::size_t start = n - 1;
+    while (start > peak && cleaned.one_diameter_mean[start - 1] < *w.below_density) --start;
+    window.low = cleaned.height[start];
+    window.rule = "from " + number(window.low, 4) +
+                  " D, above which the density averaged over one diameter stays below " + number(*w.below_density);
   } else {
     std::size_t start = first;
     while (start < peak && cleaned.one_diameter_mean[start] < w.plateau_fraction * cleaned.greatest_mean) ++start;

@@ -41,6 +41,10 @@ struct WindowOptions {
   //         `lowest_significance` standard errors.
   std::optional<double> low;
   std::optional<double> high;
+  // The tail only: low is the first height, going up, above which the density averaged over one diameter stays below
+  // this [1/D^2]. With 0.6 the Enskog curve has no bias on true disks in the local-density picture (the whole profile:
+  // -15 %).
+  std::optional<double> below_density;
   double floor_exclusion = 1.5;  // [D]
   double plateau_fraction = 0.95;
   double lowest_fraction = 0.005;
