@@ -12,11 +12,15 @@
 
 namespace shakebed::sim {
 
+// Slower approaches than this (times the distance, in D sqrt(g D)) are rounding, not motion: two disks that stay in
+// touch for ever are not made to collide for ever. What it lets pass is an overlap of 1e-14 D in a unit of time.
+inline constexpr double slowest_approach = 1e-14;
+
 // Two disks in free flight under the same gravity: their relative motion is a straight line.
 // (dx, dz), (dvx, dvz): position and velocity of the second from the first; contact_distance_squared: (R1 + R2)^2.
 inline double time_to_disk(double dx, double dz, double dvx, double dvz, double contact_distance_squared) {
   const double b = dx * dvx + dz * dvz;
-  if (!(b < 0)) return never;
+  if (!(b < -slowest_approach)) return never;
   const double speed_squared = dvx * dvx + dvz * dvz;
   const double c = std::max(dx * dx + dz * dz - contact_distance_squared, 0.0);
   const double discriminant = b * b - speed_squared * c;
@@ -27,7 +31,7 @@ inline double time_to_disk(double dx, double dz, double dvx, double dvz, double 
 // A wall across a direction in which nothing accelerates. gap: free distance to it (slightly negative counts as
 // touching); approach_speed: how fast the gap closes.
 inline double time_to_wall(double gap, double approach_speed) {
-  if (!(approach_speed > 0)) return never;
+  if (!(approach_speed > slowest_approach)) return never;
   return std::max(gap, 0.0) / approach_speed;
 }
 
@@ -45,6 +49,7 @@ inline double time_to_lid(double gap, double vz, double gravity) {
 inline double time_to_fall(double gap, double vz, double gravity) {
   if (gravity > 0) {
     const double root = std::sqrt(vz * vz + 2 * gravity * gap);
+    if (root == 0) return 0;  // at rest on the floor
     return vz > 0 ? (vz + root) / gravity : 2 * gap / (root - vz);
   }
   return vz < 0 ? gap / -vz : never;

@@ -94,6 +94,8 @@ class Engine final : public Simulation {
   void hit_floor(std::uint32_t i, Motion& motion);
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Surface& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
+  bool locked();
+  void relieve();
 
   void act_bath();
 
@@ -133,6 +135,8 @@ class Engine final : public Simulation {
   double event_rate_ = 1;
   std::uint64_t events_at_synchronisation_ = 0;
   double bath_at_ = never;  // next action of the reservoir
+  double checked_at_ = -1;  // for rows that lock, see locked()
+  std::uint64_t events_to_check_ = 1;
   Random random_;
   Counters counters_;
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;

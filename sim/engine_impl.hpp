@@ -135,7 +135,7 @@ template <class Space, class Rule, class Sizes>
   const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), zero);
   const Lanes discriminant = fused(b, b, -(fused(dvx, dvx, dvz * dvz) * c));
   const Lanes contact = time + c / (sqrt_lanes(larger(discriminant, zero)) - b);
-  const LaneMask meets = (b < zero) & (discriminant >= zero) & (contact < event_time);
+  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (discriminant >= zero) & (contact < event_time);
   return select(meets, contact, all_lanes(never));
 }
 
@@ -339,6 +339,12 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
   while (queue_.pop(until, i)) {
     const Disk& disk = disks_[i];
     now_ = disk.event_time;
+    if (--events_to_check_ == 0) [[unlikely]] {
+      if (locked()) {
+        relieve();
+        continue;
+      }
+    }
     if (disk.partner >= 0) [[likely]] {
       const auto j = static_cast<std::uint32_t>(disk.partner);
       const Disk& other = disks_[j];
@@ -530,6 +536,71 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
   }
 }
 
+// ------------------------------------------------------------------------------------------------ locked rows
+
+// Disks that fill a gap exactly, a row from wall to wall say, hand their momenta on without end at one instant. Called
+// after every so many events: has time stood still meanwhile?
+template <class Space, class Rule, class Sizes>
+bool Engine<Space, Rule, Sizes>::locked() {
+  const bool stood_still = now_ - checked_at_ < 1e-12;
+  checked_at_ = now_;
+  events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
+  return stood_still;
+}
+
+// Lets every contact without a gap lose its approach (a perfectly plastic impulse, momentum kept, the energy written
+// down as dissipated), again and again until nothing approaches: what physics does to a locked row in a real contact's
+// time.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::relieve() {
+  constexpr double touching = 1e-11;
+  constexpr int most_sweeps = 100'000;
+  ++counters_.locks_relieved;
+  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
+  const double before = kinetic_energy(), work_before = floor_work_;
+  double fastest = never;
+  for (int sweep = 0; sweep < most_sweeps && fastest > slowest_approach / 2; ++sweep) {
+    fastest = 0;
+    const auto stop = [&](double approach) {  // how much of it to take away
+      fastest = std::max(fastest, approach);
+      return std::max(approach, 0.0);
+    };
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      Disk& disk = disks_[i];
+      shells_.each_neighbour(i, [&](std::uint32_t k) {
+        if (k < i) return;
+        Disk& other = disks_[k];
+        double dx = other.x - disk.x, dz = other.z - disk.z;
+        if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+        if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+        const double distance = std::sqrt(dx * dx + dz * dz);
+        if (distance > sizes_.contact_distance(i, k) + touching) return;
+        const double nx = dx / distance, nz = dz / distance;
+        const double approach = stop(-((other.vx - disk.vx) * nx + (other.vz - disk.vz) * nz));
+        const double mi = sizes_.mass(i), mk = sizes_.mass(k);
+        disk.vx -= approach * mk / (mi + mk) * nx;
+        disk.vz -= approach * mk / (mi + mk) * nz;
+        other.vx += approach * mi / (mi + mk) * nx;
+        other.vz += approach * mi / (mi + mk) * nz;
+      });
+      if constexpr (Space::has_walls) {
+        const double radius = sizes_.radius(i);
+        if (hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
+        if (hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        if (lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
+        if (disk.z - radius - floor_.position(now_) < touching) {
+          const double approach = stop(floor_.velocity(now_) - disk.vz);
+          disk.vz += approach;
+          floor_work_ += sizes_.mass(i) * approach * floor_.velocity(now_);
+        }
+      }
+    }
+  }
+  // The floor's work is in the ledger by its impulses; the rest of what is missing was dissipated.
+  dissipated_ += before + (floor_work_ - work_before) - kinetic_energy();
+  predict_all();
+}
+
 // ------------------------------------------------------------------------------------------------ reservoirs
 
 template <class Space, class Rule, class Sizes>
@@ -617,6 +688,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
   synchronise_at_ = static_cast<double>(intervals_) * interval_;
+  checked_at_ = -1;
+  events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
   double largest_contact = 1;
   if constexpr (!Sizes::equal) largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;

@@ -26,8 +26,7 @@ class EventQueue {
     disks_ = disks;
     const double events_a_bucket = 16;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
-    const auto wanted =
-        static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket, 256.0, 1e8));
+    const auto wanted = static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket, 256.0, 1e8));
     const std::size_t size = std::bit_ceil(wanted);
     heads_.assign(size, 0);
     held_.assign(size, 0);

@@ -56,6 +56,13 @@ class NeighbourShells {
     for (std::uint32_t block = overflow_[i]; block != 0; block = links_[block]) visit(blocks_[block]);
   }
 
+  // Calls visit(k) for every neighbour.
+  template <class Visit>
+  void each_neighbour(std::uint32_t i, Visit visit) {
+    const std::uint32_t neighbours = disks_[i].neighbours;
+    for (std::uint32_t place = 0; place < neighbours; ++place) visit(*slot(i, place));
+  }
+
   void file(std::uint32_t i) {
     std::uint32_t& head = heads_[cell_of(disks_[i])];
     following_[i] = head;

@@ -40,7 +40,8 @@ struct Counters {
   std::uint64_t predictions_renewed = 0;  // a partner was hit by another disk first
   std::uint64_t shell_exits = 0;
   std::uint64_t synchronisations = 0;
-  double virial = 0;  // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
+  std::uint64_t locks_relieved = 0;  // endless chains of contacts at one instant that were ended
+  double virial = 0;                 // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
   std::uint64_t events() const {
     return disk_collisions + wall_collisions + floor_collisions + predictions_renewed + shell_exits;
   }
