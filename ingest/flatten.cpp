@@ -1,6 +1,7 @@
 #include "ingest/flatten.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -197,22 +198,44 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
   const double largest_span =
       sorted_spans[static_cast<std::size_t>(0.98 * static_cast<double>(sorted_spans.size() - 1))];
   constexpr double fair_share = 0.3;
+  // A block of little contrast is either empty, and tells the background by its median, noise or not, or so full of
+  // beads that hardly any background shows; the nearer envelope decides.
   const bool dark = polarity != Polarity::bright_beads;
-  std::vector<BlockValue>& bead_side = dark ? lower : upper;
-  std::vector<BlockValue> with_beads;
-  for (std::size_t k = 0; k < spans.size(); ++k)
-    if (spans[k] >= fair_share * largest_span) with_beads.push_back(bead_side[k]);
-  // Blocks without beads tell the background by their median, noise or not.
   std::vector<BlockValue> background_side = dark ? upper : lower;
-  for (std::size_t k = 0; k < spans.size(); ++k)
-    if (spans[k] < fair_share * largest_span) {
-      background_side[k].value = background_side[k].median;
-      background_side[k].exact = true;
-    }
+  const std::vector<BlockValue>& bead_side = dark ? lower : upper;
   const auto order_for = [](std::size_t blocks) { return blocks >= 40 ? 2 : blocks >= 12 ? 1 : 0; };
-  const int background_order = order_for(upper.size()), bead_order = order_for(with_beads.size());
-  const auto background_fit = hugging_polynomial(background_side, background_order, dark ? 1 : -1);
-  const auto bead_fit = hugging_polynomial(with_beads, bead_order, dark ? -1 : 1);
+  const double background_direction = dark ? 1 : -1;
+  std::vector<BlockValue> with_beads;
+  std::vector<std::size_t> plain;
+  for (std::size_t k = 0; k < spans.size(); ++k) {
+    if (spans[k] >= fair_share * largest_span)
+      with_beads.push_back(bead_side[k]);
+    else
+      plain.push_back(k);
+  }
+  const int background_order = order_for(background_side.size());
+  std::vector<double> background_fit = hugging_polynomial(background_side, background_order, background_direction);
+  std::vector<double> bead_fit = hugging_polynomial(with_beads, order_for(with_beads.size()), -background_direction);
+  const auto value_of = [](const std::vector<double>& fit, double u, double v) {
+    std::array<double, 6> values{};
+    polynomial_values(u, v, 2, values.data());
+    double sum = 0;
+    for (std::size_t i = 0; i < fit.size(); ++i) sum += fit[i] * values[i];
+    return sum;
+  };
+  for (const std::size_t k : plain) {
+    BlockValue& told = background_side[k];
+    const double to_background = std::abs(told.median - value_of(background_fit, told.u, told.v));
+    const double to_bead = std::abs(told.median - value_of(bead_fit, told.u, told.v));
+    if (to_background < to_bead) {
+      told.value = told.median;
+      told.exact = true;
+    } else {
+      with_beads.push_back(bead_side[k]);
+    }
+  }
+  background_fit = hugging_polynomial(background_side, background_order, background_direction);
+  bead_fit = hugging_polynomial(with_beads, order_for(with_beads.size()), -background_direction);
 
   LightField light;
   light.spacing_px = 32;
@@ -221,16 +244,12 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
   const std::size_t nodes = static_cast<std::size_t>(light.columns) * static_cast<std::size_t>(light.rows);
   light.background.resize(nodes);
   light.contrast.resize(nodes);
-  std::vector<double> basis(polynomial_terms(2));
   std::vector<double> contrasts;
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.columns; ++column) {
       const double u = std::min(1.0, 2 * column * light.spacing_px / frame.width - 1);
       const double v = std::min(1.0, 2 * row * light.spacing_px / frame.height - 1);
-      polynomial_values(u, v, 2, basis.data());
-      double background = 0, bead = 0;
-      for (std::size_t i = 0; i < background_fit.size(); ++i) background += background_fit[i] * basis[i];
-      for (std::size_t i = 0; i < bead_fit.size(); ++i) bead += bead_fit[i] * basis[i];
+      const double background = value_of(background_fit, u, v), bead = value_of(bead_fit, u, v);
       const std::size_t at =
           static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
       light.background[at] = static_cast<float>(background);
