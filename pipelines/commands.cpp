@@ -540,6 +540,13 @@ int command_rerun(const Arguments& arguments) {
   if (fs::equivalent(options.out, before, error)) throw UsageError("--out: a rerun needs a folder of its own");
   Console console(level_of(arguments.common));
   install_interrupt_handler();
+  if (plan.sweep) {
+    const int code = run_sweep_command(plan, options, {}, console);
+    if (code != exit_ok && code != exit_check_failed) return code;
+    const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
+    print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
+    return same ? exit_ok : exit_check_failed;
+  }
   const RunOutcome outcome = run_pipeline(plan, options, console);
   if (!outcome.error.empty()) console.error(outcome.error);
   if (outcome.code != exit_ok && outcome.code != exit_check_failed) return outcome.code;

@@ -176,7 +176,9 @@ void describe_sweep(Fields& fields, SweepOptions& sweep) {
         bad(where, "expected an object: pointer → value");
         continue;
       }
-      for (const auto& [pointer, value] : points[i].items()) {
+      for (const auto& item : points[i].items()) {
+        const std::string& pointer = item.key();
+        const Json& value = item.value();
         auto axis = std::find_if(sweep.axes.begin(), sweep.axes.end(),
                                  [&](const SweepAxis& a) { return a.pointer == pointer; });
         if (axis == sweep.axes.end()) axis = sweep.axes.insert(sweep.axes.end(), SweepAxis{.pointer = pointer});

@@ -10,6 +10,8 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <thread>
 
@@ -130,16 +132,113 @@ std::string sweep_header(const Plan& plan, const std::vector<std::string>& point
 // A point is done when this file says so for the same recipe at the same values.
 constexpr std::string_view point_record = ".point";
 
-std::string point_key(const Plan& plan, const SweepPoint& point) {
-  // Everything that decides the point's results: the point's own resolved recipe and the fingerprints of external
-  // files.
-  const Plan at = plan_at(plan, point);
-  std::string text = dump_canonical(at.resolved["stages"]);
+// What decides the results of a point, and of each of its stages: kind, version, options, seed, external files and what
+// it reads from.
+struct PointKeys {
+  std::string point;
+  std::vector<std::string> stages;
+};
+
+PointKeys keys_of(const Plan& at) {
+  PointKeys keys;
+  std::string whole;
   for (const PlannedStage& stage : at.stages) {
+    std::string text = fmt::format("{} {} {} {} ", stage.row->name, stage.row->version,
+                                   stage.row->uses_seed ? stage.seed : 0, stage.reduced);
+    text += dump_canonical(stage.options);
     for (const auto& [pointer, path] : stage.input_files) text += pointer + fast_hash_of_file(path);
+    for (const std::size_t k : stage.from) text += at.stages[k].id + keys.stages[k];
+    keys.stages.push_back(fast_hash(text));
+    whole += stage.id + keys.stages.back();
   }
-  return fast_hash(text);
+  keys.point = fast_hash(whole);
+  return keys;
 }
+
+// Stages that several points have in common (one simulation under a sweep of fits, say) are run once, in
+// OUT/shared/<key>/<id>; the points hold links to them.
+class SharedStages {
+ public:
+  SharedStages(fs::path out, const RunOptions& options) : root_(std::move(out) / "shared"), options_(options) {}
+
+  void count(const PointKeys& keys) {
+    for (const std::string& key : keys.stages) ++uses_[key];
+  }
+  bool is_shared(const std::string& key) const {
+    const auto found = uses_.find(key);
+    return found != uses_.end() && found->second > 1;
+  }
+
+  // Makes the shared stages of a point and links them into its folder. What fails here is left to the point itself,
+  // which then fails in the same way and says so.
+  void prepare(const Plan& at, const PointKeys& keys, const fs::path& directory) {
+    for (std::size_t i = 0; i < at.stages.size(); ++i) {
+      if (!is_shared(keys.stages[i]) || !make(at, keys, i)) continue;
+      link("../../shared/" + keys.stages[i] + "/" + at.stages[i].id, directory / at.stages[i].id);
+    }
+  }
+
+ private:
+  struct Entry {
+    std::mutex mutex;
+    bool tried = false, good = false;
+  };
+
+  static void link(const fs::path& target, const fs::path& place) {
+    std::error_code error;
+    if (fs::is_symlink(place, error) && fs::read_symlink(place, error) == target) return;
+    fs::remove_all(place, error);
+    fs::create_directory_symlink(target, place);
+  }
+
+  bool make(const Plan& at, const PointKeys& keys, std::size_t i) {
+    const std::string& key = keys.stages[i];
+    std::shared_ptr<Entry> entry;
+    {
+      const std::lock_guard lock(mutex_);
+      std::shared_ptr<Entry>& found = entries_[key];
+      if (!found) found = std::make_shared<Entry>();
+      entry = found;
+    }
+    const std::lock_guard lock(entry->mutex);  // one thread makes it, the others wait
+    if (entry->tried) return entry->good;
+    const fs::path directory = root_ / key;
+    fs::create_directories(directory);
+    std::optional<FolderLock> folder_lock;
+    while (!folder_lock) {  // so do other shards
+      try {
+        folder_lock.emplace(directory);
+      } catch (const StageError&) {
+        if (interrupt_requested()) return false;
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    }
+    if (options_.force) {
+      std::error_code error;
+      fs::remove_all(directory / at.stages[i].id, error);
+    }
+    remove_leftovers(directory);
+    for (const std::size_t k : at.stages[i].from) {
+      link("../" + keys.stages[k] + "/" + at.stages[k].id, directory / at.stages[k].id);
+    }
+    RunOptions one;
+    one.out = directory;
+    one.only = at.stages[i].id;
+    one.jobs = 1;
+    RunOutcome outcome;
+    outcome.out = directory;
+    run_stages(at, one, nullptr, outcome);
+    entry->tried = outcome.code != exit_interrupted;
+    entry->good = outcome.stages[i].state == StageState::ran || outcome.stages[i].state == StageState::kept;
+    return entry->good;
+  }
+
+  fs::path root_;
+  RunOptions options_;
+  std::map<std::string, std::size_t> uses_;
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<Entry>> entries_;
+};
 
 std::optional<Json> read_point(const fs::path& directory) {
   const fs::path path = directory / point_record;
@@ -262,14 +361,19 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
   }
   // Every point's recipe is read before any runs: a mistake in the last one is found now, not tomorrow.
   const fs::path root = options.out / "points";
-  std::vector<std::string> keys(points.size());
+  std::vector<PointKeys> keys(points.size());
   std::vector<std::uint8_t> done(points.size(), 0);
   std::vector<std::optional<int>> earlier(points.size());
   std::size_t kept = 0;
+  SharedStages shared(options.out, options);
+  for (std::size_t i = 0, mine = 0; i < all.size(); ++i) {
+    PointKeys point_keys = keys_of(plan_at(plan, all[i]));
+    shared.count(point_keys);
+    if (mine < points.size() && points[mine] == &all[i]) keys[mine++] = std::move(point_keys);
+  }
   for (std::size_t i = 0; i < points.size(); ++i) {
-    keys[i] = point_key(plan, *points[i]);
     const auto record = read_point(root / points[i]->name);
-    if (record && (*record)["key"] == keys[i]) {
+    if (record && (*record)["key"] == keys[i].point) {
       earlier[i] = (*record)["code"].get<int>();
       done[i] = !options.force && (*earlier[i] == exit_ok || *earlier[i] == exit_check_failed);
     }
@@ -335,17 +439,22 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
         }
         // It may have been finished by whoever held the lock a moment ago.
         if (const auto record = read_point(one.out);
-            !options.force && record && (*record)["key"] == keys[i] &&
+            !options.force && record && (*record)["key"] == keys[i].point &&
             ((*record)["code"] == 0 || (*record)["code"] == exit_check_failed)) {
           ++finished;
           continue;
         }
         remove_leftovers(one.out);
+        if (options.force) {  // everything anew, but what is shared only once
+          one.force = false;
+          for (const PlannedStage& stage : at.stages) fs::remove_all(one.out / stage.id);
+        }
+        shared.prepare(at, keys[i], one.out);
         const auto point_start = std::chrono::steady_clock::now();
         run_stages(at, one, nullptr, outcome);
         if (outcome.code == exit_interrupted) return;
         Json record;
-        record["key"] = keys[i];
+        record["key"] = keys[i].point;
         record["code"] = static_cast<int>(outcome.code);
         if (!outcome.error.empty()) record["error"] = outcome.error;
         record["warnings"] = outcome.warnings;
@@ -384,7 +493,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
   for (const SweepPoint& point : all) {
     const auto record = read_point(root / point.name);
     const bool counts = record && (*record)["code"].is_number() && (*record)["pointers"] == Json(pointers) &&
-                        (*record)["key"] == (shard.of == 1 ? Json(keys[point.index]) : (*record)["key"]);
+                        (*record)["key"] == (shard.of == 1 ? Json(keys[point.index].point) : (*record)["key"]);
     std::string status = "missing";
     if (counts)
       status = (*record)["code"] == 0 ? "ok" : (*record)["code"] == exit_check_failed ? "check failed" : "failed";

@@ -24,10 +24,10 @@ std::string image_recipe() {
   "name": "camera",
   "stages": [
     { "stage": "simulate", "id": "bed", "seed": 3,
-      "disks": { "count": 160, "diameter": "3 mm", "restitution": 0.8, "friction": 0.2 },
+      "disks": { "count": 160, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
       "gravity": "9.81 m/s^2",
-      "box": { "width": "48 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
-      "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.8 },
+      "box": { "width": "48 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
       "settle": "1 s", "measure": "3.2 s", "frames": { "count": 64, "phases": 32 } },
     { "stage": "render", "from": "bed", "scale": "0.15 mm/px", "noise": 5, "exposure": "0.2 ms" },
     { "stage": "extract", "from": "render", "diameter": "3 mm" },

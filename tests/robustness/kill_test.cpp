@@ -173,6 +173,26 @@ TEST_F(Sweep, OnlyWhatChangedRunsAgain) {
   EXPECT_NE(more.err.find("3 points, 2 up to date, 1 to run"), std::string::npos) << more.err;
 }
 
+TEST_F(Sweep, WhatPointsHaveInCommonRunsOnce) {
+  recipe(
+      R"({ "over": { "/stages/fit/plateau_density": [0.9, 1.0, 1.1] }, "collect": ["/bed/collisions", "/fit/plateau_density"] })");
+  ASSERT_EQ(run({"run", "r.json", "--out", "o"}).exit_code, 0);
+  std::set<std::string> beds;
+  for (const char* point : {"000000", "000001", "000002"}) {
+    const fs::path bed = folder_ / "o/points" / point / "bed";
+    EXPECT_TRUE(fs::is_symlink(bed)) << point;
+    beds.insert(fs::canonical(bed).string());
+    EXPECT_FALSE(fs::is_symlink(bed.parent_path() / "fit")) << point;
+  }
+  EXPECT_EQ(beds.size(), 1u) << "one simulation for three fits";
+  // The same numbers as when each point is a run of its own.
+  ASSERT_EQ(run({"run", "o/points/../../r.json", "--out", "o"}).exit_code, 0);
+  recipe("");
+  ASSERT_EQ(run({"run", "r.json", "--out", "alone", "--set", "/stages/fit/plateau_density=1.0"}).exit_code, 0);
+  EXPECT_EQ(read_text(folder_ / "alone/fit/fit.json"), read_text(folder_ / "o/points/000001/fit/fit.json"));
+  EXPECT_EQ(read_text(folder_ / "alone/bed/profile.csv"), read_text(folder_ / "o/points/000001/bed/profile.csv"));
+}
+
 TEST_F(Sweep, FailedPointsAreReportedAndRetriedAlone) {
   recipe(R"({ "over": { "/stages/bed/disks/restitution": [0.7, 7] } })");
   const ProgramResult refused = run({"run", "r.json", "--out", "o"});
