@@ -1,0 +1,88 @@
+// The inferred restitution and friction of the Clement-Rajchenbach beads: a coarse grid finds the pair of the full one.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "pipelines/files.hpp"
+#include "pipelines/json.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace shakebed::tests {
+namespace {
+
+const std::string source = SHAKEBED_SOURCE_DIR;
+
+struct Row {
+  double restitution = 0, friction = 0, side_friction = 0, temperature = 0, temperature_error = 0, density = 0,
+         distance = INFINITY;
+};
+// The committed result of the full search.
+std::vector<Row> full_search() {
+  std::ifstream file(source + "/reference-data/quinn-hong-2000/measured/restitution-and-friction.csv");
+  std::vector<Row> rows;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#' || line[0] == 'r') continue;
+    const auto cells = pipelines::split_csv_line(line);
+    Row row;
+    row.restitution = std::stod(cells.at(0));
+    row.friction = std::stod(cells.at(1));
+    row.side_friction = std::stod(cells.at(2));
+    row.temperature = std::stod(cells.at(4));
+    row.temperature_error = std::stod(cells.at(5));
+    row.density = std::stod(cells.at(7));
+    if (!cells.at(13).empty()) row.distance = std::stod(cells.at(13));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
+  const std::vector<Row> full = full_search();
+  ASSERT_EQ(full.size(), 88u);
+  Row nearest;
+  for (const Row& row : full) {
+    if (row.distance < nearest.distance) nearest = row;
+  }
+  ScratchFolder folder;
+  const ProgramResult result = run_shakebed(
+      {"run", source + "/pipelines/recipes/clement-rajchenbach/infer.json", "--out", "out", "--jobs", "2", "--set",
+       "/stages/search/grid/restitution=[0.5,0.8,0.95]", "--set", "/stages/search/grid/friction=[0.2,0.8]"},
+      folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const pipelines::Json found = pipelines::read_json(folder / "out/search/infer.json");
+  ASSERT_EQ(found["points"].size(), 12u);
+  EXPECT_EQ(found["nearest"]["restitution"], nearest.restitution);
+  EXPECT_EQ(found["nearest"]["friction"], nearest.friction);
+  EXPECT_EQ(found["nearest"]["side_friction"], nearest.side_friction);
+  // Every point is the same bed as in the full search: the same number within its error (3 standard errors).
+  for (const auto& point : found["points"]) {
+    for (const Row& row : full) {
+      if (row.restitution != point["restitution"] || row.friction != point["friction"] ||
+          row.side_friction != point["side_friction"])
+        continue;
+      const double temperature = point["temperature_over_mg"]["value"].get<double>() / 2.99e-3;
+      EXPECT_NEAR(temperature, row.temperature, 3 * row.temperature_error) << row.restitution << " " << row.friction;
+    }
+  }
+}
+
+// The paper's bed itself: what the recipe's material gives is what the search says of it.
+TEST(Inference, IsWhatTheFigureUses) {
+  const pipelines::Json recipe = pipelines::read_json(source + "/pipelines/recipes/clement-rajchenbach/figure.json");
+  Row nearest;
+  for (const Row& row : full_search()) {
+    if (row.distance < nearest.distance) nearest = row;
+  }
+  const pipelines::Json& bed = recipe["stages"][0];
+  EXPECT_EQ(bed["disks"]["restitution"], nearest.restitution);
+  EXPECT_EQ(bed["disks"]["friction"], nearest.friction);
+  EXPECT_EQ(bed["floor"]["restitution"], nearest.restitution);
+  EXPECT_EQ(bed["floor"]["friction"], nearest.friction);
+  EXPECT_EQ(bed["box"]["sides"]["restitution"], nearest.restitution);
+  EXPECT_EQ(bed["box"]["sides"]["friction"], nearest.side_friction);
+}
+
+}  // namespace
+}  // namespace shakebed::tests
