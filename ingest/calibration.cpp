@@ -155,7 +155,6 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
   const float reference = strong > 0.1F * strongest ? strong : 0.5F * strongest;
   const float threshold = std::max({3.0F * quiet, 0.2F * reference, 1e-3F});
   std::vector<EdgePixel> edges;
-  double edge_length = 0;
   for (int row = 1; row + 1 < frame.height; ++row)
     for (int column = 1; column + 1 < frame.width; ++column) {
       const std::size_t at = gradient.at(column, row);
@@ -165,7 +164,6 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
                        gradient.y[at] / size, std::min(size, reference)});
     }
   if (edges.size() < 12) return;
-  for (const EdgePixel& edge : edges) edge_length += static_cast<double>(edge.weight);
   constexpr std::size_t most_edges = 14000;
   std::vector<EdgePixel> chosen;
   if (edges.size() > most_edges) {  // every k-th in a shuffled-looking order keeps a share of every rim
