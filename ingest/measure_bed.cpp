@@ -52,6 +52,28 @@ double contrast_per_area(const FinderCalibration& finder) {
   return sum / (std::numbers::pi * finder.radius_px * finder.radius_px);
 }
 
+// The bead's profile summed along rows: the share of its contrast below each height, heights row_step_px apart from
+// -reach to reach, 0 at the first and 1 at the last.
+constexpr double row_step_px = 0.25;
+std::vector<double> contrast_by_row(const FinderCalibration& finder) {
+  const double reach = finder.profile.reach_px();
+  const auto half = static_cast<std::size_t>(std::ceil(reach / row_step_px));
+  const auto level_at = [&](double r) {
+    const auto cell = static_cast<std::size_t>(r / finder.profile.step_px);
+    return cell < finder.profile.level.size() ? static_cast<double>(finder.profile.level[cell]) : 0.0;
+  };
+  std::vector<double> below(2 * half + 1, 0.0);
+  for (std::size_t k = 1; k < below.size(); ++k) {
+    const double y = (static_cast<double>(k) - 0.5 - static_cast<double>(half)) * row_step_px;
+    double row = 0;
+    for (double x = 0.5 * row_step_px; x < reach; x += row_step_px) row += 2 * level_at(std::hypot(x, y));
+    below[k] = below[k - 1] + row;
+  }
+  const double all = below.back();
+  for (double& value : below) value = all > 0 ? value / all : 0;
+  return below;
+}
+
 FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, const MeasureOptions& options,
                       double per_area) {
   FrameFindings findings;
@@ -394,12 +416,19 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
     std::vector<std::vector<double>> covered;
     std::vector<double> through_chord(bins.count, 0.0);
     const double middle_floor = bed.floor_px + bed.floor_slope * 0.5 * finder.width;
-    const auto part_below = [](double t) {  // part of a unit-diameter disk's area below t of its centre
-      if (t <= -0.5) return 0.0;
-      if (t >= 0.5) return 1.0;
-      const double s = 2 * t;
-      return 0.5 + (s * std::sqrt(1 - s * s) + std::asin(s)) / std::numbers::pi;
+    // Part of a bead's own contrast below a height (D) from its centre: a flat bead's is its chord's, a shaded one's is
+    // not.
+    const std::vector<double> rows_of_bead = contrast_by_row(finder);
+    const double rows_middle = 0.5 * static_cast<double>(rows_of_bead.size() - 1);
+    const auto part_below = [&](double t) {
+      const double place = t * diameter_px / row_step_px + rows_middle;
+      if (place <= 0) return 0.0;
+      if (place >= static_cast<double>(rows_of_bead.size() - 1)) return 1.0;
+      const auto cell = static_cast<std::size_t>(place);
+      const double part = place - static_cast<double>(cell);
+      return rows_of_bead[cell] * (1 - part) + rows_of_bead[cell + 1] * part;
     };
+    const double bead_reach = rows_middle * row_step_px / diameter_px;
     for (const std::size_t f : frame_of) {
       const auto& rows = findings[f].coverage_of_row;
       std::vector<double> area(bins.count, 0.0);
@@ -420,7 +449,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
       for (const double height : heights[f])
         for (std::size_t bin = 0; bin < bins.count; ++bin) {
           const double low = bins.lowest + static_cast<double>(bin) * bins.width - height;
-          if (low > 0.5 || low + bins.width < -0.5) continue;
+          if (low > bead_reach || low + bins.width < -bead_reach) continue;
           through_chord[bin] += (part_below(low + bins.width) - part_below(low)) /
                                 (bins.width * bed.width * static_cast<double>(frame_of.size()));
         }

@@ -86,7 +86,7 @@ struct Measurement {
   DensityProfile profile;           // from centres
   std::optional<DensityProfile>
       coverage_profile;              // from covered area; same bins; kernel disk_chord with the bin's top hat
-  double coverage_disagreement = 0;  // rms difference in n D^2, centres (seen through the chord) minus coverage
+  double coverage_disagreement = 0;  // rms in n D^2: centres, seen through the bead, minus coverage
   std::vector<PhaseProfile> phases;
   double disk_count_mean = 0;
   double disk_count_std = 0;          // scatter of the bead number from frame to frame

@@ -80,7 +80,7 @@ TEST(MeasureBed, DensityOfRenderedBedWithKnownGeometryIsTheTrueOne) {
   const DensityProfile truth = average_profile(densities, measured.profile.bins, options.kernel);
   for (std::size_t bin = 0; bin < truth.bins.count; ++bin)
     EXPECT_NEAR(measured.profile.number_density[bin], truth.number_density[bin], 0.002) << truth.bins.middle(bin);
-  EXPECT_LT(measured.coverage_disagreement, 0.04);
+  EXPECT_LT(measured.coverage_disagreement, 0.006);
 }
 
 TEST(MeasureBed, GeometryIsFoundWhenNotGiven) {
