@@ -327,6 +327,11 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
     if (!selected[i]) {
       result.state = StageState::not_selected;
       result.record = std::move(found);
+      if (result.record) {  // used as it is, with what it had to say
+        for (const std::string& warning : result.record->warnings) {
+          outcome.warnings.push_back(fmt::format("{}: {}", stage.id, warning));
+        }
+      }
       continue;
     }
     std::vector<const StageRecord*> upstream;

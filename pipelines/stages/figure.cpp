@@ -67,10 +67,10 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
                         bound(picture.y_low), bound(picture.y_high));
   script +=
-      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset key top right "
-      "spacing 1.25 samplen 2.5 opaque\nset bars 0.6\n";
-  script += picture.key_above ? "set key above horizontal spacing 1.25 samplen 2.5\n"
-                              : "set key top right spacing 1.25 samplen 2.5\n";
+      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
+      "pointintervalbox 0\n";
+  // Above the picture, where it hides nothing.
+  script += "set key above vertical maxrows 3 spacing 1.25 samplen 2.5\n";
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     script += fmt::format(
@@ -93,11 +93,16 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
     script += first ? "" : ", \\\n     ";
     first = false;
     const char* color = palette[static_cast<std::size_t>(series.color) % palette.size()];
+    // The error bars as plain strokes below the points: gnuplot's own leave gaps around them.
+    if (series.style == Series::Style::points && !series.error.empty()) {
+      script += fmt::format(
+          "{} index {} using 1:($2-$3):(0):(2*$3) with vectors nohead lw 1.2 lc rgb '{}' notitle, \\\n     ",
+          gnuplot_text(name + ".dat"), i, color);
+    }
     script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), i);
     switch (series.style) {
       case Series::Style::points:
-        script += fmt::format("{} with {} pt {} ps 0.55 lw 1 lc rgb '{}'", series.error.empty() ? "1:2" : "1:2:3",
-                              series.error.empty() ? "points" : "yerrorbars", points[point++ % points.size()], color);
+        script += fmt::format("1:2 with points pt {} ps 0.55 lc rgb '{}'", points[point++ % points.size()], color);
         break;
       case Series::Style::line:
         script += fmt::format("1:2 with lines lw 2 lc rgb '{}'", color);
@@ -340,7 +345,6 @@ void Figure::run(RunContext& context) const {
     }();
     if (windows.x.size() >= 2) {
       Picture sweep{.x_label = "lower edge of the window,  z/D", .y_label = "T / (m g D)"};
-      sweep.key_above = true;
       sweep.series.push_back({"fitted temperature", Series::Style::points, black, windows.x, windows.y, windows.error});
       if (const Json* t = find_pointer(fit_result, "/temperature/value"); t != nullptr && t->is_number()) {
         const auto [low, high] = std::minmax_element(windows.x.begin(), windows.x.end());

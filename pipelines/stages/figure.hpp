@@ -24,7 +24,6 @@ struct Picture {
   std::optional<double> x_low{}, x_high{}, y_low{}, y_high{};
   std::vector<std::pair<double, double>> bands{};  // shaded from x to x
   std::string band_label{};
-  bool key_above = false;  // the legend above the picture instead of in its upper right corner
 };
 // Writes NAME.dat, NAME.gp and NAME.svg into the folder. Throws StageError when gnuplot is missing or fails.
 void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name);
