@@ -17,6 +17,7 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -26,11 +27,13 @@
 #include "sim/event_queue.hpp"
 #include "sim/floor.hpp"
 #include "sim/lanes.hpp"
+#include "sim/large_vector.hpp"
 #include "sim/neighbour_shells.hpp"
 #include "sim/overlap.hpp"
 #include "sim/policies.hpp"
 #include "sim/random.hpp"
 #include "sim/simulation.hpp"
+#include "sim/space_filling_curve.hpp"
 
 namespace shakebed::sim {
 
@@ -88,6 +91,7 @@ class Engine final : public Simulation {
 
   // --- contacts
   void process_until(double until);
+  void fetch_neighbours_of_upcoming() const;
   void collide(std::uint32_t i, std::uint32_t j);
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
@@ -102,6 +106,7 @@ class Engine final : public Simulation {
   // --- synchronisation
   void synchronise();
   void begin_interval();
+  void renumber();
   template <class Self, class Visit>
   static void visit_state(Self& self, Visit visit);
 
@@ -123,13 +128,14 @@ class Engine final : public Simulation {
   Bath bath_;
 
   // --- the state
-  std::vector<Disk> disks_;           // and a sentinel after the last
-  std::vector<double> spins_;         // rough disks only
-  std::vector<double> last_contact_;  // contact clocks, dissipative disks only
-  double now_ = 0;                    // since base_
-  double base_ = 0;                   // of the present count, since the start
-  double interval_ = 1;               // the floor's period
-  std::uint64_t intervals_ = 1;       // that many of them between synchronisations now
+  LargeVector<Disk> disks_;            // and a sentinel after the last
+  std::vector<std::uint32_t> labels_;  // what a disk is called outside: its place in the start
+  std::vector<double> spins_;          // rough disks only
+  std::vector<double> last_contact_;   // contact clocks, dissipative disks only
+  double now_ = 0;                     // since base_
+  double base_ = 0;                    // of the present count, since the start
+  double interval_ = 1;                // the floor's period
+  std::uint64_t intervals_ = 1;        // that many of them between synchronisations now
   std::uint64_t intervals_done_ = 0;
   double synchronise_at_ = 1;
   double event_rate_ = 1;
@@ -147,6 +153,7 @@ class Engine final : public Simulation {
     std::uint32_t disk;
   };
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
+  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;
   std::vector<Nearby> nearby_;

@@ -5,7 +5,8 @@ namespace shakebed::sim {
 
 inline constexpr double rest_hop = 1e-4;     // length of the hop of a disk at rest on the floor without a contact clock
 inline constexpr double shell_slack = 1e-9;  // covers the rounding of shells' centres and exit times
-inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
+inline constexpr std::uint32_t fits_cache = 8'000;  // that many disks and their lists stay in a second-level cache
+inline constexpr double longest_interval = 64;      // between synchronisations, unless the floor's period is longer
 
 // ------------------------------------------------------------------------------------------------ start
 
@@ -33,7 +34,10 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   }
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);
 
+  beyond_cache_ = count_ > fits_cache;
   disks_.resize(count_ + 1);
+  labels_.resize(count_);
+  std::iota(labels_.begin(), labels_.end(), 0);
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Placed& p = placed[i];
     disks_[i] = {p.x, p.z, p.vx, p.vz, 0, never, nobody, 0, 0, 0, 0, 0};
@@ -57,6 +61,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (const auto* bath = std::get_if<AndersenBath>(&bath_))
     bath_at_ = -std::log(random_.uniform_positive()) / (bath->rate * count_);
   interval_ = floor_.period();
+  if (!floor_.moves()) intervals_ = 16;
   event_rate_ = 8.0 * count_;
   initial_energy_ = kinetic_energy() + potential_energy();
   begin_interval();
@@ -333,10 +338,28 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
 
 // ------------------------------------------------------------------------------------------------ the loop
 
+// Fetches the neighbours of disks that will collide soon.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::fetch_neighbours_of_upcoming() const {
+  std::uint32_t a, b;
+  // At the start of a bucket those of its first events, later one more each time.
+  constexpr std::size_t ahead = 4;
+  for (std::size_t k = queue_.at_bucket_start() ? 0 : ahead; k <= ahead && queue_.upcoming(k, a, b); ++k) {
+    for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
+    for (std::uint32_t neighbour : shells_.first_block(b).disk) __builtin_prefetch(&disks_[neighbour]);
+  }
+}
+
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i;
-  while (queue_.pop(until, i)) {
+  const auto will_need = [this](std::uint32_t k) {
+    if (!beyond_cache_) return;
+    __builtin_prefetch(&disks_[k]);
+    __builtin_prefetch(&shells_.first_block(k));
+  };
+  while (queue_.pop(until, i, will_need)) {
+    if (beyond_cache_) fetch_neighbours_of_upcoming();
     const Disk& disk = disks_[i];
     now_ = disk.event_time;
     if (--events_to_check_ == 0) [[unlikely]] {
@@ -684,9 +707,37 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   begin_interval();
 }
 
+// Numbers the disks along a space-filling curve. Sorting what is sorted changes nothing, so a resumed run has the
+// numbers of the one it continues.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::renumber() {
+  const auto cell = [](double value) { return static_cast<std::uint32_t>(std::clamp(value + 16, 0.0, 65535.0)); };
+  std::vector<std::uint64_t> keys(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    double x = disks_[i].x, z = disks_[i].z;
+    if constexpr (Space::wraps_x) x = period_x_.wrapped(x);
+    if constexpr (Space::wraps_z) z = period_z_.wrapped(z);
+    keys[i] = static_cast<std::uint64_t>(hilbert_place(cell(x), cell(z))) << 32 | i;
+  }
+  std::sort(keys.begin(), keys.end());
+  const auto permute = [&](auto& values) {
+    auto old = values;
+    for (std::uint32_t i = 0; i < count_; ++i) values[i] = old[static_cast<std::uint32_t>(keys[i])];
+  };
+  permute(disks_);
+  permute(labels_);
+  if constexpr (Rule::spins) permute(spins_);
+  if constexpr (Rule::dissipates) permute(last_contact_);
+  if constexpr (!Sizes::equal) {
+    permute(sizes_.radii);
+    permute(sizes_.masses);
+  }
+}
+
 // From positions, velocities, spins and clocks at now_ = 0 alone.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
+  renumber();
   synchronise_at_ = static_cast<double>(intervals_) * interval_;
   checked_at_ = -1;
   events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
@@ -751,7 +802,14 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   visit(self.dissipated_);
   visit(self.floor_work_);
   visit(self.bath_work_);
+  if constexpr (!Sizes::equal) {
+    for (std::uint32_t i = 0; i < self.count_; ++i) {
+      visit(self.sizes_.radii[i]);
+      visit(self.sizes_.masses[i]);
+    }
+  }
   for (std::uint32_t i = 0; i < self.count_; ++i) {
+    visit(self.labels_[i]);
     visit(self.disks_[i].x);
     visit(self.disks_[i].z);
     visit(self.disks_[i].vx);
@@ -786,6 +844,8 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   std::array<std::uint64_t, 4> random_state{};
   checkpoint_bytes::take(at, end, random_state);
   if (at != end) throw std::invalid_argument("the checkpoint is of another scene: it holds more than this one needs");
+  if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
+    throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
   random_.set_state(random_state);
   for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
   base_ = static_cast<double>(intervals_done_) * interval_;
@@ -804,24 +864,26 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.z.resize(count_);
   out.vx.resize(count_);
   out.vz.resize(count_);
+  out.spin.resize(spins_.size());
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
-    out.x[i] = motion.x;
-    out.z[i] = motion.z;
-    out.vx[i] = motion.vx;
-    out.vz[i] = motion.vz;
-    if constexpr (Space::wraps_x) out.x[i] = period_x_.wrapped(out.x[i]);
-    if constexpr (Space::wraps_z) out.z[i] = period_z_.wrapped(out.z[i]);
+    const std::uint32_t label = labels_[i];
+    out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x) : motion.x;
+    out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z) : motion.z;
+    out.vx[label] = motion.vx;
+    out.vz[label] = motion.vz;
+    if constexpr (Rule::spins) out.spin[label] = spins_[i];
   }
-  out.spin = spins_;
 }
 
 template <class Space, class Rule, class Sizes>
 DiskProperties Engine<Space, Rule, Sizes>::properties() const {
   DiskProperties properties;
+  properties.radius.resize(count_);
+  properties.mass.resize(count_);
   for (std::uint32_t i = 0; i < count_; ++i) {
-    properties.radius.push_back(sizes_.radius(i));
-    properties.mass.push_back(sizes_.mass(i));
+    properties.radius[labels_[i]] = sizes_.radius(i);
+    properties.mass[labels_[i]] = sizes_.mass(i);
   }
   return properties;
 }
@@ -859,14 +921,15 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
   snapshot(here);
   double cell = 1;
   if constexpr (!Sizes::equal) cell = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  const DiskProperties disks = properties();
   return sim::largest_overlap(here, cell, period_x_.length, period_z_.length,
-                              [this](std::uint32_t i, std::uint32_t k) { return sizes_.contact_distance(i, k); });
+                              [&](std::uint32_t i, std::uint32_t k) { return disks.radius[i] + disks.radius[k]; });
 }
 
 template <class Space, class Rule, class Sizes>
 std::size_t Engine<Space, Rule, Sizes>::bytes() const {
-  return disks_.capacity() * sizeof(Disk) + (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
-         shells_.bytes() + queue_.bytes();
+  return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
+         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) + shells_.bytes() + queue_.bytes();
 }
 
 }  // namespace shakebed::sim

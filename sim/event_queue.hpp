@@ -16,6 +16,7 @@
 
 #include "sim/disk.hpp"
 #include "sim/lanes.hpp"
+#include "sim/large_vector.hpp"
 
 namespace shakebed::sim {
 
@@ -50,10 +51,20 @@ class EventQueue {
   }
 
   // The earliest valid event at or before `until`: its disk, and its time in disks[disk].event_time. False if none.
-  bool pop(double until, std::uint32_t& disk) {
+  // will_need(disk) is called some time before a disk comes up, to fetch its record into the cache.
+  template <class WillNeed>
+  bool pop(double until, std::uint32_t& disk, WillNeed will_need) {
     for (;;) {
       if (next_ == end_) [[unlikely]] {
         if (!load_next_bucket(until)) return false;
+        const std::size_t after = static_cast<std::size_t>(current_ + 1) & mask_;
+        const std::uint64_t* later = &slots_[(static_cast<std::size_t>(current_ + 2) & mask_) * pairs_a_bucket];
+        for (std::uint32_t k = 0; k < pairs_a_bucket; k += 8) __builtin_prefetch(later + k);
+        for (std::uint32_t k = 0; k < held_[after]; ++k) {
+          const std::uint64_t pair = slots_[after * pairs_a_bucket + k];
+          will_need(static_cast<std::uint32_t>(pair));
+          will_need(static_cast<std::uint32_t>(pair >> 32));
+        }
       }
       const double time = times_[next_];
       const std::uint64_t pair = pairs_[next_];
@@ -66,6 +77,15 @@ class EventQueue {
       disk = static_cast<std::uint32_t>(pair >> 32);
       if (disks_[disk].event_time == time) return true;
     }
+  }
+
+  bool at_bucket_start() const { return next_ <= 1; }  // its first event was just popped
+  // The pair of disks that comes up `ahead` events from now, if it is already in order.
+  bool upcoming(std::size_t ahead, std::uint32_t& a, std::uint32_t& b) const {
+    if (next_ + ahead >= end_) return false;
+    a = static_cast<std::uint32_t>(pairs_[next_ + ahead]);
+    b = static_cast<std::uint32_t>(pairs_[next_ + ahead] >> 32);
+    return true;
   }
 
   std::size_t bytes() const {
@@ -236,8 +256,8 @@ class EventQueue {
   static constexpr std::size_t largest_ranked = 64;
   const Disk* disks_ = nullptr;
   double buckets_a_time_ = 1;
-  std::vector<std::uint32_t> held_;   // pairs in a bucket's slots
-  std::vector<std::uint64_t> slots_;  // pairs_a_bucket a bucket
+  LargeVector<std::uint32_t> held_;   // pairs in a bucket's slots
+  LargeVector<std::uint64_t> slots_;  // pairs_a_bucket a bucket
   std::vector<std::uint32_t> heads_;  // of its chunks
   std::size_t mask_ = 0;
   std::vector<Chunk> chunks_;

@@ -15,6 +15,7 @@
 
 #include "sim/disk.hpp"
 #include "sim/lanes.hpp"
+#include "sim/large_vector.hpp"
 
 namespace shakebed::sim {
 
@@ -207,8 +208,8 @@ class NeighbourShells {
   std::uint32_t sentinel_ = 0;
   int columns_ = 1, rows_ = 1;
   double per_x_ = 1, per_z_ = 1;
-  std::vector<std::uint32_t> heads_, following_;  // the grid: a linked list a cell
-  std::vector<NeighbourBlock> lists_;             // the first eight neighbours of each disk
+  LargeVector<std::uint32_t> heads_, following_;  // the grid: a linked list a cell
+  LargeVector<NeighbourBlock> lists_;             // the first eight neighbours of each disk
   std::vector<std::uint32_t> overflow_;           // first of the blocks that hold the rest, 0 for none
   std::vector<NeighbourBlock> blocks_;
   std::vector<std::uint32_t> links_;

@@ -1,0 +1,28 @@
+// The order in which disks are numbered inside the engine: along a Hilbert curve, so that neighbours in space are
+// neighbours in memory.
+#pragma once
+
+#include <cstdint>
+
+namespace shakebed::sim {
+
+// Place of a cell (0 to 65535 each way) along the Hilbert curve that fills the square [Hilbert1891].
+inline std::uint32_t hilbert_place(std::uint32_t column, std::uint32_t row) {
+  std::uint32_t place = 0;
+  for (std::uint32_t side = 1u << 15; side > 0; side >>= 1) {
+    const std::uint32_t right = (column & side) != 0, up = (row & side) != 0;
+    place += side * side * ((3 * right) ^ up);
+    if (up == 0) {
+      if (right == 1) {
+        column = ~column;
+        row = ~row;
+      }
+      const std::uint32_t swapped = column;
+      column = row;
+      row = swapped;
+    }
+  }
+  return place;
+}
+
+}  // namespace shakebed::sim
