@@ -110,6 +110,16 @@ std::string words(std::string name) {
   return name;
 }
 
+// A page up to its headline.
+std::string page_head(const std::string& title) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\">\n"
+      "<meta name=\"generator\" content=\"shakebed {}\">\n<link rel=\"icon\" "
+      "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
+      program_version(), html(title), style, html(title));
+}
+
 class Report {
  public:
   Report(const Plan& plan, const RunOutcome& outcome) : plan_(plan), outcome_(outcome) {
@@ -129,12 +139,7 @@ class Report {
 
   std::string page() {
     const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
-    std::string out = fmt::format(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\">\n"
-        "<meta name=\"generator\" content=\"shakebed {}\">\n<link rel=\"icon\" "
-        "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
-        program_version(), html(title), style, html(title));
+    std::string out = page_head(title);
     out += verdict_line();
     for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
@@ -535,6 +540,35 @@ class Report {
 }  // namespace
 
 std::string report_html(const Plan& plan, const RunOutcome& outcome) { return Report(plan, outcome).page(); }
+
+std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<std::string>>& table,
+                              const std::vector<fs::path>& figures, const std::vector<std::string>& problems) {
+  constexpr std::size_t most_rows = 500;
+  const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
+  std::string out = page_head(title);
+  for (const std::string& paragraph : plan.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
+  if (!problems.empty()) {
+    out += "<div class=\"warnings\"><strong>Points that failed</strong><ul>\n";
+    for (const std::string& problem : problems) out += fmt::format("<li>{}</li>\n", html(problem));
+    out += "</ul></div>\n";
+  }
+  int number = 0;
+  for (const fs::path& figure : figures) {
+    out += fmt::format("<figure>{}</figure>\n", inline_svg(figure, ++number));
+  }
+  out += fmt::format("<h2>{} points</h2>\n<div class=\"scroll\"><table>\n", table.empty() ? 0 : table.size() - 1);
+  for (std::size_t i = 0; i < table.size() && i <= most_rows; ++i) {
+    out += "<tr>";
+    for (const std::string& cell : table[i]) {
+      out += (i == 0 ? "<th>" : "<td class=\"number\">") + html(cell) + (i == 0 ? "</th>" : "</td>");
+    }
+    out += "</tr>\n";
+  }
+  out += "</table></div>\n";
+  if (table.size() > most_rows + 1)
+    out += fmt::format("<p>The first {} of them; all are in sweep.csv.</p>\n", most_rows);
+  return out + "</main>\n</body>\n</html>\n";
+}
 
 std::string published_text(const Plan& plan, const RunOutcome& outcome) {
   const auto rows = Report(plan, outcome).published_rows();

@@ -2,7 +2,9 @@
 // beside the published ones, what was assumed, the stages with their times, and where it all came from.
 #pragma once
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipelines/run.hpp"
 
@@ -12,5 +14,10 @@ std::string report_html(const Plan& plan, const RunOutcome& outcome);
 
 // The table of our numbers beside the published ones, for the terminal; "" where the recipe names none.
 std::string published_text(const Plan& plan, const RunOutcome& outcome);
+
+// The page of a sweep: its figures and its table (the first row is the header; long tables are cut and say so).
+std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<std::string>>& table,
+                              const std::vector<std::filesystem::path>& figures,
+                              const std::vector<std::string>& problems);
 
 }  // namespace shakebed::pipelines

@@ -18,6 +18,8 @@
 #include "pipelines/files.hpp"
 #include "pipelines/manifest.hpp"
 #include "pipelines/process.hpp"
+#include "pipelines/report.hpp"
+#include "pipelines/stages/figure.hpp"
 
 namespace shakebed::pipelines {
 
@@ -119,14 +121,6 @@ std::vector<std::string> gather_cells(const Plan& plan, const fs::path& director
     cells.push_back(value), cells.push_back(error);
   }
   return cells;
-}
-
-std::string sweep_header(const Plan& plan, const std::vector<std::string>& pointers) {
-  std::string line = "point,replica,status";
-  for (const SweepAxis& axis : plan.sweep->axes) line += "," + csv_cell(axis.pointer);
-  for (const std::string& pointer : pointers)
-    line += fmt::format(",{},{}", csv_cell(pointer), csv_cell(pointer + "/std_error"));
-  return line + "\n";
 }
 
 // A point is done when this file says so for the same recipe at the same values.
@@ -350,6 +344,94 @@ Plan plan_at(const Plan& plan, const SweepPoint& point) {
   return make_plan(std::move(document), plan.file, plan.directory);
 }
 
+namespace {
+
+// Figures of a sweep: every gathered number against the first axis that has numbers, one series for each combination of
+// the other axes (six at most).
+std::vector<fs::path> draw_sweep(const Plan& plan, const std::vector<SweepPoint>& points,
+                                 const std::vector<std::vector<std::string>>& table,
+                                 const std::vector<std::string>& pointers, const fs::path& folder) {
+  const auto number = [](const std::string& text, double& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size();
+  };
+  // "/stages/bed/floor/amplitude" → "bed floor amplitude"; short = only its last word.
+  const auto words = [](const std::string& pointer, bool only_last) {
+    std::string text;
+    for (const std::string& token : split_pointer(pointer)) {
+      if (token == "stages" && text.empty()) continue;
+      text = only_last || text.empty() ? token : text + " " + token;
+    }
+    std::replace(text.begin(), text.end(), '_', ' ');
+    return text;
+  };
+  const auto rounded = [](const Json& value) {
+    return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : value_text(value);
+  };
+  const std::vector<SweepAxis>& axes = plan.sweep->axes;
+  std::size_t along = axes.size();
+  std::string unit;
+  for (std::size_t a = 0; a < axes.size() && along == axes.size(); ++a) {
+    const Json& value = points.front().values[a];
+    try {
+      if (value.is_number()) along = a;
+      if (value.is_string() && parse_quantity(value.get<std::string>()).has_unit) {
+        along = a;
+        unit = si_unit(parse_quantity(value.get<std::string>()).dimension);
+      }
+    } catch (const std::invalid_argument&) {}
+  }
+  std::vector<fs::path> figures;
+  if (along == axes.size()) return figures;
+  const std::size_t first = 3 + axes.size();  // column of the first number
+  for (std::size_t k = 0; k < pointers.size(); ++k) {
+    Picture picture{.x_label = words(axes[along].pointer, false) + (unit.empty() ? "" : "  [" + unit + "]"),
+                    .y_label = words(pointers[k], false)};
+    std::map<std::string, std::size_t> groups;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::vector<std::string>& row = table[i + 1];
+      double x = 0, y = 0, error = 0;
+      const Json& at = points[i].values[along];
+      try {
+        if (at.is_number())
+          x = at.get<double>();
+        else if (at.is_string())
+          x = parse_quantity(at.get<std::string>()).value;
+        else
+          continue;
+      } catch (const std::invalid_argument&) {
+        continue;
+      }
+      if (!number(row[first + 2 * k], y)) continue;
+      const bool has_error = number(row[first + 2 * k + 1], error);
+      std::string label;
+      for (std::size_t a = 0; a < axes.size(); ++a) {
+        if (a == along || plan.sweep->kind == SweepKind::random) continue;
+        label += (label.empty() ? "" : ", ") + words(axes[a].pointer, true) + " = " + rounded(points[i].values[a]);
+      }
+      const auto [group, fresh] = groups.emplace(label, groups.size());
+      if (group->second >= 6) continue;
+      if (fresh)
+        picture.series.push_back(
+            {label.empty() ? "points" : label, Series::Style::points, static_cast<int>(group->second), {}, {}, {}});
+      Series& series = picture.series[group->second];
+      series.x.push_back(x), series.y.push_back(y);
+      if (has_error) series.error.push_back(error);
+    }
+    for (Series& series : picture.series) {
+      if (series.error.size() != series.x.size()) series.error.clear();
+    }
+    if (picture.series.empty()) continue;
+    const std::string name = fmt::format("sweep-{}", k + 1);
+    fs::create_directories(folder);
+    draw_picture(picture, folder, name);
+    figures.push_back(folder / (name + ".svg"));
+  }
+  return figures;
+}
+
+}  // namespace
+
 int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepArguments& arguments, Console& console) {
   const Shard shard = parse_shard(arguments.shard);
   const std::vector<SweepPoint> all = sweep_points(plan);
@@ -488,7 +570,9 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
   console.end_progress();
 
   // Gather: every point of the whole sweep that is there, whoever ran it.
-  std::string csv = sweep_header(plan, pointers);
+  std::vector<std::vector<std::string>> table{{"point", "replica", "status"}};
+  for (const SweepAxis& axis : plan.sweep->axes) table[0].push_back(axis.pointer);
+  for (const std::string& pointer : pointers) table[0].push_back(pointer), table[0].push_back(pointer + "/std_error");
   std::size_t there = 0;
   for (const SweepPoint& point : all) {
     const auto record = read_point(root / point.name);
@@ -498,17 +582,32 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
     if (counts)
       status = (*record)["code"] == 0 ? "ok" : (*record)["code"] == exit_check_failed ? "check failed" : "failed";
     there += counts && status != "failed";
-    csv += fmt::format("{},{},{}", point.name, point.replica, status);
-    for (const Json& value : point.values) csv += "," + csv_cell(value_text(value));
-    for (std::size_t k = 0; k < 2 * pointers.size(); ++k)
-      csv += "," + (counts && status != "failed" ? csv_cell((*record)["cells"][k].get<std::string>()) : std::string());
-    csv += "\n";
+    std::vector<std::string> row{point.name, std::to_string(point.replica), status};
+    for (const Json& value : point.values) row.push_back(value_text(value));
+    for (std::size_t k = 0; k < 2 * pointers.size(); ++k) {
+      row.push_back(counts && status != "failed" ? (*record)["cells"][k].get<std::string>() : std::string());
+    }
+    table.push_back(std::move(row));
+  }
+  std::string csv;
+  for (const std::vector<std::string>& row : table) {
+    for (std::size_t i = 0; i < row.size(); ++i) csv += (i == 0 ? "" : ",") + csv_cell(row[i]);
+    csv += '\n';
   }
   const bool interrupted = interrupt_requested();
   // Shards that end at the same time write the same bytes; the last one sees all points.
   write_file_atomically(options.out / "sweep.csv", csv);
   write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
   for (const std::string& failure : failures) console.error(failure);
+  // Pictures and page when the whole sweep is there: a shard alone has nothing to show yet.
+  if (!interrupted && there == all.size()) {
+    try {
+      const auto figures = draw_sweep(plan, all, table, pointers, options.out / "figures");
+      write_file_atomically(options.out / "report.html", sweep_report_html(plan, table, figures, failures));
+    } catch (const StageError& error) {
+      console.warning(fmt::format("the sweep is done, but its report is not: {}", error.what()));
+    }
+  }
   if (failed > failures.size()) console.error(fmt::format("and {} more points", failed - failures.size()));
   if (busy > 0) console.warning(fmt::format("{} points are being run by somebody else", busy.load()));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
