@@ -25,7 +25,7 @@ class EventQueue {
   // Forgets everything. disks: the records that the entries refer to; events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
-    const double events_a_bucket = 16;
+    const double events_a_bucket = 7;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
     const auto wanted = static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket, 256.0, 1e8));
     const std::size_t size = std::bit_ceil(wanted);
