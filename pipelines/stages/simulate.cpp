@@ -364,7 +364,7 @@ Json Simulate::results(const sim::Simulation& simulation, const sim::BedObserver
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 1,
+          .version = 2,
           .summary = "simulates a bed of hard disks, event by event",
           .uses_seed = true,
           .result = "observables.json",
