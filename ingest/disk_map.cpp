@@ -3,11 +3,74 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
+#include <opencv2/core.hpp>
 #include <unordered_map>
 
 namespace shakebed::ingest {
 
 int map_reduction(double radius_px) { return std::max(1, static_cast<int>(radius_px / 4.5)); }
+
+namespace {
+
+// Local maxima of a map whose pixel (margin, margin) is the first of the reduced frame, best first, the better kept of
+// two that are too near.
+std::vector<DiskCandidate> maxima_of(const std::vector<float>& map, int map_width, int map_height, int margin,
+                                     int factor, double least_score, double least_distance_px) {
+  const std::size_t map_stride = static_cast<std::size_t>(map_width);
+  std::vector<DiskCandidate> maxima;
+  const float least = static_cast<float>(least_score);
+  for (int row = 1; row + 1 < map_height; ++row) {
+    const float* b = map.data() + static_cast<std::size_t>(row) * map_stride;
+    const float* a = b - map_stride;
+    const float* c = b + map_stride;
+    for (int column = 1; column + 1 < map_width; ++column) {
+      const float here = b[column];
+      if (here < least) continue;
+      if (here <= b[column - 1] || here < b[column + 1] || here <= a[column] || here < c[column] ||
+          here <= a[column - 1] || here <= a[column + 1] || here < c[column - 1] || here < c[column + 1])
+        continue;
+      const auto offset = [](float low, float middle, float top) {
+        const double bend = static_cast<double>(low) - 2 * static_cast<double>(middle) + static_cast<double>(top);
+        return bend < 0 ? std::clamp(0.5 * (static_cast<double>(low) - static_cast<double>(top)) / bend, -0.5, 0.5)
+                        : 0.0;
+      };
+      const double x = column - margin + offset(b[column - 1], here, b[column + 1]);
+      const double y = row - margin + offset(a[column], here, c[column]);
+      maxima.push_back({(x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5, static_cast<double>(here)});
+    }
+  }
+  std::sort(maxima.begin(), maxima.end(), [](const DiskCandidate& a, const DiskCandidate& b) {
+    if (a.score != b.score) return a.score > b.score;
+    if (a.y != b.y) return a.y < b.y;
+    return a.x < b.x;
+  });
+  // Keep the better of two that are too near, by a grid of cells as wide as that distance.
+  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells;
+  const auto cell_of = [&](double value) { return static_cast<std::int64_t>(std::floor(value / least_distance_px)); };
+  const auto key = [](std::int64_t column, std::int64_t row) { return row * 0x100000000LL + column; };
+  std::vector<DiskCandidate> kept;
+  for (const DiskCandidate& candidate : maxima) {
+    const std::int64_t column = cell_of(candidate.x), row = cell_of(candidate.y);
+    bool free = true;
+    for (std::int64_t y = row - 1; y <= row + 1 && free; ++y)
+      for (std::int64_t x = column - 1; x <= column + 1 && free; ++x) {
+        const auto found = cells.find(key(x, y));
+        if (found == cells.end()) continue;
+        for (const std::size_t other : found->second)
+          if (std::hypot(kept[other].x - candidate.x, kept[other].y - candidate.y) < least_distance_px) {
+            free = false;
+            break;
+          }
+      }
+    if (!free) continue;
+    cells[key(column, row)].push_back(kept.size());
+    kept.push_back(candidate);
+  }
+  return kept;
+}
+
+}  // namespace
 
 std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
                                            double least_distance_px) {
@@ -92,56 +155,74 @@ std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, d
     }
   }
 
-  std::vector<DiskCandidate> maxima;
-  const float least = static_cast<float>(least_score);
-  for (int row = 1; row + 1 < map_height; ++row) {
-    const float* b = map.data() + static_cast<std::size_t>(row) * map_stride;
-    const float* a = b - map_stride;
-    const float* c = b + map_stride;
-    for (int column = 1; column + 1 < map_width; ++column) {
-      const float here = b[column];
-      if (here < least) continue;
-      if (here <= b[column - 1] || here < b[column + 1] || here <= a[column] || here < c[column] ||
-          here <= a[column - 1] || here <= a[column + 1] || here < c[column - 1] || here < c[column + 1])
-        continue;
-      const auto offset = [](float low, float middle, float top) {
-        const double bend = static_cast<double>(low) - 2 * static_cast<double>(middle) + static_cast<double>(top);
-        return bend < 0 ? std::clamp(0.5 * (static_cast<double>(low) - static_cast<double>(top)) / bend, -0.5, 0.5)
-                        : 0.0;
-      };
-      const double x = column - margin + offset(b[column - 1], here, b[column + 1]);
-      const double y = row - margin + offset(a[column], here, c[column]);
-      maxima.push_back({(x + 0.5) * factor - 0.5, (y + 0.5) * factor - 0.5, static_cast<double>(here)});
+  return maxima_of(map, map_width, map_height, margin, factor, least_score, least_distance_px);
+}
+
+std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int factor, const BeadProfile& profile,
+                                                   double radius_px, double noise, double least_score,
+                                                   double least_distance_px) {
+  const double radius = radius_px / factor;
+  const int reach = static_cast<int>(std::ceil(profile.reach_px() / factor));
+  const int margin = static_cast<int>(std::ceil(0.8 * radius));
+  const int wide = cv::getOptimalDFTSize(small.width + 2 * (margin + reach));
+  const int high = cv::getOptimalDFTSize(small.height + 2 * (margin + reach));
+  cv::Mat frame = cv::Mat::zeros(high, wide, CV_32F), bead = cv::Mat::zeros(high, wide, CV_32F);
+  for (int row = 0; row < small.height; ++row) {
+    const float* from = small.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(small.width);
+    float* to = frame.ptr<float>(row + margin) + margin;
+    for (int column = 0; column < small.width; ++column) to[column] = std::min(1.6F, std::max(-0.6F, from[column]));
+  }
+  // The bead as the reduced frame shows it, centred on pixel (0, 0) of the periodic field.
+  const auto level_at = [&](double r) {
+    const auto cell = static_cast<std::size_t>(r / profile.step_px);
+    return cell < profile.level.size() ? static_cast<double>(profile.level[cell]) : 0.0;
+  };
+  for (int dy = -reach; dy <= reach; ++dy)
+    for (int dx = -reach; dx <= reach; ++dx) {
+      double sum = 0;
+      for (int j = 0; j < factor; ++j)
+        for (int i = 0; i < factor; ++i)
+          sum += level_at(std::hypot(dx * factor + i - 0.5 * (factor - 1), dy * factor + j - 0.5 * (factor - 1)));
+      bead.at<float>((dy + high) % high, (dx + wide) % wide) = static_cast<float>(sum / (factor * factor));
     }
+  cv::dft(frame, frame, cv::DFT_COMPLEX_OUTPUT);
+  cv::dft(bead, bead, cv::DFT_COMPLEX_OUTPUT);
+  // W = conj(P)/(|P|^2 + sigma^2/n) for centres strewn at density n, drawn as Gaussians of `spot` px.
+  constexpr double spot = 0.9, model_error = 0.03;
+  const double sigma = std::max(noise / factor, model_error), density = 0.25 / (radius * radius);
+  const float ridge = static_cast<float>(sigma * sigma / density);
+  std::vector<float> along_x(static_cast<std::size_t>(wide));
+  const auto spot_at = [](int k, int size) {
+    const double wave = 2 * std::numbers::pi * std::min(k, size - k) / size;
+    return static_cast<float>(std::exp(-0.5 * spot * spot * wave * wave));
+  };
+  for (int k = 0; k < wide; ++k) along_x[static_cast<std::size_t>(k)] = spot_at(k, wide);
+  double lone_peak = 0;
+  for (int row = 0; row < high; ++row) {
+    cv::Vec2f* field = frame.ptr<cv::Vec2f>(row);
+    const cv::Vec2f* kernel = bead.ptr<cv::Vec2f>(row);
+    const float along_y = spot_at(row, high);
+    float line_peak = 0;
+    for (int k = 0; k < wide; ++k) {
+      const float p = kernel[k][0], q = kernel[k][1], power = p * p + q * q;
+      const float weight = along_y * along_x[static_cast<std::size_t>(k)] / (power + ridge);
+      line_peak += weight * power;
+      const float real = field[k][0], imaginary = field[k][1];
+      field[k] = cv::Vec2f(weight * (real * p + imaginary * q), weight * (imaginary * p - real * q));
+    }
+    lone_peak += static_cast<double>(line_peak);
   }
-  std::sort(maxima.begin(), maxima.end(), [](const DiskCandidate& a, const DiskCandidate& b) {
-    if (a.score != b.score) return a.score > b.score;
-    if (a.y != b.y) return a.y < b.y;
-    return a.x < b.x;
-  });
-  // Keep the better of two that are too near, by a grid of cells as wide as that distance.
-  std::unordered_map<std::int64_t, std::vector<std::size_t>> cells;
-  const auto cell_of = [&](double value) { return static_cast<std::int64_t>(std::floor(value / least_distance_px)); };
-  const auto key = [](std::int64_t column, std::int64_t row) { return row * 0x100000000LL + column; };
-  std::vector<DiskCandidate> kept;
-  for (const DiskCandidate& candidate : maxima) {
-    const std::int64_t column = cell_of(candidate.x), row = cell_of(candidate.y);
-    bool free = true;
-    for (std::int64_t y = row - 1; y <= row + 1 && free; ++y)
-      for (std::int64_t x = column - 1; x <= column + 1 && free; ++x) {
-        const auto found = cells.find(key(x, y));
-        if (found == cells.end()) continue;
-        for (const std::size_t other : found->second)
-          if (std::hypot(kept[other].x - candidate.x, kept[other].y - candidate.y) < least_distance_px) {
-            free = false;
-            break;
-          }
-      }
-    if (!free) continue;
-    cells[key(column, row)].push_back(kept.size());
-    kept.push_back(candidate);
+  cv::Mat centres;
+  cv::dft(frame, centres, cv::DFT_INVERSE | cv::DFT_REAL_OUTPUT);  // not divided by the size, as lone_peak is not
+  const int map_width = small.width + 2 * margin, map_height = small.height + 2 * margin;
+  std::vector<float> map(static_cast<std::size_t>(map_width) * static_cast<std::size_t>(map_height));
+  const float scale = static_cast<float>(1 / lone_peak);
+  for (int row = 0; row < map_height; ++row) {
+    const float* from = centres.ptr<float>(row);
+    float* to = map.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(map_width);
+    for (int column = 0; column < map_width; ++column) to[column] = scale * from[column];
   }
-  return kept;
+  return maxima_of(map, map_width, map_height, margin, factor, least_score, least_distance_px);
 }
 
 }  // namespace shakebed::ingest

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "ingest/calibration.hpp"
 #include "ingest/frames.hpp"
 
 namespace shakebed::ingest {
@@ -22,5 +23,13 @@ int map_reduction(double radius_px);
 // map reaches 0.8 radii beyond the frame, where cut disks have their centres.
 std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
                                            double least_distance_px);
+
+// The same from the bead's learned profile: the frame is a sum of beads, and the filter that turns each of them into a
+// narrow peak of height 1, as well as the noise (sigma, contrast units of the full frame) allows, tells a strongly
+// blurred crystal's beads from its voids, which the ideal disk alone does not (Wiener's filter). `small` must not have
+// been smoothed.
+std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int factor, const BeadProfile& profile,
+                                                   double radius_px, double noise, double least_score,
+                                                   double least_distance_px);
 
 }  // namespace shakebed::ingest

@@ -229,6 +229,19 @@ std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, d
                          2 * radius * least_separation);
 }
 
+// Beyond this edge width, in radii, touching beads run into one another so much that the ideal disk's map no longer
+// tells them from the voids between them; the learned profile's does.
+constexpr double strong_blur = 0.14;
+
+// Candidates once the bead's profile is known.
+std::vector<DiskCandidate> candidates_by(const BeadProfile& profile, const GrayFrame& flat, double radius, double edge,
+                                         double noise, double score) {
+  if (edge < strong_blur * radius) return candidates_in(flat, radius, noise, score);
+  const int factor = map_reduction(radius);
+  return find_matched_candidates(reduced(flat, factor), factor, profile, radius, noise, score,
+                                 2 * radius * least_separation);
+}
+
 // Beads that leave much more unexplained than the others are taken out; then all beads that show in the residual are
 // put in. A bead taken out in whose place nothing better shows goes back. Returns how many places were looked at again.
 std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double noise) {
@@ -378,7 +391,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   double typical_explained = 1;
   constexpr int rounds = 5;
   for (int round = 0; round < rounds; ++round) {
-    const bool search = round <= 1;
+    const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
     std::size_t total = 0;
     for (std::size_t f = 0; f < used.size(); ++f) {
@@ -386,7 +399,9 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       if (!fits[f]) fits[f] = std::make_unique<JointFit>(flats[f]);
       fits[f]->set_table(&table);
       if (search) {
-        disks[f] = disks_at(candidates_in(flats[f], radius, noise_of(flats[f]), least_score));
+        const double noise = noise_of(flats[f]);
+        disks[f] = disks_at(round == 0 ? candidates_in(flats[f], radius, noise, least_score)
+                                       : candidates_by(profile, flats[f], radius, edge, noise, least_score));
       }
       for (ModelDisk& disk : disks[f]) disk.quiet_sweeps = 0;
       fits[f]->reset(flats[f], disks[f]);
@@ -515,7 +530,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
   const GrayFrame flat = flatten(frame, calibration.light);
   const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, std::abs(calibration.contrast_level)));
-  std::vector<ModelDisk> disks = disks_at(candidates_in(flat, radius, noise, least_score));
+  std::vector<ModelDisk> disks = disks_at(candidates_by(calibration.profile, flat, radius, edge, noise, least_score));
   const double contrast = std::abs(calibration.contrast_level);
   if (disks.empty()) {
     result.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius) + " px";
