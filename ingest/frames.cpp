@@ -339,13 +339,17 @@ class Film {
  public:
   Film(std::string path, const FrameSourceOptions& options) : path_(std::move(path)), options_(options) { reopen(); }
 
+  // Goes past the picture at `index` without decoding it into memory; false when the film ends before.
+  bool step_over(std::size_t index) {
+    for (; next_ <= index; ++next_)
+      if (!capture_.grab()) return false;
+    return true;
+  }
+
   // The picture at `index`, or nothing past the end.
   std::optional<cv::Mat> picture(std::size_t index) {
     if (index < next_) reopen();
-    while (next_ < index) {
-      if (!capture_.grab()) return std::nullopt;
-      ++next_;
-    }
+    if (index > 0 && !step_over(index - 1)) return std::nullopt;
     cv::Mat picture;
     if (!capture_.read(picture) || picture.empty()) {
       if (next_ == 0)
@@ -439,7 +443,11 @@ struct FrameSource::State {
           }
         }
         if (skip) {
-          ++page;  // the film grabs past it later
+          if (!film->step_over(current_page)) {
+            advance_entry();
+            continue;
+          }
+          ++page;
           ++index;
           return item;
         }

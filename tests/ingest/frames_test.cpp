@@ -8,7 +8,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/ingest/test_files.hpp"
@@ -146,6 +150,102 @@ TEST(Frames, PagesOfATiffAreFrames) {
     EXPECT_NEAR(frame->pixels[0], static_cast<double>(page + 1) * 100 * 255 / 65535, 1e-4);
   }
   EXPECT_FALSE(source.next());
+}
+
+// A film of `count` grey pictures, each with its number written in black and white blocks that survive compression.
+constexpr int film_side = 96, film_block = 32;
+cv::Mat numbered_picture(std::size_t number) {
+  cv::Mat picture(film_side, film_side, CV_8UC3);
+  for (int row = 0; row < film_side; ++row)
+    for (int column = 0; column < film_side; ++column) {
+      const int bit = row / film_block * 3 + column / film_block;
+      const std::uint8_t level = number >> bit & 1U ? 220 : 30;
+      picture.at<cv::Vec3b>(row, column) = cv::Vec3b(level, level, level);
+    }
+  return picture;
+}
+std::size_t number_in(const GrayFrame& frame) {
+  std::size_t number = 0;
+  for (int bit = 0; bit < 9; ++bit)
+    if (frame.at(bit % 3 * film_block + film_block / 2, bit / 3 * film_block + film_block / 2) > 125)
+      number |= std::size_t{1} << bit;
+  return number;
+}
+bool write_film(const std::string& path, int code, std::size_t count) {
+  cv::VideoWriter writer(path, code, 25, cv::Size(film_side, film_side));
+  if (!writer.isOpened()) return false;
+  for (std::size_t k = 0; k < count; ++k) writer.write(numbered_picture(k));
+  return true;
+}
+
+class Films : public testing::TestWithParam<std::pair<const char*, std::array<char, 4>>> {};
+
+TEST_P(Films, FrameKIsTheKthPicture) {
+  const ScratchFolder folder;
+  const auto& [ending, code] = GetParam();
+  const std::string path = folder / (std::string("film.") + ending);
+  constexpr std::size_t count = 61;
+  if (!write_film(path, cv::VideoWriter::fourcc(code[0], code[1], code[2], code[3]), count))
+    GTEST_SKIP() << "this OpenCV cannot write " << ending;
+  FrameSource source = FrameSource::open({path});
+  FrameOrigin origin;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto frame = source.next(&origin);
+      ASSERT_TRUE(frame) << k;
+      EXPECT_EQ(number_in(*frame), k);
+      EXPECT_EQ(origin.page, k);
+    }
+    EXPECT_FALSE(source.next());
+    source.rewind();
+  }
+  // Any order: forwards over several key frames, backwards, the last one.
+  for (const std::size_t k : {40UL, 7UL, 60UL, 0UL, 13UL}) EXPECT_EQ(number_in(read_frame(path, k)), k);
+  EXPECT_THROW(read_frame(path, count), InputError);
+}
+
+TEST_P(Films, StrideStepsOverPicturesExactly) {
+  const ScratchFolder folder;
+  const auto& [ending, code] = GetParam();
+  const std::string path = folder / (std::string("film.") + ending);
+  if (!write_film(path, cv::VideoWriter::fourcc(code[0], code[1], code[2], code[3]), 30))
+    GTEST_SKIP() << "this OpenCV cannot write " << ending;
+  FrameSourceOptions options;
+  options.stride = 7;
+  // Two films one after the other: 60 pictures, every seventh of the whole stream.
+  FrameSource source = FrameSource::open({path, path}, options);
+  std::vector<std::size_t> seen, expected;
+  while (const auto frame = source.next()) seen.push_back(number_in(*frame));
+  for (std::size_t k = 0; k < 60; k += 7) expected.push_back(k % 30);
+  EXPECT_EQ(seen, expected);
+}
+
+INSTANTIATE_TEST_SUITE_P(Frames, Films,
+                         testing::Values(std::pair{"avi", std::array<char, 4>{'M', 'J', 'P', 'G'}},
+                                         std::pair{"mp4", std::array<char, 4>{'m', 'p', '4', 'v'}}),
+                         [](const auto& test_info) { return std::string(test_info.param.first); });
+
+// Red beads on green: only one channel shows them well; the choice of the first frame holds for the others.
+TEST(Frames, ColourFramesAreReadInTheChannelThatShowsTheBeads) {
+  const ScratchFolder folder;
+  const auto write = [&](const std::string& name, int blue, int green, int red) {
+    cv::Mat picture(60, 60, CV_8UC3, cv::Scalar(90, 200, 100));  // blue, green, red
+    cv::circle(picture, {30, 30}, 15, cv::Scalar(blue, green, red), cv::FILLED);
+    ASSERT_TRUE(cv::imwrite(folder / name, picture));
+  };
+  write("1.png", 95, 20, 110);
+  write("2.png", 250, 60, 250);
+  FrameSource source = FrameSource::open({folder.path()});
+  const auto first = source.next(), second = source.next();
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->at(30, 30), 20.0F);
+  EXPECT_EQ(first->at(2, 2), 200.0F);
+  EXPECT_EQ(second->at(30, 30), 60.0F) << "another channel than in the frame before";
+  for (const auto& [channel, level] : {std::pair{0, 110.0F}, {1, 20.0F}, {2, 95.0F}}) {
+    FrameSourceOptions options;
+    options.channel = channel;
+    EXPECT_EQ(read_frame(folder / "1.png", 0, options).at(30, 30), level);
+  }
 }
 
 TEST(Frames, ErrorsNameTheFileTheProblemAndTheCure) {
