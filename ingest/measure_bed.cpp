@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
+#include <map>
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
@@ -32,6 +34,7 @@ void check(const MeasureOptions& options) {
           "the left wall must lie left of the right wall");
   require(options.shaking_frequency_hz.has_value() <= options.frame_rate_hz.has_value(),
           "phases need the frame rate beside the shaking frequency");
+  require(options.geometry_frames > 0, "geometry_frames must be positive");
   require(options.phase_bins > 0, "phase_bins must be positive");
 }
 
@@ -246,126 +249,142 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
   // Every frame on its own: what a frame gives depends on nothing but the calibration, so threads change nothing.
   const double per_area = contrast_per_area(finder);
   source.rewind();
-  std::vector<FrameFindings> findings;
-  std::mutex source_mutex, result_mutex;
-  std::size_t done = 0;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (;;) {
-      std::optional<FrameSource::Item> item;
-      {
-        const std::lock_guard<std::mutex> lock(source_mutex);
-        if (failure) return;
-        try {
-          item = source.next_item();
-        } catch (...) {
-          failure = std::current_exception();
-          return;
-        }
-      }
-      if (!item) return;
-      try {
-        FrameFindings one = examine(*item, finder, options, per_area);
-        const std::lock_guard<std::mutex> lock(result_mutex);
-        if (findings.size() <= one.report.index) findings.resize(one.report.index + 1);
-        const std::size_t index = one.report.index;
-        findings[index] = std::move(one);
-        ++done;
-        if (options.progress) options.progress(done);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(source_mutex);
-        if (!failure) failure = std::current_exception();
-        return;
-      }
-    }
-  };
-  if (options.threads <= 1) {
-    work();
-  } else {
-    std::vector<std::thread> threads;
-    for (unsigned k = 0; k < options.threads; ++k) threads.emplace_back(work);
-    for (std::thread& thread : threads) thread.join();
-  }
-  if (failure) std::rethrow_exception(failure);
-
-  // Geometry.
+  std::vector<FrameFindings> held;  // found, not yet placed: their floor and walls are not known
   BedCalibration& bed = measurement.calibration;
-  bed.radius_px = finder.radius_px;
-  bed.radius_std_error_px = finder.radius_std_error_px;
-  bed.edge_width_px = finder.edge_width_px;
-  bed.noise_level = finder.noise_level;
-  bed.contrast_level = finder.contrast_level;
-  bed.polarity = finder.polarity;
-  bed.scale_given = options.scale_m_per_px.has_value();
-  bed.scale_m_per_px = bed.scale_given ? *options.scale_m_per_px : options.bead_diameter_m / (2 * finder.radius_px);
-  bed.scale_relative_std_error = bed.scale_given ? 0 : finder.radius_std_error_px / finder.radius_px;
-  const double diameter_px = options.bead_diameter_m / bed.scale_m_per_px;
-  if (bed.scale_given && std::abs(2 * finder.radius_px / diameter_px - 1) > 0.02)
-    measurement.warnings.push_back("The scale given makes a bead " + std::to_string(diameter_px) +
-                                   " px wide, but the frames show " + std::to_string(2 * finder.radius_px) + " px.");
-  bed.floor_given = options.floor_px.has_value();
-  if (bed.floor_given) {
-    bed.floor_px = *options.floor_px;
-    bed.floor_slope = options.floor_slope.value_or(0.0);
-  } else {
-    const Line floor = find_floor(findings, diameter_px, finder.width);
-    bed.floor_px = floor.offset;
-    bed.floor_slope = options.floor_slope.value_or(floor.slope);
-    if (options.floor_slope) {  // keep the line through the middle of the frame
-      bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
-    }
-  }
-  bed.floor_tilt_degrees = std::atan(bed.floor_slope) * 180 / std::numbers::pi;
-
+  double diameter_px = 0;
   const double frame_left = options.find.roi ? options.find.roi->left - 0.5 : -0.5;
   const double frame_right =
       options.find.roi ? options.find.roi->left + options.find.roi->width - 0.5 : finder.width - 0.5;
-  bed.walls_given = options.left_wall_px && options.right_wall_px;
-  std::vector<double> leftmost, rightmost;
-  for (const FrameFindings& frame : findings) {
-    double low = 1e9, high = -1e9;
-    for (const FoundDisk& disk : frame.disks) {
-      low = std::min(low, disk.x_px - finder.radius_px);
-      high = std::max(high, disk.x_px + finder.radius_px);
-    }
-    if (frame.disks.empty()) continue;
-    leftmost.push_back(low);
-    rightmost.push_back(high);
-  }
-  const auto side = [&](const std::optional<double>& given, std::vector<double>& seen, double frame_side, bool left) {
-    if (given) return *given;
-    const double extreme = quantile(seen, left ? 0.1 : 0.9);
-    const bool cut = left ? extreme < frame_side - 0.02 * diameter_px : extreme > frame_side + 0.02 * diameter_px;
-    if (!cut) return extreme;
-    // Beads go on beyond the frame: only centres a radius inside are counted, so that each of them is seen whole.
-    bed.walls_are_frame_sides = true;
-    return left ? frame_side + finder.radius_px : frame_side - finder.radius_px;
+  HeightBins bins;  // up to the top of the frame; cut at the highest disk in the end
+  bins.lowest = options.lowest.value_or(0.0);
+  bins.width = options.bin_width;
+  const auto bins_up_to = [&](double top) {
+    if (!(top > bins.lowest)) return std::size_t{0};
+    return static_cast<std::size_t>(std::clamp(std::ceil((top - bins.lowest) / bins.width - 1e-9), 1.0, 1e5));
   };
-  bed.left_wall_px = side(options.left_wall_px, leftmost, frame_left, true);
-  bed.right_wall_px = side(options.right_wall_px, rightmost, frame_right, false);
-  bed.width = (bed.right_wall_px - bed.left_wall_px) / diameter_px;
-  if (!(bed.width > 0)) {
-    bed.left_wall_px = frame_left;
-    bed.right_wall_px = frame_right;
-    bed.width = (frame_right - frame_left) / diameter_px;
-    measurement.warnings.push_back("The side walls could not be told from the disks: the whole frame's width is used.");
-  }
-  if (bed.walls_are_frame_sides)
-    measurement.warnings.push_back("The bed goes on beyond the frame: the profile is that of the part in view.");
+  const auto settle_geometry = [&] {
+    bed.radius_px = finder.radius_px;
+    bed.radius_std_error_px = finder.radius_std_error_px;
+    bed.edge_width_px = finder.edge_width_px;
+    bed.noise_level = finder.noise_level;
+    bed.contrast_level = finder.contrast_level;
+    bed.polarity = finder.polarity;
+    bed.scale_given = options.scale_m_per_px.has_value();
+    bed.scale_m_per_px = bed.scale_given ? *options.scale_m_per_px : options.bead_diameter_m / (2 * finder.radius_px);
+    bed.scale_relative_std_error = bed.scale_given ? 0 : finder.radius_std_error_px / finder.radius_px;
+    diameter_px = options.bead_diameter_m / bed.scale_m_per_px;
+    if (bed.scale_given && std::abs(2 * finder.radius_px / diameter_px - 1) > 0.02)
+      measurement.warnings.push_back("The scale given makes a bead " + std::to_string(diameter_px) +
+                                     " px wide, but the frames show " + std::to_string(2 * finder.radius_px) + " px.");
+    bed.floor_given = options.floor_px.has_value();
+    if (bed.floor_given) {
+      bed.floor_px = *options.floor_px;
+      bed.floor_slope = options.floor_slope.value_or(0.0);
+    } else {
+      const Line floor = find_floor(held, diameter_px, finder.width);
+      bed.floor_px = floor.offset;
+      bed.floor_slope = options.floor_slope.value_or(floor.slope);
+      if (options.floor_slope) {  // keep the line through the middle of the frame
+        bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
+      }
+    }
+    bed.floor_tilt_degrees = std::atan(bed.floor_slope) * 180 / std::numbers::pi;
 
-  // Disks in heights.
+    bed.walls_given = options.left_wall_px && options.right_wall_px;
+    std::vector<double> leftmost, rightmost;
+    for (const FrameFindings& frame : held) {
+      double low = 1e9, high = -1e9;
+      for (const FoundDisk& disk : frame.disks) {
+        low = std::min(low, disk.x_px - finder.radius_px);
+        high = std::max(high, disk.x_px + finder.radius_px);
+      }
+      if (frame.disks.empty()) continue;
+      leftmost.push_back(low);
+      rightmost.push_back(high);
+    }
+    const auto side = [&](const std::optional<double>& given, std::vector<double>& seen, double frame_side, bool left) {
+      if (given) return *given;
+      const double extreme = quantile(seen, left ? 0.1 : 0.9);
+      const bool cut = left ? extreme < frame_side - 0.02 * diameter_px : extreme > frame_side + 0.02 * diameter_px;
+      if (!cut) return extreme;
+      // Beads go on beyond the frame: only centres a radius inside are counted, so that each of them is seen whole.
+      bed.walls_are_frame_sides = true;
+      return left ? frame_side + finder.radius_px : frame_side - finder.radius_px;
+    };
+    bed.left_wall_px = side(options.left_wall_px, leftmost, frame_left, true);
+    bed.right_wall_px = side(options.right_wall_px, rightmost, frame_right, false);
+    bed.width = (bed.right_wall_px - bed.left_wall_px) / diameter_px;
+    if (!(bed.width > 0)) {
+      bed.left_wall_px = frame_left;
+      bed.right_wall_px = frame_right;
+      bed.width = (frame_right - frame_left) / diameter_px;
+      measurement.warnings.push_back(
+          "The side walls could not be told from the disks: the whole frame's width is used.");
+    }
+    if (bed.walls_are_frame_sides)
+      measurement.warnings.push_back("The bed goes on beyond the frame: the profile is that of the part in view.");
+    bins.count = bins_up_to(options.highest.value_or(
+        (bed.floor_px + std::max(0.0, bed.floor_slope * finder.width) + finder.radius_px) / diameter_px + 1));
+  };
+
+  // A frame's disks in heights, its densities.
   double highest = 0;
-  std::vector<std::vector<double>> heights(findings.size());
   std::vector<double> counts;
   std::size_t good = 0, cut_below = 0;
-  const double cosine = std::cos(std::atan(bed.floor_slope));
-  for (std::size_t f = 0; f < findings.size(); ++f) {
-    FrameFindings& frame = findings[f];
-    measurement.frames.push_back(frame.report);
+  std::vector<std::vector<double>> densities, covered;
+  std::vector<std::size_t> frame_of;
+  std::vector<double> through_chord;  // what the centres say, seen through the bead as covered area sees it
+  // Part of a bead's own contrast below a height (D) from its centre: a flat bead's is its chord's, a shaded one's is
+  // not.
+  const std::vector<double> rows_of_bead = contrast_by_row(finder);
+  const double rows_middle = 0.5 * static_cast<double>(rows_of_bead.size() - 1);
+  const auto part_below = [&](double t) {
+    const double place = t * diameter_px / row_step_px + rows_middle;
+    if (place <= 0) return 0.0;
+    if (place >= static_cast<double>(rows_of_bead.size() - 1)) return 1.0;
+    const auto cell = static_cast<std::size_t>(place);
+    const double part = place - static_cast<double>(cell);
+    return rows_of_bead[cell] * (1 - part) + rows_of_bead[cell + 1] * part;
+  };
+  const auto add_coverage = [&](const std::vector<float>& rows, const std::vector<double>& heights) {
+    const double counted_width = options.left_wall_px && options.right_wall_px
+                                     ? *options.right_wall_px - *options.left_wall_px
+                                 : bed.walls_are_frame_sides ? frame_right - frame_left
+                                                             : bed.right_wall_px - bed.left_wall_px;
+    const double middle_floor = bed.floor_px + bed.floor_slope * 0.5 * finder.width;
+    const double bead_reach = rows_middle * row_step_px / diameter_px;
+    std::vector<double> area(bins.count, 0.0);
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      const double upper = (middle_floor - static_cast<double>(row) + 0.5) / diameter_px;
+      const double lower = upper - 1 / diameter_px;
+      const double first = std::floor((lower - bins.lowest) / bins.width);
+      for (double bin = std::max(0.0, first); bin < static_cast<double>(bins.count); ++bin) {
+        const double bin_low = bins.lowest + bin * bins.width, bin_high = bin_low + bins.width;
+        if (bin_low >= upper) break;
+        const double overlap = std::min(upper, bin_high) - std::max(lower, bin_low);
+        if (overlap > 0) area[static_cast<std::size_t>(bin)] += static_cast<double>(rows[row]) * overlap * diameter_px;
+      }
+    }
+    for (double& value : area) value *= 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
+    covered.push_back(std::move(area));
+    through_chord.resize(bins.count, 0.0);
+    for (const double height : heights) {
+      const double from = std::floor((height - bead_reach - bins.lowest) / bins.width) - 1;
+      for (auto bin = static_cast<std::size_t>(std::max(0.0, from)); bin < bins.count; ++bin) {
+        const double low = bins.lowest + static_cast<double>(bin) * bins.width - height;
+        if (low > bead_reach) break;
+        through_chord[bin] += (part_below(low + bins.width) - part_below(low)) / (bins.width * bed.width);
+      }
+    }
+  };
+  const auto place = [&](FrameFindings& frame) {
+    const double cosine = std::cos(std::atan(bed.floor_slope));
     if (frame.report.status == FrameStatus::good || frame.report.status == FrameStatus::nothing_found) {
       ++good;
       counts.push_back(static_cast<double>(frame.disks.size()));
     }
+    std::vector<double> heights;
+    std::vector<MeasuredDisk> disks;
     for (const FoundDisk& disk : frame.disks) {
       MeasuredDisk measured;
       measured.frame = frame.report.index;
@@ -380,80 +399,99 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
       measured.std_error_px = std::sqrt(std::max(0.0, 0.5 * (disk.variance_x + disk.variance_y)));
       measured.cut = disk.cut;
       measured.half_hidden = disk.half_hidden;
-      measurement.disks.push_back(measured);
+      disks.push_back(measured);
       const bool in_width = disk.x_px >= bed.left_wall_px && disk.x_px < bed.right_wall_px;
-      if (in_width) heights[f].push_back(measured.z);
+      if (in_width) heights.push_back(measured.z);
       highest = std::max(highest, measured.z);
       cut_below += disk.cut && disk.y_px > finder.height - finder.radius_px;
     }
-    frame.disks.clear();
-    frame.disks.shrink_to_fit();
+    measurement.disk_total += disks.size();
+    if (frame.report.status != FrameStatus::unreadable && frame.report.status != FrameStatus::size_changed) {
+      densities.push_back(density_of_frame(heights, bed.width, bins, options.kernel));
+      frame_of.push_back(frame.report.index);
+      if (options.profile_from_coverage) add_coverage(frame.coverage_of_row, heights);
+    }
+    if (options.disk_sink)
+      options.disk_sink(frame.report, disks);
+    else
+      measurement.disks.insert(measurement.disks.end(), disks.begin(), disks.end());
+    measurement.frames.push_back(std::move(frame.report));
+    frame = FrameFindings();
+  };
+  bool geometry_known = false;
+  const auto place_held = [&] {
+    if (!geometry_known) settle_geometry();
+    geometry_known = true;
+    for (FrameFindings& frame : held) place(frame);
+    held.clear();
+  };
+
+  // Frames are examined as threads come by them, and taken up in their order; nobody runs far ahead of the slowest.
+  std::mutex source_mutex, result_mutex;
+  std::condition_variable taken_up;
+  std::map<std::size_t, FrameFindings> early;  // examined before one that precedes them
+  std::size_t done = 0;                        // frames taken up, also the index of the next
+  const std::size_t run_ahead = 2 * static_cast<std::size_t>(std::max(1U, options.threads));
+  std::exception_ptr failure;
+  const auto fail = [&] {
+    const std::lock_guard<std::mutex> lock(result_mutex);
+    if (!failure) failure = std::current_exception();
+    taken_up.notify_all();
+  };
+  const auto work = [&] {
+    try {
+      for (;;) {
+        std::optional<FrameSource::Item> item;
+        {
+          const std::lock_guard<std::mutex> lock(source_mutex);
+          item = source.next_item();
+        }
+        if (!item) return;
+        {
+          std::unique_lock<std::mutex> lock(result_mutex);
+          taken_up.wait(lock, [&] { return failure || item->index < done + run_ahead; });
+          if (failure) return;
+        }
+        FrameFindings one = examine(*item, finder, options, per_area);
+        const std::lock_guard<std::mutex> lock(result_mutex);
+        if (failure) return;
+        early.emplace(one.report.index, std::move(one));
+        for (auto next = early.find(done); next != early.end(); next = early.find(done)) {
+          held.push_back(std::move(next->second));
+          early.erase(next);
+          measurement.most_frames_held = std::max(measurement.most_frames_held, held.size() + early.size());
+          if (options.disk_sink && (geometry_known || held.size() >= options.geometry_frames)) place_held();
+          ++done;
+          if (options.progress) options.progress(done);
+        }
+        taken_up.notify_all();
+      }
+    } catch (...) {
+      fail();
+    }
+  };
+  if (options.threads <= 1) {
+    work();
+  } else {
+    std::vector<std::thread> threads;
+    for (unsigned k = 0; k < options.threads; ++k) threads.emplace_back(work);
+    for (std::thread& thread : threads) thread.join();
   }
+  if (failure) std::rethrow_exception(failure);
+  place_held();
 
   // Profiles.
-  HeightBins bins;
-  bins.lowest = options.lowest.value_or(0.0);
-  bins.width = options.bin_width;
-  const double top = options.highest.value_or(highest + 1);
-  if (top > bins.lowest)
-    bins.count = static_cast<std::size_t>(std::clamp(std::ceil((top - bins.lowest) / bins.width - 1e-9), 1.0, 1e5));
-  std::vector<std::vector<double>> densities;
-  std::vector<std::size_t> frame_of;
-  for (std::size_t f = 0; f < findings.size(); ++f) {
-    const FrameStatus status = findings[f].report.status;
-    if (status == FrameStatus::unreadable || status == FrameStatus::size_changed) continue;
-    densities.push_back(density_of_frame(heights[f], bed.width, bins, options.kernel));
-    frame_of.push_back(f);
-  }
+  const auto cut_to_bins = [&](std::vector<std::vector<double>>& rows) {
+    for (auto& row : rows) row.resize(bins.count);
+  };
+  bins.count = std::min(bins.count, bins_up_to(options.highest.value_or(highest + 1)));
+  cut_to_bins(densities);
   measurement.profile = average_profile(densities, bins, options.kernel, bed.scale_relative_std_error);
 
   if (options.profile_from_coverage) {
-    // Rows are laid over the bins; what the centres say is seen through the disk's chord for comparison.
-    const double counted_width = options.left_wall_px && options.right_wall_px
-                                     ? *options.right_wall_px - *options.left_wall_px
-                                 : bed.walls_are_frame_sides ? frame_right - frame_left
-                                                             : bed.right_wall_px - bed.left_wall_px;
-    std::vector<std::vector<double>> covered;
-    std::vector<double> through_chord(bins.count, 0.0);
-    const double middle_floor = bed.floor_px + bed.floor_slope * 0.5 * finder.width;
-    // Part of a bead's own contrast below a height (D) from its centre: a flat bead's is its chord's, a shaded one's is
-    // not.
-    const std::vector<double> rows_of_bead = contrast_by_row(finder);
-    const double rows_middle = 0.5 * static_cast<double>(rows_of_bead.size() - 1);
-    const auto part_below = [&](double t) {
-      const double place = t * diameter_px / row_step_px + rows_middle;
-      if (place <= 0) return 0.0;
-      if (place >= static_cast<double>(rows_of_bead.size() - 1)) return 1.0;
-      const auto cell = static_cast<std::size_t>(place);
-      const double part = place - static_cast<double>(cell);
-      return rows_of_bead[cell] * (1 - part) + rows_of_bead[cell + 1] * part;
-    };
-    const double bead_reach = rows_middle * row_step_px / diameter_px;
-    for (const std::size_t f : frame_of) {
-      const auto& rows = findings[f].coverage_of_row;
-      std::vector<double> area(bins.count, 0.0);
-      for (std::size_t row = 0; row < rows.size(); ++row) {
-        const double upper = (middle_floor - static_cast<double>(row) + 0.5) / diameter_px;
-        const double lower = upper - 1 / diameter_px;
-        const double first = std::floor((lower - bins.lowest) / bins.width);
-        for (double bin = std::max(0.0, first); bin < static_cast<double>(bins.count); ++bin) {
-          const double bin_low = bins.lowest + bin * bins.width, bin_high = bin_low + bins.width;
-          if (bin_low >= upper) break;
-          const double overlap = std::min(upper, bin_high) - std::max(lower, bin_low);
-          if (overlap > 0)
-            area[static_cast<std::size_t>(bin)] += static_cast<double>(rows[row]) * overlap * diameter_px;
-        }
-      }
-      for (double& value : area) value *= 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
-      covered.push_back(std::move(area));
-      for (const double height : heights[f])
-        for (std::size_t bin = 0; bin < bins.count; ++bin) {
-          const double low = bins.lowest + static_cast<double>(bin) * bins.width - height;
-          if (low > bead_reach || low + bins.width < -bead_reach) continue;
-          through_chord[bin] += (part_below(low + bins.width) - part_below(low)) /
-                                (bins.width * bed.width * static_cast<double>(frame_of.size()));
-        }
-    }
+    cut_to_bins(covered);
+    through_chord.resize(bins.count, 0.0);
+    for (double& value : through_chord) value /= static_cast<double>(std::max<std::size_t>(1, frame_of.size()));
     DensityProfile coverage =
         average_profile(covered, bins, {KernelKind::disk_chord, 1.0}, bed.scale_relative_std_error);
     double square = 0;

@@ -13,6 +13,26 @@
 
 namespace shakebed::ingest {
 
+struct MeasuredDisk {
+  std::size_t frame = 0;
+  double x_px = 0, y_px = 0, radius_px = 0;
+  double x = 0, z = 0;  // D, from the left wall and from the floor
+  double quality = 0;
+  double std_error_px = 0;
+  bool cut = false, half_hidden = false;
+};
+
+enum class FrameStatus { good, nothing_found, unreadable, size_changed };
+struct FrameReport {
+  std::size_t index = 0;
+  FrameOrigin origin;
+  FrameStatus status = FrameStatus::good;
+  std::string why;  // a sentence unless good
+  std::size_t disks = 0;
+  std::size_t rejected = 0;
+  double residual_level = 0;  // grey levels
+};
+
 // Only the diameter is needed; each other member overrides something that is otherwise found.
 struct MeasureOptions {
   double bead_diameter_m = 0;            // required, > 0
@@ -33,26 +53,11 @@ struct MeasureOptions {
   bool profile_from_coverage = true;                      // also measure covered area, independently
   unsigned threads = 1;                                   // results do not depend on it
   std::function<void(std::size_t frames_done)> progress;  // called from one thread at a time
-};
-
-struct MeasuredDisk {
-  std::size_t frame = 0;
-  double x_px = 0, y_px = 0, radius_px = 0;
-  double x = 0, z = 0;  // D, from the left wall and from the floor
-  double quality = 0;
-  double std_error_px = 0;
-  bool cut = false, half_hidden = false;
-};
-
-enum class FrameStatus { good, nothing_found, unreadable, size_changed };
-struct FrameReport {
-  std::size_t index = 0;
-  FrameOrigin origin;
-  FrameStatus status = FrameStatus::good;
-  std::string why;  // a sentence unless good
-  std::size_t disks = 0;
-  std::size_t rejected = 0;
-  double residual_level = 0;  // grey levels
+  // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
+  // that memory hardly grows with the film. Floor and walls, unless given, are then told from the first geometry_frames
+  // frames of the film instead of from all.
+  std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink;
+  std::size_t geometry_frames = 100;
 };
 
 struct BedCalibration {
@@ -81,9 +86,11 @@ struct PhaseProfile {
 struct Measurement {
   FinderCalibration finder;
   BedCalibration calibration;
-  std::vector<MeasuredDisk> disks;  // frame after frame
-  std::vector<FrameReport> frames;  // one a frame of the stream
-  DensityProfile profile;           // from centres
+  std::vector<MeasuredDisk> disks;   // frame after frame; empty with a disk_sink
+  std::size_t disk_total = 0;        // over all frames, with a disk_sink or without
+  std::size_t most_frames_held = 0;  // frames whose disks were in memory at once, at most
+  std::vector<FrameReport> frames;   // one a frame of the stream
+  DensityProfile profile;            // from centres
   std::optional<DensityProfile>
       coverage_profile;              // from covered area; same bins; kernel disk_chord with the bin's top hat
   double coverage_disagreement = 0;  // rms in n D^2: centres, seen through the bead, minus coverage

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "ingest/overlay.hpp"
 #include "ingest/random_stream.hpp"
@@ -111,6 +113,76 @@ TEST(MeasureBed, ThreadsChangeNothing) {
   }
   EXPECT_EQ(one.profile.number_density, two.profile.number_density);
   EXPECT_EQ(one.profile.covariance, two.profile.covariance);
+}
+
+TEST(MeasureBed, SinkReceivesEveryDiskInOrderAndTheProfileIsTheSame) {
+  const Film film = film_of(12);
+  FrameSource source = FrameSource::from_frames(film.frames), again = FrameSource::from_frames(film.frames);
+  MeasureOptions options = options_of();
+  options.floor_px = 500;
+  options.left_wall_px = 20;
+  options.right_wall_px = 620;
+  const Measurement kept = measure_bed(source, options);
+  std::vector<MeasuredDisk> streamed;
+  std::vector<std::size_t> order;
+  options.threads = 3;
+  options.geometry_frames = 2;
+  options.disk_sink = [&](const FrameReport& frame, const std::vector<MeasuredDisk>& disks) {
+    order.push_back(frame.index);
+    EXPECT_EQ(frame.disks, disks.size());
+    streamed.insert(streamed.end(), disks.begin(), disks.end());
+  };
+  const Measurement measured = measure_bed(again, options);
+  EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}));
+  EXPECT_TRUE(measured.disks.empty());
+  EXPECT_EQ(measured.disk_total, kept.disk_total);
+  ASSERT_EQ(streamed.size(), kept.disks.size());
+  for (std::size_t k = 0; k < streamed.size(); ++k) {
+    EXPECT_EQ(streamed[k].frame, kept.disks[k].frame);
+    EXPECT_EQ(streamed[k].x_px, kept.disks[k].x_px);
+    EXPECT_EQ(streamed[k].z, kept.disks[k].z);
+  }
+  EXPECT_EQ(measured.profile.number_density, kept.profile.number_density);
+  ASSERT_TRUE(measured.coverage_profile);
+  EXPECT_EQ(measured.coverage_profile->number_density, kept.coverage_profile->number_density);
+}
+
+// Ten times the film, no more frames in memory at once; without a sink all of them are.
+TEST(MeasureBed, WithASinkMemoryDoesNotGrowWithTheFilm) {
+  const Film film = film_of(3);
+  const auto held = [&](std::size_t frames, bool with_sink) {
+    FrameSource source = FrameSource::from_generator(frames, [&](std::size_t k) { return film.frames[k % 3]; });
+    MeasureOptions options = options_of();
+    options.threads = 2;
+    options.geometry_frames = 5;
+    options.find.joint_fit_sweeps = 1;
+    std::size_t disks = 0;
+    if (with_sink)
+      options.disk_sink = [&](const FrameReport&, const std::vector<MeasuredDisk>& found) { disks += found.size(); };
+    const Measurement measured = measure_bed(source, options);
+    EXPECT_EQ(measured.frames.size(), frames);
+    EXPECT_EQ(disks, with_sink ? measured.disk_total : 0U);
+    EXPECT_EQ(measured.disks.size(), with_sink ? 0U : measured.disk_total);
+    EXPECT_NEAR(static_cast<double>(measured.disk_total), 337.0 * static_cast<double>(frames),
+                0.02 * 337 * static_cast<double>(frames));
+    return measured.most_frames_held;
+  };
+  constexpr std::size_t at_most = 5 + 2 * 2;  // those that tell the geometry, and two a thread
+  EXPECT_LE(held(12, true), at_most);
+  EXPECT_LE(held(120, true), at_most);
+  EXPECT_GE(held(30, false), 30U);
+}
+
+TEST(MeasureBed, AThrowingSinkEndsTheRunWithItsError) {
+  const Film film = film_of(6);
+  FrameSource source = FrameSource::from_frames(film.frames);
+  MeasureOptions options = options_of();
+  options.threads = 3;
+  options.geometry_frames = 1;
+  options.disk_sink = [](const FrameReport& frame, const std::vector<MeasuredDisk>&) {
+    if (frame.index == 2) throw std::runtime_error("disk full");
+  };
+  EXPECT_THROW(measure_bed(source, options), std::runtime_error);
 }
 
 TEST(MeasureBed, BadFramesAreReportedAndTheOthersUsed) {
