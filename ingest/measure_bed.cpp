@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "ingest/atomic_file.hpp"
+#include "ingest/smooth_field.hpp"
 
 namespace shakebed::ingest {
 
@@ -189,6 +190,77 @@ Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, in
   return robust_line(low);
 }
 
+// The floor's motion, y = middle - rise sin(2 pi turns) - rise_late cos(2 pi turns), from what no bead ever passes.
+struct FloorMotion {
+  bool known = false;
+  double middle = 0, amplitude = 0, phase = 0;
+};
+// A bottom counts in full while it is below the floor or no more than a tolerance above; the tolerance shrinks, so that
+// what is left in the end are the beads that touch. Known only if such beads are seen all around the period.
+FloorMotion find_floor_motion(const std::vector<FrameFindings>& frames, double slope, double diameter_px, int width,
+                              double turns_per_frame) {
+  struct Bottom {
+    double y, sine, cosine;
+    std::size_t part;  // of the period
+  };
+  constexpr std::size_t parts = 12;
+  const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
+  std::vector<Bottom> bottoms;
+  for (const FrameFindings& frame : frames) {
+    const double turns = static_cast<double>(frame.report.index) * turns_per_frame;
+    const double phase = turns - std::floor(turns);
+    std::vector<double> lowest(columns, -1e9);
+    for (const FoundDisk& disk : frame.disks) {
+      const auto column = std::min(
+          columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
+      lowest[column] = std::max(lowest[column], disk.y_px + disk.radius_px - slope * disk.x_px);
+    }
+    for (const double y : lowest)
+      if (y > -1e8)
+        bottoms.push_back({y, std::sin(2 * std::numbers::pi * phase), std::cos(2 * std::numbers::pi * phase),
+                           std::min(parts - 1, static_cast<std::size_t>((phase + 1e-9) * parts))});
+  }
+  FloorMotion motion;
+  if (bottoms.size() < 30) return motion;
+  std::vector<double> heights;
+  for (const Bottom& bottom : bottoms) heights.push_back(bottom.y);
+  std::vector<double> fit = {quantile(heights, 0.9), 0, 0};
+  const auto gap = [&](const Bottom& bottom) {
+    return fit[0] - fit[1] * bottom.sine - fit[2] * bottom.cosine - bottom.y;
+  };
+  double tolerance = diameter_px;
+  for (int round = 0; round < 60; ++round) {
+    tolerance = std::max(0.02 * diameter_px, 0.85 * tolerance);
+    std::vector<double> matrix(9, 0.0), right(3, 0.0);
+    for (const Bottom& bottom : bottoms) {
+      const double above = std::max(0.0, gap(bottom)) / tolerance;
+      const double weight = std::exp(-above * above);
+      const double row[3] = {1, -bottom.sine, -bottom.cosine};
+      for (std::size_t a = 0; a < 3; ++a) {
+        right[a] += weight * row[a] * bottom.y;
+        for (std::size_t b = 0; b < 3; ++b) matrix[a * 3 + b] += weight * row[a] * row[b];
+      }
+    }
+    for (std::size_t a = 0; a < 3; ++a) matrix[a * 4] += 1e-6 * matrix[0];
+    if (!solve_symmetric(matrix, right, 3)) return motion;
+    fit = right;
+  }
+  std::vector<std::size_t> touching(parts, 0);
+  for (const Bottom& bottom : bottoms) touching[bottom.part] += gap(bottom) < 2 * tolerance;
+  // The longest stretch of the period without a touching bead: beyond half a period nothing bounds the fit there.
+  std::size_t longest = 0, empty = 0;
+  for (std::size_t k = 0; k < 2 * parts; ++k) {
+    empty = touching[k % parts] ? 0 : empty + 1;
+    longest = std::max(longest, empty);
+  }
+  motion.middle = fit[0];
+  motion.amplitude = std::hypot(fit[1], fit[2]);
+  const double turns = std::atan2(fit[2], fit[1]) / (2 * std::numbers::pi);
+  motion.phase = turns - std::floor(turns);
+  motion.known = longest <= parts / 2;
+  return motion;
+}
+
 }  // namespace
 
 Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
@@ -286,6 +358,23 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
       bed.floor_slope = options.floor_slope.value_or(floor.slope);
       if (options.floor_slope) {  // keep the line through the middle of the frame
         bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
+      }
+      if (options.shaking_frequency_hz && options.frame_rate_hz) {
+        const double turns_per_frame = *options.shaking_frequency_hz / *options.frame_rate_hz;
+        const FloorMotion motion = find_floor_motion(held, bed.floor_slope, diameter_px, finder.width, turns_per_frame);
+        constexpr double resting = 0.02;  // D: what touching beads scatter
+        if (!motion.known) {
+          measurement.warnings.push_back(
+              "The floor's motion could not be told: beads touch it in too small a part of the shaker's period. "
+              "Heights "
+              "are measured from its lowest position.");
+        } else if (motion.amplitude > resting * diameter_px) {
+          bed.floor_px = motion.middle;
+          bed.floor_amplitude_px = motion.amplitude;
+          bed.floor_phase = motion.phase;
+          if (!options.lowest)  // beads follow the floor below its mean position
+            bins.lowest = -std::ceil(motion.amplitude / diameter_px / bins.width) * bins.width;
+        }
       }
     }
     bed.floor_tilt_degrees = std::atan(bed.floor_slope) * 180 / std::numbers::pi;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -230,6 +231,61 @@ TEST(MeasureBed, PhasesAreSortedByTheShakersClock) {
   const Measurement measured = measure_bed(source, options);
   ASSERT_EQ(measured.phases.size(), 4U);
   for (const PhaseProfile& phase : measured.phases) EXPECT_EQ(phase.profile.samples, 1U);
+}
+
+// A bed that rides the floor for part of the period and flies for the rest.
+std::vector<GrayFrame> shaken_film(double amplitude_px, double phase, std::size_t count, double turns_per_frame) {
+  Camera camera;
+  camera.width = 340;
+  camera.height = 300;
+  camera.blur_px = 0.8;
+  camera.read_noise = 4;
+  const FrameRenderer renderer(camera);
+  std::vector<GrayFrame> frames;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double angle = 2 * std::numbers::pi * (static_cast<double>(k) * turns_per_frame + phase);
+    const double flight = amplitude_px * std::max(0.0, std::sin(angle - 1.2));  // above the floor, half of the period
+    SyntheticBed bed;
+    bed.left_wall_px = 20;
+    bed.right_wall_px = 320;
+    bed.floor_px = 270 - amplitude_px * std::sin(angle) - flight;
+    bed.rows = 6;
+    bed.gas_count = 15;
+    bed.gas_height_px = 30;
+    bed.seed = k + 1;
+    frames.push_back(renderer.render(make_synthetic_bed(bed), k));
+  }
+  return frames;
+}
+
+TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
+  MeasureOptions options = options_of();
+  options.shaking_frequency_hz = 20;
+  options.frame_rate_hz = 20 * 13.7;
+  FrameSource source = FrameSource::from_frames(shaken_film(9, 0.3, 41, 1 / 13.7));
+  const BedCalibration bed = measure_bed(source, options).calibration;
+  // Touching beads are those within 0.02 D = 0.4 px.
+  EXPECT_NEAR(bed.floor_px, 270, 0.4);
+  EXPECT_NEAR(bed.floor_amplitude_px, 9, 0.4);
+  EXPECT_NEAR(bed.floor_phase, 0.3, 0.4 / 9 / (2 * std::numbers::pi) * 2);
+
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 20, 1 / 13.7));
+  const BedCalibration resting = measure_bed(still, options).calibration;
+  EXPECT_EQ(resting.floor_amplitude_px, 0);
+  EXPECT_NEAR(resting.floor_px, 270, 0.1);
+}
+
+TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {
+  MeasureOptions options = options_of();
+  options.shaking_frequency_hz = 20;
+  options.frame_rate_hz = 20;
+  FrameSource source = FrameSource::from_frames(shaken_film(9, 0.05, 8, 1));
+  const Measurement measured = measure_bed(source, options);
+  EXPECT_EQ(measured.calibration.floor_amplitude_px, 0);
+  bool told = false;
+  for (const std::string& warning : measured.warnings)
+    told = told || warning.find("floor's motion") != std::string::npos;
+  EXPECT_TRUE(told);
 }
 
 TEST(MeasureBed, TablesAndOverlayAreWritten) {
