@@ -38,6 +38,8 @@ std::vector<Row> full_search() {
   return rows;
 }
 
+// Same seed, same beds: where a change of the simulator changes trajectories, the full search has to be run again (six
+// minutes), since the nearest pairs lie closer together than one run's scatter.
 TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   const std::vector<Row> full = full_search();
   ASSERT_EQ(full.size(), 88u);
@@ -48,7 +50,7 @@ TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   ScratchFolder folder;
   const ProgramResult result = run_shakebed(
       {"run", source + "/pipelines/recipes/clement-rajchenbach/infer.json", "--out", "out", "--jobs", "2", "--set",
-       "/stages/search/grid/restitution=[0.5,0.8,0.95]", "--set", "/stages/search/grid/friction=[0.2,0.8]"},
+       "/stages/search/grid/restitution=[0.7,0.8,0.95]", "--set", "/stages/search/grid/friction=[0.2,0.6]"},
       folder.path());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const pipelines::Json found = pipelines::read_json(folder / "out/search/infer.json");
