@@ -275,28 +275,33 @@ std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const s
   return shapes;
 }
 
-// Radius and edge by damped least squares; `use` tells which of the three shapes take part.
+// Radius and edge by damped least squares; `use` tells which of the three shapes, and the level
+// outside, take part.
 RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<double>& level, double radius_guess,
-                    double edge_guess, std::array<bool, 3> use) {
+                    double edge_guess, std::array<bool, 4> use, double* offset = nullptr) {
   RimFit best;
   const auto misfit_of = [&](double radius, double edge, std::vector<double>& residual) {
     const auto rows = shapes_at(radius, edge, distance);
-    std::vector<double> matrix(9, 0.0), right(3, 0.0);
+    const auto shape = [&](std::size_t i, std::size_t a) { return a < 3 ? rows[i][a] : 1.0; };
+    const std::array<bool, 4>& takes_part = use;
+    std::vector<double> matrix(16, 0.0), right(4, 0.0);
     for (std::size_t i = 0; i < distance.size(); ++i) {
       const double weight = distance[i];  // pixels at this distance
-      for (std::size_t a = 0; a < 3; ++a) {
-        if (!use[a]) continue;
-        right[a] += weight * rows[i][a] * level[i];
-        for (std::size_t b = 0; b < 3; ++b)
-          if (use[b]) matrix[a * 3 + b] += weight * rows[i][a] * rows[i][b];
+      for (std::size_t a = 0; a < 4; ++a) {
+        if (!takes_part[a]) continue;
+        right[a] += weight * shape(i, a) * level[i];
+        for (std::size_t b = 0; b < 4; ++b)
+          if (takes_part[b]) matrix[a * 4 + b] += weight * shape(i, a) * shape(i, b);
       }
     }
-    for (std::size_t a = 0; a < 3; ++a) matrix[a * 4] += use[a] ? 1e-9 * matrix[0] : 1.0;
-    if (!solve_symmetric(matrix, right, 3)) return 1e30;
+    for (std::size_t a = 0; a < 4; ++a) matrix[a * 5] += takes_part[a] ? 1e-9 * matrix[0] : 1.0;
+    if (!solve_symmetric(matrix, right, 4)) return 1e30;
+    if (offset) *offset = right[3];
     residual.resize(distance.size());
     double sum = 0, weights = 0;
     for (std::size_t i = 0; i < distance.size(); ++i) {
-      const double model = right[0] * rows[i][0] + right[1] * rows[i][1] + right[2] * rows[i][2];
+      double model = 0;
+      for (std::size_t a = 0; a < 4; ++a) model += right[a] * shape(i, a);
       residual[i] = std::sqrt(distance[i]) * (level[i] - model);
       sum += residual[i] * residual[i];
       weights += distance[i];
@@ -366,13 +371,27 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
   }
   if (distance.size() < 6) return {};
   // The simplest shading that will do: flat, then a sphere's, then both with a parabola.
-  RimFit best = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, {true, false, false});
-  for (const std::array<bool, 3>& use : {std::array<bool, 3>{true, true, false}, {true, true, true}}) {
+  std::array<bool, 4> chosen = {true, false, false, false};
+  RimFit best = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, chosen);
+  for (const std::array<bool, 4>& use :
+       {std::array<bool, 4>{true, true, false, false}, std::array<bool, 4>{true, true, true, false}}) {
     // Both shapes together can imitate another radius: they are asked only when nothing simpler comes near.
     const double negligible_misfit = use[2] ? 0.008 : 0.0015, clearly_better = use[2] ? 0.5 : 0.7;
     if (best.good && best.misfit < negligible_misfit) break;
     const RimFit richer = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, use);
-    if (richer.good && (!best.good || richer.misfit < clearly_better * best.misfit)) best = richer;
+    if (richer.good && (!best.good || richer.misfit < clearly_better * best.misfit)) {
+      best = richer;
+      chosen = use;
+    }
+  }
+  // In a crystal hardly any background is left to tell the level outside by, and a profile that ends a few thousandths
+  // too low passes for a larger bead. An offset beyond that is something else: light between the beads, a halo.
+  constexpr double largest_offset = 0.006;
+  if (best.good) {
+    chosen[3] = true;
+    double offset = 0;
+    const RimFit levelled = fit_rim_with(distance, level, best.radius_px, best.edge_px, chosen, &offset);
+    if (levelled.good && std::abs(offset) < largest_offset && levelled.misfit < best.misfit) best = levelled;
   }
   return best;
 }

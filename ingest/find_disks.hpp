@@ -33,9 +33,10 @@ struct FindOptions {
   std::optional<double> radius_px;    // a first value, refined unless hold_radius
   bool hold_radius = false;           // keep radius_px exactly
   std::optional<PixelRectangle> roi;  // centres outside are not reported
-  int joint_fit_sweeps = 8;           // at most; 0 stops at the peaks of the map: fast, about 0.1 px
-  bool learn_profile = true;          // false keeps the ideal disk with a Gaussian-blurred edge
-  bool keep_half_hidden = false;      // report beads that fail the interior test, flagged
+  int joint_fit_sweeps =
+      20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
+  bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge
+  bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
 };
 
 // What is common to all frames of a film, learned from its first frames.

@@ -294,7 +294,7 @@ std::vector<FinderBenchmarkRow> benchmark_finder(const FinderBenchmarkOptions& o
         const CalibrationResult calibrated = calibrate_finder({&frames.front()});
         const double calibration_seconds = cpu_seconds() - start;
         const std::vector<std::pair<int, const char*>> costs = {
-            {0, "map"}, {1, "1 sweep"}, {2, "2 sweeps"}, {4, "4 sweeps"}, {8, "joint fit"}};
+            {0, "map"}, {1, "1 sweep"}, {2, "2 sweeps"}, {4, "4 sweeps"}, {20, "joint fit"}};
         for (const auto& [sweeps, name] : costs) {
           FinderBenchmarkRow row = base;
           row.method = name;
