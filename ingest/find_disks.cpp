@@ -541,7 +541,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   JointFit fit(flat);
   fit.set_table(&exact);
   fit.reset(flat, disks);
-  const double tolerance = std::clamp(0.004 * noise / 0.1, 2e-4, 4e-3);
+  const double tolerance = std::clamp(0.006 * noise / 0.1, 6e-4, 4e-3);
   std::size_t dropped = 0;
   bool repaired = false;
   double largest = 1;
