@@ -579,9 +579,9 @@ int command_rerun(const Arguments& arguments) {
     print(dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}}));
   } else {
     for (const std::string& name : different) fmt::print(stderr, "differs: {}\n", name);
-    print(different.empty()
-              ? fmt::format("the same: all {} files of {} came out byte for byte, timings aside\n", files, before.string())
-              : fmt::format("{} of {} files differ\n", different.size(), files));
+    print(different.empty() ? fmt::format("the same: all {} files of {} came out byte for byte, timings aside\n", files,
+                                          before.string())
+                            : fmt::format("{} of {} files differ\n", different.size(), files));
   }
   return different.empty() ? exit_ok : exit_check_failed;
 }

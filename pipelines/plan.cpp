@@ -358,7 +358,7 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
         continue;
       }
       Draft draft{.node = &item, .common = {}, .row = row, .index = i};
-      // Only the id for now: "from" of others needs it.
+      // Only the id here: "from" of others needs it.
       draft.common.id = row->name;
       if (const JsonNode* id = item.find("id"); id != nullptr && id->is_string()) {
         draft.common.id = id->text;
