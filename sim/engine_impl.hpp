@@ -240,7 +240,7 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, c
 }
 
 // Everything anew. Every disk must be predicted, even one that another has already claimed: its own best event may be
-// an earlier one with a third.
+// an earlier one with a third, or the edge of its shell.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::predict_all() {
   queue_.reset(disks_.data(), count_, now_, event_rate_);
@@ -250,9 +250,10 @@ void Engine<Space, Rule, Sizes>::predict_all() {
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
-    const Candidate next = next_event(i, motion);
-    if (disks_[i].partner >= 0 && next.time >= disks_[i].event_time) continue;
-    commit(i, motion, next);
+    Candidate next = next_event(i, motion);
+    const Disk& disk = disks_[i];
+    if (disk.partner >= 0 && next.time >= disk.event_time) next = {disk.event_time, disk.partner};
+    commit(i, motion, next);  // also where it stands already: the disk may leave its shell before
   }
 }
 

@@ -71,11 +71,14 @@ class EventQueue {
       if (time > until) [[unlikely]]
         return false;
       ++next_;
-      disk = static_cast<std::uint32_t>(pair);
-      if (disks_[disk].event_time == time) [[likely]]
+      // The partner counts too: a disk may have found another one at the very same time, and its former partner must
+      // still have its turn.
+      const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
+      disk = first;
+      if (stands(first, second, time)) [[likely]]
         return true;
-      disk = static_cast<std::uint32_t>(pair >> 32);
-      if (disks_[disk].event_time == time) return true;
+      disk = second;
+      if (stands(second, first, time)) return true;
     }
   }
 
@@ -100,6 +103,12 @@ class EventQueue {
     std::uint32_t next = 0;
     std::array<std::uint64_t, pairs_a_chunk> pairs{};
   };
+
+  // Is a's next event still that with b (alone: a == b) at this time?
+  bool stands(std::uint32_t a, std::uint32_t b, double time) const {
+    const Disk& disk = disks_[a];
+    return disk.event_time == time && (disk.partner == static_cast<std::int32_t>(b) || a == b);
+  }
 
   std::int64_t bucket_of(double time) const {
     const double bucket = time * buckets_a_time_;

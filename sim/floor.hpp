@@ -24,7 +24,7 @@ class FloorMotion {
   explicit FloorMotion(const SinusoidalFloor& floor);
   explicit FloorMotion(const TabulatedFloor& floor);
 
-  // At a time counted from a whole number of periods. Keep it within a few periods of 0: its rounding is the phase's.
+  // At a time counted from a whole number of periods.
   double position(double time) const;
   double velocity(double time) const;
   double acceleration(double time) const;
@@ -41,7 +41,8 @@ class FloorMotion {
   //
   // The gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max floor''. From any t with F >= 0 the
   // parabola F + F' h - M h^2/2 lies below the gap, so its root can never step over a crossing; near a simple root
-  // the steps converge quadratically, and near a tangent one they crawl past it on the safe side.
+  // the steps converge quadratically, and near a tangent one they crawl past it on the safe side. A point that touches
+  // the floor while this falls faster than the point does leaves it: that is no contact.
   double time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const;
 
  private:
@@ -49,11 +50,11 @@ class FloorMotion {
   struct Motion {
     double position, velocity, acceleration;
   };
-  Motion motion(double time) const;
+  Motion motion(double now, double later) const;  // at now + later, whose rounding does not count
 
   Kind kind_ = Kind::still;
-  double amplitude_ = 0, angular_frequency_ = 0, period_ = 1;
-  double highest_ = 0, lowest_ = 0, largest_acceleration_ = 0;
+  double amplitude_ = 0, frequency_ = 0, angular_frequency_ = 0, period_ = 1;
+  double highest_ = 0, lowest_ = 0, largest_acceleration_ = 0, largest_jerk_ = 0;
   std::vector<double> heights_, curvatures_;  // spline knots: value and second derivative
   double spacing_ = 0;
 };

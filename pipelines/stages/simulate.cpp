@@ -364,7 +364,7 @@ Json Simulate::results(const sim::Simulation& simulation, const sim::BedObserver
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 2,
+          .version = 3,
           .summary = "simulates a bed of hard disks, event by event",
           .uses_seed = true,
           .result = "observables.json",

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <numbers>
+#include <utility>
 
 #include "sim/simulation.hpp"
 
@@ -113,6 +115,50 @@ TEST(Engine, LetsNothingOverlapAndNothingOut) {
       EXPECT_GE(at.z[k] - 0.5, at.floor_position - 1e-12);
     }
   }
+}
+
+// Rows whose disks touch exactly: contacts of equal times, many of them at one instant, each of which must have its
+// turn.
+TEST(Engine, KeepsALatticeOfTouchingDisksApart) {
+  for (const auto& [disks_a_row, rows] : {std::pair{6, 4}, std::pair{10, 4}, std::pair{19, 10}}) {
+    Scene scene;
+    scene.gravity = UniformGravity{};
+    scene.disks.species = {{static_cast<std::uint32_t>(disks_a_row * rows), 1, 1}};
+    scene.box.width = disks_a_row + 1;
+    scene.box.sides = HardSides{};
+    PlacedStart start;
+    for (int row = 0; row < rows; ++row) {
+      for (int k = 0; k < disks_a_row; ++k)
+        start.disks.push_back({k + 0.5 + 0.5 * (row % 2), 0.5 + row * std::sqrt(0.75) * (1 + 1e-12), 0, 0, 0, 0});
+    }
+    start.disks[static_cast<std::size_t>((rows / 2 - 1) * disks_a_row + disks_a_row / 2)].vz = 1;
+    scene.start = start;
+    const auto bed = simulate(scene);
+    for (double time = 0.01; time < 5; time *= 1.3) {
+      bed->advance_to(time);
+      ASSERT_LT(bed->largest_overlap(), 1e-12) << rows << " rows, time " << time;
+    }
+  }
+}
+
+// A plastic ball that touches a floor which begins to fall faster than the ball: no contact, and no endless loop.
+TEST(Engine, LetsTheFloorFallAwayFromAPlasticBall) {
+  const double gamma = 3.6, amplitude = gamma / std::pow(2 * std::numbers::pi, 2);
+  const double phase = std::acos(std::numbers::pi / gamma), flight = 1 - phase / (2 * std::numbers::pi);
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{1, 1, 1}};
+  scene.box.width = 4;
+  scene.box.sides = HardSides{};
+  scene.box.floor = SinusoidalFloor{amplitude, 1};
+  scene.box.floor_surface = {0, 0, 0};
+  scene.start =
+      PlacedStart{{{2, 0.5 + amplitude * std::sin(phase) + (0.5 - flight / 2) * flight + 1e-7, 0, 0.5 - flight, 0, 0}}};
+  const auto ball = simulate(scene);
+  ball->advance_to(200);
+  EXPECT_GE(ball->counters().floor_collisions, 190u);
+  EXPECT_LE(ball->counters().floor_collisions, 400u);  // rounding makes some of them double
+  EXPECT_LT(std::abs(ball->energy().imbalance()), 1e-12);
 }
 
 }  // namespace
