@@ -65,7 +65,8 @@ void replace_all(std::string& text, std::string_view what, std::string_view with
     text.replace(at, what.size(), with);
 }
 
-// An SVG file as part of a page: without its prolog, its ids made its own.
+}  // namespace
+
 std::string inline_svg(const fs::path& path, int number) {
   std::string svg = read_file(path);
   const std::size_t begin = svg.find("<svg");
@@ -80,6 +81,8 @@ std::string inline_svg(const fs::path& path, int number) {
   svg.replace(0, 4, "<svg class=\"plot\"");
   return svg;
 }
+
+namespace {
 
 // A quantity as people read it: lengths in mm, the error beside the value.
 std::string shown(const Json& quantity) {
@@ -110,7 +113,8 @@ std::string words(std::string name) {
   return name;
 }
 
-// A page up to its headline.
+}  // namespace
+
 std::string page_head(const std::string& title) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
@@ -119,6 +123,8 @@ std::string page_head(const std::string& title) {
       "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
       program_version(), html(title), style, html(title));
 }
+
+namespace {
 
 class Report {
  public:

@@ -20,4 +20,9 @@ std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<st
                               const std::vector<std::filesystem::path>& figures,
                               const std::vector<std::string>& problems);
 
+// For other pages of ours. The page up to and with its headline; it ends with "</main>\n</body>\n</html>\n".
+std::string page_head(const std::string& title);
+// An SVG file as part of a page: without its prolog, its ids made its own by the number.
+std::string inline_svg(const std::filesystem::path& path, int number);
+
 }  // namespace shakebed::pipelines
