@@ -53,6 +53,8 @@ class Engine final : public Simulation {
   std::size_t bytes() const override;
   std::vector<std::uint8_t> checkpoint() const override;
   void restore(const std::vector<std::uint8_t>& bytes) override;
+  void watch(Watcher* watcher) override;
+  void set_bath_temperature(double temperature) override;
 
  private:
   struct Candidate {
@@ -145,6 +147,7 @@ class Engine final : public Simulation {
   std::uint64_t events_to_check_ = 1;
   Random random_;
   Counters counters_;
+  Watcher* watcher_ = nullptr;
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
 
   // --- bookkeeping

@@ -204,6 +204,8 @@ template <class Space, class Rule, class Sizes>
 // Writes down what comes next for disk i, whose state now is `motion`, unless it leaves its shell before.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, const Candidate& next) {
+  if (watcher_ != nullptr) [[unlikely]]
+    watcher_->flies(base_ + now_, labels_[i], motion.x, motion.z, motion.vx, motion.vz);
   Disk& disk = disks_[i];
   const double dt = next.time - now_;
   const double ox = motion.x - static_cast<double>(disk.shell_x), oz = motion.z - static_cast<double>(disk.shell_z);
@@ -471,6 +473,8 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
       spins_[j] += inverse_inertia_ratio_ * p.tangential * inverse_second / rj;
       counters_.virial -= p.px * dx + p.pz * dz;
       dissipated_ += p.dissipated;
+      if (watcher_ != nullptr) [[unlikely]]
+        watcher_->touched(base_ + now_, first.x, first.z, dx, dz, -p.px, -p.pz);
       return;
     }
   }
@@ -482,11 +486,14 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   second.vz += share_second * impulse.jz;
   counters_.virial += reduced_mass * (impulse.jx * dx + impulse.jz * dz);
   if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
+  if (watcher_ != nullptr) [[unlikely]]
+    watcher_->touched(base_ + now_, first.x, first.z, dx, dz, reduced_mass * impulse.jx, reduced_mass * impulse.jz);
 }
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   Motion motion = motion_at(disks_[i], now_);
+  const double vx_before = motion.vx, vz_before = motion.vz;
   switch (disks_[i].partner) {
     case left_wall:
       bounce(i, motion, -1, 0, 0, side_surface_);
@@ -502,6 +509,11 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
+  if (watcher_ != nullptr) [[unlikely]] {
+    const double mass = sizes_.mass(i);
+    watcher_->touched_wall(base_ + now_, disks_[i].partner == floor_below, mass * (motion.vx - vx_before),
+                           mass * (motion.vz - vz_before));
+  }
   const Candidate next = next_event(i, motion);
   write_down(i, motion);
   commit(i, motion, next);
@@ -855,6 +867,31 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
 }
 
 // ------------------------------------------------------------------------------------------------ looking
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
+  watcher_ = watcher;
+  if (watcher_ == nullptr) return;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Motion motion = motion_at(disks_[i], now_);
+    watcher_->flies(time(), labels_[i], motion.x, motion.z, motion.vx, motion.vz);
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::set_bath_temperature(double temperature) {
+  if (!(temperature > 0) || !std::isfinite(temperature))
+    throw std::invalid_argument("a bath's temperature must be positive");
+  if (auto* langevin = std::get_if<LangevinBath>(&bath_)) {
+    langevin->temperature = temperature;
+  } else if (auto* andersen = std::get_if<AndersenBath>(&bath_)) {
+    andersen->temperature = temperature;
+  } else if (auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
+    thermal->temperature = temperature;
+  } else {
+    throw std::invalid_argument("the scene has no bath that holds a temperature");
+  }
+}
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {

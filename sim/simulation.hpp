@@ -48,6 +48,20 @@ struct Counters {
   std::uint64_t collisions() const { return disk_collisions + wall_collisions + floor_collisions; }
 };
 
+// Told of everything that happens between looks, as it happens. Disks by their place in the start, times since the
+// start, in reduced units; under periodic sides positions may lie a little outside the box.
+class Watcher {
+ public:
+  virtual ~Watcher() = default;
+  // From this time on the disk flies freely from here, until it is named again. A flight that goes on may be repeated.
+  virtual void flies(double time, std::uint32_t disk, double x, double z, double vx, double vz) = 0;
+  // Two disks touched. (x, z): centre of the first, (dx, dz): from it to the second's; (px, pz): momentum given to the
+  // second, taken from the first.
+  virtual void touched(double time, double x, double z, double dx, double dz, double px, double pz) = 0;
+  // A disk touched the floor, the lid or a side and got this momentum.
+  virtual void touched_wall(double time, bool floor, double px, double pz) = 0;
+};
+
 class Simulation {
  public:
   virtual ~Simulation() = default;
@@ -68,6 +82,12 @@ class Simulation {
   virtual double next_synchronisation() const = 0;
   virtual std::vector<std::uint8_t> checkpoint() const = 0;
   virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;
+  // From now on the watcher (nullptr: nobody) is told; first of all how every disk flies now. It changes nothing of the
+  // run, must outlive it, and is not part of a checkpoint.
+  virtual void watch(Watcher* watcher) = 0;
+  // Another temperature for the Langevin, Andersen or thermal-floor reservoir, from now on. Not part of a checkpoint.
+  // Throws std::invalid_argument where the scene has none of them.
+  virtual void set_bath_temperature(double temperature) = 0;
 };
 
 // The one place where a scene becomes a specialised engine. Throws std::invalid_argument with check()'s words.
