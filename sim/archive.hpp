@@ -2,8 +2,8 @@
 //
 //   template <class Archive> void visit(Archive& archive) { archive(count_, sums_, blocks_); }
 //
-// and the same function writes and reads them. Members may be numbers, plain structs, vectors and classes with a visit()
-// of their own. The bytes are those of this kind of machine.
+// and the same function writes and reads them. Members may be numbers, plain structs, vectors and classes with a
+// visit() of their own. The bytes are those of this kind of machine.
 #pragma once
 
 #include <cstdint>

@@ -511,8 +511,8 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
   if (watcher_ != nullptr) [[unlikely]] {
     const double mass = sizes_.mass(i);
-    watcher_->touched_wall(base_ + now_, disks_[i].partner == floor_below, mass * (motion.vx - vx_before),
-                           mass * (motion.vz - vz_before));
+    watcher_->touched_wall(base_ + now_, labels_[i], disks_[i].partner == floor_below, motion.z,
+                           mass * (motion.vx - vx_before), mass * (motion.vz - vz_before));
   }
   const Candidate next = next_event(i, motion);
   write_down(i, motion);

@@ -44,7 +44,7 @@ double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) 
 
 namespace {
 
-enum Scalar : std::size_t { centre, t_x, spin_t, scalar_count };
+enum Scalar : std::size_t { centre, t_x, spin_t, bottom_row, scalar_count };
 
 }  // namespace
 
@@ -78,7 +78,8 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
       period_sum_[static_cast<std::size_t>(frame) * grid_.points + i] += share * density[i];
   }
   double z = 0, vx2 = 0, vz = 0, vz2 = 0, spin2 = 0;
-  double mass = 0;
+  double mass = 0, in_bottom_row = 0;
+  constexpr double row = std::numbers::sqrt3 / 2;
   for (std::size_t i = 0; i < at.z.size(); ++i) {
     const double m = masses_[i];
     mass += m;
@@ -93,12 +94,18 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
     layer.vx2 += m * at.vx[i] * at.vx[i];
     layer.vz += m * at.vz[i];
     layer.vz2 += m * at.vz[i] * at.vz[i];
+    if (!at.spin.empty()) {
+      const double spin = inertias_[i] * at.spin[i] * at.spin[i];
+      layer.spin += spin;
+      spin2 += spin;
+    }
+    in_bottom_row += std::abs(at.z[i] - at.floor_position - 0.5) < row / 2;
   }
-  for (std::size_t i = 0; i < at.spin.size(); ++i) spin2 += inertias_[i] * at.spin[i] * at.spin[i];
   double* scalars = &period_sum_[2 * grid_.points];
   scalars[centre] += share * z / mass;
   scalars[t_x] += share * vx2 / n;
   scalars[spin_t] += share * spin2 / n;
+  scalars[bottom_row] += share * in_bottom_row / (width_ * row);
   centre_by_phase_[phase] += z / mass;
   mean_vz_.push_back(vz / mass);
   mean_vz2_.push_back(vz2 / n);
@@ -132,6 +139,11 @@ Measured BedObserver::temperature_x() const {
 }
 Measured BedObserver::spin_temperature() const {
   const std::size_t i = 2 * grid_.points + spin_t;
+  return {means_.mean(i), means_.std_error(i)};
+}
+
+Measured BedObserver::bottom_row_density() const {
+  const std::size_t i = 2 * grid_.points + bottom_row;
   return {means_.mean(i), means_.std_error(i)};
 }
 
@@ -169,7 +181,7 @@ std::vector<BedObserver::Layer> BedObserver::layers() const {
   double total = 0;
   for (const LayerSums& sums : layers_) total += sums.count;
   for (std::size_t index = 0; index < layer_count_; ++index) {
-    double count = 0, mass = 0, vx2 = 0, vz = 0, thermal = 0;
+    double count = 0, mass = 0, vx2 = 0, vz = 0, thermal = 0, spin = 0;
     for (std::uint32_t phase = 0; phase < phases_; ++phase) {
       const LayerSums& sums = layer(phase, index);
       if (sums.count == 0) continue;
@@ -178,10 +190,11 @@ std::vector<BedObserver::Layer> BedObserver::layers() const {
       vz += sums.vz;
       mass += sums.mass;
       thermal += sums.vz2 - sums.vz * sums.vz / sums.mass;
+      spin += sums.spin;
     }
     if (count == 0) continue;
-    result.push_back(
-        {layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass, count / total});
+    result.push_back({layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass,
+                      count / total, spin / count});
   }
   return result;
 }

@@ -33,10 +33,6 @@ struct Profile {
 void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
                  double shift, std::vector<double>& density);
 
-struct Measured {
-  double value = 0, std_error = 0;
-};
-
 // Height of the centre of mass of count equal disks packed hexagonally on a floor at 0: rows of floor(width), in a hard
 // box alternately one less where half a diameter is missing.
 double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
@@ -62,16 +58,26 @@ class BedObserver {
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
   Measured temperature_z_local() const;  // without the mean velocity of each layer of 1 D at each phase
   Measured spin_temperature() const;     // I <w^2>; 0 for smooth disks
-  struct Layer {                         // by height, layers of 1 D
+  // Number density in the lowest row: centres between (1/2 -+ sqrt(3)/4) D above the moving floor. 2/sqrt 3 when every
+  // site of a packed row is taken (between hard sides up to half a disk less).
+  Measured bottom_row_density() const;
+  struct Layer {  // by height, layers of 1 D
     double height, temperature_x, temperature_z, mean_velocity_z;
     double share;  // of the disks
+    double spin_temperature;
   };
   std::vector<Layer> layers() const;
   std::vector<double> centre_of_mass_by_phase() const;
 
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(periods_, period_sum_, means_, covariance_, mean_vz_, mean_vz2_, mean_mass_, centre_by_phase_, layers_);
+  }
+
  private:
   struct LayerSums {
     double count = 0, mass = 0, vx2 = 0, vz = 0, vz2 = 0;  // velocities weighted with the masses
+    double spin = 0;                                       // I w^2
   };
   const LayerSums& layer(std::uint32_t phase, std::size_t index) const { return layers_[phase * layer_count_ + index]; }
 

@@ -58,8 +58,8 @@ class Watcher {
   // Two disks touched. (x, z): centre of the first, (dx, dz): from it to the second's; (px, pz): momentum given to the
   // second, taken from the first.
   virtual void touched(double time, double x, double z, double dx, double dz, double px, double pz) = 0;
-  // A disk touched the floor, the lid or a side and got this momentum.
-  virtual void touched_wall(double time, bool floor, double px, double pz) = 0;
+  // A disk, its centre at height z, touched the floor, or the lid or a side, and got this momentum.
+  virtual void touched_wall(double time, std::uint32_t disk, bool floor, double z, double px, double pz) = 0;
 };
 
 class Simulation {

@@ -87,4 +87,13 @@ std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t l
   return covariance;
 }
 
+Measured propagated(double value, std::span<const double> gradient, std::span<const double> covariance) {
+  double variance = 0;
+  for (std::size_t i = 0; i < gradient.size(); ++i) {
+    for (std::size_t k = 0; k < gradient.size(); ++k)
+      variance += gradient[i] * gradient[k] * covariance[i * gradient.size() + k];
+  }
+  return {value, std::sqrt(std::max(variance, 0.0))};
+}
+
 }  // namespace shakebed::sim

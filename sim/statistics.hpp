@@ -8,6 +8,10 @@
 
 namespace shakebed::sim {
 
+struct Measured {
+  double value = 0, std_error = 0;
+};
+
 // Means of `size` quantities sampled together. Memory: 3 numbers a quantity and level, log2(samples) levels.
 class BlockedMean {
  public:
@@ -22,12 +26,21 @@ class BlockedMean {
   // neighbouring blocks are independent. With fewer than 16 samples, the uncorrelated estimate; NaN with fewer than 2.
   double std_error(std::size_t i = 0) const;
 
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(size_, levels_);
+  }
+
  private:
   struct Level {
     std::uint64_t blocks = 0;
     bool waiting = false;
     std::vector<double> half;                  // a block that waits for its partner
     std::vector<double> mean, sum_of_squares;  // running (Welford)
+    template <class Archive>
+    void visit(Archive& archive) {
+      archive(blocks, waiting, half, mean, sum_of_squares);
+    }
   };
   std::size_t size_;
   std::vector<Level> levels_;
@@ -45,11 +58,20 @@ class BlockedCovariance {
   std::vector<double> of_means(std::size_t first, std::size_t last) const;
   std::size_t independent_blocks() const;  // that of_means() rests on
 
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(size_, block_length_, in_block_, sum_, blocks_);
+  }
+
  private:
   std::size_t size_;
   std::size_t block_length_ = 1, in_block_ = 0;
   std::vector<double> sum_;
   std::vector<std::vector<double>> blocks_;
 };
+
+// A function of means: its value, and by its derivatives (gradient) and the covariance of the means, row by row, its
+// error.
+Measured propagated(double value, std::span<const double> gradient, std::span<const double> covariance);
 
 }  // namespace shakebed::sim
