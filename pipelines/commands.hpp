@@ -46,6 +46,11 @@ struct SlurmArguments {
   int shards = 1;
   std::vector<std::string> options;
 };
+struct BenchArguments {
+  std::string stage;  // empty: all
+  bool quick = false;
+  std::optional<std::string> against;
+};
 struct Arguments {
   std::vector<std::string> command_line;
   CommonArguments common;
@@ -55,6 +60,7 @@ struct Arguments {
   TheoryArguments theory;
   MapArguments map;
   SlurmArguments slurm;
+  BenchArguments bench;
   std::string recipe;  // the command's own first argument: a recipe, a folder, a name
   std::string format = "dot";
   std::string older_than;
@@ -77,5 +83,6 @@ int command_verify(const Arguments& arguments);
 int command_rerun(const Arguments& arguments);
 int command_clean(const Arguments& arguments);
 int command_submit_slurm(const Arguments& arguments);
+int command_bench(const Arguments& arguments);  // in bench/bench.cpp
 
 }  // namespace shakebed::pipelines

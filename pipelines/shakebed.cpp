@@ -200,6 +200,16 @@ int run_program(int argc, char** argv) {
   clean->add_option("--older-than", arguments.older_than, "only what is older: 30d, 12h")->type_name("AGE");
   clean->add_flag("--dry-run", arguments.run.dry_run, "say what would go");
 
+  CLI::App* bench = command(&app, "bench", "speed against error, stage by stage, on this machine",
+                            "  shakebed bench --quick\n  shakebed bench simulate --out o\n  shakebed bench --json > "
+                            "now.json\n  shakebed bench --against now.json",
+                            command_bench);
+  bench->add_option("stage", arguments.bench.stage, "all (the default), simulate, fit, map, pipeline")
+      ->check(CLI::IsMember({"all", "simulate", "fit", "map", "pipeline"}));
+  bench->add_flag("--quick", arguments.bench.quick, "minutes instead of an hour: fewer repeats, smaller beds");
+  bench->add_option("--against", arguments.bench.against, "an earlier bench.json to set this run against")
+      ->type_name("FILE.json");
+
   CLI::App* submit = app.add_subcommand("submit", "hand a sweep to a cluster");
   submit->require_subcommand(1);
   CLI::App* slurm = command(submit, "slurm", "a Slurm job array over the points of a sweep, and a job that gathers",
