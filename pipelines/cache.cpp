@@ -112,6 +112,13 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
   return record;
 }
 
+std::string work_key(const StageRecord& record) {
+  std::string text = fmt::format("{} {} {} {} ", record.stage, record.version, record.seed, record.reduced);
+  text += dump_canonical(record.options);
+  for (const Fingerprint& input : record.inputs) text += input.file + " " + input.fast + "\n";
+  return fast_hash(text);
+}
+
 std::vector<std::string> differences(const Json& before, const Json& after) {
   std::map<std::string, std::string> left, right;
   flatten(before, "", left);

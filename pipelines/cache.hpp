@@ -46,6 +46,9 @@ std::optional<StageRecord> read_record(const std::filesystem::path& stage_direct
 // What a stage would be made from now; `upstream` are the records of the stages it reads from, in order.
 StageRecord fresh_record(const PlannedStage& stage, const std::vector<const StageRecord*>& upstream);
 
+// One hash of all that decides what a stage makes: kind, version, options, seed, inputs. `record` from fresh_record().
+std::string work_key(const StageRecord& record);
+
 // Why the stage must run again, one sentence each; empty: `found` counts. `upstream_ids` name the stages of fresh's
 // inputs.
 std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::optional<StageRecord>& found,

@@ -132,13 +132,28 @@ void publish(const fs::path& finished, const fs::path& place) {
 
 class StageRun : public RunContext {
  public:
-  StageRun(const PlannedStage& stage, std::vector<Input> inputs, fs::path directory, int jobs, Console* console)
-      : stage_(stage), inputs_(std::move(inputs)), directory_(std::move(directory)), jobs_(jobs), console_(console) {}
+  StageRun(const PlannedStage& stage, std::vector<Input> inputs, fs::path directory, fs::path scratch, int jobs,
+           Console* console)
+      : stage_(stage),
+        inputs_(std::move(inputs)),
+        directory_(std::move(directory)),
+        scratch_(std::move(scratch)),
+        jobs_(jobs),
+        console_(console) {}
 
   const std::vector<Input>& inputs() const override { return inputs_; }
   std::uint64_t seed() const override { return stage_.seed; }
   int jobs() const override { return jobs_; }
   const fs::path& output_directory() const override { return directory_; }
+  const fs::path& scratch() override {
+    const std::lock_guard lock(mutex_);
+    try {
+      fs::create_directories(scratch_);
+    } catch (const fs::filesystem_error& error) {
+      throw StageError(fmt::format("{}: cannot be made: {}", scratch_.string(), error.code().message()));
+    }
+    return scratch_;
+  }
   void progress(double fraction, std::string_view what) override {
     if (console_ == nullptr) return;
     // At most every 50 ms, whatever the stage does.
@@ -176,7 +191,7 @@ class StageRun : public RunContext {
  private:
   const PlannedStage& stage_;
   std::vector<Input> inputs_;
-  fs::path directory_;
+  fs::path directory_, scratch_;
   int jobs_;
   Console* console_;
   std::mutex mutex_;
@@ -220,8 +235,10 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
                       const RunOptions& options, Console* console) {
   const fs::path place = options.out / stage.id;
   const fs::path working = options.out / fmt::format("{}{}-{}", partial_prefix, stage.id, ::getpid());
+  const fs::path scratch = scratch_folder(options.out, fresh);
   std::error_code ignored;
   fs::remove_all(working, ignored);
+  if (options.force) fs::remove_all(scratch, ignored);
   struct Remover {
     const fs::path& path;
     ~Remover() {
@@ -236,7 +253,7 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
   }
   const auto wall_start = std::chrono::steady_clock::now();
   const double cpu_start = cpu_seconds_so_far();
-  StageRun context(stage, std::move(inputs), working, options.jobs > 0 ? options.jobs : processors(), console);
+  StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
   stage.stage->run(context);
   context.check_interrupted();
   fresh.outputs = fingerprint_directory(working, true);
@@ -248,10 +265,17 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
   if (!context.log_text().empty()) write_file(working / "log.txt", context.log_text());
   write_file(working / record_name, dump(fresh.to_json()));
   publish(working, place);
+  // Finished: nothing of it, nor of what was begun with other options, is needed any more.
+  fs::remove_all(scratch.parent_path(), ignored);
+  fs::remove(options.out / scratch_name, ignored);
   return fresh;
 }
 
 }  // namespace
+
+fs::path scratch_folder(const fs::path& out, const StageRecord& fresh) {
+  return out / scratch_name / fresh.id / fast_hash(work_key(fresh) + source_revision());
+}
 
 void remove_leftovers(const fs::path& out) {
   std::error_code error;
@@ -318,6 +342,8 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
   for (const PlannedStage& stage : plan.stages) {
     outcome.stages.push_back({.id = stage.id, .kind = std::string(stage.row->name)});
   }
+  std::error_code no_scratch;
+  const bool has_scratch = fs::exists(options.out / scratch_name, no_scratch);
   for (std::size_t i = 0; i < plan.stages.size(); ++i) {
     const PlannedStage& stage = plan.stages[i];
     StageOutcome& result = outcome.stages[i];
@@ -351,6 +377,10 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
       result.reasons = reasons_to_run(fresh, found, place);
       if (result.reasons.empty() && options.force) result.reasons.push_back("--force asks for it");
       if (result.reasons.empty()) {
+        if (has_scratch) {  // killed between publishing and tidying up
+          std::error_code ignored;
+          fs::remove_all(scratch_folder(options.out, fresh), ignored);
+        }
         result.state = StageState::kept;
         result.record = std::move(found);
         if (console != nullptr) console->message(fmt::format("{}: up to date", stage.id));

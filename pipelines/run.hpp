@@ -74,7 +74,10 @@ class FolderLock {
 
 // summary.json: the numbers of every stage under its id.
 Json summary_json(const Plan& plan, const RunOutcome& outcome);
-// Removes what a killed run left half-written in OUT.
+// Removes what a killed run left half-written in OUT. What unfinished stages keep in their scratch folders stays.
 void remove_leftovers(const std::filesystem::path& out);
+inline constexpr std::string_view scratch_name = ".scratch";
+// Where a stage keeps what must outlive a kill: OUT/.scratch/<id>/<key of its work>. Removed when the stage finished.
+std::filesystem::path scratch_folder(const std::filesystem::path& out, const StageRecord& fresh);
 
 }  // namespace shakebed::pipelines

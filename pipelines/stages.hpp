@@ -98,6 +98,11 @@ class RunContext {
   // --- what comes out
   virtual const std::filesystem::path& output_directory() const = 0;
   std::filesystem::path output(std::string_view name) const { return output_directory() / name; }
+  // A folder for what must outlive a kill -9, Ctrl-C or an error: checkpoints. The same work (stage version, options,
+  // seed, inputs' bytes, program) started again under the same OUT finds the same folder with what was left in it;
+  // other work never does. It is made on the first call, may be read from any thread, and is removed when the stage has
+  // finished. Write files there atomically (write_file_atomically): whoever comes next sees whole ones only.
+  virtual const std::filesystem::path& scratch() = 0;
 
   // --- on the way. May be called from any thread.
   virtual void progress(double fraction, std::string_view what = {}) = 0;  // cheap: call as often as you like

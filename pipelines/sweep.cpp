@@ -210,6 +210,7 @@ class SharedStages {
     if (options_.force) {
       std::error_code error;
       fs::remove_all(directory / at.stages[i].id, error);
+      fs::remove_all(directory / scratch_name, error);
     }
     remove_leftovers(directory);
     for (const std::size_t k : at.stages[i].from) {
@@ -530,6 +531,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
         if (options.force) {  // everything anew, but what is shared only once
           one.force = false;
           for (const PlannedStage& stage : at.stages) fs::remove_all(one.out / stage.id);
+          fs::remove_all(one.out / scratch_name);
         }
         shared.prepare(at, keys[i], one.out);
         const auto point_start = std::chrono::steady_clock::now();

@@ -1,0 +1,126 @@
+// The folder of a stage that outlives its being killed.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "pipelines/files.hpp"
+#include "pipelines/run.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::pipelines;
+using shakebed::tests::ScratchFolder;
+namespace fs = std::filesystem;
+
+enum class End { well, error, killed };
+
+// Counts its starts in its scratch folder; what it found there is its result.
+class Counting : public Stage {
+ public:
+  explicit Counting(End end) : end_(end) {}
+  void describe(Fields&) override {}
+  void run(RunContext& context) const override {
+    const fs::path file = context.scratch() / "starts";
+    std::string starts = fs::exists(file) ? read_file(file) : "";
+    starts += "x";
+    write_file_atomically(file, starts);
+    if (end_ == End::killed) ::raise(SIGKILL);
+    if (end_ == End::error) throw StageError("on purpose");
+    write_file(context.output("starts.txt"), starts);
+  }
+
+ private:
+  End end_;
+};
+
+const StageRow& row() {
+  static const StageRow counting{.name = "counting", .summary = "counts its starts"};
+  return counting;
+}
+
+Plan plan_of(End end, int option, const std::string& id = "count") {
+  Plan plan;
+  plan.name = "scratch";
+  PlannedStage stage;
+  stage.id = id;
+  stage.row = &row();
+  stage.stage = std::make_unique<Counting>(end);
+  stage.options = Json{{"option", option}};
+  plan.stages.push_back(std::move(stage));
+  return plan;
+}
+
+class Scratch : public testing::Test {
+ protected:
+  ExitCode run(End end, int option, bool force = false, const std::string& id = "count") {
+    RunOptions options;
+    options.out = folder_.path();
+    options.force = force;
+    RunOutcome outcome;
+    outcome.out = options.out;
+    run_stages(plan_of(end, option, id), options, nullptr, outcome);
+    return outcome.code;
+  }
+  void run_and_be_killed(int option) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      run(End::killed, option);
+      ::_exit(1);  // not reached
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status)) << status;
+  }
+  std::string starts(const std::string& id = "count") { return read_file(folder_ / (id + "/starts.txt")); }
+  ScratchFolder folder_;
+};
+
+TEST_F(Scratch, OutlivesAKillAndAnErrorAndGoesWhenTheStageHasFinished) {
+  run_and_be_killed(1);
+  remove_leftovers(folder_.path());  // as the next run does
+  EXPECT_EQ(run(End::error, 1), exit_stage_failed);
+  run_and_be_killed(1);
+  remove_leftovers(folder_.path());
+  EXPECT_EQ(run(End::well, 1), exit_ok);
+  EXPECT_EQ(starts(), "xxxx") << "three starts that did not end, and this one";
+  EXPECT_FALSE(fs::exists(folder_ / std::string(scratch_name)));
+}
+
+TEST_F(Scratch, BelongsToOneWorkOnly) {
+  run_and_be_killed(1);
+  EXPECT_EQ(run(End::error, 1, false, "other"), exit_stage_failed);
+  EXPECT_EQ(run(End::well, 2), exit_ok);
+  EXPECT_EQ(starts(), "x") << "other options: nothing of the first";
+  EXPECT_EQ(run(End::well, 1, false, "other"), exit_ok);
+  EXPECT_EQ(starts("other"), "xx") << "another stage keeps its own";
+  EXPECT_FALSE(fs::exists(folder_ / std::string(scratch_name)));
+}
+
+TEST_F(Scratch, OptionsTriedInBetweenDoNotCostIt) {
+  run_and_be_killed(1);
+  run_and_be_killed(2);
+  EXPECT_EQ(run(End::well, 1), exit_ok);
+  EXPECT_EQ(starts(), "xx");
+}
+
+TEST_F(Scratch, ForceBeginsAfresh) {
+  run_and_be_killed(1);
+  EXPECT_EQ(run(End::well, 1, true), exit_ok);
+  EXPECT_EQ(starts(), "x");
+}
+
+TEST_F(Scratch, LeftBehindByAFinishedStageIsTidiedUp) {
+  EXPECT_EQ(run(End::well, 1), exit_ok);
+  Plan plan = plan_of(End::well, 1);
+  const fs::path place = scratch_folder(folder_.path(), fresh_record(plan.stages[0], {}));
+  fs::create_directories(place);
+  EXPECT_EQ(run(End::well, 1), exit_ok);
+  EXPECT_FALSE(fs::exists(place));
+}
+
+}  // namespace
