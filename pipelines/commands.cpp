@@ -59,11 +59,12 @@ void add_data(JsonNode& document, const std::string& file) {
   if (!found) throw UsageError("--data: the recipe has no figure stage to draw the points into");
 }
 
-// A recipe read with --set and --data applied.
+// A recipe read with --preset, --set and --data applied.
 Plan plan_of(const std::string& text, const std::string& file, const fs::path& directory, const RunArguments& run) {
   std::vector<Problem> problems;
   auto document = parse_json(text, file, problems);
   if (!problems.empty()) throw ConfigError(std::move(problems));
+  if (run.preset) apply_preset(*document, file, *run.preset);
   for (const Setting& setting : settings_of(run)) set_pointer(*document, setting.pointer, setting.value);
   if (run.data) add_data(*document, *run.data);
   return make_plan(std::move(*document), file, directory);
@@ -114,16 +115,29 @@ Json explanation_json(const std::vector<StageOutcome>& stages) {
   return out;
 }
 
-int run_plan_command(const Arguments& arguments, const Plan& plan) {
+// Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
+int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result = nullptr) {
   const RunOptions options = run_options(arguments, plan);
   Console console(level_of(arguments.common));
-  if (plan.sweep)
-    return run_sweep_command(plan, options, {arguments.run.shard, arguments.run.dry_run, arguments.common.json},
-                             console);
+  const auto answer = [&](Json json) {
+    if (result != nullptr)
+      *result = std::move(json);
+    else
+      print(dump(json));
+  };
+  if (plan.sweep) {
+    SweepArguments sweep{arguments.run.shard, arguments.run.dry_run, arguments.common.json, {}};
+    const int code = run_sweep_command(plan, options, sweep, console);
+    if (arguments.common.json) answer(std::move(sweep.result));
+    return code;
+  }
   if (arguments.run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");
   if (arguments.run.dry_run) {
     const auto stages = explain(plan, options);
-    print(arguments.common.json ? dump(explanation_json(stages)) : explanation_text(stages));
+    if (arguments.common.json)
+      answer(explanation_json(stages));
+    else
+      print(explanation_text(stages));
     return exit_ok;
   }
   install_interrupt_handler();
@@ -131,7 +145,7 @@ int run_plan_command(const Arguments& arguments, const Plan& plan) {
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
   if (arguments.common.json) {
-    print(dump(outcome_json(plan, outcome)));
+    answer(outcome_json(plan, outcome));
   } else {
     std::string text = published_text(plan, outcome);
     if (!text.empty()) text = "\n" + text + "\n";
@@ -206,16 +220,47 @@ int command_reproduce(const Arguments& arguments) {
                                  nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
                                                  : fmt::format("did you mean \"{}\"?", nearest)));
   }
-  int code = exit_ok;
-  for (const auto& [name, file] : figures) {
-    if (wanted != "all" && wanted != name) continue;
-    Arguments one = arguments;
-    if (wanted == "all" && one.common.out) one.common.out = (fs::path(*one.common.out) / name).string();
-    const int result =
-        run_plan_command(one, plan_of(std::string(file->text), std::string(file->name), fs::current_path(), one.run));
-    if (code == exit_ok) code = result;
-    if (result == exit_interrupted) return result;
+  const auto read = [&](const EmbeddedFile& file) {
+    return plan_of(std::string(file.text), std::string(file.name), fs::current_path(), arguments.run);
+  };
+  if (wanted != "all") {
+    const auto chosen =
+        std::find_if(figures.begin(), figures.end(), [&](const auto& figure) { return figure.first == wanted; });
+    return run_plan_command(arguments, read(*chosen->second));
   }
+  // All: every recipe is read before the first runs; one that fails does not keep the others from running.
+  std::vector<std::pair<std::string, Plan>> plans;
+  for (const auto& [name, file] : figures) plans.emplace_back(name, read(*file));
+  int code = exit_ok;
+  Json answers = Json::array();
+  std::string table;
+  for (const auto& [name, plan] : plans) {
+    Arguments one = arguments;
+    if (one.common.out) one.common.out = (fs::path(*one.common.out) / name).string();
+    if (!arguments.common.json && !arguments.run.dry_run) print(fmt::format("== {}\n", name));
+    const auto start = std::chrono::steady_clock::now();
+    Json answer;
+    int result = exit_ok;
+    try {
+      result = run_plan_command(one, plan, &answer);
+    } catch (const Error& error) {
+      fmt::print(stderr, "error: {}: {}\n", name, error.what());
+      result = error.code();
+    }
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    answers.push_back(Json{{"figure", name}, {"exit_code", result}, {"wall_seconds", seconds}, {"result", answer}});
+    table += fmt::format("{:<24} {:<14} {:>12}  {}\n", name,
+                         result == exit_ok             ? "ok"
+                         : result == exit_check_failed ? "check failed"
+                                                       : fmt::format("exit code {}", result),
+                         duration_text(seconds), (out_of(one, plan.name) / "report.html").string());
+    if (code == exit_ok) code = result;
+    if (result == exit_interrupted) break;
+  }
+  if (arguments.common.json)
+    print(dump(Json{{"figures", std::move(answers)}}));
+  else if (!arguments.run.dry_run)
+    print(fmt::format("== all figures\n{}", table));
   return code;
 }
 
@@ -401,8 +446,14 @@ int command_schema(const Arguments& arguments) {
 int command_validate(const Arguments& arguments) {
   const fs::path file = arguments.recipe;
   try {
-    const Plan plan = read_plan(file, settings_of(arguments.run));
+    const Plan plan = read_plan(file, settings_of(arguments.run), arguments.run.preset);
     if (plan.sweep) sweep_points(plan);
+    if (!arguments.run.preset) {  // a preset that spoils the recipe is found now as well
+      for (const std::string& preset : preset_names(plan.document)) {
+        const Plan with = read_plan(file, settings_of(arguments.run), preset);
+        if (with.sweep) sweep_points(with);
+      }
+    }
     if (arguments.common.json)
       print(dump(Json{{"valid", true}, {"name", plan.name}, {"stages", plan.stages.size()}}));
     else if (!arguments.common.quiet)
@@ -552,7 +603,8 @@ int command_rerun(const Arguments& arguments) {
   Console console(level_of(arguments.common));
   install_interrupt_handler();
   if (plan.sweep) {
-    const int code = run_sweep_command(plan, options, {}, console);
+    SweepArguments whole;
+    const int code = run_sweep_command(plan, options, whole, console);
     if (code != exit_ok && code != exit_check_failed) return code;
     const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
     print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
@@ -637,11 +689,12 @@ int command_clean(const Arguments& arguments) {
 }
 
 int command_submit_slurm(const Arguments& arguments) {
-  const Plan plan = read_plan(arguments.recipe, settings_of(arguments.run));
+  const Plan plan = read_plan(arguments.recipe, settings_of(arguments.run), arguments.run.preset);
   Console console(level_of(arguments.common));
   SlurmOptions options;
   options.shards = arguments.slurm.shards;
   options.sbatch = arguments.slurm.options;
+  options.preset = arguments.run.preset;
   options.settings = arguments.run.settings;
   options.dry_run = arguments.run.dry_run;
   options.json = arguments.common.json;

@@ -13,7 +13,7 @@ struct CommonArguments {
 };
 struct RunArguments {
   std::vector<std::string> settings;
-  std::optional<std::string> only, from, until, shard, data;
+  std::optional<std::string> preset, only, from, until, shard, data;
   bool force = false, dry_run = false;
   int jobs = 0;
 };

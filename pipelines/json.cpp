@@ -556,7 +556,9 @@ const Json* find_pointer(const Json& root, std::string_view pointer) {
   return node;
 }
 
-void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value) {
+void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value, ValueFrom from) {
+  const bool from_command_line = from == ValueFrom::command_line;
+  const Position at = from_command_line ? Position{} : value.at;
   JsonNode* node = &root;
   std::string walked, parent;
   for (const std::string& token : split_pointer(pointer)) {
@@ -579,22 +581,24 @@ void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value) {
         // A shorthand ("bath": "none") or nothing yet becomes an object that can hold the key.
         JsonNode fresh;
         fresh.kind = JsonNode::Kind::object;
-        fresh.from_command_line = true;
+        fresh.at = at;
+        fresh.from_command_line = from_command_line;
         *node = fresh;
       }
       JsonNode* found = node->find(token);
       if (found == nullptr) {
-        node->members.push_back({token, {}, {}});
+        node->members.push_back({token, at, {}});
         found = &node->members.back().value;
-        found->from_command_line = true;
+        found->at = at;
+        found->from_command_line = from_command_line;
       }
       node = found;
     }
     walked = pointer_join(walked, token);
     parent = token;
   }
-  value.at = {};
-  value.from_command_line = true;
+  value.at = at;
+  value.from_command_line = from_command_line;
   *node = std::move(value);
 }
 

@@ -70,8 +70,10 @@ std::vector<std::string> split_pointer(std::string_view pointer);
 const JsonNode* find_pointer(const JsonNode& root, std::string_view pointer);
 const Json* find_pointer(const Json& root, std::string_view pointer);
 // Puts a value there, making objects on the way; an array index must exist or be one past the end. Within "stages" an
-// element may be named by its id instead of its index ("/stages/bed/floor/amplitude"). Throws UsageError.
-void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value);
+// element may be named by its id instead of its index ("/stages/bed/floor/amplitude"). Mistakes in the value are then
+// shown as those of the command line, or where it stands in the file. Throws UsageError.
+enum class ValueFrom { command_line, file };
+void set_pointer(JsonNode& root, std::string_view pointer, JsonNode value, ValueFrom from = ValueFrom::command_line);
 
 // Text of a document: two-space indent, short arrays and objects on one line, a final newline. Doubles: the fewest
 // digits that give the same double back (at most 17). NaN and infinities become null.

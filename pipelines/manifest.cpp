@@ -55,6 +55,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
     recipe["sha256"] = sha256_of_file(plan.file);
     recipe["directory"] = fs::absolute(plan.directory, error).string();
   }
+  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
   recipe["settings"] = Json::object();
   for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
   out["recipe"] = std::move(recipe);

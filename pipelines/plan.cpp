@@ -205,8 +205,9 @@ void describe_sweep(Fields& fields, SweepOptions& sweep) {
 
 // The top of a recipe, without its stages.
 struct Top {
-  std::string schema, name, description;
+  std::string schema, preset, name, description;
   int format = recipe_format;
+  Json presets;
   ReportOptions report;
   std::optional<SweepOptions> sweep;
   Json raw_sweep;
@@ -221,6 +222,43 @@ void describe_top(Fields& fields, Top& top) {
   fields.object<ReportOptions>("report", top.report, describe_report,
                                {.help = "what report.html says beside the results"});
   fields.object<SweepOptions>("sweep", top.sweep, describe_sweep, {.help = "run the pipeline at many points"});
+  fields.any("presets", top.presets,
+             {.help = "named sets of changes for --preset NAME: {\"quick\": {\"/stages/bed/measure\": \"2 s\"}}"});
+  fields.text("$preset", top.preset, {.help = "in resolved.json: the preset whose values these are"});
+}
+
+// Whether the presets are what they should be; whether their values are good is known when they are applied.
+void check_presets(const JsonNode& root, const Fields::Source& source) {
+  const JsonNode* presets = root.find("presets");
+  if (presets == nullptr) return;
+  const auto problem = [&](const JsonNode& node, std::string pointer, std::string what, std::string suggestion) {
+    source.problems->push_back({node.from_command_line ? "--set" : source.file,
+                                node.from_command_line ? Position{} : node.at, std::move(pointer), std::move(what),
+                                std::move(suggestion)});
+  };
+  const char* example = "Write \"presets\": {\"quick\": {\"/stages/bed/measure\": \"2 s\"}}";
+  if (!presets->is_object()) {
+    problem(*presets, "/presets", fmt::format("expected an object: name → changes; got {}", presets->described()),
+            example);
+    return;
+  }
+  for (const JsonMember& preset : presets->members) {
+    if (preset.key == "$comment") continue;
+    const std::string where = pointer_join("/presets", preset.key);
+    if (!preset.value.is_object()) {
+      problem(preset.value, where,
+              fmt::format("expected an object: JSON pointer → value; got {}", preset.value.described()), example);
+      continue;
+    }
+    for (const JsonMember& change : preset.value.members) {
+      if (change.key == "$comment") continue;
+      if (change.key.empty() || change.key.front() != '/')
+        problem(change.value, pointer_join(where, change.key), fmt::format("\"{}\" is not a JSON pointer", change.key),
+                "Write for example \"/stages/bed/measure\"");
+      else if (change.key.starts_with("/presets") || change.key.starts_with("/$preset"))
+        problem(change.value, pointer_join(where, change.key), "a preset cannot change the presets", "Remove it");
+    }
+  }
 }
 
 struct Draft {  // a stage before its place in the order is known
@@ -270,17 +308,59 @@ Setting parse_setting(const std::string& text) {
   return setting;
 }
 
+std::vector<std::string> preset_names(const JsonNode& document) {
+  std::vector<std::string> names;
+  if (const JsonNode* presets = document.find("presets"); presets != nullptr && presets->is_object()) {
+    for (const JsonMember& preset : presets->members) {
+      if (preset.key != "$comment") names.push_back(preset.key);
+    }
+  }
+  return names;
+}
+
+void apply_preset(JsonNode& document, const std::string& file, const std::string& name) {
+  const std::vector<std::string> names = preset_names(document);
+  if (names.empty()) throw UsageError(fmt::format("--preset {}: {} has no presets", name, file));
+  const JsonNode presets = *document.find("presets");
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    const std::string nearest = nearest_name(name, names);
+    throw UsageError(fmt::format("--preset {}: {}:{}:{}: /presets: there is none of this name; there {} {}{}", name,
+                                 file, presets.at.line, presets.at.column, names.size() == 1 ? "is" : "are",
+                                 fmt::join(names, ", "),
+                                 nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
+  }
+  std::vector<Problem> problems;
+  check_presets(document, {.file = file, .directory = {}, .problems = &problems});
+  if (!problems.empty()) throw ConfigError(std::move(problems));
+  for (const JsonMember& change : presets.find(name)->members) {
+    if (change.key == "$comment") continue;
+    try {
+      set_pointer(document, change.key, change.value, ValueFrom::file);
+    } catch (const UsageError& error) {
+      problems.push_back({file, change.at, pointer_join(pointer_join("/presets", name), change.key), error.what(),
+                          "Name a stage by its id or its number: /stages/bed/measure"});
+    }
+  }
+  if (!problems.empty()) throw ConfigError(std::move(problems));
+  JsonNode text;
+  text.kind = JsonNode::Kind::string;
+  text.text = name;
+  set_pointer(document, "/$preset", std::move(text));
+}
+
 Plan read_plan_text(const std::string& text, const std::string& file, const std::filesystem::path& directory,
-                    const std::vector<Setting>& settings) {
+                    const std::vector<Setting>& settings, const std::optional<std::string>& preset) {
   std::vector<Problem> problems;
   auto document = parse_json(text, file, problems);
   if (!problems.empty()) throw ConfigError(std::move(problems));
+  if (preset) apply_preset(*document, file, *preset);
   for (const Setting& setting : settings) set_pointer(*document, setting.pointer, setting.value);
   return make_plan(std::move(*document), file, directory);
 }
 
-Plan read_plan(const std::filesystem::path& file, const std::vector<Setting>& settings) {
-  return read_plan_text(read_file(file), file.string(), file.parent_path(), settings);
+Plan read_plan(const std::filesystem::path& file, const std::vector<Setting>& settings,
+               const std::optional<std::string>& preset) {
+  return read_plan_text(read_file(file), file.string(), file.parent_path(), settings, preset);
 }
 
 Plan make_plan(JsonNode document, const std::string& file, const std::filesystem::path& directory) {
@@ -316,8 +396,10 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     Json ignored;
     fields.any("stages", ignored);
     fields.finish();
+    check_presets(root, source);
   }
   plan.name = top.name, plan.description = top.description, plan.report = top.report, plan.sweep = top.sweep;
+  plan.preset = top.preset;
   if (!top.name.empty() && !good_id(top.name)) {
     problem(*root.find("name"), "/name", fmt::format("\"{}\" cannot be the name of a folder", top.name),
             "Use letters, digits, '-', '_' and '.'");
@@ -507,6 +589,7 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
   // --- resolved.json: the recipe with nothing left out
   plan.resolved["name"] = plan.name;
   plan.resolved["format"] = recipe_format;
+  if (!plan.preset.empty()) plan.resolved["$preset"] = plan.preset;
   if (!plan.description.empty()) plan.resolved["description"] = plan.description;
   plan.resolved["stages"] = Json::array();
   for (const PlannedStage& stage : plan.stages) {
@@ -560,6 +643,8 @@ Json recipe_schema() {
   stages["items"]["required"] = Json::array({"stage"});
   stages["items"]["allOf"] = std::move(choices);
   schema["properties"]["stages"] = std::move(stages);
+  schema["properties"]["presets"]["type"] = "object";
+  schema["properties"]["presets"]["additionalProperties"] = Json{{"type", Json::array({"object", "string"})}};
   schema["required"].push_back("stages");
   fields.finish();
   return schema;

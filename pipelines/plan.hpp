@@ -70,8 +70,9 @@ struct Plan {
   std::string name;
   std::string description;
   std::string file;                  // of the recipe, as the user named it
+  std::string preset;                // that it was read with; "" for none
   std::filesystem::path directory;   // its folder
-  JsonNode document;                 // after --set
+  JsonNode document;                 // after --preset and --set
   std::vector<PlannedStage> stages;  // each after those it reads from
   ReportOptions report;
   std::optional<SweepOptions> sweep;
@@ -88,11 +89,18 @@ struct Setting {
 };
 Setting parse_setting(const std::string& text);  // throws UsageError
 
+// Presets: named sets of changes that a recipe carries, "presets": {"quick": {"/stages/bed/measure": "2 s"}}. They are
+// made before those of --set. The name is kept in the document as "$preset", so that resolved.json and manifest.json
+// tell it. Throws UsageError naming those there are, ConfigError when a change cannot be made.
+void apply_preset(JsonNode& document, const std::string& file, const std::string& preset);
+std::vector<std::string> preset_names(const JsonNode& document);
+
 // Reads a recipe. Throws ConfigError with every mistake, InputError when the file cannot be read.
-Plan read_plan(const std::filesystem::path& file, const std::vector<Setting>& settings = {});
+Plan read_plan(const std::filesystem::path& file, const std::vector<Setting>& settings = {},
+               const std::optional<std::string>& preset = {});
 // From text already here (a built-in recipe): `file` names it in messages.
 Plan read_plan_text(const std::string& text, const std::string& file, const std::filesystem::path& directory,
-                    const std::vector<Setting>& settings = {});
+                    const std::vector<Setting>& settings = {}, const std::optional<std::string>& preset = {});
 // From a document already parsed.
 Plan make_plan(JsonNode document, const std::string& file, const std::filesystem::path& directory);
 

@@ -24,6 +24,13 @@ void add_common(CLI::App& command, CommonArguments& common) {
   command.add_flag("--verbose,-v", common.verbose, "what the stages say");
 }
 
+void add_preset(CLI::App& command, RunArguments& run) {
+  command
+      .add_option("--preset", run.preset,
+                  "changes that the recipe carries under this name (\"quick\", say); before --set")
+      ->type_name("NAME");
+}
+
 void add_run(CLI::App& command, RunArguments& run) {
   command.add_option("--set", run.settings, "change the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
       ->type_name("POINTER=VALUE");
@@ -68,11 +75,12 @@ int run_program(int argc, char** argv) {
   };
 
   CLI::App* reproduce = command(&app, "reproduce", "run a shipped recipe: a published figure, end to end",
-                                "  shakebed reproduce\n  shakebed reproduce clement-rajchenbach --data "
-                                "my-digitised-points.csv\n  shakebed reproduce all",
+                                "  shakebed reproduce\n  shakebed reproduce --preset quick\n  shakebed reproduce "
+                                "clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce all",
                                 command_reproduce);
   reproduce->add_option("figure", arguments.recipe,
                         "clement-rajchenbach (the default), quinn-hong-fig1, -fig2, -fig3, all");
+  add_preset(*reproduce, arguments.run);
   add_run(*reproduce, arguments.run);
 
   CLI::App* run = command(&app, "run", "run a pipeline",
@@ -81,6 +89,7 @@ int run_program(int argc, char** argv) {
                           "sweep.json --jobs 8 --shard 2/4",
                           command_run);
   run->add_option("recipe", arguments.recipe, "the recipe")->required()->type_name("FILE.json");
+  add_preset(*run, arguments.run);
   add_run(*run, arguments.run);
 
   CLI::App* images =
@@ -172,10 +181,12 @@ int run_program(int argc, char** argv) {
   CLI::App* validate = command(&app, "validate", "check a recipe, all mistakes at once", "  shakebed validate bed.json",
                                command_validate);
   validate->add_option("recipe", arguments.recipe, "the recipe")->required()->type_name("FILE.json");
+  add_preset(*validate, arguments.run);
   validate->add_option("--set", arguments.run.settings, "change the recipe first")->type_name("POINTER=VALUE");
   CLI::App* explain = command(&app, "explain", "what a run would do, a sentence a stage",
                               "  shakebed explain bed.json --out o", command_explain);
   explain->add_option("recipe", arguments.recipe, "the recipe")->required()->type_name("FILE.json");
+  add_preset(*explain, arguments.run);
   add_run(*explain, arguments.run);
   CLI::App* graph = command(
       &app, "graph", "the stages and their arrows",
@@ -220,6 +231,7 @@ int run_program(int argc, char** argv) {
   slurm->add_option("--shards", arguments.slurm.shards, "tasks of the array")->check(CLI::PositiveNumber);
   slurm->add_option("--sbatch", arguments.slurm.options, "more options for sbatch, one each: --sbatch=--time=1:00:00")
       ->type_name("OPTION");
+  add_preset(*slurm, arguments.run);
   slurm->add_option("--set", arguments.run.settings, "change the recipe")->type_name("POINTER=VALUE");
   slurm->add_flag("--dry-run", arguments.run.dry_run, "write the scripts, submit nothing");
 

@@ -29,9 +29,10 @@ Plan plan_at(const Plan& plan, const SweepPoint& point);
 struct SweepArguments {
   std::optional<std::string> shard;  // "2/8"
   bool dry_run = false;
-  bool json = false;
+  bool json = false;  // no text on stdout
+  Json result{};      // set: what --json prints
 };
-int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepArguments& arguments, Console& console);
+int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, Console& console);
 
 // {"points", "done", "failed"} of a folder with a sweep, null of any other.
 Json sweep_status(const std::filesystem::path& out);
@@ -39,7 +40,8 @@ Json sweep_status(const std::filesystem::path& out);
 struct SlurmOptions {
   int shards = 1;
   std::vector<std::string> sbatch;    // more options
-  std::vector<std::string> settings;  // --set of the submission
+  std::optional<std::string> preset;  // --preset and --set of the submission
+  std::vector<std::string> settings;
   bool dry_run = false, json = false;
   std::filesystem::path out;
 };

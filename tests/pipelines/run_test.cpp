@@ -150,6 +150,62 @@ TEST_F(Pipeline, ResolvedRecipeGivesTheSameResults) {
   EXPECT_EQ(read_text(folder_ / "o/resolved.json"), read_text(folder_ / "again/resolved.json"));
 }
 
+// --- presets
+
+class Presets : public Pipeline {
+ protected:
+  void presets(const std::string& text) {
+    std::string recipe = small_recipe();
+    recipe.insert(recipe.rfind('}'), ", \"presets\": " + text);
+    write_text(folder_ / "r.json", recipe);
+  }
+};
+
+TEST_F(Presets, ChangeTheRecipeBeforeSetAndAreRecorded) {
+  presets(R"({ "long": { "$comment": "-", "/stages/bed/seed": 11, "/stages/0/measure": "1 s" }, "other": {} })");
+  ASSERT_EQ(run({"run", "r.json", "--out", "o", "--preset", "long", "--set", "/stages/bed/seed=12"}).exit_code, 0);
+  const Json resolved = read_json(folder_ / "o/resolved.json");
+  EXPECT_EQ(resolved["$preset"], "long");
+  EXPECT_EQ(resolved["stages"][0]["seed"], 12) << "--set has the last word";
+  EXPECT_EQ(resolved["stages"][0]["measure"], "1 s");
+  EXPECT_EQ(read_json(folder_ / "o/manifest.json")["recipe"]["preset"], "long");
+  // What was written can be run again, and is the same work.
+  EXPECT_THAT(run({"explain", "o/resolved.json", "--out", "o"}).out, HasSubstr("bed: up to date"));
+  EXPECT_EQ(run({"rerun", "o", "--out", "again", "--quiet"}).exit_code, 0);
+  // Without it the recipe is as it was.
+  EXPECT_THAT(run({"explain", "r.json", "--out", "o"}).out, HasSubstr("seed changed 12 → 7"));
+}
+
+TEST_F(Presets, AMistypedNameIsToldWhichThereAre) {
+  presets(R"({ "quick": {}, "full": {} })");
+  const ProgramResult mistyped = run({"run", "r.json", "--out", "o", "--preset", "qiuck"});
+  EXPECT_EQ(mistyped.exit_code, 2);
+  EXPECT_THAT(mistyped.err, HasSubstr("r.json:"));
+  EXPECT_THAT(mistyped.err, HasSubstr("there are quick, full; did you mean \"quick\"?"));
+  EXPECT_FALSE(fs::exists(folder_ / "o"));
+  write_text(folder_ / "none.json", small_recipe());
+  EXPECT_THAT(run({"run", "none.json", "--preset", "quick"}).err, HasSubstr("none.json has no presets"));
+  EXPECT_EQ(run({"reproduce", "all", "--preset", "no-such", "--out", "o"}).exit_code, 2);
+}
+
+TEST_F(Presets, AMistakeInOneIsShownAtItsPlaceWithoutRunningIt) {
+  presets("{ \"quick\": {\n\"/stages/bed/disks/diameter\": \"3 Hz\" } }");
+  const ProgramResult wrong = run({"validate", "r.json"});
+  EXPECT_EQ(wrong.exit_code, 3);
+  const std::string recipe = read_text(folder_ / "r.json");
+  const auto line = 1 + std::count(recipe.begin(), recipe.begin() + static_cast<long>(recipe.find("3 Hz")), '\n');
+  EXPECT_THAT(wrong.err, HasSubstr("r.json:" + std::to_string(line) + ":"));
+  EXPECT_THAT(wrong.err, HasSubstr("/stages/0/disks/diameter"));
+  presets(R"({ "quick": { "/stages/bde/measure": "1 s" } })");
+  EXPECT_EQ(run({"validate", "r.json"}).exit_code, 3);
+  EXPECT_THAT(run({"validate", "r.json"}).err, HasSubstr("/presets/quick/~1stages~1bde~1measure"));
+  for (const char* bad :
+       {R"([])", R"({ "quick": 3 })", R"({ "quick": { "measure": 3 } })", R"({ "quick": { "/presets/full/a": 3 } })"}) {
+    presets(bad);
+    EXPECT_EQ(run({"validate", "r.json"}).exit_code, 3) << bad;
+  }
+}
+
 TEST_F(Pipeline, AFailedCheckEndsWith6AndAReport) {
   const ProgramResult result = run_recipe({"--set", "/stages/check/expect/~1bed~1column_number/value=5"});
   EXPECT_EQ(result.exit_code, 6);
