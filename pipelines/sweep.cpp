@@ -18,6 +18,7 @@
 #include "pipelines/files.hpp"
 #include "pipelines/manifest.hpp"
 #include "pipelines/process.hpp"
+#include "pipelines/replica_seed.hpp"
 #include "pipelines/report.hpp"
 #include "pipelines/stages/figure.hpp"
 
@@ -27,13 +28,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// SplitMix64: the points of a random sweep and the seeds of replicas are the same everywhere.
-std::uint64_t mixed(std::uint64_t z) {
-  z += 0x9e3779b97f4a7c15ULL;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31);
-}
+// The points of a random sweep are the same everywhere.
 double uniform(std::uint64_t seed, std::uint64_t a, std::uint64_t b) {
   return static_cast<double>(mixed(mixed(mixed(seed) ^ a) ^ b) >> 11) * 0x1.0p-53;
 }
@@ -338,8 +333,7 @@ Plan plan_at(const Plan& plan, const SweepPoint& point) {
       if (row == nullptr || !row->uses_seed || point.replica == 0) continue;
       const JsonNode* seed = stage.find("seed");
       const auto own = seed != nullptr && seed->is_number() ? static_cast<std::uint64_t>(seed->number) : 1u;
-      // Below 2^53, so that any JSON reader sees the same number.
-      set_pointer(stage, "/seed", to_node(Json(mixed(mixed(own) ^ point.replica) >> 11)));
+      set_pointer(stage, "/seed", to_node(Json(replica_seed(own, point.replica))));
     }
   }
   return make_plan(std::move(document), plan.file, plan.directory);
@@ -433,7 +427,7 @@ std::vector<fs::path> draw_sweep(const Plan& plan, const std::vector<SweepPoint>
 
 }  // namespace
 
-int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepArguments& arguments, Console& console) {
+int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, Console& console) {
   const Shard shard = parse_shard(arguments.shard);
   const std::vector<SweepPoint> all = sweep_points(plan);
   if (all.empty()) throw UsageError("the sweep has no points");
@@ -467,8 +461,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
       Json rows = Json::array();
       for (std::size_t i = 0; i < points.size(); ++i)
         rows.push_back(Json{{"point", points[i]->name}, {"runs", done[i] == 0}, {"values", points[i]->values}});
-      const std::string text = dump(rows);
-      std::fwrite(text.data(), 1, text.size(), stdout);
+      arguments.result = std::move(rows);
     } else {
       for (std::size_t i = 0; i < points.size(); ++i) {
         std::string values;
@@ -634,6 +627,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
   manifest["finished"] = utc_now();
   manifest["wall_seconds"] = seconds;
   manifest["exit_code"] = static_cast<int>(code);
+  if (!plan.preset.empty()) manifest["preset"] = plan.preset;
   manifest["document"] = plan.document.to_json();
   manifest["stages"] = Json::array();
   manifest["outputs"] = Json::array({Json{{"file", "sweep.csv"}, {"bytes", csv.size()}, {"sha256", sha256(csv)}}});
@@ -641,8 +635,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, const SweepAr
   if (arguments.json) {
     summary["exit_code"] = static_cast<int>(code);
     summary["table"] = (options.out / "sweep.csv").string();
-    const std::string text = dump(summary);
-    std::fwrite(text.data(), 1, text.size(), stdout);
+    arguments.result = std::move(summary);
   } else {
     fmt::print("{} of {} points done{} in {}\ntable: {}\n", there, all.size(),
                failed > 0 ? fmt::format(", {} failed: run again to retry them alone", failed.load()) : "",
@@ -696,6 +689,7 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   std::string command =
       fmt::format("{} run {} --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\"", shell_quoted(program),
                   shell_quoted(fs::absolute(plan.file).string()), shell_quoted(fs::absolute(options.out).string()));
+  if (options.preset) command += " --preset " + shell_quoted(*options.preset);
   for (const std::string& setting : options.settings) command += " --set " + shell_quoted(setting);
   const std::string head = "#!/bin/sh\n#SBATCH --job-name=shakebed-" + plan.name + "\n";
   write_file_atomically(
