@@ -3,23 +3,38 @@
 
 step() { printf '\n== %s\n' "$*" >&2; }
 
-# Installs the missing packages of packages.txt with apt when that is possible; otherwise says exactly which and stops.
+# The packages of packages.txt: those to build and run, or ("tests") those that only tests need.
+packages_for() {
+  awk -v part="$1" '/^# Only for tests/ { tests = 1 } !/^[[:space:]]*(#|$)/ && (part == "tests") == tests' packages.txt
+}
+
+# Those of the packages given that are not installed.
+missing_packages() {
+  for package in "$@"; do
+    dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || printf ' %s' "$package"
+  done
+}
+
+# Installs with apt, updating its lists first where that is needed.
+apt_install() {
+  export DEBIAN_FRONTEND=noninteractive
+  apt-get install -y --no-install-recommends "$@" >&2 && return 0
+  apt-get update >&2
+  apt-get install -y --no-install-recommends "$@" >&2
+}
+
+# Installs what is missing to build and run, when that is possible; otherwise says exactly what and stops.
 install_missing_packages() {
-  wanted=$(grep -vE '^[[:space:]]*(#|$)' packages.txt)
+  wanted=$(packages_for build)
   missing=
   if command -v dpkg-query >/dev/null 2>&1; then
-    for package in $wanted; do
-      dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing="$missing $package"
-    done
+    # shellcheck disable=SC2086
+    missing=$(missing_packages $wanted)
     [ -z "$missing" ] && return 0
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
       step "installing$missing"
-      export DEBIAN_FRONTEND=noninteractive
       # shellcheck disable=SC2086
-      apt-get install -y --no-install-recommends $missing >&2 && return 0
-      apt-get update >&2
-      # shellcheck disable=SC2086
-      apt-get install -y --no-install-recommends $missing >&2 && return 0
+      apt_install $missing && return 0
       echo "apt could not install them; see above" >&2
       return 1
     fi
@@ -37,6 +52,20 @@ install_missing_packages() {
   echo "What is needed, by its Debian names:" >&2
   for package in $wanted; do echo "  $package" >&2; done
   return 1
+}
+
+# Installs what only tests need. Where it cannot be had, says so and goes on: those tests are skipped, and say it.
+install_test_packages() {
+  command -v dpkg-query >/dev/null 2>&1 || return 0
+  # shellcheck disable=SC2046
+  missing=$(missing_packages $(packages_for tests))
+  [ -z "$missing" ] && return 0
+  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
+    step "installing for the tests:$missing"
+    # shellcheck disable=SC2086
+    apt_install $missing && return 0
+  fi
+  echo "Some tests will be skipped: these Debian packages are missing:$missing" >&2
 }
 
 # Configures and builds a target ("all" by default) with the preset release.

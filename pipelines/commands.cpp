@@ -126,11 +126,12 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
       print(dump(json));
   };
   if (plan.sweep) {
-    SweepArguments sweep{arguments.run.shard, arguments.run.dry_run, arguments.common.json, {}};
+    SweepArguments sweep{arguments.run.shard, arguments.run.gather, arguments.run.dry_run, arguments.common.json, {}};
     const int code = run_sweep_command(plan, options, sweep, console);
     if (arguments.common.json) answer(std::move(sweep.result));
     return code;
   }
+  if (arguments.run.gather) throw UsageError("--gather: this recipe has no \"sweep\", so there is nothing to gather");
   if (arguments.run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");
   if (arguments.run.dry_run) {
     const auto stages = explain(plan, options);

@@ -14,7 +14,7 @@ struct CommonArguments {
 struct RunArguments {
   std::vector<std::string> settings;
   std::optional<std::string> preset, only, from, until, shard, data;
-  bool force = false, dry_run = false;
+  bool force = false, dry_run = false, gather = false;
   int jobs = 0;
 };
 struct ImageArguments {

@@ -44,6 +44,7 @@ void add_run(CLI::App& command, RunArguments& run) {
       ->check(CLI::PositiveNumber);
   command.add_option("--shard", run.shard, "of a sweep: only the points k, k + n, k + 2n, ... (k from 1 to n)")
       ->type_name("K/N");
+  command.add_flag("--gather", run.gather, "of a sweep: run nothing, gather what its shards have left");
   command
       .add_option("--data", run.data,
                   "points of your own (CSV with height, number_density): drawn into the figures and compared")

@@ -241,6 +241,13 @@ std::optional<Json> read_point(const fs::path& directory) {
   return std::nullopt;
 }
 
+// How a point ended when it was last run with this key; nothing when it was not.
+std::optional<int> code_of_point(const fs::path& directory, const std::string& key) {
+  const auto record = read_point(directory);
+  if (!record || (*record)["key"] != key || !(*record)["code"].is_number_integer()) return std::nullopt;
+  return (*record)["code"].get<int>();
+}
+
 }  // namespace
 
 std::vector<SweepPoint> sweep_points(const Plan& plan) {
@@ -429,6 +436,8 @@ std::vector<fs::path> draw_sweep(const Plan& plan, const std::vector<SweepPoint>
 
 int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, Console& console) {
   const Shard shard = parse_shard(arguments.shard);
+  if (arguments.gather && arguments.shard)
+    throw UsageError("--gather: looks at the whole sweep, so there is no --shard");
   const std::vector<SweepPoint> all = sweep_points(plan);
   if (all.empty()) throw UsageError("the sweep has no points");
   const std::vector<std::string> pointers = collected(plan);
@@ -449,11 +458,8 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
     if (mine < points.size() && points[mine] == &all[i]) keys[mine++] = std::move(point_keys);
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto record = read_point(root / points[i]->name);
-    if (record && (*record)["key"] == keys[i].point) {
-      earlier[i] = (*record)["code"].get<int>();
-      done[i] = !options.force && (*earlier[i] == exit_ok || *earlier[i] == exit_check_failed);
-    }
+    earlier[i] = code_of_point(root / points[i]->name, keys[i].point);
+    done[i] = !options.force && earlier[i] && (*earlier[i] == exit_ok || *earlier[i] == exit_check_failed);
     kept += done[i];
   }
   if (arguments.dry_run) {
@@ -485,16 +491,20 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   const auto start = std::chrono::steady_clock::now();
   const int workers =
       std::max(1, options.jobs > 0 ? options.jobs : static_cast<int>(std::thread::hardware_concurrency()));
-  console.message(fmt::format("{} points, {} up to date, {} to run on {} threads", points.size(), kept,
-                              points.size() - kept, workers));
+  if (arguments.gather) {
+    console.message(fmt::format("{} points, {} up to date: gathered, none is run", points.size(), kept));
+  } else {
+    console.message(fmt::format("{} points, {} up to date, {} to run on {} threads", points.size(), kept,
+                                points.size() - kept, workers));
+  }
 
   std::atomic<std::size_t> next{0}, finished{0}, failed{0}, checks{0}, busy{0};
   std::mutex failures_mutex;
   std::vector<std::string> failures;
   std::string stop;  // what ends the whole sweep: a full disk, say
-  const std::size_t to_run = points.size() - kept;
+  const std::size_t to_run = arguments.gather ? 0 : points.size() - kept;
   const auto work = [&] {
-    while (!interrupt_requested()) {
+    while (to_run > 0 && !interrupt_requested()) {
       const std::size_t i = next++;
       if (i >= points.size()) return;
       if (done[i]) continue;
@@ -606,10 +616,11 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   if (failed > failures.size()) console.error(fmt::format("and {} more points", failed - failures.size()));
   if (busy > 0) console.warning(fmt::format("{} points are being run by somebody else", busy.load()));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const ExitCode code = interrupted  ? exit_interrupted
-                        : failed > 0 ? exit_stage_failed
-                        : checks > 0 ? exit_check_failed
-                                     : exit_ok;
+  const ExitCode code = interrupted                              ? exit_interrupted
+                        : failed > 0                             ? exit_stage_failed
+                        : arguments.gather && there < all.size() ? exit_stage_failed
+                        : checks > 0                             ? exit_check_failed
+                                                                 : exit_ok;
   Json summary;
   summary["pipeline"] = plan.name;
   summary["points"] = all.size();
@@ -677,9 +688,47 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   if (!plan.sweep)
     throw UsageError("this recipe has no \"sweep\": there is only one point, and nothing to spread over a cluster");
   const std::vector<SweepPoint> points = sweep_points(plan);
-  const int shards = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size()));
-  std::error_code error;
+  if (points.empty()) throw UsageError("the sweep has no points");
+  const std::size_t shards = std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size());
   const fs::path folder = options.out / "slurm";
+  const fs::path submitted = folder / "submitted.json";
+  std::error_code error;
+
+  // What an earlier submission still has in the queue would be run twice.
+  if (fs::is_regular_file(submitted, error) && !options.dry_run) {
+    const Json before = read_json(submitted);
+    const std::string ids = before.value("job", std::string()) + "," + before.value("gather_job", std::string());
+    const ProcessResult queue =
+        run_process({"squeue", "--noheader", "--format=%i %T", "--jobs=" + ids}, fs::current_path());
+    if (queue.exit_code == 0 && queue.output.find_first_not_of(" \n") != std::string::npos) {
+      throw StageError(
+          fmt::format("jobs {} of this sweep are still in the queue; wait for them, or end them first: "
+                      "scancel {}",
+                      ids, before.value("job", std::string()) + " " + before.value("gather_job", std::string())));
+    }
+  }
+
+  // Only shards with something left to do become tasks.
+  std::vector<std::uint8_t> waiting(shards, 0);
+  std::size_t missing = 0;
+  for (const SweepPoint& point : points) {
+    const auto code = code_of_point(options.out / "points" / point.name, keys_of(plan_at(plan, point)).point);
+    if (code && (*code == exit_ok || *code == exit_check_failed)) continue;
+    waiting[point.index % shards] = 1;
+    ++missing;
+  }
+  std::string tasks;  // "1-3,7"
+  std::size_t task_count = 0;
+  for (std::size_t i = 0; i < shards; ++i) {
+    if (!waiting[i]) continue;
+    std::size_t last = i;
+    while (last + 1 < shards && waiting[last + 1]) ++last;
+    tasks +=
+        (tasks.empty() ? "" : ",") + (last == i ? fmt::format("{}", i + 1) : fmt::format("{}-{}", i + 1, last + 1));
+    task_count += last - i + 1;
+    i = last;
+  }
+
   try {
     fs::create_directories(folder);
   } catch (const fs::filesystem_error& problem) {
@@ -687,29 +736,32 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   }
   const std::string program = fs::read_symlink("/proc/self/exe", error).string();
   std::string command =
-      fmt::format("{} run {} --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\"", shell_quoted(program),
-                  shell_quoted(fs::absolute(plan.file).string()), shell_quoted(fs::absolute(options.out).string()));
+      fmt::format("{} run {} --out {}", shell_quoted(program), shell_quoted(fs::absolute(plan.file).string()),
+                  shell_quoted(fs::absolute(options.out).string()));
   if (options.preset) command += " --preset " + shell_quoted(*options.preset);
   for (const std::string& setting : options.settings) command += " --set " + shell_quoted(setting);
   const std::string head = "#!/bin/sh\n#SBATCH --job-name=shakebed-" + plan.name + "\n";
   write_file_atomically(
       folder / "array.sh",
       head + fmt::format("# One task is one shard. What is up to date is skipped, so submitting again runs only what "
-                         "is missing.\nexec {} --quiet --shard \"$SLURM_ARRAY_TASK_ID/{}\"\n",
+                         "is missing.\nexec {} --quiet --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\" "
+                         "--shard \"$SLURM_ARRAY_TASK_ID/{}\"\n",
                          command, shards));
   write_file_atomically(folder / "gather.sh",
-                        head + fmt::format("# Runs when all shards have ended, however they ended: points left out are "
-                                           "run here, then all are gathered.\nexec {}\n",
+                        head + fmt::format("# Runs when all shards have ended, however they ended: gathers the points "
+                                           "that are there, and fails when some are missing.\nexec {} --gather\n",
                                            command));
-  const std::string logs = (fs::absolute(folder) / "%x-%A-%a.log").string();
-  std::vector<std::string> array{"sbatch", "--parsable", fmt::format("--array=1-{}", shards), "--output=" + logs};
+  std::vector<std::string> array{"sbatch", "--parsable", "--array=" + tasks,
+                                 "--output=" + (fs::absolute(folder) / "%x-%A-%a.log").string()};
   std::vector<std::string> gather{"sbatch", "--parsable",
                                   "--output=" + (fs::absolute(folder) / "%x-%j-gather.log").string()};
   array.insert(array.end(), options.sbatch.begin(), options.sbatch.end());
   gather.insert(gather.end(), options.sbatch.begin(), options.sbatch.end());
   array.push_back((fs::absolute(folder) / "array.sh").string());
+  const std::string gather_script = (fs::absolute(folder) / "gather.sh").string();
   if (options.dry_run) {
-    fmt::print("{}\n{}\n", fmt::join(array, " "), fmt::join(gather, " "));
+    if (missing > 0) fmt::print("{}\n", fmt::join(array, " "));
+    fmt::print("{}{} {}\n", fmt::join(gather, " "), missing > 0 ? " --dependency=afterany:JOB" : "", gather_script);
     return exit_ok;
   }
   const auto submit = [&](const std::vector<std::string>& arguments) {
@@ -721,15 +773,23 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
     }
     return id;
   };
-  const std::string id = submit(array);
-  gather.push_back("--dependency=afterany:" + id);
-  gather.push_back((fs::absolute(folder) / "gather.sh").string());
-  const std::string gather_id = submit(gather);
-  console.message(fmt::format("{} points in {} tasks", points.size(), shards));
-  if (options.json)
-    fmt::print("{}", dump(Json{{"job", id}, {"gather_job", gather_id}, {"tasks", shards}, {"points", points.size()}}));
-  else
-    fmt::print("job {} (array of {}), then job {} gathers\nlogs: {}\n", id, shards, gather_id, folder.string());
+  Json record{{"job", ""}, {"gather_job", ""}, {"tasks", task_count}, {"points", points.size()}, {"to_run", missing}};
+  if (missing > 0) {
+    record["job"] = submit(array);
+    write_file_atomically(submitted, dump(record));
+    gather.push_back("--dependency=afterany:" + record["job"].get<std::string>());
+  }
+  gather.push_back(gather_script);
+  record["gather_job"] = submit(gather);
+  write_file_atomically(submitted, dump(record));
+  console.message(fmt::format("{} points, {} to run in {} tasks", points.size(), missing, task_count));
+  if (options.json) {
+    fmt::print("{}", dump(record));
+  } else {
+    if (missing > 0) fmt::print("job {} (array {}), then ", record["job"].get<std::string>(), tasks);
+    fmt::print("job {} gathers\nlogs: {}\nlook: shakebed status {}\n", record["gather_job"].get<std::string>(),
+               folder.string(), options.out.string());
+  }
   return exit_ok;
 }
 

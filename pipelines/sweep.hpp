@@ -28,6 +28,7 @@ Plan plan_at(const Plan& plan, const SweepPoint& point);
 
 struct SweepArguments {
   std::optional<std::string> shard;  // "2/8"
+  bool gather = false;               // run nothing, gather what is there
   bool dry_run = false;
   bool json = false;  // no text on stdout
   Json result{};      // set: what --json prints
@@ -45,6 +46,8 @@ struct SlurmOptions {
   bool dry_run = false, json = false;
   std::filesystem::path out;
 };
+// Submits a job array, one task a shard that has something left to do, and a job that gathers when all have ended.
+// Throws StageError when jobs of this sweep are still in the queue, or sbatch refuses.
 int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console);
 
 }  // namespace shakebed::pipelines
