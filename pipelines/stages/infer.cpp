@@ -10,6 +10,7 @@
 
 #include "fit/fit_profile.hpp"
 #include "pipelines/files.hpp"
+#include "pipelines/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "sim/observables.hpp"
 #include "sim/simulation.hpp"
@@ -27,18 +28,37 @@ struct Grid {
   std::vector<std::string> side_friction{"none", "as disks"};
 };
 
-struct Point {
-  double restitution = 0, friction = 0, side_friction = 0;
-  // What its bed gives.
+// What one simulated bed gives.
+struct Bed {
   fit::FitStatus status = fit::FitStatus::not_converged;
   sim::Measured temperature;  // of the fit [m g D]
   double solid_height = 0;    // of the fit [D]
   sim::Measured density;      // greatest of the profile
   sim::Measured temperature_x, temperature_z, temperature_z_local;
-  double rise = 0;
-  double distance = INFINITY;
+  sim::Measured rise;  // of the centre of mass [D]
   std::uint64_t collisions = 0;
 };
+
+// A pair of restitution and friction, and the mean of its beds. The errors are those of that mean: from the spread
+// between the beds, or the bed's own where there is only one.
+struct Point {
+  double restitution = 0, friction = 0, side_friction = 0;
+  fit::FitStatus status =
+      fit::FitStatus::not_converged;  // of the first bed whose fit did not succeed, else that of all
+  bool all_ok = false;
+  sim::Measured temperature, solid_height, density, temperature_x, temperature_z, temperature_z_local, rise;
+  double distance = INFINITY, distance_error = 0;
+  std::uint64_t collisions = 0;
+};
+
+// Of one-sided 2.5 %: Student's t for `freedom` degrees of freedom [Abramowitz and Stegun, 26.7.5].
+double student_t(int freedom) {
+  constexpr double z = 1.959963984540054;
+  static constexpr double table[] = {12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228};
+  if (freedom <= 10) return table[std::max(freedom, 1) - 1];
+  return z + (z * z * z + z) / (4 * freedom) +
+         (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96.0 * freedom * freedom);
+}
 
 class Infer : public Stage {
  public:
@@ -47,12 +67,15 @@ class Infer : public Stage {
 
  private:
   std::vector<Point> points() const;
-  void simulate(Point& point, std::uint64_t seed, const RunContext& context) const;
+  Bed simulate(const Point& point, std::uint64_t seed, const RunContext& context) const;
+  void average(Point& point, const Bed* beds) const;  // replicas_ of them
+  // Those that are no farther from the target than the nearest, as far as the errors allow to tell.
+  std::vector<const Point*> as_near(const std::vector<Point>& points, const Point& nearest) const;
   Json results(const std::vector<Point>& points) const;
 
   SceneOptions bed_;
   double settle_ = 0, measure_ = 0;
-  std::uint32_t phases_ = 16;
+  std::uint32_t phases_ = 16, replicas_ = 3;
   double kernel_width_ = 0.5;  // Gaussian [D]
   double plateau_density_ = 1.10;
   Target target_;
@@ -67,6 +90,10 @@ void Infer::describe(Fields& fields) {
                   {.help = "time over which each bed is measured", .required = true, .range = positive});
   fields.integer("phases", phases_,
                  {.help = "moments of each period that the profile averages over", .range = from_to(1, 4096)});
+  fields.integer(
+      "replicas", replicas_,
+      {.help = "beds at every point, each with a seed of its own; their mean counts, their spread is its error",
+       .range = from_to(1, 1000)});
   fields.number("kernel_width", kernel_width_,
                 {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
   fields.number(
@@ -121,7 +148,8 @@ std::vector<Point> Infer::points() const {
   return points;
 }
 
-void Infer::simulate(Point& point, std::uint64_t seed, const RunContext& context) const {
+Bed Infer::simulate(const Point& point, std::uint64_t seed, const RunContext& context) const {
+  Bed out;
   SceneOptions bed = bed_;
   bed.set_material(point.restitution, point.friction, point.side_friction);
   const sim::Scene scene = bed.scene(seed);
@@ -150,14 +178,14 @@ void Infer::simulate(Point& point, std::uint64_t seed, const RunContext& context
   const sim::Profile profile = observer.density(false);
   const auto greatest = static_cast<std::size_t>(
       std::max_element(profile.number_density.begin(), profile.number_density.end()) - profile.number_density.begin());
-  point.density = {profile.number_density[greatest], profile.std_error[greatest]};
-  point.temperature_x = observer.temperature_x();
-  point.temperature_z = observer.temperature_z();
-  point.temperature_z_local = observer.temperature_z_local();
-  point.rise = observer.centre_of_mass().value -
-               sim::ideal_centre_of_mass(scene.count(), scene.box.width,
-                                         std::holds_alternative<sim::HardSides>(scene.box.sides));
-  point.collisions = simulation->counters().collisions();
+  out.density = {profile.number_density[greatest], profile.std_error[greatest]};
+  out.temperature_x = observer.temperature_x();
+  out.temperature_z = observer.temperature_z();
+  out.temperature_z_local = observer.temperature_z_local();
+  out.rise = observer.centre_of_mass();
+  out.rise.value -= sim::ideal_centre_of_mass(scene.count(), scene.box.width,
+                                              std::holds_alternative<sim::HardSides>(scene.box.sides));
+  out.collisions = simulation->counters().collisions();
 
   fit::Profile measured{profile.height, profile.number_density, profile.std_error, {}, 0};
   fit::FitOptions options;
@@ -167,30 +195,119 @@ void Infer::simulate(Point& point, std::uint64_t seed, const RunContext& context
   options.interval = options.sweep = options.compare = false;
   options.curve_points = 0;
   const fit::FitResult result = fit::fit_profile(measured, options);
-  point.status = result.status;
-  point.temperature = {result.temperature.value, result.temperature.std_error};
-  point.solid_height = result.solid_height.value;
-  if (!result.ok()) return;
+  out.status = result.status;
+  out.temperature = {result.temperature.value, result.temperature.std_error};
+  out.solid_height = result.solid_height.value;
+  return out;
+}
+
+void Infer::average(Point& point, const Bed* beds) const {
+  const auto n = static_cast<double>(replicas_);
+  const auto mean = [&](const auto& value_of) {
+    double sum = 0, squares = 0;
+    for (std::uint32_t r = 0; r < replicas_; ++r) sum += value_of(beds[r]);
+    for (std::uint32_t r = 0; r < replicas_; ++r) squares += std::pow(value_of(beds[r]) - sum / n, 2);
+    return sim::Measured{sum / n, replicas_ > 1 ? std::sqrt(squares / (n - 1) / n) : 0};
+  };
+  const auto mean_of = [&](sim::Measured Bed::*member) {
+    sim::Measured out = mean([&](const Bed& bed) { return (bed.*member).value; });
+    if (replicas_ == 1) out.std_error = (beds[0].*member).std_error;
+    return out;
+  };
+  point.status = beds[0].status;
+  point.all_ok = true;
+  for (std::uint32_t r = 0; r < replicas_; ++r) {
+    const bool ok = beds[r].status == fit::FitStatus::ok;
+    if (!ok && point.all_ok) point.status = beds[r].status;
+    point.all_ok = point.all_ok && ok;
+    point.collisions += beds[r].collisions;
+  }
+  point.temperature = mean_of(&Bed::temperature);
+  point.solid_height = mean([](const Bed& bed) { return bed.solid_height; });
+  point.density = mean_of(&Bed::density);
+  point.temperature_x = mean_of(&Bed::temperature_x);
+  point.temperature_z = mean_of(&Bed::temperature_z);
+  point.temperature_z_local = mean_of(&Bed::temperature_z_local);
+  point.rise = mean_of(&Bed::rise);
+  if (!point.all_ok) return;
   const double target = target_.temperature_over_mg / bed_.length_unit();
-  point.distance = std::hypot(point.temperature.value / target - 1, point.density.value / target_.density - 1);
+  const double off_t = point.temperature.value / target - 1, off_density = point.density.value / target_.density - 1;
+  point.distance = std::hypot(off_t, off_density);
+  if (point.distance == 0) return;
+  // To first order the distance moves with the replica's offset along the direction to the target.
+  const double along_t = off_t / point.distance, along_density = off_density / point.distance;
+  point.distance_error = replicas_ > 1 ? mean([&](const Bed& bed) {
+                                           return along_t * bed.temperature.value / target +
+                                                  along_density * bed.density.value / target_.density;
+                                         }).std_error
+                                       : std::hypot(along_t * point.temperature.std_error / target,
+                                                    along_density * point.density.std_error / target_.density);
+}
+
+std::vector<const Point*> Infer::as_near(const std::vector<Point>& points, const Point& nearest) const {
+  const double t = student_t(replicas_ > 1 ? static_cast<int>(2 * (replicas_ - 1)) : 1000);
+  std::vector<const Point*> found;
+  for (const Point& p : points) {
+    if (p.distance - nearest.distance <= t * std::hypot(p.distance_error, nearest.distance_error)) found.push_back(&p);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Point* l, const Point* r) { return l->distance < r->distance; });
+  return found;
+}
+
+// A finished bed, kept in the scratch folder until the whole search has finished.
+Json to_json(const Bed& bed) {
+  const auto pair = [](const sim::Measured& m) { return Json::array({m.value, m.std_error}); };
+  return Json{{"status", static_cast<int>(bed.status)},
+              {"temperature", pair(bed.temperature)},
+              {"solid_height", bed.solid_height},
+              {"density", pair(bed.density)},
+              {"temperature_x", pair(bed.temperature_x)},
+              {"temperature_z", pair(bed.temperature_z)},
+              {"temperature_z_local", pair(bed.temperature_z_local)},
+              {"rise", pair(bed.rise)},
+              {"collisions", bed.collisions}};
+}
+Bed bed_from(const Json& json) {
+  const auto number = [](const Json& value) { return value.is_null() ? NAN : value.get<double>(); };
+  const auto pair = [&](const char* name) { return sim::Measured{number(json.at(name)[0]), number(json.at(name)[1])}; };
+  Bed bed;
+  bed.status = static_cast<fit::FitStatus>(json.at("status").get<int>());
+  bed.temperature = pair("temperature");
+  bed.solid_height = number(json.at("solid_height"));
+  bed.density = pair("density");
+  bed.temperature_x = pair("temperature_x");
+  bed.temperature_z = pair("temperature_z");
+  bed.temperature_z_local = pair("temperature_z_local");
+  bed.rise = pair("rise");
+  bed.collisions = json.at("collisions").get<std::uint64_t>();
+  return bed;
 }
 
 void Infer::run(RunContext& context) const {
   std::vector<Point> all = points();
+  std::vector<Bed> beds(all.size() * replicas_);
+  const std::filesystem::path& finished = context.scratch();
   std::atomic<std::size_t> next = 0, done = 0;
   std::mutex failure_guard;
   std::exception_ptr failure;
   const auto work = [&] {
-    for (std::size_t i = next++; i < all.size(); i = next++) {
+    for (std::size_t i = next++; i < beds.size(); i = next++) {
       try {
-        simulate(all[i], context.seed(), context);
+        const std::filesystem::path kept = finished / fmt::format("bed-{}.json", i);
+        if (std::filesystem::exists(kept)) {
+          beds[i] = bed_from(read_json(kept));
+        } else {
+          beds[i] = simulate(all[i / replicas_], replica_seed(context.seed(), i % replicas_), context);
+          write_file_atomically(kept, dump(to_json(beds[i])));
+        }
       } catch (...) {
         const std::lock_guard lock(failure_guard);
         if (!failure) failure = std::current_exception();
-        next = all.size();
+        next = beds.size();
       }
-      context.progress(static_cast<double>(++done) / static_cast<double>(all.size()),
-                       fmt::format("{} beds", all.size()));
+      context.progress(static_cast<double>(++done) / static_cast<double>(beds.size()),
+                       fmt::format("{} beds", beds.size()));
     }
   };
   {
@@ -199,18 +316,21 @@ void Infer::run(RunContext& context) const {
     work();
   }
   if (failure) std::rethrow_exception(failure);
+  for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
 
-  std::string table =
+  std::string table = fmt::format(
+      "# mean of {} beds a point; errors are of that mean{}\n"
       "# T in m g D; density: greatest of the profile [1/D^2]; heights in D\n"
       "restitution,friction,side_friction,status,temperature,temperature_error,solid_height,density,density_error,"
-      "temperature_x,"
-      "temperature_z,temperature_z_local,rise,distance,collisions\n";
+      "temperature_x,temperature_z,temperature_z_local,rise,distance,collisions,distance_error\n",
+      replicas_, replicas_ > 1 ? ", from the spread between them" : "");
   for (const Point& p : all) {
-    table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", p.restitution, p.friction, p.side_friction,
-                         fit::to_string(p.status), p.temperature.value, p.temperature.std_error, p.solid_height,
-                         p.density.value, p.density.std_error, p.temperature_x.value, p.temperature_z.value,
-                         p.temperature_z_local.value, p.rise,
-                         std::isfinite(p.distance) ? fmt::format("{}", p.distance) : "", p.collisions);
+    const bool near = std::isfinite(p.distance);
+    table += fmt::format(
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", p.restitution, p.friction, p.side_friction,
+        fit::to_string(p.status), p.temperature.value, p.temperature.std_error, p.solid_height.value, p.density.value,
+        p.density.std_error, p.temperature_x.value, p.temperature_z.value, p.temperature_z_local.value, p.rise.value,
+        near ? fmt::format("{}", p.distance) : "", p.collisions, near ? fmt::format("{}", p.distance_error) : "");
   }
   write_file(context.output("infer.csv"), table);
   write_file(context.output("infer.json"), dump(results(all)));
@@ -229,13 +349,14 @@ Json Infer::results(const std::vector<Point>& points) const {
       return quantity_json(t.value * length, length_name, t.std_error * length);
     };
     out["temperature_over_mg"] = over_mg(p.temperature);
-    out["solid_height"] = quantity_json(p.solid_height, "D");
+    out["solid_height"] = quantity_json(p.solid_height.value, "D", p.solid_height.std_error);
     out["density"] = quantity_json(p.density.value, "1/D^2", p.density.std_error);
     out["temperature_x_over_mg"] = over_mg(p.temperature_x);
     out["temperature_z_over_mg"] = over_mg(p.temperature_z);
     out["temperature_z_local_over_mg"] = over_mg(p.temperature_z_local);
-    out["center_of_mass_rise"] = quantity_json(p.rise, "D");
+    out["center_of_mass_rise"] = quantity_json(p.rise.value, "D", p.rise.std_error);
     out["distance"] = std::isfinite(p.distance) ? Json(p.distance) : Json(nullptr);
+    if (std::isfinite(p.distance)) out["distance_error"] = p.distance_error;
     out["collisions"] = p.collisions;
     return out;
   };
@@ -248,7 +369,21 @@ Json Infer::results(const std::vector<Point>& points) const {
       "sqrt((T/T_target - 1)^2 + (phi/phi_target - 1)^2), T of the fit with phi_0 fixed, phi the greatest density of "
       "the profile";
   out["profile"] = fmt::format("lab frame, average over {} phases, Gaussian window of {} D", phases_, kernel_width_);
+  out["replicas"] = replicas_;
   out["nearest"] = std::isfinite(nearest->distance) ? row(*nearest) : Json(nullptr);
+  out["as_near_is"] =
+      "points whose distance is not above that of the nearest by more than Student's t (97.5 %) times the error of the "
+      "difference, the nearest first: the data do not tell them apart";
+  out["as_near"] = Json::array();
+  if (std::isfinite(nearest->distance)) {
+    for (const Point* p : as_near(points, *nearest)) {
+      out["as_near"].push_back(Json{{"restitution", p->restitution},
+                                    {"friction", p->friction},
+                                    {"side_friction", p->side_friction},
+                                    {"distance", p->distance},
+                                    {"distance_error", p->distance_error}});
+    }
+  }
   out["points"] = Json::array();
   for (const Point& p : points) out["points"].push_back(row(p));
   return out;
@@ -258,7 +393,7 @@ Json Infer::results(const std::vector<Point>& points) const {
 
 StageRow infer_stage() {
   return {.name = "infer",
-          .version = 3,
+          .version = 4,
           .summary = "searches the restitution and friction with which a simulated bed comes nearest to a measured one",
           .uses_seed = true,
           .result = "infer.json",
