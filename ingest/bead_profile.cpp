@@ -81,7 +81,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
     return value;
   };
   const double fine = knot / 16;
-  std::vector<float> left_over(static_cast<std::size_t>(std::ceil(reach_px / fine)) + 2);
+  std::vector<float> left_over(static_cast<std::size_t>(std::ceil(reach_px / fine)) + 3);
   for (std::size_t i = 0; i < left_over.size(); ++i) {
     const double r = static_cast<double>(i) * fine;
     left_over[i] =
@@ -92,6 +92,25 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
   const std::size_t ring_cells = static_cast<std::size_t>(std::ceil((ring_high - ring_low) / 0.25));
   std::vector<double> ring_sum(ring_cells + 1, 0.0), ring_weight(ring_cells + 1, 0.0);
 
+  // Pixels are collected by their distance from the bead (shared between the two nearest of fine steps), and where the
+  // reaches of two beads overlap by both their distances; splines are laid over the collected sums.
+  std::vector<double> pixel_count(left_over.size() + 1, 0.0), residual_sum(left_over.size() + 1, 0.0);
+  const std::size_t pair_bins_of_knot = std::clamp<std::size_t>(600 / cells, 2, 6);
+  const std::size_t pair_bins = cells * pair_bins_of_knot;
+  const double inverse_fine = 1 / fine, inverse_pair_bin = static_cast<double>(pair_bins_of_knot) / knot;
+  std::vector<float> pair_count(pair_bins * pair_bins, 0.0F);
+  const auto longest = static_cast<std::size_t>(2 * reach_px) + 2;
+  std::vector<float> place1(longest), place2(longest);
+  // Distances of a row's pixels from a bead, in steps.
+  const auto distances = [](int left, int count, double x, double dy, double inverse_step, std::vector<float>& places) {
+    const float dx0 = static_cast<float>(left - x), squared = static_cast<float>(dy * dy);
+    const float scale = static_cast<float>(inverse_step);
+    float* to = places.data();
+    for (int k = 0; k < count; ++k) {
+      const float dx = dx0 + static_cast<float>(k);
+      to[k] = std::sqrt(dx * dx + squared) * scale;
+    }
+  };
   for (std::size_t f = 0; f < fits.size(); ++f) {
     const JointFit& fit = *fits[f];
     const std::vector<ModelDisk>& beads = *disks[f];
@@ -103,34 +122,36 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
         const double half = std::sqrt(std::max(0.0, reach_squared - dy * dy));
         const int left = std::max(0, static_cast<int>(std::ceil(bead.x - half)));
         const int right_column = std::min(fit.width() - 1, static_cast<int>(std::floor(bead.x + half)));
-        const float* line = fit.residual_row(row);
-        for (int column = left; column <= right_column; ++column) {
-          const double dx = column - bead.x;
-          const double r = std::sqrt(dx * dx + dy * dy);
-          const double place = r * inverse_knot;
-          const std::size_t cell = std::min(cells - 1, static_cast<std::size_t>(place));
-          const auto splines = cubic_b_splines(place - static_cast<double>(cell));
-          const double e = static_cast<double>(line[column]) + value_at(left_over, fine, r);
-          std::array<std::size_t, 4> at;
-          for (std::size_t a = 0; a < 4; ++a) at[a] = slot(cell + a);
-          for (std::size_t a = 0; a < 4; ++a) {
-            right[at[a]] += splines[a] * e;
-            double* matrix_row = matrix.data() + at[a] * size;
-            for (std::size_t b = 0; b < 4; ++b) matrix_row[at[b]] += splines[a] * splines[b];
-          }
-          if (fourth_harmonic && r > ring_low && r < ring_high) {
-            const double squared = r * r;
-            const double a2 = dx * dx, b2 = dy * dy;
-            const double cosine = (a2 * a2 - 6 * a2 * b2 + b2 * b2) / (squared * squared);
-            const double ring_place = (r - ring_low) / 0.25;
-            const auto ring = static_cast<std::size_t>(ring_place);
-            const double part = ring_place - static_cast<double>(ring);
-            ring_sum[ring] += (1 - part) * e * cosine;
-            ring_weight[ring] += (1 - part) * cosine * cosine;
-            if (ring + 1 <= ring_cells) {
-              ring_sum[ring + 1] += part * e * cosine;
-              ring_weight[ring + 1] += part * cosine * cosine;
-            }
+        const int count = right_column - left + 1;
+        if (count <= 0) continue;
+        const float* line = fit.residual_row(row) + left;
+        distances(left, count, bead.x, dy, inverse_fine, place1);
+        for (int k = 0; k < count; ++k) {
+          const float place = place1[static_cast<std::size_t>(k)];
+          const auto cell = static_cast<std::size_t>(static_cast<int>(place));
+          const double part = static_cast<double>(place - static_cast<float>(static_cast<int>(place)));
+          const double e = static_cast<double>(line[k]);
+          pixel_count[cell] += 1 - part;
+          pixel_count[cell + 1] += part;
+          residual_sum[cell] += (1 - part) * e;
+          residual_sum[cell + 1] += part * e;
+        }
+        if (!fourth_harmonic) continue;
+        for (int k = 0; k < count; ++k) {
+          const double r = static_cast<double>(place1[static_cast<std::size_t>(k)]) * fine;
+          if (r <= ring_low || r >= ring_high) continue;
+          const double dx = left + k - bead.x, squared = r * r;
+          const double a2 = dx * dx, b2 = dy * dy;
+          const double cosine = (a2 * a2 - 6 * a2 * b2 + b2 * b2) / (squared * squared);
+          const double ring_place = (r - ring_low) / 0.25;
+          const auto ring = static_cast<std::size_t>(ring_place);
+          const double part = ring_place - static_cast<double>(ring);
+          const double e = static_cast<double>(line[k]) + value_at(left_over, fine, r);
+          ring_sum[ring] += (1 - part) * e * cosine;
+          ring_weight[ring] += (1 - part) * cosine * cosine;
+          if (ring + 1 <= ring_cells) {
+            ring_sum[ring + 1] += part * e * cosine;
+            ring_weight[ring + 1] += part * cosine * cosine;
           }
         }
       }
@@ -143,8 +164,9 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
       const ModelDisk& one = beads[order[i]];
       for (std::size_t j = i + 1; j < order.size(); ++j) {
         const ModelDisk& other = beads[order[j]];
-        if (other.y - one.y > 2 * reach_px) break;
-        if (std::abs(other.x - one.x) > 2 * reach_px) continue;
+        const double apart_x = other.x - one.x, apart_y = other.y - one.y;
+        if (apart_y > 2 * reach_px) break;
+        if (apart_x * apart_x + apart_y * apart_y > 4 * reach_squared) continue;
         const int top = std::max(0, static_cast<int>(std::ceil(other.y - reach_px)));
         const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(one.y + reach_px)));
         for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
@@ -154,26 +176,60 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
           const int left = std::max(0, static_cast<int>(std::ceil(std::max(one.x - half1, other.x - half2))));
           const int right_column =
               std::min(fit.width() - 1, static_cast<int>(std::floor(std::min(one.x + half1, other.x + half2))));
-          for (int column = left; column <= right_column; ++column) {
-            const double dx1 = column - one.x, dx2 = column - other.x;
-            const double place1 = std::sqrt(dx1 * dx1 + dy1 * dy1) * inverse_knot;
-            const double place2 = std::sqrt(dx2 * dx2 + dy2 * dy2) * inverse_knot;
-            const std::size_t cell1 = std::min(cells - 1, static_cast<std::size_t>(place1));
-            const std::size_t cell2 = std::min(cells - 1, static_cast<std::size_t>(place2));
-            const auto splines1 = cubic_b_splines(place1 - static_cast<double>(cell1));
-            const auto splines2 = cubic_b_splines(place2 - static_cast<double>(cell2));
-            for (std::size_t a = 0; a < 4; ++a)
-              for (std::size_t b = 0; b < 4; ++b) {
-                const std::size_t p = slot(cell1 + a), q = slot(cell2 + b);
-                const double product = splines1[a] * splines2[b];
-                matrix[p * size + q] += product;
-                matrix[q * size + p] += product;
-              }
+          const int count = right_column - left + 1;
+          if (count <= 0) continue;
+          distances(left, count, one.x, dy1, inverse_pair_bin, place1);
+          distances(left, count, other.x, dy2, inverse_pair_bin, place2);
+          for (int k = 0; k < count; ++k) {
+            const auto bin1 = std::min(pair_bins - 1,
+                                       static_cast<std::size_t>(static_cast<int>(place1[static_cast<std::size_t>(k)])));
+            const auto bin2 = std::min(pair_bins - 1,
+                                       static_cast<std::size_t>(static_cast<int>(place2[static_cast<std::size_t>(k)])));
+            pair_count[bin1 * pair_bins + bin2] += 1;
           }
         }
       }
     }
   }
+  struct Cell {
+    std::array<std::size_t, 4> slots;
+    std::array<double, 4> splines;
+  };
+  const auto cell_at = [&](double r) {
+    const double place = r * inverse_knot;
+    const std::size_t number = std::min(cells - 1, static_cast<std::size_t>(place));
+    Cell cell;
+    cell.splines = cubic_b_splines(place - static_cast<double>(number));
+    for (std::size_t a = 0; a < 4; ++a) cell.slots[a] = slot(number + a);
+    return cell;
+  };
+  for (std::size_t i = 0; i < pixel_count.size(); ++i) {
+    const double r = static_cast<double>(i) * fine;
+    if (pixel_count[i] == 0 || r >= reach_px) continue;
+    const Cell cell = cell_at(r);
+    const double e = residual_sum[i] + pixel_count[i] * value_at(left_over, fine, r);
+    for (std::size_t a = 0; a < 4; ++a) {
+      right[cell.slots[a]] += cell.splines[a] * e;
+      for (std::size_t b = 0; b < 4; ++b)
+        matrix[cell.slots[a] * size + cell.slots[b]] += pixel_count[i] * cell.splines[a] * cell.splines[b];
+    }
+  }
+  std::vector<Cell> pair_cells(pair_bins);
+  for (std::size_t i = 0; i < pair_bins; ++i)
+    pair_cells[i] = cell_at((static_cast<double>(i) + 0.5) / inverse_pair_bin);
+  for (std::size_t i = 0; i < pair_bins; ++i)
+    for (std::size_t j = 0; j < pair_bins; ++j) {
+      const double count = static_cast<double>(pair_count[i * pair_bins + j]);
+      if (count == 0) continue;
+      const Cell &one = pair_cells[i], &other = pair_cells[j];
+      for (std::size_t a = 0; a < 4; ++a)
+        for (std::size_t b = 0; b < 4; ++b) {
+          const std::size_t p = one.slots[a], q = other.slots[b];
+          const double product = count * one.splines[a] * other.splines[b];
+          matrix[p * size + q] += product;
+          matrix[q * size + p] += product;
+        }
+    }
 
   // A touch of smoothness (second differences of the whole profile): in a crystal, pixels far out of one bead lie
   // inside another, and what is added to the one can be taken from the other.
@@ -510,9 +566,8 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
       open.fill(true);
       for (std::size_t j = first; j < beads.size() && beads[j].y <= bead.y + far; ++j) {
         const double dx = beads[j].x - bead.x, dy = beads[j].y - bead.y;
-        if (j == i || std::abs(dx) > far) continue;
-        const double distance = std::hypot(dx, dy);
-        if (distance > far) continue;
+        if (j == i || dx * dx + dy * dy > far * far) continue;
+        const double distance = std::sqrt(dx * dx + dy * dy);
         const double half =
             std::asin(std::min(1.0, (radius_px + 3 * edge_px + 1) / distance)) + 2 * 3.14159265358979 / sectors / 2;
         const double direction = std::atan2(dy, dx);
@@ -531,7 +586,7 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
       for (int row = top; row <= bottom; ++row)
         for (int column = left; column <= right; ++column) {
           const double dx = column - bead.x, dy = row - bead.y;
-          const double r = std::hypot(dx, dy);
+          const double r = std::sqrt(dx * dx + dy * dy);
           if (r < inner || r > open_to) continue;
           const int s = std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * 3.14159265358979) + 0.5) * sectors), 0,
                                    sectors - 1);

@@ -69,24 +69,38 @@ float quantile(std::vector<float>& values, double fraction) {
   return values[static_cast<std::size_t>(place)];
 }
 
-// Share of the rim of a circle where the gradient points along the radius with at least `threshold`.
-double rim_support(const Gradient& gradient, double x, double y, double radius, double sign, float threshold) {
+// Points of a circle.
+struct CirclePoint {
+  float unit_x, unit_y;
+};
+std::vector<CirclePoint> circle_points(double radius) {
   const int samples = std::clamp(static_cast<int>(4 * radius), 12, 48);
-  int supported = 0, inside = 0;
+  std::vector<CirclePoint> points;
   for (int k = 0; k < samples; ++k) {
     const double angle = 2 * std::numbers::pi * k / samples;
-    const double unit_x = std::cos(angle), unit_y = std::sin(angle);
-    const int column = static_cast<int>(std::lround(x + radius * unit_x));
-    const int row = static_cast<int>(std::lround(y + radius * unit_y));
-    if (column < 1 || row < 1 || column >= gradient.width - 1 || row >= gradient.height - 1) continue;
+    points.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))});
+  }
+  return points;
+}
+
+// Share of the rim of a circle where the gradient points along the radius with at least `threshold`.
+double rim_support(const Gradient& gradient, int x, int y, double radius, const std::vector<CirclePoint>& points,
+                   float sign, float threshold) {
+  std::size_t supported = 0, inside = 0;
+  const float centre_x = static_cast<float>(x) + 0.5F, centre_y = static_cast<float>(y) + 0.5F;
+  for (const CirclePoint& point : points) {
+    const float to_x = centre_x + static_cast<float>(radius) * point.unit_x,
+                to_y = centre_y + static_cast<float>(radius) * point.unit_y;
+    if (to_x < 1 || to_y < 1) continue;
+    const int column = static_cast<int>(to_x), row = static_cast<int>(to_y);
+    if (column >= gradient.width - 1 || row >= gradient.height - 1) continue;
     ++inside;
     const std::size_t at = gradient.at(column, row);
-    const double along =
-        sign * (static_cast<double>(gradient.x[at]) * unit_x + static_cast<double>(gradient.y[at]) * unit_y);
-    const double size = std::hypot(static_cast<double>(gradient.x[at]), static_cast<double>(gradient.y[at]));
-    if (size > static_cast<double>(threshold) && along > 0.8 * size) ++supported;
+    const float along = sign * (gradient.x[at] * point.unit_x + gradient.y[at] * point.unit_y);
+    const float size = std::sqrt(gradient.x[at] * gradient.x[at] + gradient.y[at] * gradient.y[at]);
+    if (size > threshold && along > 0.8F * size) ++supported;
   }
-  return inside < samples / 2 ? 0.0 : static_cast<double>(supported) / inside;
+  return inside < points.size() / 2 ? 0.0 : static_cast<double>(supported) / static_cast<double>(inside);
 }
 
 // The square window of at most `side` px with the most gradient: enough to tell a radius of a few px from.
@@ -237,6 +251,7 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
       }
       const double radius = from_radius * std::pow(ratio, position);
       fill(radius);
+      const std::vector<CirclePoint> circle = circle_points(radius);
       std::vector<Peak> peaks;
       for (int row = 1; row + 1 < frame.height; ++row)
         for (int column = 1; column + 1 < frame.width; ++column) {
@@ -259,7 +274,8 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
       for (const Peak& peak : peaks) {
         const std::size_t at = gradient.at(peak.column, peak.row);
         if (taken[at]) continue;
-        const double support = rim_support(gradient, peak.column, peak.row, radius, sign, threshold);
+        const double support =
+            rim_support(gradient, peak.column, peak.row, radius, circle, static_cast<float>(sign), threshold);
         if (support < 0.45) continue;
         for (int row = std::max(0, peak.row - keep_off); row <= std::min(frame.height - 1, peak.row + keep_off); ++row)
           for (int column = std::max(0, peak.column - keep_off);

@@ -62,9 +62,9 @@ std::vector<ModelDisk> disks_at(const std::vector<DiskCandidate>& candidates) {
   return disks;
 }
 
-// Takes out beads that explain nothing and the worse of two in one place; puts their share back into the residual.
+// Takes out beads that explain nothing and the worse of two in one place, as judged; puts their share back into the
+// residual.
 std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least) {
-  fit.judge(disks, radius + 1);
   std::vector<std::uint8_t> drop(disks.size(), 0);
   for (std::size_t i = 0; i < disks.size(); ++i) drop[i] = disks[i].explained < least;
   std::vector<std::size_t> order(disks.size());
@@ -75,8 +75,9 @@ std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, d
     if (drop[order[i]]) continue;
     for (std::size_t j = i + 1; j < order.size(); ++j) {
       const ModelDisk &one = disks[order[i]], &other = disks[order[j]];
-      if (other.y - one.y > near) break;
-      if (drop[order[j]] || std::hypot(one.x - other.x, one.y - other.y) > near) continue;
+      const double dx = other.x - one.x, dy = other.y - one.y;
+      if (dy > near) break;
+      if (drop[order[j]] || dx * dx + dy * dy > near * near) continue;
       const bool first_worse = one.explained < other.explained;
       drop[first_worse ? order[i] : order[j]] = 1;
       if (first_worse) break;
@@ -243,9 +244,9 @@ std::vector<DiskCandidate> candidates_by(const BeadProfile& profile, const GrayF
 }
 
 // Beads that leave much more unexplained than the others are taken out; then all beads that show in the residual are
-// put in. A bead taken out in whose place nothing better shows goes back. Returns how many places were looked at again.
+// put in. A bead taken out in whose place nothing better shows goes back. `disks` have been judged. Returns how many
+// places were looked at again.
 std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double noise) {
-  fit.judge(disks, radius + 1);
   std::vector<double> unexplained;
   for (const ModelDisk& disk : disks) unexplained.push_back(1 - disk.explained);
   constexpr double suspicious_share = 1.5, always_tolerated = 0.03;
@@ -272,9 +273,10 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
   std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, noise, clear_score));
   const double near = 2 * radius * least_separation;
   const auto taken = [&](const std::vector<ModelDisk>& among, const ModelDisk& disk, double distance) {
-    for (const ModelDisk& other : among)
-      if (std::abs(other.y - disk.y) < distance && std::hypot(other.x - disk.x, other.y - disk.y) < distance)
-        return true;
+    for (const ModelDisk& other : among) {
+      const double dx = other.x - disk.x, dy = other.y - disk.y;
+      if (dx * dx + dy * dy < distance * distance) return true;
+    }
     return false;
   };
   std::vector<ModelDisk> added;
@@ -310,9 +312,13 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
 }
 
 // After a few sweeps: beads moved by repair() that explain no more than before go back where they were.
-void settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
+// True if there was one.
+bool settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
   constexpr double must_fall_to = 0.7;
+  const auto moved = [](const ModelDisk& disk) { return disk.former_unexplained >= 0; };
+  if (std::none_of(disks.begin(), disks.end(), moved)) return false;
   fit.judge(disks, radius + 1);
+  bool went_back = false;
   for (ModelDisk& disk : disks) {
     if (disk.former_unexplained >= 0 && 1 - disk.explained > must_fall_to * disk.former_unexplained) {
       fit.subtract(disk.x, disk.y, -1.0F);
@@ -320,9 +326,34 @@ void settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
       disk.y = disk.former_y;
       disk.quiet_sweeps = 0;
       fit.subtract(disk.x, disk.y, 1.0F);
+      went_back = true;
     }
     disk.former_unexplained = -1;
   }
+  if (went_back) fit.judge(disks, radius + 1);
+  return went_back;
+}
+
+// A Newton step of all beads together, then sweeps, at most `sweeps`, for the few that have a longer way to go (cut
+// ones outside the frame) and those they touch. True when nothing moves by more than the tolerance any more.
+bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disks, double tolerance, double bound,
+              int sweeps) {
+  constexpr double quadratic = 10;  // what a step together leaves is less than a tenth of it
+  constexpr double longest_step = 0.5;
+  if (fit.step_together(flat, disks, longest_step, bound) < quadratic * tolerance) return true;
+  std::vector<std::size_t> far;
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    disks[i].quiet_sweeps = 2;
+    if (disks[i].last_step >= longest_step) far.push_back(i);
+  }
+  if (50 * far.size() <= disks.size())
+    for (const std::size_t i : far)
+      for (ModelDisk& disk : disks)
+        if (std::hypot(disk.x - disks[i].x, disk.y - disks[i].y) < 2 * fit.reach()) disk.quiet_sweeps = 0;
+  const bool few = 50 * far.size() <= disks.size() && !far.empty();
+  for (int sweep = 0; few && sweep < sweeps; ++sweep)
+    if (fit.sweep(disks, longest_step, tolerance, bound) < tolerance) break;
+  return false;
 }
 
 }  // namespace
@@ -405,15 +436,17 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       }
       for (ModelDisk& disk : disks[f]) disk.quiet_sweeps = 0;
       fits[f]->reset(flats[f], disks[f]);
-      const int sweeps = round == 0 ? 0 : 3;
-      for (int sweep = 0; sweep < sweeps; ++sweep)
-        fits[f]->sweep(disks[f], search && sweep == 0 ? 0.3 * radius : 0.5, 1e-5, residual_bound);
+      if (round > 0) {
+        if (search) fits[f]->sweep(disks[f], 0.3 * radius, 1e-5, residual_bound);
+        for (int step = 0; step < 2; ++step) fits[f]->step_together(flats[f], disks[f], 0.5, residual_bound);
+      }
+      fits[f]->judge(disks[f], radius + 1);
       if ((round == 1 || round == 2) && repair(*fits[f], disks[f], radius, noise_of(flats[f])) > 0) {
         for (int sweep = 0; sweep < 2; ++sweep) fits[f]->sweep(disks[f], 0.2 * radius, 1e-5, residual_bound);
         settle(*fits[f], disks[f], radius);
-        fits[f]->sweep(disks[f], 0.5, 1e-5, residual_bound);
+        fits[f]->step_together(flats[f], disks[f], 0.5, residual_bound);
+        fits[f]->judge(disks[f], radius + 1);
       }
-      fits[f]->judge(disks[f], radius + 1);
       total += disks[f].size();
     }
     if (total == 0) {
@@ -544,20 +577,31 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   const double tolerance = std::clamp(0.006 * noise / 0.1, 6e-4, 4e-3);
   std::size_t dropped = 0;
   bool repaired = false;
-  double largest = 1;
+  const double bound = std::max(residual_bound, 4 * noise);
   for (int sweep = 0; sweep < options.joint_fit_sweeps; ++sweep) {
     fit.set_table(sweep < 2 ? &soft : &exact);
-    largest = fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance, std::max(residual_bound, 4 * noise));
-    if (sweep == 1 || (sweep == 4 && repaired)) {
-      dropped += prune(fit, disks, radius, faintly_explained);
-      repaired = repair(fit, disks, radius, noise) > 0;
-    } else if (sweep == 3 && repaired) {
-      settle(fit, disks, radius);
+    bool converged = false;
+    if (sweep < 2) {
+      fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance, bound);
+    } else {
+      converged = step_all(fit, flat, disks, tolerance, bound, options.joint_fit_sweeps - sweep - 1);
     }
-    if (largest < tolerance && sweep >= 2) break;
+    if (sweep == 1 || (sweep == 4 && repaired)) {
+      fit.judge(disks, radius + 1);
+      const std::size_t pruned = prune(fit, disks, radius, faintly_explained);
+      dropped += pruned;
+      if (pruned > 0) fit.judge(disks, radius + 1);
+      repaired = repair(fit, disks, radius, noise) > 0;
+      converged = converged && !repaired;
+    } else if (sweep == 3 && repaired) {
+      converged = !settle(fit, disks, radius) && converged;
+    }
+    if (converged) break;
   }
-  dropped += prune(fit, disks, radius, faintly_explained);
-  settle(fit, disks, radius);
+  fit.judge(disks, radius + 1);
+  const std::size_t dropped_last = prune(fit, disks, radius, faintly_explained);
+  if (!settle(fit, disks, radius) && dropped_last > 0) fit.judge(disks, radius + 1);
+  dropped += dropped_last;
 
   std::vector<double> explained;
   for (const ModelDisk& disk : disks) explained.push_back(disk.explained);

@@ -49,7 +49,16 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
       soft[i] = sum / weights;
     }
     for (std::size_t i = 0; i + 1 < count; ++i) soft_rise_[i] = static_cast<float>(soft[i + 1] - soft[i]);
+    // A small move changes the residual by the true gradient: sums over area of soft^2 against soft times true.
+    double soft_soft = 0, soft_true = 0;
+    for (std::size_t i = 0; i + 1 < count; ++i) {
+      const double squared = (static_cast<double>(i) + 0.5) * step;
+      soft_soft += squared * static_cast<double>(soft_rise_[i] * soft_rise_[i]);
+      soft_true += squared * static_cast<double>(soft_rise_[i] * rise_[i]);
+    }
+    if (soft_true > soft_soft) relaxation_ = soft_soft / soft_true;
   }
+  prepare_overlaps(radius_px, edge_px);
   fourth_ = std::any_of(profile.fourth_harmonic.begin(), profile.fourth_harmonic.end(), [](float v) { return v != 0; });
   if (fourth_) {
     fourth_level_.assign(count, 0.0F);
@@ -61,6 +70,44 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
     }
     for (std::size_t i = 0; i + 1 < count; ++i) fourth_rise_[i] = fourth_level_[i + 1] - fourth_level_[i];
   }
+}
+
+void ProfileTable::prepare_overlaps(double radius_px, double edge_px) {
+  // Sums over the lens that two beads share, one at (0, 0), the other at (distance, 0): by symmetry the blocks are
+  // diagonal. Beads nearer than overlap_from_px are on their way out; what they get need only be roughly right.
+  overlap_from_px_ = 1.4 * radius_px;
+  overlap_step_px_ = std::max(0.25, 0.2 * edge_px);
+  constexpr double grid = 0.5;  // px
+  const auto slope_at = [&](const std::vector<float>& rise, double dx, double dy) {
+    const double place = (dx * dx + dy * dy) * static_cast<double>(inverse_step_);
+    return place < last_ ? static_cast<double>(rise[static_cast<std::size_t>(place)]) : 0.0;
+  };
+  const auto sums = [&](double distance) {
+    Overlap overlap;
+    const double lens = std::sqrt(std::max(0.0, reach_ * reach_ - 0.25 * distance * distance));
+    for (double y = 0.5 * grid; y <= lens; y += grid)  // and its mirror image
+      for (double x = distance - reach_; x <= reach_; x += grid) {
+        const double product = slope_at(soft_rise_, x, y) * slope_at(rise_, x - distance, y);
+        overlap.along += 2 * product * x * (x - distance);
+        overlap.across += 2 * product * y * y;
+      }
+    return overlap;
+  };
+  const Overlap own = sums(0);
+  if (!(own.along > 0)) return;
+  for (double distance = overlap_from_px_; distance < 2 * reach_ + overlap_step_px_; distance += overlap_step_px_) {
+    const Overlap overlap = sums(distance);
+    overlaps_.push_back({overlap.along / own.along, overlap.across / own.along});
+  }
+}
+
+ProfileTable::Overlap ProfileTable::overlap(double distance_px) const {
+  const double place = std::max(0.0, distance_px - overlap_from_px_) / overlap_step_px_;
+  const auto cell = static_cast<std::size_t>(place);
+  if (cell + 1 >= overlaps_.size()) return {};
+  const double part = place - static_cast<double>(cell);
+  const Overlap &a = overlaps_[cell], &b = overlaps_[cell + 1];
+  return {a.along + part * (b.along - a.along), a.across + part * (b.across - a.across)};
 }
 
 double ProfileTable::at(double squared_distance) const {
@@ -171,74 +218,88 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
   }
 }
 
-double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound) {
-  const float most = static_cast<float>(bound);
+JointFit::Descent JointFit::descent_of(ModelDisk& disk, float bound) const {
   const ProfileTable& table = *table_;
   const double reach = table.reach_;
   const float inverse = table.inverse_step_;
   const int last = table.last_;
   const float* rise = table.soft_rise_.data();
+  const int top = std::max(0, static_cast<int>(std::ceil(disk.y - reach)));
+  const int bottom = std::min(height_ - 1, static_cast<int>(std::floor(disk.y + reach)));
+  double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;
+  for (int row = top; row <= bottom; ++row) {
+    const double dy = row - disk.y;
+    const double half = std::sqrt(std::max(0.0, reach * reach - dy * dy));
+    const int left = std::max(0, static_cast<int>(std::ceil(disk.x - half)));
+    const int right = std::min(width_ - 1, static_cast<int>(std::floor(disk.x + half)));
+    const int count = right - left + 1;
+    if (count <= 0) continue;
+    const float dy_squared = static_cast<float>(dy * dy);
+    const float dx0 = static_cast<float>(left - disk.x);
+    const float* line = residual_row(row) + left;
+    Floats s_dd = {}, s_ddx = {}, s_ddxx = {}, s_e = {}, s_ex = {};
+    for (int k = 0; k < count; k += lanes) {
+      const Floats dx = dx0 + (static_cast<float>(k) + lane_numbers);
+      const Floats place = (dx * dx + dy_squared) * inverse;
+      Ints cell = __builtin_convertvector(place, Ints);
+      cell = cell < last ? cell : last;
+      cell = lane_indices < count - k ? cell : last;  // beyond the chord or the frame
+      Floats d, e;
+      gather(rise, cell, d);
+      load(line + k, e);
+      e = e < bound ? e : bound;
+      e = e > -bound ? e : -bound;
+      const Floats d_dx = d * dx;
+      s_dd += d * d;
+      s_ddx += d * d_dx;
+      s_ddxx += d_dx * d_dx;
+      s_e += e * d;
+      s_ex += e * d_dx;
+    }
+    const float dd = sum_of(s_dd), ddx = sum_of(s_ddx), ddxx = sum_of(s_ddxx), e = sum_of(s_e), ex = sum_of(s_ex);
+    xx += static_cast<double>(ddxx);
+    xy += dy * static_cast<double>(ddx);
+    yy += dy * dy * static_cast<double>(dd);
+    bx += static_cast<double>(ex);
+    by += dy * static_cast<double>(e);
+  }
+  // d model/d x0 = -2 P'(u) dx, P' = rise/step
+  const double slope = -2 * static_cast<double>(inverse);
+  disk.hessian_xx = xx * slope * slope;
+  disk.hessian_xy = xy * slope * slope;
+  disk.hessian_yy = yy * slope * slope;
+  return {bx * slope, by * slope};
+}
+
+namespace {
+
+// (H + damping) step = descent; false when H is not positive.
+bool solve_own(const ModelDisk& disk, double bx, double by, double& step_x, double& step_y) {
+  const double damping = 1e-9 + 1e-4 * (disk.hessian_xx + disk.hessian_yy);
+  const double xx = disk.hessian_xx + damping, yy = disk.hessian_yy + damping, xy = disk.hessian_xy;
+  const double determinant = xx * yy - xy * xy;
+  if (!(determinant > 0)) return false;
+  step_x = (yy * bx - xy * by) / determinant;
+  step_y = (xx * by - xy * bx) / determinant;
+  return true;
+}
+
+}  // namespace
+
+double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound) {
+  const float most = static_cast<float>(bound);
   double largest = 0;
   for (ModelDisk& disk : disks) {
     if (disk.quiet_sweeps >= 2) continue;
-    const int top = std::max(0, static_cast<int>(std::ceil(disk.y - reach)));
-    const int bottom = std::min(height_ - 1, static_cast<int>(std::floor(disk.y + reach)));
-    double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;
-    for (int row = top; row <= bottom; ++row) {
-      const double dy = row - disk.y;
-      const double half = std::sqrt(std::max(0.0, reach * reach - dy * dy));
-      const int left = std::max(0, static_cast<int>(std::ceil(disk.x - half)));
-      const int right = std::min(width_ - 1, static_cast<int>(std::floor(disk.x + half)));
-      const int count = right - left + 1;
-      if (count <= 0) continue;
-      const float dy_squared = static_cast<float>(dy * dy);
-      const float dx0 = static_cast<float>(left - disk.x);
-      const float* line = residual_row(row) + left;
-      Floats s_dd = {}, s_ddx = {}, s_ddxx = {}, s_e = {}, s_ex = {};
-      for (int k = 0; k < count; k += lanes) {
-        const Floats dx = dx0 + (static_cast<float>(k) + lane_numbers);
-        const Floats place = (dx * dx + dy_squared) * inverse;
-        Ints cell = __builtin_convertvector(place, Ints);
-        cell = cell < last ? cell : last;
-        cell = lane_indices < count - k ? cell : last;  // beyond the chord or the frame
-        Floats d, e;
-        gather(rise, cell, d);
-        load(line + k, e);
-        e = e < most ? e : most;
-        e = e > -most ? e : -most;
-        const Floats d_dx = d * dx;
-        s_dd += d * d;
-        s_ddx += d * d_dx;
-        s_ddxx += d_dx * d_dx;
-        s_e += e * d;
-        s_ex += e * d_dx;
-      }
-      const float dd = sum_of(s_dd), ddx = sum_of(s_ddx), ddxx = sum_of(s_ddxx), e = sum_of(s_e), ex = sum_of(s_ex);
-      xx += static_cast<double>(ddxx);
-      xy += dy * static_cast<double>(ddx);
-      yy += dy * dy * static_cast<double>(dd);
-      bx += static_cast<double>(ex);
-      by += dy * static_cast<double>(e);
-    }
-    // d model/d x0 = -2 P'(u) dx, P' = rise/step
-    const double slope = -2 * static_cast<double>(inverse);
-    xx *= slope * slope;
-    xy *= slope * slope;
-    yy *= slope * slope;
-    bx *= slope;
-    by *= slope;
-    disk.hessian_xx = xx;
-    disk.hessian_xy = xy;
-    disk.hessian_yy = yy;
-    const double damping = 1e-9 + 1e-4 * (xx + yy);
-    const double determinant = (xx + damping) * (yy + damping) - xy * xy;
-    if (!(determinant > 0)) {
+    const Descent descent = descent_of(disk, most);
+    double step_x = 0, step_y = 0;
+    if (!solve_own(disk, descent.x, descent.y, step_x, step_y)) {
       disk.last_step = 0;
       ++disk.quiet_sweeps;
       continue;
     }
-    double step_x = ((yy + damping) * bx - xy * by) / determinant;
-    double step_y = ((xx + damping) * by - xy * bx) / determinant;
+    step_x *= table_->relaxation_;
+    step_y *= table_->relaxation_;
     const double length = std::hypot(step_x, step_y);
     if (length > largest_step) {
       step_x *= largest_step / length;
@@ -252,6 +313,96 @@ double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, doubl
     disk.x += step_x;
     disk.y += step_y;
   }
+  return largest;
+}
+
+double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step,
+                               double bound) {
+  const std::size_t n = disks.size();
+  std::vector<double> descent(2 * n), step(2 * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Descent one = descent_of(disks[i], static_cast<float>(bound));
+    descent[2 * i] = table_->relaxation_ * one.x;
+    descent[2 * i + 1] = table_->relaxation_ * one.y;
+  }
+  // Pairs that share pixels, with the off-diagonal block of the Hessian: symmetric.
+  struct Pair {
+    std::size_t one, other;
+    double xx, xy, yy;
+  };
+  std::vector<Pair> pairs;
+  std::vector<std::size_t> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return disks[a].y < disks[b].y; });
+  const double far = 2 * table_->reach_;
+  for (std::size_t a = 0; a < n; ++a)
+    for (std::size_t b = a + 1; b < n; ++b) {
+      const ModelDisk &one = disks[order[a]], &other = disks[order[b]];
+      const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
+      if (dy > far) break;
+      if (squared >= far * far || squared < 1e-6) continue;
+      const auto [along, across] = table_->overlap(std::sqrt(squared));
+      // Of a bead cut by the border only a part is there to be shared.
+      const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
+      const double along_more = scale * (along - across) / squared;
+      pairs.push_back({order[a], order[b], scale * across + along_more * dx * dx, along_more * dx * dy,
+                       scale * across + along_more * dy * dy});
+    }
+  // Conjugate gradients, each bead's own 2 x 2 block taken out beforehand.
+  std::vector<double> left = descent, direction(2 * n), towards(2 * n), image(2 * n);
+  const auto own_solution = [&](const std::vector<double>& from, std::vector<double>& to) {
+    for (std::size_t i = 0; i < n; ++i) {
+      to[2 * i] = to[2 * i + 1] = 0;
+      solve_own(disks[i], from[2 * i], from[2 * i + 1], to[2 * i], to[2 * i + 1]);
+    }
+  };
+  const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
+    return sum;
+  };
+  own_solution(left, towards);
+  direction = towards;
+  double norm = product(left, towards);
+  const double enough = 1e-6 * norm;  // a thousandth of the step
+  constexpr int most_rounds = 60;
+  for (int round = 0; round < most_rounds && norm > enough; ++round) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const ModelDisk& disk = disks[i];
+      const double damping = 1e-9 + 1e-4 * (disk.hessian_xx + disk.hessian_yy);
+      const double x = direction[2 * i], y = direction[2 * i + 1];
+      image[2 * i] = (disk.hessian_xx + damping) * x + disk.hessian_xy * y;
+      image[2 * i + 1] = disk.hessian_xy * x + (disk.hessian_yy + damping) * y;
+    }
+    for (const Pair& pair : pairs) {
+      const std::size_t a = 2 * pair.one, b = 2 * pair.other;
+      image[a] += pair.xx * direction[b] + pair.xy * direction[b + 1];
+      image[a + 1] += pair.xy * direction[b] + pair.yy * direction[b + 1];
+      image[b] += pair.xx * direction[a] + pair.xy * direction[a + 1];
+      image[b + 1] += pair.xy * direction[a] + pair.yy * direction[a + 1];
+    }
+    const double curvature = product(direction, image);
+    if (!(curvature > 0)) break;  // not a minimum that way: what was found so far is a descent all the same
+    const double length = norm / curvature;
+    for (std::size_t k = 0; k < 2 * n; ++k) {
+      step[k] += length * direction[k];
+      left[k] -= length * image[k];
+    }
+    own_solution(left, towards);
+    const double next = product(left, towards);
+    for (std::size_t k = 0; k < 2 * n; ++k) direction[k] = towards[k] + next / norm * direction[k];
+    norm = next;
+  }
+  double largest = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double length = std::hypot(step[2 * i], step[2 * i + 1]);
+    const double share = length > largest_step ? largest_step / length : 1.0;
+    disks[i].x += share * step[2 * i];
+    disks[i].y += share * step[2 * i + 1];
+    disks[i].last_step = share * length;
+    largest = std::max(largest, disks[i].last_step);
+  }
+  reset(flat, disks);
   return largest;
 }
 

@@ -30,10 +30,20 @@ class ProfileTable {
   ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px);
   [[nodiscard]] double reach() const { return reach_; }
   [[nodiscard]] double at(double squared_distance) const;
+  // Overlap of the gradients of two beads `distance_px` apart, along the line of centres and across it, as a share of
+  // one bead's own, of each component.
+  struct Overlap {
+    double along = 0, across = 0;
+  };
+  [[nodiscard]] Overlap overlap(double distance_px) const;
 
  private:
   friend class JointFit;
   double reach_ = 0;
+  double relaxation_ = 1;  // Newton steps along the widened gradient are this much too long near the solution
+  double overlap_from_px_ = 0, overlap_step_px_ = 0;
+  std::vector<Overlap> overlaps_;
+  void prepare_overlaps(double radius_px, double edge_px);
   float inverse_step_ = 0;
   int last_ = 0;
   std::vector<float> level_, rise_, soft_rise_;
@@ -47,6 +57,7 @@ class JointFit {
   // `flat`: flattened frame, 0 background, 1 bead.
   explicit JointFit(const GrayFrame& flat);
   void set_table(const ProfileTable* table) { table_ = table; }
+  [[nodiscard]] double reach() const { return table_->reach(); }
 
   // Adds or takes out one bead's contrast (sign +1 takes the model's part out of the residual).
   void subtract(double x, double y, float sign);
@@ -56,6 +67,10 @@ class JointFit {
   // twice are left alone. Residuals count at most `bound` in size (contrast
   // units), so that what is no bead at all, a dark base say, hardly pulls. Returns the largest move.
   double sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound);
+  // One Newton step of all beads at once: where blur makes touching beads share pixels, sweeps creep and this does
+  // not. The coupling of two beads is that of two whole beads; what it leaves is taken up by the next step. `flat` as
+  // in reset(). Returns the largest move, at most `largest_step` px.
+  double step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound);
   // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
   void judge(std::vector<ModelDisk>& disks, double radius) const;
   // Residual (flat frame minus model) at a pixel.
@@ -73,6 +88,11 @@ class JointFit {
   [[nodiscard]] double strong_pixels(float level) const;
 
  private:
+  // Half the sum of squares around a bead: its curvature (into `disk`) and its descent, per px.
+  struct Descent {
+    double x = 0, y = 0;
+  };
+  Descent descent_of(ModelDisk& disk, float bound) const;
   void move(double old_x, double old_y, double new_x, double new_y);
   int width_, height_;
   std::size_t stride_;
