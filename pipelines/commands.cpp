@@ -29,8 +29,8 @@ Console::Level level_of(const CommonArguments& common) {
 }
 
 void print(std::string_view text) {
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  if (std::fflush(stdout) != 0) throw StageError("stdout cannot be written");
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    throw StageError("stdout cannot be written");
 }
 
 std::vector<Setting> settings_of(const RunArguments& run) {
@@ -245,7 +245,7 @@ int command_reproduce(const Arguments& arguments) {
     try {
       result = run_plan_command(one, plan, &answer);
     } catch (const Error& error) {
-      fmt::print(stderr, "error: {}: {}\n", name, error.what());
+      std::fputs(fmt::format("error: {}: {}\n", name, error.what()).c_str(), stderr);
       result = error.code();
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -567,7 +567,7 @@ int command_verify(const Arguments& arguments) {
   if (arguments.common.json) {
     print(dump(Json{{"files", result.files}, {"problems", result.problems}}));
   } else {
-    for (const std::string& problem : result.problems) fmt::print(stderr, "{}\n", problem);
+    for (const std::string& problem : result.problems) std::fputs(fmt::format("{}\n", problem).c_str(), stderr);
     print(result.problems.empty()
               ? fmt::format("{}: all {} files are as the manifest says\n", out.string(), result.files)
               : fmt::format("{}: {} of {} files are not as the manifest says\n", out.string(), result.problems.size(),
@@ -631,7 +631,7 @@ int command_rerun(const Arguments& arguments) {
   if (arguments.common.json) {
     print(dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}}));
   } else {
-    for (const std::string& name : different) fmt::print(stderr, "differs: {}\n", name);
+    for (const std::string& name : different) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
     print(different.empty() ? fmt::format("the same: all {} files of {} came out byte for byte, timings aside\n", files,
                                           before.string())
                             : fmt::format("{} of {} files differ\n", different.size(), files));

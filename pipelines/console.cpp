@@ -54,17 +54,17 @@ void Console::progress(std::string_view what, double fraction, std::string_view 
     left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / fraction));
   const std::string line = fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K{}", line.substr(0, 118));
+    std::fputs(("\r\033[K" + line.substr(0, 118)).c_str(), stderr);
     std::fflush(stderr);
     line_open_ = true;
   } else {
-    fmt::print(stderr, "{}\n", line);
+    std::fputs((line + "\n").c_str(), stderr);
   }
 }
 
 void Console::end_progress() {
   const std::lock_guard lock(mutex_);
-  if (line_open_) fmt::print(stderr, "\r\033[K");
+  if (line_open_) std::fputs("\r\033[K", stderr);
   line_open_ = false;
   progress_of_.clear();
 }

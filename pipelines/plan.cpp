@@ -363,6 +363,9 @@ Plan read_plan(const std::filesystem::path& file, const std::vector<Setting>& se
   return read_plan_text(read_file(file), file.string(), file.parent_path(), settings, preset);
 }
 
+// A file that is no recipe at all would otherwise have a problem in every line.
+constexpr std::size_t most_problems = 1000;
+
 Plan make_plan(JsonNode document, const std::string& file, const std::filesystem::path& directory) {
   Plan plan;
   plan.file = file;
@@ -421,6 +424,10 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     for (std::size_t i = 0; i < list->items.size(); ++i) {
       const JsonNode& item = list->items[i];
       const std::string pointer = pointer_join("/stages", i);
+      if (problems.size() >= most_problems) {
+        problem(item, pointer, fmt::format("more than {} mistakes: the rest is not looked at", most_problems));
+        throw ConfigError(std::move(problems));
+      }
       if (!item.is_object()) {
         problem(item, pointer, fmt::format("expected a stage, an object; got {}", item.described()));
         continue;

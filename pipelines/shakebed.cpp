@@ -258,22 +258,25 @@ int run_program(int argc, char** argv) {
   return chosen();
 }
 
+// A stderr that cannot be written (a full disk) changes nothing about how the program ends.
+void say(const std::string& what) { std::fputs(("error: " + what + "\n").c_str(), stderr); }
+
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
     return run_program(argc, argv);
   } catch (const ConfigError& error) {
-    for (const Problem& problem : error.problems()) fmt::print(stderr, "error: {}\n", to_string(problem));
+    for (const Problem& problem : error.problems()) say(to_string(problem));
     return error.code();
   } catch (const Error& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    say(error.what());
     return error.code();
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "error: out of memory\n");
+    say("out of memory");
     return exit_stage_failed;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
+    say(error.what());
     return exit_stage_failed;
   }
 }

@@ -128,6 +128,7 @@ bool TrajectoryReader::more() {
   if (!decompressor_) {
     char chunk[1 << 16];
     const std::size_t size = std::fread(chunk, 1, sizeof chunk, file_);
+    if (size == 0 && std::ferror(file_) != 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
     buffer_.append(chunk, size);
     at_end_ = size == 0;
     return size > 0;
@@ -137,6 +138,7 @@ bool TrajectoryReader::more() {
     if (d.input.pos == d.input.size) {
       const std::size_t size = std::fread(d.in.data(), 1, d.in.size(), file_);
       if (size == 0) {
+        if (std::ferror(file_) != 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
         at_end_ = true;
         if (d.state != 0) fail("the compressed data end in the middle");
         return false;
@@ -153,6 +155,9 @@ bool TrajectoryReader::more() {
   }
 }
 
+// Far above what any trajectory holds; a compressed file may claim gigabytes.
+constexpr std::size_t longest_line = 1 << 20;
+
 bool TrajectoryReader::line(std::string_view& out) {
   std::size_t searched = position_;
   while (true) {
@@ -165,6 +170,7 @@ bool TrajectoryReader::line(std::string_view& out) {
       return true;
     }
     const std::size_t held = buffer_.size() - position_;
+    if (held > longest_line) fail(fmt::format("a line of more than {} bytes: this is no trajectory", longest_line));
     if (!more()) {
       if (buffer_.size() == position_) return false;
       out = std::string_view(buffer_).substr(position_);

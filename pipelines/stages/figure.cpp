@@ -18,18 +18,14 @@ namespace {
 constexpr std::array palette = {"#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
 enum Color { black, blue, vermilion, green, purple, orange, sky };
 
-// gnuplot strings in double quotes.
+// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes.
 std::string gnuplot_text(std::string_view text) {
-  std::string out = "\"";
+  std::string out = "'";
   for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (c == '\n') {
-      out += "\\n";
-      continue;
-    }
-    out += c;
+    if (c == '\'') out += '\'';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   }
-  return out + "\"";
+  return out + "'";
 }
 
 // Text from the user, in a terminal with enhanced markup: its special characters mean themselves.
