@@ -118,14 +118,14 @@ std::string html_table(const Table& table) {
 
 // --- figures
 
-// gnuplot strings in double quotes; the terminal is not an enhanced one, so nothing else has a meaning.
+// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes.
 std::string gnuplot_text(std::string_view text) {
-  std::string out = "\"";
+  std::string out = "'";
   for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
+    if (c == '\'') out += '\'';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   }
-  return out + "\"";
+  return out + "'";
 }
 
 bool drawable(double cost, double error) {

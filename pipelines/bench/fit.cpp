@@ -246,7 +246,7 @@ void hard_cases(const Effort& effort, StageResult& result) {
     options.window.low = data.height.front(), options.window.high = data.height.back();
     fit_case(one, data, options, true_temperature);
   });
-  add("T = 0.01 m g D: the tail is far sharper than a bin", "", 0, [&](HardCase& one) {
+  add("T = 1e-4 m g D: the tail is far sharper than a bin", "", 0, [&](HardCase& one) {
     const auto truth = fit::HydrostaticProfile::of_column(fit::enskog(), 1e-4, {column, plateau});
     fit::Profile data = exact_profile(52, gaussian);
     truth.sample(data.height, gaussian, data.number_density);
