@@ -118,12 +118,15 @@ std::string html_table(const Table& table) {
 
 // --- figures
 
-// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes.
+// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes. An apostrophe becomes a
+// typographic one, since gnuplot versions differ about quotes within quotes.
 std::string gnuplot_text(std::string_view text) {
   std::string out = "'";
   for (const char c : text) {
-    if (c == '\'') out += '\'';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    if (c == '\'')
+      out += "\u2019";
+    else
+      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   }
   return out + "'";
 }

@@ -18,12 +18,15 @@ namespace {
 constexpr std::array palette = {"#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
 enum Color { black, blue, vermilion, green, purple, orange, sky };
 
-// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes.
+// gnuplot strings in single quotes: in double ones gnuplot runs what stands between backquotes. An apostrophe becomes a
+// typographic one, since gnuplot versions differ about quotes within quotes.
 std::string gnuplot_text(std::string_view text) {
   std::string out = "'";
   for (const char c : text) {
-    if (c == '\'') out += '\'';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    if (c == '\'')
+      out += "\u2019";
+    else
+      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   }
   return out + "'";
 }
