@@ -2,6 +2,7 @@
 // Speed against error of the disk finder, beside OpenCV's HoughCircles on the same frames, with the Cramer-Rao bound.
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -33,6 +34,12 @@ struct FinderBenchmarkRow {
   double radius_error_px = 0;  // found minus true; 0 for methods that are given the radius
   double density_error = 0;    // rms of n D^2 in strips of one diameter, D as found
   double cpu_ms = 0;           // per frame, calibration spread over the frames of the look, drawing not counted
+  // What the finder promises, on its own rows ("joint fit") of frames as in the defaults above: recall and precision
+  // at least .999, rms at most 1.3 bounds (noise-free: .006 px), and the rest.
+  bool has_limits = false;
+  double rms_limit_px = 0, radius_limit_px = 0, density_limit = 0, cpu_limit_ms = 0;
+  bool within_limits = false;
+  std::string beyond;  // which of them are broken, empty when none is
 };
 
 // Runs all methods on all looks; `progress`, if given, is called with each row as it is done. HoughCircles is given the
@@ -46,5 +53,24 @@ double centre_bound_px(const std::vector<RenderedDisk>& disks, const Camera& cam
 
 // The rows as an aligned table with a header line.
 std::string finder_benchmark_table(const std::vector<FinderBenchmarkRow>& rows);
+
+// One input that breaks disk finders, and what came of it.
+struct HardCaseRow {
+  std::string name;                    // "touching pair, any angle"
+  std::string status;                  // "found", "refused", "nothing found", "wrong"
+  double error = 0;                    // in error_unit; none to tell when that is empty
+  std::string error_unit;              // "px" (rms per axis), "deg", "D"
+  double limit = 0;                    // of error, same unit
+  double recall = -1, precision = -1;  // -1 where there is no truth
+  double cpu_ms = 0, cpu_limit_ms = 0;
+  bool pass = false;
+  std::string note;  // the sentence a user would read, or what is wrong
+};
+
+// Runs all hard cases; files are written into `scratch_folder`, which must exist. A case that throws anything but a
+// located InputError is "wrong".
+std::vector<HardCaseRow> benchmark_hard_cases(const std::filesystem::path& scratch_folder,
+                                              const std::function<void(const HardCaseRow&)>& progress = {});
+std::string hard_case_table(const std::vector<HardCaseRow>& rows);
 
 }  // namespace shakebed::ingest

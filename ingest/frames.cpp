@@ -171,7 +171,7 @@ GrayFrame to_gray(cv::Mat picture, const std::string& path, const FrameSourceOpt
     throw InputError(
         path, "frame of " + std::to_string(picture.cols) + " x " + std::to_string(picture.rows) + " px is too large",
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",
-        "crop it, reduce it, or raise largest_frame_pixels");
+        "crop it or reduce it");
   if (picture.depth() != CV_8U && picture.depth() != CV_16U && picture.depth() != CV_32F) {
     cv::Mat converted;
     picture.convertTo(converted, CV_32F);
@@ -291,7 +291,7 @@ void refuse_if_enormous(const std::string& path, std::ifstream& file, const Fram
     throw InputError(
         path, "frame of " + std::to_string(width) + " x " + std::to_string(height) + " px is too large",
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",
-        "crop it, reduce it, or raise largest_frame_pixels");
+        "crop it or reduce it");
 }
 
 GrayFrame read_image(const std::string& path, Kind kind, std::size_t page, const FrameSourceOptions& options,

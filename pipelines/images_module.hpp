@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/finder_benchmark.hpp"
 #include "pipelines/config.hpp"
 #include "pipelines/frame_geometry.hpp"
 #include "pipelines/stages.hpp"
@@ -61,6 +62,13 @@ class ImagesModule {
   virtual ~ImagesModule() = default;
   virtual void render(const RenderOptions& options, RunContext& context) const = 0;
   virtual void extract(const ExtractOptions& options, RunContext& context) const = 0;
+  // See ingest/finder_benchmark.hpp.
+  virtual std::vector<ingest::FinderBenchmarkRow> benchmark_finder(
+      const ingest::FinderBenchmarkOptions& options,
+      const std::function<void(const ingest::FinderBenchmarkRow&)>& progress) const = 0;
+  virtual std::vector<ingest::HardCaseRow> benchmark_hard_cases(
+      const std::filesystem::path& scratch_folder,
+      const std::function<void(const ingest::HardCaseRow&)>& progress) const = 0;
 };
 
 // Loads the module once. It lies beside the program, or in the library folder it was installed to. Throws StageError

@@ -422,6 +422,16 @@ class Module : public ImagesModule {
   void extract(const ExtractOptions& options, RunContext& context) const override {
     translated([&] { extract_disks(options, context); });
   }
+  std::vector<ingest::FinderBenchmarkRow> benchmark_finder(
+      const ingest::FinderBenchmarkOptions& options,
+      const std::function<void(const ingest::FinderBenchmarkRow&)>& progress) const override {
+    return ingest::benchmark_finder(options, progress);
+  }
+  std::vector<ingest::HardCaseRow> benchmark_hard_cases(
+      const std::filesystem::path& scratch_folder,
+      const std::function<void(const ingest::HardCaseRow&)>& progress) const override {
+    return ingest::benchmark_hard_cases(scratch_folder, progress);
+  }
 };
 
 }  // namespace

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <string>
+
+#include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -56,6 +59,21 @@ TEST(FinderBenchmark, JointFitReachesTheBoundAndBeatsHough) {
     EXPECT_LT(joint.rms_px, 1.3 * joint.bound_px);
     EXPECT_LT(joint.rms_px, 0.2 * hough.rms_px);
     EXPECT_LT(joint.density_error, 0.002);
+    EXPECT_FALSE(joint.has_limits);  // promises are made for the usual frames
+  }
+}
+
+TEST(FinderBenchmark, HardCasesAllPassAndFillTheirTable) {
+  const test::ScratchFolder folder;
+  const auto rows = benchmark_hard_cases(folder.path());
+  EXPECT_EQ(rows.size(), 23U);
+  const std::string table = hard_case_table(rows);
+  for (const HardCaseRow& row : rows) {
+    EXPECT_TRUE(row.status == "found" || row.status == "refused" || row.status == "nothing found") << row.name;
+    // Times belong to the benchmark.
+    EXPECT_TRUE(row.pass || row.cpu_ms > row.cpu_limit_ms) << row.name << ": " << row.note;
+    EXPECT_EQ(row.status == "found", !row.error_unit.empty()) << row.name;
+    EXPECT_NE(table.find(row.name), std::string::npos);
   }
 }
 
