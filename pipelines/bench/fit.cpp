@@ -296,7 +296,7 @@ void hard_cases(const Effort& effort, StageResult& result) {
        spoil([&](fit::Profile& d) { d.covariance.assign(d.height.size() * d.height.size(), -1); })},
   };
   for (const auto& [name, data] : refused)
-    add(name, "", 0, [&](HardCase& one) { refusal_case(one, data, plain_options(gaussian)); });
+    add(name, "", 0, [&, &profile = data](HardCase& one) { refusal_case(one, profile, plain_options(gaussian)); });
 }
 
 }  // namespace
