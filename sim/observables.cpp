@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 
 namespace shakebed::sim {
 
@@ -40,6 +41,26 @@ double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) 
     left -= here;
   }
   return count > 0 ? sum / count : 0;
+}
+
+std::string precision_lost(const Simulation& simulation) {
+  std::ostringstream out;
+  out.precision(3);
+  const EnergyLedger ledger = simulation.energy();
+  const double turned_over = std::abs(ledger.initial) + std::abs(ledger.kinetic) + std::abs(ledger.potential) +
+                             ledger.dissipated + std::abs(ledger.floor_work) + std::abs(ledger.bath_work);
+  if (!std::isfinite(turned_over)) {
+    out << "a position, a velocity or an energy is no longer a number";
+    return out.str();
+  }
+  if (std::abs(ledger.imbalance()) > 1e-6 * turned_over) {
+    out << "the energy ledger misses " << std::abs(ledger.imbalance()) << " of the " << turned_over
+        << " turned over (1e-6 of it is allowed)";
+    return out.str();
+  }
+  const double overlap = simulation.largest_overlap();
+  if (!(overlap <= 1e-9)) out << "two disks overlap by " << overlap << " D (1e-9 D is allowed)";
+  return out.str();
 }
 
 namespace {

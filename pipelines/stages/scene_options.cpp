@@ -1,8 +1,12 @@
 #include "pipelines/stages/scene_options.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
+#include "pipelines/files.hpp"
 #include "pipelines/trajectory.hpp"
 
 namespace shakebed::pipelines {
@@ -22,9 +26,122 @@ void describe_surface(Fields& fields, SurfaceOptions& surface) {
                 {.help = "tangential restitution b0 of a contact that sticks", .range = from_to(-1, 1)});
 }
 
+// The floor's positions from its file, if there is one; what is missing or too much is reported.
+void read_table(Fields& fields, TableFloorOptions& table) {
+  if (!fields.decoding()) return;
+  if (table.file.empty() == table.heights.empty()) {
+    fields.problem("/heights",
+                   table.file.empty() ? "the floor has neither \"heights\" nor a \"file\""
+                                      : "the floor has both \"heights\" and a \"file\"",
+                   "Give one of them");
+    return;
+  }
+  if (!table.file.empty()) {
+    if (table.file.paths.empty()) return;  // it is missing, which has been reported
+    if (table.file.paths.size() > 1) {
+      fields.problem("/file",
+                     "names " + std::to_string(table.file.paths.size()) + " files, but the floor is one table");
+      return;
+    }
+    const FloorTable read = read_floor_table(table.file.paths[0]);
+    table.heights = read.heights;
+    if (!table.period) table.period = read.duration;
+  }
+  fields.require(table.period.has_value(), "period", "the period of the floor is not known",
+                 "Give \"period\", or a column time in the file");
+  if (!table.period) table.period = 1;
+}
+
 sim::Surface to_sim(const SurfaceOptions& s) { return {s.restitution, s.friction, s.tangential_restitution}; }
 
 }  // namespace
+
+FloorTable read_floor_table(const std::filesystem::path& path) {
+  FloorTable table;
+  std::vector<double> times;
+  const std::string text = read_file(path);
+  std::size_t time_column = std::string::npos, height_column = std::string::npos;
+  int line_number = 0;
+  bool header = false;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    std::string line = text.substr(begin, end - begin);
+    begin = end + 1;
+    ++line_number;
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty() || line[0] == '#') continue;
+    const std::vector<std::string> cells = split_csv_line(line);
+    const auto fail = [&](const std::string& what) {
+      throw InputError(fmt::format("{}:{}: {}", path.string(), line_number, what));
+    };
+    if (!header) {
+      header = true;
+      for (std::size_t k = 0; k < cells.size(); ++k) {
+        if (cells[k] == "time") time_column = k;
+        if (cells[k] == "height") height_column = k;
+      }
+      if (height_column == std::string::npos) fail("expected a header with the columns time,height or height");
+      continue;
+    }
+    const auto number = [&](std::size_t column) {
+      if (column >= cells.size()) fail(fmt::format("expected {} columns, found {}", column + 1, cells.size()));
+      char* stop = nullptr;
+      const double value = std::strtod(cells[column].c_str(), &stop);
+      if (cells[column].empty() || *stop != '\0' || !std::isfinite(value))
+        fail(fmt::format("\"{}\" is no number", cells[column]));
+      return value;
+    };
+    table.heights.push_back(number(height_column));
+    if (time_column != std::string::npos) {
+      times.push_back(number(time_column));
+      const std::size_t n = times.size();
+      if (n >= 2 && !(times[n - 1] > times[n - 2])) fail("the times do not rise");
+      const double step = times.size() >= 2 ? times[1] - times[0] : 0;
+      if (n >= 3 && std::abs((times[n - 1] - times[0]) / static_cast<double>(n - 1) / step - 1) > 1e-3)
+        fail("the times are not equally spaced");
+    }
+  }
+  if (table.heights.size() < 4)
+    throw InputError(fmt::format("{}: a period of the floor needs at least 4 positions, found {}", path.string(),
+                                 table.heights.size()));
+  if (!times.empty()) {
+    const auto n = static_cast<double>(times.size());
+    table.duration = (times.back() - times.front()) / (n - 1) * n;
+  }
+  return table;
+}
+
+sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks& disks) {
+  sim::PlacedStart start;
+  TrajectoryReader reader(path);
+  TrajectoryFrame frame, last;
+  while (reader.read(frame)) last = frame;
+  std::size_t count = 0;
+  for (const sim::Species& species : disks.species) count += species.count;
+  if (last.size() != count)
+    throw InputError(fmt::format("{}: its last frame has {} disks, the bed {}", path.string(), last.size(), count));
+  if (disks.species.size() > 1 && disks.species[1].diameter == disks.species[0].diameter)
+    throw InputError(
+        fmt::format("{}: which disk is of which species cannot be told: their diameters are the same", path.string()));
+  std::vector<std::size_t> found(disks.species.size());
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    const double diameter = i < last.radius.size() ? 2 * last.radius[i] : 1;
+    std::uint32_t species = 0;
+    while (species < disks.species.size() && std::abs(disks.species[species].diameter - diameter) > 1e-9) ++species;
+    if (species == disks.species.size())
+      throw InputError(
+          fmt::format("{}: disk {} has the diameter {} D, which is that of no species", path.string(), i, diameter));
+    ++found[species];
+    start.disks.push_back(
+        {last.x[i], last.z[i], last.vx[i], last.vz[i], i < last.spin.size() ? last.spin[i] : 0.0, species});
+  }
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    if (found[k] != disks.species[k].count)
+      throw InputError(fmt::format("{}: {} disks of species {}, the bed has {}", path.string(), found[k], k + 1,
+                                   disks.species[k].count));
+  }
+  return start;
+}
 
 void SceneOptions::describe(Fields& fields) {
   reduced_ = fields.reduced();
@@ -124,8 +241,13 @@ void SceneOptions::describe(Fields& fields) {
                      "one period of measured positions, equally spaced in time; a periodic cubic spline between them",
                      [](Fields& g, TableFloorOptions& t) {
                        g.quantity("period", t.period, dimension::time,
-                                  {.help = "period", .required = true, .range = positive});
-                       g.quantities("heights", t.heights, dimension::length, {.help = "positions", .required = true});
+                                  {.help = "period (default: that of the file's times)", .range = positive});
+                       g.quantities("heights", t.heights, dimension::length,
+                                    {.help = "positions in the order of time", .example = "[\"0 mm\", \"1 mm\", ...]"});
+                       g.input_files("file", t.file,
+                                     {.help = "instead of heights: a CSV with the columns time,height in s and m "
+                                              "(reduced: sqrt(D/g) and D), or height alone"});
+                       read_table(g, t);
                      }));
         describe_surface(f, floor.surface);
       },
@@ -225,7 +347,8 @@ double SceneOptions::time_unit() const { return gravity_ && !reduced_ ? std::sqr
 double SceneOptions::period() const {
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
     return 1 / (sine->frequency * time_unit());
-  if (const auto* table = std::get_if<TableFloorOptions>(&floor_.motion)) return table->period / time_unit();
+  if (const auto* table = std::get_if<TableFloorOptions>(&floor_.motion))
+    return table->period.value_or(1) / time_unit();
   return 0;
 }
 
@@ -273,7 +396,7 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
     scene.box.floor = sim::SinusoidalFloor{sine->amplitude / length, sine->frequency * time};
   if (const auto* table = std::get_if<TableFloorOptions>(&floor_.motion)) {
-    sim::TabulatedFloor floor{table->period / time, table->heights};
+    sim::TabulatedFloor floor{table->period.value_or(1) / time, table->heights};
     for (double& height : floor.heights) height /= length;
     scene.box.floor = floor;
   }
@@ -292,16 +415,7 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
     scene.start = sim::HexagonalStart{s->disks_a_row, s->spacing};
   if (const auto* s = std::get_if<RandomStartOptions>(&start_)) scene.start = sim::RandomStart{s->height / length};
   if (const auto* s = std::get_if<FileStartOptions>(&start_)) {
-    sim::PlacedStart start;
-    TrajectoryReader reader(s->file.paths.at(0));
-    TrajectoryFrame frame, last;
-    while (reader.read(frame)) last = frame;
-    for (std::size_t i = 0; i < last.size(); ++i) {
-      const bool second = i < last.radius.size() && last.radius[i] != 0.5;
-      start.disks.push_back(
-          {last.x[i], last.z[i], last.vx[i], last.vz[i], i < last.spin.size() ? last.spin[i] : 0.0, second ? 1u : 0u});
-    }
-    scene.start = start;
+    scene.start = read_start(s->file.paths.at(0), scene.disks);
   }
   scene.start_temperature = start_temperature_ / (gravity_ ? length : 1);
   return scene;

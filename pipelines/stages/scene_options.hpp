@@ -58,8 +58,9 @@ struct SinusoidalFloorOptions {
   double amplitude = 0, frequency = 0;
 };
 struct TableFloorOptions {
-  double period = 0;
+  std::optional<double> period;
   std::vector<double> heights;
+  InputFiles file;  // instead of heights
 };
 struct FloorOptions {
   std::variant<StillFloorOptions, SinusoidalFloorOptions, TableFloorOptions> motion;
@@ -92,6 +93,18 @@ struct FileStartOptions {
   InputFiles file;
 };
 
+// The disks of the last frame of a trajectory (lengths in D). Throws InputError where it is none, holds another number
+// of disks than the scene, or a disk that is of neither species.
+sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks& disks);
+
+// One period of a floor from a CSV with the columns time,height (or height alone, then without a duration): equally
+// spaced, the first moment not repeated at the end. Throws InputError naming the line.
+struct FloorTable {
+  std::vector<double> heights;
+  std::optional<double> duration;  // number of rows times their distance in time
+};
+FloorTable read_floor_table(const std::filesystem::path& path);
+
 class SceneOptions {
  public:
   // Names every option of the bed; when decoding, also checks that such a bed can be and reports what cannot.
@@ -108,6 +121,7 @@ class SceneOptions {
   double length_unit() const { return disks_.diameter; }  // D
   double time_unit() const;                               // sqrt(D/g)
   bool weightless() const { return !gravity_; }
+  bool periodic_upwards() const { return std::holds_alternative<PeriodicLidOptions>(box_.lid); }
   // The floor's period in reduced units; 0 when it stands still.
   double period() const;
   // T/(m g D) of the reservoir; 0 without one.

@@ -5,20 +5,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <memory>
-#include <numbers>
+#include <mutex>
 #include <numeric>
+#include <thread>
 
 #include "pipelines/files.hpp"
+#include "pipelines/replica_seed.hpp"
+#include "pipelines/stages/bed_measurement.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/trajectory.hpp"
+#include "sim/archive.hpp"
 #include "sim/observables.hpp"
+#include "sim/random.hpp"
 #include "sim/simulation.hpp"
 
 namespace shakebed::pipelines {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 double thread_cpu_seconds() {
   timespec now{};
@@ -38,6 +49,91 @@ struct ProfileOptions {
   double spacing = 0.25;  // [D]
   KernelOptions kernel;
 };
+// Of the reservoir's temperature, before the bed settles.
+struct AnnealingStep {
+  double temperature = 0;  // T/(m g), a length
+  double ramp = 0;         // time in which T changes linearly to it
+  double hold = 0;         // time for which it stays
+};
+
+// ------------------------------------------------------------------------------------------------ frames
+
+// The trajectory while it grows: frames are joined into groups of a fixed number, each of which is written (and
+// compressed) by itself, so that a run that goes on from a checkpoint ends with the same bytes.
+class FrameStore {
+ public:
+  FrameStore(fs::path path, std::size_t disks)
+      : path_(std::move(path)), frames_a_group_(std::max<std::size_t>(1, 200'000 / std::max<std::size_t>(disks, 1))) {}
+
+  void start() {  // an empty file
+    std::ofstream(path_, std::ios::binary | std::ios::trunc).flush();
+    bytes_ = 0;
+  }
+  // After the state has been read from a checkpoint: what was written later is cut off.
+  void go_on() {
+    std::error_code error;
+    if (fs::file_size(path_, error) < bytes_ || error)
+      throw StageError(fmt::format("{}: the trajectory so far is not there", path_.string()));
+    fs::resize_file(path_, bytes_);
+  }
+  void add(TrajectoryFrame frame) {
+    waiting_.push_back(std::move(frame));
+    if (waiting_.size() == frames_a_group_) write_group();
+  }
+  void finish(const fs::path& destination) {
+    if (!waiting_.empty()) write_group();
+    fs::rename(path_, destination);
+  }
+
+  template <class Archive>
+  void visit(Archive& archive) {
+    std::uint64_t count = waiting_.size();
+    archive(bytes_, count);
+    waiting_.resize(count);
+    for (TrajectoryFrame& f : waiting_)
+      archive(f.time, f.phase, f.floor_position, f.floor_velocity, f.width, f.height, f.periodic, f.x, f.z, f.vx, f.vz,
+              f.spin, f.radius);
+  }
+
+ private:
+  void write_group() {
+    const fs::path group = path_.parent_path() / ("group-" + path_.filename().string());
+    TrajectoryWriter writer(group);
+    for (const TrajectoryFrame& frame : waiting_) writer.write(frame);
+    writer.close();
+    const std::string text = read_file(group);
+    fs::remove(group);
+    std::ofstream out(path_, std::ios::binary | std::ios::app);
+    out.write(text.data(), static_cast<std::streamsize>(text.size()));
+    if (!out.flush()) throw StageError(fmt::format("{}: cannot be written", path_.string()));
+    bytes_ += text.size();
+    waiting_.clear();
+  }
+  fs::path path_;
+  std::size_t frames_a_group_;
+  std::uint64_t bytes_ = 0;
+  std::vector<TrajectoryFrame> waiting_;
+};
+
+TrajectoryFrame frame_of(const sim::Snapshot& at, const sim::Scene& scene, const sim::DiskProperties& properties,
+                         double phase) {
+  TrajectoryFrame frame;
+  frame.time = at.time;
+  frame.phase = phase;
+  frame.floor_position = at.floor_position;
+  frame.floor_velocity = at.floor_velocity;
+  frame.width = scene.box.width;
+  frame.periodic = std::holds_alternative<sim::PeriodicSides>(scene.box.sides);
+  frame.x = at.x;
+  frame.z = at.z;
+  frame.vx = at.vx;
+  frame.vz = at.vz;
+  frame.spin = at.spin;
+  frame.radius = properties.radius;
+  return frame;
+}
+
+// ------------------------------------------------------------------------------------------------ the stage
 
 class Simulate : public Stage {
  public:
@@ -48,7 +144,7 @@ class Simulate : public Stage {
   // When snapshots are taken, in reduced time. A shaken bed is looked at `phases` times a period, and every frame is
   // one of those moments; a bed on a still floor at equal intervals.
   struct Schedule {
-    double settle = 0;
+    double settle = 0;          // the first look, after the annealing
     std::uint64_t periods = 0;  // measured
     std::uint32_t phases = 1;   // snapshots a period
     double period = 1;
@@ -60,13 +156,19 @@ class Simulate : public Stage {
     }
   };
   Schedule schedule() const;
-  Json results(const sim::Simulation& simulation, const sim::BedObserver& observer, const sim::BlockedMean& virial_rate,
-               double cpu_seconds) const;
+  double annealing_time() const;
+  sim::Scene scene(const RunContext& context, std::uint64_t seed) const;
+  MeasurementPlan measurement_plan(const sim::Scene& scene) const;
 
+  class Run;
   SceneOptions bed_;
   double settle_ = 0, measure_ = 0;
   FrameOptions frames_;
   ProfileOptions profile_;
+  std::vector<AnnealingStep> annealing_;
+  std::vector<std::string> observe_;
+  std::uint32_t replicas_ = 1;
+  double checkpoint_seconds_ = 30;
   bool compress_ = true;
 };
 
@@ -102,8 +204,51 @@ void Simulate::describe(Fields& fields) {
             {.help = "the window through which density is measured"});
       },
       {.help = "the density profile"});
+  fields.array<AnnealingStep>(
+      "schedule", annealing_,
+      [](Fields& f, AnnealingStep& step) {
+        f.quantity("temperature", step.temperature, dimension::length,
+                   {.help = "T/(m g) of the reservoir", .required = true, .range = positive});
+        f.quantity("ramp", step.ramp, dimension::time,
+                   {.help = "time in which T changes linearly to it, from that of the step before (or of the bath)",
+                    .range = non_negative});
+        f.quantity(
+            "hold", step.hold, dimension::time,
+            {.help = "time for which it stays; its second half is averaged for schedule.csv", .range = non_negative});
+      },
+      {.help =
+           "annealing: temperatures of the bath, one after the other, before the bed settles; it stays at the last"});
+  fields.texts("observe", observe_,
+               {.help = "measured only when named: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
+                        "displacement, pressure (by height, with exact averages over time), phases (means by height "
+                        "and phase)"});
+  fields.integer(
+      "replicas", replicas_,
+      {.help = "runs of the same bed with seeds of their own; results are means with the spread between them",
+       .range = from_to(1, 10'000)});
+  fields.number(
+      "checkpoint_seconds", checkpoint_seconds_,
+      {.help = "a killed run goes on from a state at most about this old; 0: from none", .range = non_negative});
   fields.boolean("compress", compress_, {.help = "trajectory.extxyz.zst instead of .extxyz"});
-  if (!fields.decoding() || fields.problem_count() > 0) return;
+  if (!fields.decoding()) return;
+  for (const std::string& name : observe_) {
+    const auto& known = ObserveOptions::names();
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string nearest = nearest_name(name, known);
+    fields.problem("/observe", "\"" + name + "\" is nothing that can be observed",
+                   nearest.empty() ? "One of: order, velocities, displacement, pressure, phases"
+                                   : "Did you mean \"" + nearest + "\"?");
+  }
+  if (fields.problem_count() > 0) return;
+  fields.require(annealing_.empty() || bed_.bath_temperature() > 0, "schedule",
+                 "there is no bath whose temperature could change",
+                 "Name a \"bath\": langevin, andersen or thermal_floor");
+  for (std::size_t k = 0; k < annealing_.size(); ++k)
+    fields.require(annealing_[k].ramp + annealing_[k].hold > 0, "schedule/" + std::to_string(k),
+                   "the step lasts no time", "Give \"ramp\" or \"hold\"");
+  fields.require(!ObserveOptions::from(observe_).pressure || !bed_.periodic_upwards(), "observe",
+                 "the pressure by height needs a height, but the box is periodic upwards",
+                 "compressibility_factor is measured anyway");
   const double period = bed_.period() * bed_.time_unit();
   fields.require(period == 0 || measure_ >= period, "measure",
                  "the bed must be measured over at least one period of the floor",
@@ -119,7 +264,7 @@ void Simulate::describe(Fields& fields) {
 
 Simulate::Schedule Simulate::schedule() const {
   Schedule plan;
-  plan.settle = settle_ / bed_.time_unit();
+  plan.settle = annealing_time() + settle_ / bed_.time_unit();
   const double measure = measure_ / bed_.time_unit();
   plan.period = bed_.period();
   plan.phases = frames_.phases;
@@ -141,231 +286,480 @@ Simulate::Schedule Simulate::schedule() const {
   return plan;
 }
 
-// The rows from the lowest to the highest that holds anything.
-struct Rows {
-  std::size_t first, last;
-};
-Rows filled_rows(const sim::Profile& profile) {
-  Rows rows{0, profile.height.size()};
-  while (rows.first < rows.last && profile.number_density[rows.first] < 1e-12) ++rows.first;
-  while (rows.last > rows.first && profile.number_density[rows.last - 1] < 1e-12) --rows.last;
-  return rows;
+double Simulate::annealing_time() const {
+  double time = 0;
+  for (const AnnealingStep& step : annealing_) time += (step.ramp + step.hold) / bed_.time_unit();
+  return time;
 }
 
-ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
-                      const std::vector<std::string>& comments) {
-  ProfileTable table;
-  table.comments = comments;
-  const Rows rows = filled_rows(profile);
-  for (std::size_t i = rows.first; i < rows.last; ++i) {
-    const double phi = profile.number_density[i];
-    table.height.push_back(profile.height[i]);
-    table.number_density.push_back(phi);
-    table.std_error.push_back(profile.std_error[i]);
-    table.area_fraction.push_back(std::numbers::pi / 4 * phi);
-    table.samples.push_back(std::round(phi * width * spacing * static_cast<double>(profile.samples)));
-  }
-  return table;
+// A bed that follows another simulation begins where that one ended.
+sim::Scene Simulate::scene(const RunContext& context, std::uint64_t seed) const {
+  sim::Scene scene = bed_.scene(seed);
+  if (const Input* before = context.find_input("simulate"))
+    scene.start = read_start(before->file("final.extxyz"), scene.disks);
+  return scene;
 }
 
-// Of the lab profile: height_i,height_j,covariance for j >= i, only what is not 0.
-std::string covariance_text(const sim::BedObserver& observer) {
-  const sim::Profile profile = observer.density(false);
-  const Rows rows = filled_rows(profile);
-  const std::vector<double> covariance = observer.density_covariance(rows.first, rows.last);
-  const std::size_t n = rows.last - rows.first;
-  std::string text = fmt::format(
-      "# covariance of number_density in profile.csv\n# independent_blocks: {}\nheight_i,height_j,covariance\n",
-      observer.covariance_blocks());
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i; j < n; ++j) {
-      if (covariance[i * n + j] != 0)
-        text += fmt::format("{},{},{}\n", profile.height[rows.first + i], profile.height[rows.first + j],
-                            covariance[i * n + j]);
-    }
-  }
-  return text;
-}
-
-void Simulate::run(RunContext& context) const {
-  const sim::Scene scene = bed_.scene(context.seed());
-  std::unique_ptr<sim::Simulation> simulation;
-  try {
-    simulation = sim::simulate(scene);
-  } catch (const std::exception& error) {
-    throw StageError(error.what());
-  }
-  const Schedule plan = schedule();
-  const std::uint64_t moments = plan.periods * plan.phases;
-  const double end = plan.moment(moments);
-  const double cpu_start = thread_cpu_seconds();
-
-  const auto run_to = [&](double time, const char* what) {
-    // In steps short enough to be interrupted.
-    const double step = std::max(bed_.period(), 1.0);
-    while (simulation->time() < time) {
-      context.check_interrupted();
-      simulation->advance_to(std::min(time, simulation->time() + step));
-      context.progress(simulation->time() / end, what);
-    }
-  };
-  run_to(plan.settle, "settling");
-
+MeasurementPlan Simulate::measurement_plan(const sim::Scene& scene) const {
   double amplitude = 0;
   if (const auto* sine = std::get_if<sim::SinusoidalFloor>(&scene.box.floor)) amplitude = sine->amplitude;
   if (const auto* table = std::get_if<sim::TabulatedFloor>(&scene.box.floor))
     for (double h : table->heights) amplitude = std::max(amplitude, std::abs(h));
-  sim::ProfileGrid grid;
-  grid.spacing = profile_.spacing;
-  grid.lowest = -std::ceil((amplitude + 6 * profile_.kernel.width + 1) / grid.spacing) * grid.spacing;
-  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * bed_.bath_temperature();
-  grid.points = static_cast<std::size_t>(std::min((loose_height - grid.lowest) / grid.spacing, 200'000.0));
-  const sim::Kernel kernel{profile_.kernel.kind, profile_.kernel.width};
-  sim::BedObserver observer(scene, simulation->properties(), plan.phases, grid, kernel);
-  sim::BedObserver frame_observer(scene, simulation->properties(), 1, grid, kernel);
-  sim::BlockedMean virial_rate;
-
-  std::unique_ptr<TrajectoryWriter> trajectory;
-  if (plan.frames > 0)
-    trajectory =
-        std::make_unique<TrajectoryWriter>(context.output(compress_ ? "trajectory.extxyz.zst" : "trajectory.extxyz"));
-  const sim::DiskProperties properties = simulation->properties();
-  sim::Snapshot at;
-  double virial = simulation->counters().virial;
-  std::uint64_t above = 0;
-  for (std::uint64_t moment = 0; moment < moments; ++moment) {
-    run_to(plan.moment(moment), "measuring");
-    simulation->snapshot(at);
-    const auto phase = static_cast<std::uint32_t>(moment % plan.phases);
-    observer.observe(at, phase);
-    for (double z : at.z) above += z > grid.height(grid.points - 1);
-    if (phase == 0 && moment > 0) {
-      const double now = simulation->counters().virial;
-      virial_rate.add((now - virial) / plan.period);
-      virial = now;
-    }
-    if (trajectory && moment % plan.frame_stride == 0 && moment / plan.frame_stride < plan.frames) {
-      frame_observer.observe(at, 0);
-      TrajectoryFrame frame;
-      frame.time = at.time;
-      frame.phase = bed_.period() > 0 ? static_cast<double>(phase) / plan.phases : 0;
-      frame.floor_position = at.floor_position;
-      frame.floor_velocity = at.floor_velocity;
-      frame.width = scene.box.width;
-      frame.periodic = std::holds_alternative<sim::PeriodicSides>(scene.box.sides);
-      frame.x = at.x;
-      frame.z = at.z;
-      frame.vx = at.vx;
-      frame.vz = at.vz;
-      frame.spin = at.spin;
-      frame.radius = properties.radius;
-      trajectory->write(frame);
-    }
-  }
-  if (trajectory) trajectory->close();
-  const double cpu = thread_cpu_seconds() - cpu_start;
-
-  if (above > 0)
-    context.warning(std::to_string(above) +
-                    " disk positions lay above the highest bin of the profile and are missing from it");
-  const std::string kernel_name = kernel.kind == sim::KernelKind::gaussian ? "gaussian" : "top-hat";
-  const auto comments = [&](const char* frame) {
-    return std::vector<std::string>{"heights in D above " + std::string(frame), "kernel: " + kernel_name,
-                                    "kernel_width: " + dump_canonical(Json(kernel.width)),
-                                    "column_number: " + dump_canonical(Json(scene.count() / scene.box.width))};
-  };
-  write_profile_csv(context.output("profile.csv"), table_of(observer.density(false), scene.box.width, grid.spacing,
-                                                            comments("the floor's mean position")));
-  write_file(context.output("covariance.csv"), covariance_text(observer));
-  write_profile_csv(context.output("profile_floor_frame.csv"),
-                    table_of(observer.density(true), scene.box.width, grid.spacing, comments("the moving floor")));
-  if (plan.frames > 0)
-    write_profile_csv(context.output("profile_frames.csv"),
-                      table_of(frame_observer.density(false), scene.box.width, grid.spacing,
-                               comments("the floor's mean position, at the moments of the frames only")));
-  write_file(context.output("observables.json"), dump(results(*simulation, observer, virial_rate, cpu)));
-  write_file(context.output("bed.json"), dump(bed_.description().to_json()));
-  std::string layers =
-      "# layers of 1 D by the height of their middle above the floor's mean [D]; temperatures in m g D, "
-      "velocities in sqrt(g D)\nheight,temperature_x,temperature_z,mean_velocity_z,share\n";
-  for (const sim::BedObserver::Layer& layer : observer.layers())
-    layers += fmt::format("{},{},{},{},{}\n", layer.height, layer.temperature_x, layer.temperature_z,
-                          layer.mean_velocity_z, layer.share);
-  write_file(context.output("layers.csv"), layers);
-  const sim::Counters counters = simulation->counters();
-  context.timing("cpu_seconds", cpu);
-  context.timing("collisions_per_second", static_cast<double>(counters.collisions()) / cpu);
-  context.progress(1, "measured");
+  double temperature = bed_.bath_temperature();
+  if (!annealing_.empty()) temperature = std::max(temperature, annealing_.back().temperature / bed_.length_unit());
+  const Schedule times = schedule();
+  MeasurementPlan plan;
+  plan.phases = times.phases;
+  plan.period = times.period;
+  plan.grid.spacing = profile_.spacing;
+  plan.grid.lowest = -std::ceil((amplitude + 6 * profile_.kernel.width + 1) / plan.grid.spacing) * plan.grid.spacing;
+  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * temperature;
+  plan.grid.points =
+      static_cast<std::size_t>(std::min((loose_height - plan.grid.lowest) / plan.grid.spacing, 200'000.0));
+  plan.kernel = {profile_.kernel.kind, profile_.kernel.width};
+  plan.observe = ObserveOptions::from(observe_);
+  return plan;
 }
 
-Json Simulate::results(const sim::Simulation& simulation, const sim::BedObserver& observer,
-                       const sim::BlockedMean& virial_rate, double cpu_seconds) const {
-  const sim::Scene scene = bed_.scene(1);
-  const bool hard = std::holds_alternative<sim::HardSides>(scene.box.sides);
-  const bool periodic_up = std::holds_alternative<sim::PeriodicTop>(scene.box.top);
-  const BedDescription bed = bed_.description();
-  const double length = bed_.length_unit();
-  const std::string length_name = bed.reduced ? "D" : "m";
-  const sim::Counters counters = simulation.counters();
-  const sim::EnergyLedger energy = simulation.energy();
-  const std::string energy_name = bed_.weightless() ? "T0" : "m g D";
-  Json out;
-  const auto temperature = [&](const char* name, const sim::Measured& t) {
-    out[name] = quantity_json(t.value, energy_name, t.std_error);
-    if (!bed_.weightless())
-      out[std::string(name) + "_over_mg"] = quantity_json(t.value * length, length_name, t.std_error * length);
+// ------------------------------------------------------------------------------------------------ one run
+
+// The bed run once: its simulation, what is measured of it, and how far it has come. All of this is in a checkpoint.
+class Simulate::Run {
+ public:
+  Run(const Simulate& stage, RunContext& context, std::uint32_t replica, std::uint32_t replicas)
+      : stage_(stage),
+        context_(context),
+        folder_(context.scratch() / (replicas > 1 ? "replica-" + std::to_string(replica) : std::string("run"))),
+        times_(stage.schedule()),
+        lead_(replica == 0) {
+    scene_ = stage.scene(context, replica_seed(context.seed(), replica));
+    if (replica > 0) tell_apart();
+    fs::create_directories(folder_);
+    plan_annealing();
+    start();
+    if (!fs::exists(folder_ / "checkpoint") || !resume()) begin_frames();
+  }
+
+  void operator()() {
+    const double cpu_start = thread_cpu_seconds();
+    cpu_start_ = cpu_start;
+    last_saved_ = std::chrono::steady_clock::now();
+    anneal();
+    run_to(times_.settle, "settling");
+    const std::uint64_t moments = times_.periods * times_.phases;
+    sim::Snapshot at;
+    for (; moment_ < moments; ++moment_) {
+      run_to(times_.moment(moment_), "measuring");
+      if (moment_ == 0) measurement_->begin(*simulation_);
+      simulation_->snapshot(at);
+      const auto phase = static_cast<std::uint32_t>(moment_ % times_.phases);
+      const bool frame =
+          times_.frames > 0 && moment_ % times_.frame_stride == 0 && moment_ / times_.frame_stride < times_.frames;
+      measurement_->look(*simulation_, at, phase, frame);
+      if (frame && frames_)
+        frames_->add(frame_of(at, scene_, properties_,
+                              stage_.bed_.period() > 0 ? static_cast<double>(phase) / times_.phases : 0));
+    }
+    run_to(times_.moment(moments), "measuring");
+    measurement_->end(*simulation_);
+    require_soundness();
+    cpu_ += thread_cpu_seconds() - cpu_start;
+  }
+
+  const BedMeasurement& measurement() const { return *measurement_; }
+  double cpu_seconds() const { return cpu_; }
+  sim::Counters counters() const { return simulation_->counters(); }
+
+  Json results() const {
+    Json out;
+    measurement_->results(stage_.bed_, scene_, out);
+    const BedDescription bed = stage_.bed_.description();
+    const sim::EnergyLedger energy = simulation_->energy();
+    const sim::Counters counters = simulation_->counters();
+    out["gamma"] = quantity_json(bed.gamma(), "1");
+    out["column_number"] = quantity_json(bed.column_number(), "1");
+    out["energy_ledger"] = {{"unit", stage_.bed_.weightless() ? "T0" : "m g D"},
+                            {"initial", energy.initial},
+                            {"kinetic", energy.kinetic},
+                            {"potential", energy.potential},
+                            {"dissipated", energy.dissipated},
+                            {"floor_work", energy.floor_work},
+                            {"bath_work", energy.bath_work},
+                            {"imbalance", energy.imbalance()}};
+    out["collisions"] = counters.collisions();
+    out["disk_collisions"] = counters.disk_collisions;
+    out["wall_collisions"] = counters.wall_collisions;
+    out["floor_collisions"] = counters.floor_collisions;
+    out["elastic_contacts"] = counters.elastic_contacts;
+    out["events"] = counters.events();
+    out["periods"] = measurement_->bed().periods();
+    out["max_overlap"] = quantity_json(simulation_->largest_overlap(), "D");
+    return out;
+  }
+
+  // Everything but observables.json and bed.json.
+  void write() {
+    measurement_->write(context_, times_.frames > 0);
+    if (frames_) frames_->finish(context_.output(trajectory_name()));
+    TrajectoryWriter final(context_.output("final.extxyz"));
+    sim::Snapshot at;
+    simulation_->snapshot(at);
+    final.write(frame_of(at, scene_, properties_, 0));
+    final.close();
+    if (!stage_.annealing_.empty()) write_file(context_.output("schedule.csv"), schedule_text());
+    if (measurement_->above_profile() > 0)
+      context_.warning(std::to_string(measurement_->above_profile()) +
+                       " disk positions lay above the highest bin of the profile and are missing from it");
+  }
+
+ private:
+  // The temperature of the bath up to a time; in the holds, looks whose means are told in schedule.csv.
+  struct Stop {
+    double time, temperature;
+    std::uint32_t step;
+    bool look;
   };
-  if (!bed_.weightless()) {
-    const sim::Measured centre = observer.centre_of_mass();
-    const double ideal = sim::ideal_centre_of_mass(scene.count(), scene.box.width, hard);
-    out["center_of_mass"] = quantity_json(centre.value, "D", centre.std_error);
-    out["center_of_mass_rise"] = quantity_json(centre.value - ideal, "D", centre.std_error);
-    out["ideal_center_of_mass"] = quantity_json(ideal, "D");
+
+  // Replicas that begin from the same placed disks differ by who has which velocity.
+  void tell_apart() {
+    auto* placed = std::get_if<sim::PlacedStart>(&scene_.start);
+    if (placed == nullptr) return;
+    sim::Random random(scene_.seed);
+    for (std::size_t i = placed->disks.size(); i > 1; --i) {
+      sim::Placed &one = placed->disks[i - 1], &other = placed->disks[random.below(static_cast<std::uint32_t>(i))];
+      if (one.species != other.species) continue;
+      std::swap(one.vx, other.vx);
+      std::swap(one.vz, other.vz);
+      std::swap(one.spin, other.spin);
+    }
   }
-  temperature("temperature_x", observer.temperature_x());
-  temperature("temperature_z", observer.temperature_z());
-  temperature("temperature_z_local", observer.temperature_z_local());
-  temperature("spin_temperature", observer.spin_temperature());
-  if (periodic_up && virial_rate.samples() > 0) {
-    // P V = N T + virial rate/2 with T from the kinetic energy of the N - 1 free momenta.
-    const auto n = static_cast<double>(scene.count());
-    const double t = observer.temperature_x().value + observer.temperature_z().value;
-    const double kinetic = t * n / (2 * (n - 1));
-    out["compressibility_factor"] =
-        quantity_json(1 + virial_rate.mean() / (2 * n * kinetic), "1", virial_rate.std_error() / (2 * n * kinetic));
-    const auto height = std::get<sim::PeriodicTop>(scene.box.top).height;
-    out["number_density"] = quantity_json(n / (scene.box.width * height), "1/D^2");
+
+  void plan_annealing() {
+    double time = 0, before = stage_.bed_.bath_temperature();
+    for (std::uint32_t k = 0; k < stage_.annealing_.size(); ++k) {
+      const AnnealingStep& step = stage_.annealing_[k];
+      const double to = step.temperature / stage_.bed_.length_unit();
+      const double ramp = step.ramp / stage_.bed_.time_unit(), hold = step.hold / stage_.bed_.time_unit();
+      // A ramp in pieces of a time unit, each at the temperature of its middle; a hold in 64.
+      const int pieces = ramp > 0 ? static_cast<int>(std::clamp(std::ceil(ramp), 16.0, 10'000.0)) : 0;
+      for (int i = 0; i < pieces; ++i)
+        stops_.push_back({time + ramp * (i + 1) / pieces, before + (to - before) * (i + 0.5) / pieces, k, false});
+      time += ramp;
+      for (int i = 0; i < 64 && hold > 0; ++i) stops_.push_back({time + hold * (i + 1) / 64, to, k, i >= 32});
+      time += hold;
+      before = to;
+    }
+    step_means_.assign(stage_.annealing_.size(), sim::BlockedMean(2));
   }
-  out["gamma"] = quantity_json(bed.gamma(), "1");
-  out["column_number"] = quantity_json(bed.column_number(), "1");
-  if (bed_.period() > 0) {
-    Json phases = Json::array();
-    for (double height : observer.centre_of_mass_by_phase()) phases.push_back(height);
-    out["center_of_mass_by_phase"] = phases;
+
+  void start() {
+    try {
+      simulation_ = sim::simulate(scene_);
+    } catch (const std::exception& error) {
+      throw StageError(error.what());
+    }
+    properties_ = simulation_->properties();
+    measurement_.emplace(scene_, properties_, stage_.measurement_plan(scene_));
+    stop_ = moment_ = 0;
+    cpu_ = 0;
+    step_means_.assign(stage_.annealing_.size(), sim::BlockedMean(2));
+    if (lead_ && times_.frames > 0) frames_.emplace(folder_ / trajectory_name(), properties_.mass.size());
   }
-  out["energy_ledger"] = {
-      {"unit", energy_name},           {"initial", energy.initial},       {"kinetic", energy.kinetic},
-      {"potential", energy.potential}, {"dissipated", energy.dissipated}, {"floor_work", energy.floor_work},
-      {"bath_work", energy.bath_work}, {"imbalance", energy.imbalance()}};
-  out["collisions"] = counters.collisions();
-  out["disk_collisions"] = counters.disk_collisions;
-  out["wall_collisions"] = counters.wall_collisions;
-  out["floor_collisions"] = counters.floor_collisions;
-  out["elastic_contacts"] = counters.elastic_contacts;
-  out["events"] = counters.events();
-  out["periods"] = observer.periods();
-  out["max_overlap"] = quantity_json(simulation.largest_overlap(), "D");
-  out["collisions_per_second"] = static_cast<double>(counters.collisions()) / cpu_seconds;
-  out["cpu_seconds"] = cpu_seconds;
+  void begin_frames() {
+    if (frames_) frames_->start();
+  }
+
+  std::string trajectory_name() const { return stage_.compress_ ? "trajectory.extxyz.zst" : "trajectory.extxyz"; }
+
+  template <class Archive>
+  void visit(Archive& archive, std::vector<std::uint8_t>& engine) {
+    std::uint64_t form = 0x31306e7572626b73;  // "skbrun01"
+    archive(form);
+    if (form != 0x31306e7572626b73) throw std::invalid_argument("it is of another version");
+    archive(engine, stop_, moment_, cpu_, step_means_, *measurement_);
+    if (frames_) archive(*frames_);
+  }
+
+  std::vector<std::uint8_t> state() {
+    std::vector<std::uint8_t> engine = simulation_->checkpoint();
+    const double cpu = cpu_;
+    cpu_ += thread_cpu_seconds() - cpu_start_;
+    sim::ArchiveWriter out;
+    visit(out, engine);
+    cpu_ = cpu;
+    return out.take();
+  }
+
+  // False where the checkpoint cannot be used: all is then as at the start.
+  bool resume() {
+    try {
+      const std::string text = read_file(folder_ / "checkpoint");
+      constexpr std::size_t hash_size = 32;
+      if (text.size() < hash_size || fast_hash(std::string_view(text).substr(hash_size)) != text.substr(0, hash_size))
+        throw std::invalid_argument("it is damaged");
+      const std::vector<std::uint8_t> bytes(text.begin() + hash_size, text.end());
+      std::vector<std::uint8_t> engine;
+      sim::ArchiveReader in(bytes);
+      visit(in, engine);
+      if (!in.at_end()) throw std::invalid_argument("it holds more than this run needs");
+      simulation_->restore(engine);
+      if (frames_) frames_->go_on();
+      if (stop_ == stops_.size() && !stops_.empty()) simulation_->set_bath_temperature(stops_.back().temperature);
+      if (moment_ > 0) measurement_->go_on(*simulation_);
+      context_.log(fmt::format("goes on at {:.6g} of {:.6g} time units", simulation_->time(),
+                               times_.moment(times_.periods * times_.phases)));
+      return true;
+    } catch (const std::exception& error) {
+      context_.warning(
+          fmt::format("{}: cannot be used ({}); the run begins anew", (folder_ / "checkpoint").string(), error.what()));
+      start();
+      return false;
+    }
+  }
+
+  // In steps short enough to be interrupted. Where a synchronisation of the engine lies on the way and it is time, the
+  // state is kept: in memory now and then, on disk every `checkpoint_seconds`.
+  void run_to(double time, const char* what) {
+    const double step = std::max(stage_.bed_.period(), 1.0);
+    const double end = times_.moment(times_.periods * times_.phases);
+    while (simulation_->time() < time) {
+      context_.check_interrupted();
+      double goal = std::min(time, simulation_->time() + step);
+      const double synchronisation = simulation_->next_synchronisation();
+      const bool save_due = stage_.checkpoint_seconds_ > 0 &&
+                            std::chrono::duration<double>(std::chrono::steady_clock::now() - last_saved_).count() >=
+                                stage_.checkpoint_seconds_;
+      const bool keep_due = simulation_->time() >= keep_at_;
+      if ((save_due || keep_due) && synchronisation <= goal) {
+        simulation_->advance_to(synchronisation);
+        require_soundness();
+        sound_ = state();
+        keep_at_ = simulation_->time() + end / 16;
+        if (save_due) save();
+      } else {
+        simulation_->advance_to(goal);
+      }
+      if (lead_) context_.progress(simulation_->time() / end, what);
+    }
+  }
+
+  void save() {
+    const std::string_view bytes(reinterpret_cast<const char*>(sound_.data()), sound_.size());
+    write_file_atomically(folder_ / "checkpoint", fast_hash(bytes) + std::string(bytes));
+    last_saved_ = std::chrono::steady_clock::now();
+  }
+
+  // A run that has lost its precision stops; what was sound stays in the checkpoint.
+  void require_soundness() {
+    const std::string trouble = sim::precision_lost(*simulation_);
+    if (trouble.empty()) return;
+    if (!sound_.empty()) save();
+    throw StageError(fmt::format(
+        "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
+        simulation_->time(), simulation_->counters().collisions(), trouble,
+        sound_.empty() ? std::string("there is no earlier sound state")
+                       : "its last sound state is kept in " + (folder_ / "checkpoint").string()));
+  }
+
+  void anneal() {
+    sim::Snapshot at;
+    for (; stop_ < stops_.size(); ++stop_) {
+      const Stop& stop = stops_[stop_];
+      simulation_->set_bath_temperature(stop.temperature);
+      run_to(stop.time, "annealing");
+      if (!stop.look) continue;
+      simulation_->snapshot(at);
+      double mass = 0, height = 0, kinetic = 0;
+      for (std::size_t i = 0; i < at.z.size(); ++i) {
+        const double m = properties_.mass[i];
+        mass += m;
+        height += m * at.z[i];
+        kinetic += m * (at.vx[i] * at.vx[i] + at.vz[i] * at.vz[i]) / 2;
+      }
+      const double sample[] = {kinetic / static_cast<double>(at.z.size()), height / mass};
+      step_means_[stop.step].add(sample);
+    }
+  }
+
+  std::string schedule_text() const {
+    std::string text =
+        "# means over the second half of each hold; temperatures in m g D, heights in D\n"
+        "step,bath_temperature,temperature,temperature_error,center_of_mass,center_of_mass_error\n";
+    for (std::size_t k = 0; k < step_means_.size(); ++k) {
+      const sim::BlockedMean& means = step_means_[k];
+      text += fmt::format("{},{}", k, stage_.annealing_[k].temperature / stage_.bed_.length_unit());
+      if (means.samples() == 0)
+        text += ",,,,\n";
+      else
+        text += fmt::format(",{},{},{},{}\n", means.mean(0), means.std_error(0), means.mean(1), means.std_error(1));
+    }
+    return text;
+  }
+
+  const Simulate& stage_;
+  RunContext& context_;
+  fs::path folder_;
+  Schedule times_;
+  bool lead_;  // the one whose trajectory is kept and whose progress is shown
+  sim::Scene scene_;
+  sim::DiskProperties properties_;
+  std::unique_ptr<sim::Simulation> simulation_;
+  std::vector<Stop> stops_;
+
+  // What a checkpoint holds.
+  std::uint64_t stop_ = 0, moment_ = 0;
+  double cpu_ = 0;
+  std::vector<sim::BlockedMean> step_means_;
+  std::optional<BedMeasurement> measurement_;
+  std::optional<FrameStore> frames_;
+
+  double cpu_start_ = 0;
+  double keep_at_ = 0;
+  std::vector<std::uint8_t> sound_;
+  std::chrono::steady_clock::time_point last_saved_;
+};
+
+// ------------------------------------------------------------------------------------------------ replicas
+
+// Mean and spread of a number over the replicas.
+struct Spread {
+  double mean = 0, deviation = 0;
+  explicit Spread(const std::vector<double>& values) {
+    const auto n = static_cast<double>(values.size());
+    for (const double v : values) mean += v / n;
+    for (const double v : values) deviation += (v - mean) * (v - mean) / (n - 1);
+    deviation = std::sqrt(deviation);
+  }
+};
+
+// Quantities become means with their error and spread, counts become sums; what is neither is the first's.
+Json joined(const std::vector<Json>& results) {
+  Json out = results.front();
+  for (auto& [key, value] : out.items()) {
+    std::vector<double> values;
+    for (const Json& r : results) {
+      const Json& v = r.at(key);
+      const Json& number = v.is_object() && v.contains("value") ? v.at("value") : v;
+      if (number.is_number()) values.push_back(number.get<double>());
+    }
+    if (values.size() != results.size()) continue;
+    if (value.is_number_unsigned()) {
+      std::uint64_t sum = 0;
+      for (const Json& r : results) sum += r.at(key).get<std::uint64_t>();
+      value = sum;
+    } else if (key == "max_overlap") {
+      value["value"] = *std::max_element(values.begin(), values.end());
+    } else if (value.is_object() && value.contains("std_error")) {
+      const Spread spread(values);
+      value["value"] = spread.mean;
+      value["std_error"] = spread.deviation / std::sqrt(static_cast<double>(values.size()));
+      value["spread"] = spread.deviation;
+    }
+  }
+  out["replicas"] = results.size();
   return out;
+}
+
+std::string replicas_text(const std::vector<Json>& results) {
+  std::string text = "replica", rows;
+  for (const auto& [key, value] : results.front().items())
+    if (value.is_object() && value.contains("std_error")) text += "," + key;
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    rows += std::to_string(k);
+    for (const auto& [key, value] : results[k].items()) {
+      if (!value.is_object() || !value.contains("std_error")) continue;
+      rows += ",";
+      if (value["value"].is_number()) rows += number_text(value["value"].get<double>());
+    }
+    rows += "\n";
+  }
+  return text + "\n" + rows;
+}
+
+// The same file of every replica's measurement: mean densities, errors from their spread.
+sim::Profile joined_density(const std::vector<const BedMeasurement*>& measurements, bool floor_frame) {
+  std::vector<sim::Profile> profiles;
+  for (const BedMeasurement* m : measurements) profiles.push_back(m->bed().density(floor_frame));
+  sim::Profile out = profiles.front();
+  for (std::size_t i = 0; i < out.height.size(); ++i) {
+    std::vector<double> values;
+    for (const sim::Profile& p : profiles) values.push_back(p.number_density[i]);
+    const Spread spread(values);
+    out.number_density[i] = spread.mean;
+    out.std_error[i] = spread.deviation / std::sqrt(static_cast<double>(values.size()));
+  }
+  out.samples *= profiles.size();
+  return out;
+}
+
+void Simulate::run(RunContext& context) const {
+  std::vector<std::unique_ptr<Run>> runs(replicas_);
+  if (replicas_ == 1) {
+    runs[0] = std::make_unique<Run>(*this, context, 0, 1);
+    (*runs[0])();
+  } else {
+    // Each replica on one thread; which does not matter.
+    std::atomic<std::uint32_t> next{0};
+    std::mutex mutex;
+    std::exception_ptr failure;
+    const auto work = [&] {
+      for (std::uint32_t k = next++; k < replicas_; k = next++) {
+        try {
+          {
+            const std::lock_guard lock(mutex);
+            if (failure) return;
+          }
+          auto one = std::make_unique<Run>(*this, context, k, replicas_);
+          (*one)();
+          const std::lock_guard lock(mutex);
+          runs[k] = std::move(one);
+        } catch (...) {
+          const std::lock_guard lock(mutex);
+          if (!failure) failure = std::current_exception();
+        }
+      }
+    };
+    std::vector<std::thread> threads;
+    for (int t = 1; t < context.jobs(); ++t) threads.emplace_back(work);
+    work();
+    for (std::thread& thread : threads) thread.join();
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  runs[0]->write();
+  std::vector<Json> results;
+  std::vector<const BedMeasurement*> measurements;
+  double cpu = 0, collisions = 0;
+  for (const auto& one : runs) {
+    results.push_back(one->results());
+    measurements.push_back(&one->measurement());
+    cpu += one->cpu_seconds();
+    collisions += static_cast<double>(one->counters().collisions());
+  }
+  if (replicas_ > 1) {
+    measurements[0]->write_densities(context, joined_density(measurements, false), joined_density(measurements, true));
+    write_file(context.output("replicas.csv"), replicas_text(results));
+  }
+  Json out = replicas_ > 1 ? joined(results) : results[0];
+  out["collisions_per_second"] = collisions / cpu;
+  out["cpu_seconds"] = cpu;
+  write_file(context.output("observables.json"), dump(out));
+  BedDescription description = bed_.description();
+  if (!annealing_.empty()) description.bath_temperature = annealing_.back().temperature / bed_.length_unit();
+  write_file(context.output("bed.json"), dump(description.to_json()));
+  context.timing("cpu_seconds", cpu);
+  context.timing("collisions_per_second", collisions / cpu);
+  context.progress(1, "measured");
 }
 
 }  // namespace
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 3,
+          .version = 4,
           .summary = "simulates a bed of hard disks, event by event",
+          .accepts = {"simulate"},
+          .most_inputs = 1,
           .uses_seed = true,
           .result = "observables.json",
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Simulate>(); }};

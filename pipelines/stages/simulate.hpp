@@ -1,7 +1,19 @@
 // simulate: a scene → trajectory, profile, observables, by event-driven simulation.
 //
-// Files: trajectory.extxyz[.zst], profile.csv, observables.json, bed.json (a BedDescription, see bed.hpp: what render,
-// fit and map need to know of the bed).
+// Files, always:
+//   observables.json        numbers of the bed as a whole
+//   bed.json                a BedDescription (see bed.hpp: what render, fit and map need to know of the bed)
+//   profile.csv             density by height, with covariance.csv; profile_floor_frame.csv above the moving floor
+//   layers.csv              temperatures by height
+//   final.extxyz            the last state: what a simulate stage that names this one in "from" begins with
+// With frames: trajectory.extxyz[.zst], profile_frames.csv. With "schedule": schedule.csv. With replicas: replicas.csv.
+// With "observe":
+//   order         psi6_local, psi6_global, neighbours_per_disk, vacancies; order.csv by height
+//   velocities    a2, a2_local; velocities.csv by height, velocity_histogram.csv
+//   displacement  displacement.csv: mean square displacement against time
+//   pressure      floor_pressure; pressure.csv by height. All columns are exact averages over time along the
+//                 trajectories; everything else is averaged over looks
+//   phases        phases.csv, phases_floor_frame.csv: density, mean velocities, temperatures by phase and height
 #pragma once
 
 #include "pipelines/stages.hpp"

@@ -1,0 +1,87 @@
+// What a running bed is measured for: which observers look, when, and how their results become files and numbers.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipelines/config.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/json.hpp"
+#include "pipelines/stages.hpp"
+#include "pipelines/stages/scene_options.hpp"
+#include "sim/flights.hpp"
+#include "sim/observables.hpp"
+#include "sim/order.hpp"
+#include "sim/simulation.hpp"
+#include "sim/velocities.hpp"
+
+namespace shakebed::pipelines {
+
+// Measured only when asked for: "observe": ["order", "pressure"].
+struct ObserveOptions {
+  bool order = false, velocities = false, displacement = false, pressure = false, phases = false;
+  static const std::vector<std::string>& names();
+  static ObserveOptions from(const std::vector<std::string>& wanted);
+};
+
+struct MeasurementPlan {
+  std::uint32_t phases = 1;  // looks a period
+  double period = 1;         // between looks at phase 0, reduced
+  sim::ProfileGrid grid;
+  sim::Kernel kernel;
+  ObserveOptions observe;
+};
+
+class BedMeasurement {
+ public:
+  BedMeasurement(const sim::Scene& scene, const sim::DiskProperties& disks, const MeasurementPlan& plan);
+
+  // Before the first look (at the simulation's time now), or after the state has been read from a checkpoint.
+  void begin(sim::Simulation& simulation);
+  void go_on(sim::Simulation& simulation);
+  // The bed as it stands; phase 0 begins a period. `frame`: it is kept in the trajectory, too.
+  void look(const sim::Simulation& simulation, const sim::Snapshot& at, std::uint32_t phase, bool frame);
+  // After the last period's last look, at the time where the next period would begin.
+  void end(const sim::Simulation& simulation);
+
+  const sim::BedObserver& bed() const { return bed_; }
+  // Numbers for observables.json, in the order of the file.
+  void results(const SceneOptions& options, const sim::Scene& scene, Json& out) const;
+  // profile.csv, covariance.csv, layers.csv ... below the stage's output.
+  void write(RunContext& context, bool frames) const;
+  // profile.csv and profile_floor_frame.csv of other densities on the same heights, in place of this bed's own, without
+  // a covariance.
+  void write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor) const;
+  std::uint64_t above_profile() const { return above_; }
+
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(bed_, frames_, virial_rate_, collision_rate_, virial_, collisions_, above_);
+    if (order_) archive(*order_);
+    if (lab_) archive(*lab_);
+    if (floor_) archive(*floor_);
+    if (displacement_) archive(*displacement_);
+    if (flights_) archive(*flights_);
+  }
+
+ private:
+  void end_period(const sim::Simulation& simulation);
+  void write_profile(RunContext& context, const char* file, const sim::Profile& density,
+                     const std::string& frame) const;
+  double width_, disk_count_;
+  bool floor_frame_;
+  MeasurementPlan plan_;
+  sim::BedObserver bed_, frames_;
+  sim::BlockedMean virial_rate_, collision_rate_;
+  double virial_ = 0;
+  std::uint64_t collisions_ = 0;
+  std::uint64_t above_ = 0;  // positions above the highest bin
+  std::optional<sim::OrderObserver> order_;
+  std::optional<sim::VelocityObserver> lab_, floor_;
+  std::optional<sim::DisplacementObserver> displacement_;
+  std::optional<sim::FlightObserver> flights_;
+};
+
+}  // namespace shakebed::pipelines
