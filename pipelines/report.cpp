@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipelines/animation.hpp"
 #include "pipelines/bed.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/manifest.hpp"
 #include "pipelines/stages/check.hpp"
-#include "pipelines/trajectory.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -37,28 +37,17 @@ tr:first-child th { border-top: 0; background: var(--card); } td.number { white-
 figure { margin: 14px 0; } figure > svg, figure img { max-width: 100%; height: auto; display: block; border-radius: 6px; }
 figure > svg.plot { background: #ffffff; width: 100%; } figcaption { color: var(--soft); font-size: 0.9rem; margin-top: 4px; }
 details { margin: 10px 0; } summary { cursor: pointer; color: var(--accent); } pre { overflow-x: auto; background: var(--card); padding: 12px; border-radius: 6px; font-size: 0.82rem; }
+#bed-in-motion { --disk-a: #2f7fb8; --disk-b: #c98a2b; } #bed-in-motion canvas { display: none; width: 100%; max-width: 720px; }
+#bed-in-motion .still { max-width: 720px; } #bed-in-motion .controls { display: none; gap: 10px; align-items: center; flex-wrap: wrap; max-width: 720px; margin-top: 6px; }
+#bed-in-motion.plays canvas { display: block; } #bed-in-motion.plays .controls { display: flex; } #bed-in-motion.plays .still { display: none; }
+.controls input { flex: 1 1 120px; min-width: 0; accent-color: var(--accent); } .controls output { color: var(--soft); font-size: 0.9rem; font-variant-numeric: tabular-nums; }
+button { font: inherit; color: var(--text); background: var(--card); border: 1px solid var(--line); border-radius: 6px; padding: 3px 14px; cursor: pointer; }
+a { color: var(--accent); } ul.files { margin: 8px 0; padding-left: 1.2em; columns: 18rem; font-size: 0.93rem; overflow-wrap: anywhere; }
 .graph text { fill: var(--text); font-size: 13px; } .graph .small { fill: var(--soft); font-size: 11px; }
 .graph rect { fill: var(--card); stroke: var(--line); } .graph rect.failed { stroke: var(--bad); stroke-width: 2; } .graph path { fill: none; stroke: var(--soft); }
 )css";
 
 std::string html(std::string_view text) { return escape_markup(text); }
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](std::size_t k) -> unsigned {
-      return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u;
-    };
-    const unsigned word = byte(0) << 16 | byte(1) << 8 | byte(2);
-    out += digits[word >> 18];
-    out += digits[word >> 12 & 63];
-    out += i + 1 < bytes.size() ? digits[word >> 6 & 63] : '=';
-    out += i + 2 < bytes.size() ? digits[word & 63] : '=';
-  }
-  return out;
-}
 
 void replace_all(std::string& text, std::string_view what, std::string_view with) {
   for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += with.size())
@@ -107,6 +96,13 @@ std::string shown(const Json& quantity) {
   return text + (quantity.value("fixed", false) ? " (fixed)" : "");
 }
 
+std::string size_text(std::uint64_t bytes) {
+  const auto size = static_cast<double>(bytes);
+  return bytes < 1000        ? fmt::format("{} bytes", bytes)
+         : bytes < 1'000'000 ? fmt::format("{:.0f} kB", size / 1e3)
+                             : fmt::format("{:.1f} MB", size / 1e6);
+}
+
 // "temperature_over_mg" → "temperature over mg".
 std::string words(std::string name) {
   std::replace(name.begin(), name.end(), '_', ' ');
@@ -119,6 +115,10 @@ std::string page_head(const std::string& title) {
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
       "content=\"width=device-width, initial-scale=1\">\n"
+      // The page asks nobody for anything: a browser would refuse.
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+      "script-src "
+      "'unsafe-inline'; img-src data:\">\n"
       "<meta name=\"generator\" content=\"shakebed {}\">\n<link rel=\"icon\" "
       "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
       program_version(), html(title), style, html(title));
@@ -150,8 +150,8 @@ class Report {
     for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
       out += fmt::format("<p>{}</p>\n", html(plan_.description));
-    out += banners() + warnings() + figures() + published() + checks() + snapshot() + overlays() + fits() + maps() +
-           assumed() + graph() + provenance();
+    out += banners() + warnings() + figures() + published() + checks() + bed_in_motion() + overlays() + fits() +
+           maps() + assumed() + graph() + downloads() + provenance();
     return out + "</main>\n</body>\n</html>\n";
   }
 
@@ -305,8 +305,7 @@ class Report {
     return out;
   }
 
-  // The bed at one moment, drawn from the trajectory.
-  std::string snapshot() const {
+  std::string bed_in_motion() const {
     for (const PlannedStage& stage : plan_.stages) {
       if (stage.row->name != "simulate" || !results_.contains(stage.id)) continue;
       fs::path path = directory(stage) / "trajectory.extxyz.zst";
@@ -314,36 +313,64 @@ class Report {
       if (!fs::is_regular_file(path, error)) path = directory(stage) / "trajectory.extxyz";
       if (!fs::is_regular_file(path, error)) continue;
       try {
-        TrajectoryReader reader(path);
-        TrajectoryFrame frame;
-        if (!reader.read(frame) || frame.size() == 0 || frame.size() > 5000) continue;
-        double highest = 1;
-        for (std::size_t i = 0; i < frame.size(); ++i) highest = std::max(highest, frame.z[i] + frame.radius[i]);
-        const double lowest = std::min(0.0, frame.floor_position) - 0.6;
-        std::string svg = fmt::format(
-            "<svg viewBox=\"-0.6 {:.3f} {:.3f} {:.3f}\" style=\"max-height:70vh;width:100%\" role=\"img\" "
-            "aria-label=\"the bed at one moment\">"
-            "<rect x=\"-0.6\" y=\"{:.3f}\" width=\"{:.3f}\" height=\"{:.3f}\" fill=\"none\"/>\n<g fill=\"#0072B2\" "
-            "stroke=\"#ffffff\" stroke-width=\"0.03\">\n",
-            -highest - 0.6, frame.width + 1.2, highest - lowest + 0.6, -highest - 0.6, frame.width + 1.2,
-            highest - lowest + 0.6);
-        for (std::size_t i = 0; i < frame.size(); ++i) {
-          svg += fmt::format("<circle cx=\"{:.3f}\" cy=\"{:.3f}\" r=\"{:.3f}\"/>", frame.x[i], -frame.z[i],
-                             frame.radius[i]);
-        }
-        svg += fmt::format(
-            "</g>\n<path d=\"M0 {:.3f}V{:.3f}H{:.3f}V{:.3f}\" fill=\"none\" stroke=\"currentColor\" "
-            "stroke-width=\"0.12\"/></svg>",
-            -highest - 0.3, -frame.floor_position, frame.width, -highest - 0.3);
-        return fmt::format(
-            "<h2>The bed</h2>\n<figure>{}<figcaption>{} disks at time {:.1f} √(D/g), phase {:.2f} of the floor's "
-            "cycle.</figcaption></figure>\n",
-            svg, frame.size(), frame.time, frame.phase);
+        const BedDescription bed = BedDescription::read(directory(stage) / "bed.json");
+        const double unit = bed.reduced || bed.gravity <= 0 ? 1 : std::sqrt(bed.diameter / bed.gravity);
+        const std::string animation = animation_html(path, bed.frequency > 0 ? 1 / (bed.frequency * unit) : 0);
+        if (!animation.empty()) return "<h2>The bed</h2>\n" + animation;
       } catch (const InputError&) {
         continue;
       }
     }
     return "";
+  }
+
+  // Tables and figures inside the page, so that they go where it goes; what is large is linked beside it.
+  std::string downloads() const {
+    constexpr std::uint64_t largest = 300'000, most = 3'000'000;
+    std::uint64_t total = 0;
+    std::string inside, beside;
+    const auto type_of = [](const std::string& extension) {
+      return extension == ".csv"    ? "text/csv"
+             : extension == ".json" ? "application/json"
+             : extension == ".svg"  ? "image/svg+xml"
+                                    : "text/plain";
+    };
+    const auto embed = [&](const std::string& name, const std::string& bytes) {
+      total += bytes.size();
+      inside += fmt::format(
+          "<li><a download=\"{}\" href=\"data:{};base64,{}\">{}</a> <span class=\"soft\">{}</span></li>\n", html(name),
+          type_of(fs::path(name).extension().string()), base64(bytes), html(name), size_text(bytes.size()));
+    };
+    embed(plan_.name + "-recipe.json", dump(plan_.resolved));
+    for (const StageOutcome& stage : outcome_.stages) {
+      if (!stage.record) continue;
+      std::size_t listed = 0;
+      for (const Fingerprint& file : stage.record->outputs) {
+        const std::string extension = fs::path(file.file).extension().string();
+        const bool text = extension == ".csv" || extension == ".json" || extension == ".svg" || extension == ".dat" ||
+                          extension == ".gp" || extension == ".xml";
+        const fs::path path = outcome_.out / stage.id / file.file;
+        std::error_code error;
+        if (!fs::is_regular_file(path, error) || ++listed > 24) continue;
+        if (text && file.bytes <= largest && total + file.bytes <= most) {
+          std::string name = stage.id + "-" + file.file;
+          std::replace(name.begin(), name.end(), '/', '-');
+          embed(name, read_file(path));
+        } else {
+          beside +=
+              fmt::format("<li><a href=\"{}\">{}</a> <span class=\"soft\">{}</span></li>\n",
+                          html(stage.id + "/" + file.file), html(stage.id + "/" + file.file), size_text(file.bytes));
+        }
+      }
+    }
+    std::string out =
+        "<h2>Downloads</h2>\n<details><summary>Tables, figures and the recipe, inside this page</summary><ul "
+        "class=\"files\">\n" +
+        inside + "</ul></details>\n";
+    if (!beside.empty())
+      out += "<details><summary>Large files, beside this page</summary><ul class=\"files\">\n" + beside +
+             "</ul></details>\n";
+    return out;
   }
 
   std::string overlays() const {
@@ -579,7 +606,9 @@ std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<st
 std::string published_text(const Plan& plan, const RunOutcome& outcome) {
   const auto rows = Report(plan, outcome).published_rows();
   if (rows.empty()) return "";
-  std::string out = fmt::format("{:<44} {:<24} {:<14} {}\n", "number", "ours", "published", "verdict");
+  std::size_t widest = 6;
+  for (const auto& row : rows) widest = std::max(widest, row.label.size());
+  std::string out = fmt::format("{:<{}} {:<24} {:<14} {}\n", "number", widest, "ours", "published", "verdict");
   for (const auto& row : rows) {
     // "±" and "–" take two and three bytes for one column.
     const auto pad = [](const std::string& text, std::size_t width) {
@@ -587,7 +616,7 @@ std::string published_text(const Plan& plan, const RunOutcome& outcome) {
       for (const char c : text) columns += (static_cast<unsigned char>(c) & 0xC0) != 0x80;
       return text + std::string(columns < width ? width - columns : 0, ' ');
     };
-    out += pad(row.label, 44) + " " + pad(row.ours, 24) + " " + pad(row.published, 14) + " " + row.verdict + "\n";
+    out += pad(row.label, widest) + " " + pad(row.ours, 24) + " " + pad(row.published, 14) + " " + row.verdict + "\n";
   }
   return out;
 }

@@ -1,38 +1,103 @@
 #!/usr/bin/env bash
-# A report in headless Chromium: no console message, no request to any host, no sideways scrolling at 375 and 1280 px,
-# in light and dark.
-# usage: browser.sh SHAKEBED   (exit 77: no Chromium here)
+# Reports in headless Chromium: of a pipeline and of a sweep, at 375 and 1280 px, light and dark. No console message, no
+# request to any host, no sideways scrolling, text that stands out from its ground, a bed that moves, downloads that hold
+# the files' bytes.
+# usage: browser.sh SHAKEBED [PICTURES]   (exit 77: no Chromium here; PICTURES: a folder for screenshots)
 set -eu
 browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
-[ -n "$browser" ] || { echo "no Chromium"; exit 77; }
+[ -n "$browser" ] || { echo "SKIPPED: Chromium is not installed (Debian: chromium)"; exit 77; }
+shakebed=$(realpath "$1")
+pictures=${2:-}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
+[ -z "$pictures" ] || { mkdir -p "$pictures"; pictures=$(cd "$pictures" && pwd); }
 cd "$folder"
-"$1" init bed.json >/dev/null
-"$1" run bed.json --out o --quiet >/dev/null 2>&1
-# The page measures itself inside a frame of the width wanted (a window cannot be that narrow) and tells the page around.
-sed 's#</body>#<script>parent.postMessage(document.documentElement.scrollWidth, "*");</script></body>#' o/report.html > page.html
+"$shakebed" init bed.json >/dev/null
+"$shakebed" run bed.json --out o --quiet >/dev/null 2>&1
+sed 's#"name": "my-bed",#&\n  "sweep": { "over": { "/stages/bed/floor/amplitude": ["1.5 mm", "2 mm"] } },#' bed.json >sweep.json
+"$shakebed" run sweep.json --out s --quiet --set /stages/bed/measure="0.5 s" --set /stages/bed/settle="0.2 s" \
+  --set /stages/bed/frames/count=16 >/dev/null 2>&1
 bad=0
-for width in 375 1280; do
-  for scheme in light dark; do
-    cat > frame.html <<HTML
-<!DOCTYPE html><html><head><link rel="icon" href="data:,"></head><body>
-<script>addEventListener("message", event => { document.documentElement.dataset.wide = event.data; });</script>
-<iframe src="page.html" style="width: ${width}px; height: 800px; border: 0"></iframe></body></html>
+complain() { echo "$*"; bad=1; }
+
+# The page examines itself inside a frame of the width wanted (a window cannot be that narrow) and tells the page around.
+cat >probe.html <<'HTML'
+<script>
+addEventListener("load", () => setTimeout(() => {
+  const rgb = text => (text.match(/[\d.]+/g) || []).map(Number);
+  const light = ([r, g, b]) => { const f = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; return 0.2126 * f(r) + 0.7152 * f(g) + 0.0722 * f(b); };
+  const ground = element => { for (; element; element = element.parentElement) { const c = rgb(getComputedStyle(element).backgroundColor); if (c.length && c[3] !== 0) return c; } return [255, 255, 255]; };
+  let worst = 21, where = "";
+  for (const element of document.querySelectorAll("h1, h2, p, td, th, li, summary, figcaption, output, button, a, .banner")) {
+    if (!element.textContent.trim() || !element.offsetParent) continue;
+    const a = light(rgb(getComputedStyle(element).color)), b = light(ground(element));
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (contrast < worst) { worst = contrast; where = element.tagName + " " + element.textContent.trim().slice(0, 30); }
+  }
+  const figure = document.getElementById("bed-in-motion"), canvas = figure && figure.querySelector("canvas");
+  if (figure) figure.scrollIntoView();  // what is out of sight does not play
+  const before = canvas ? canvas.toDataURL() : "", drawn = figure ? Number(figure.dataset.drawn) : 0;
+  let waits = 0;
+  const tell = () => {
+    const moves = canvas ? canvas.toDataURL() !== before && Number(figure.dataset.drawn) > drawn : null;
+    if (moves === false && ++waits < 60) return setTimeout(tell, 100);
+    parent.postMessage(JSON.stringify({
+      wide: document.documentElement.scrollWidth, dark: matchMedia("(prefers-color-scheme: dark)").matches,
+      contrast: worst, where, moves, downloads: document.querySelectorAll("a[download]").length,
+    }), "*");
+  };
+  setTimeout(tell, 100);
+}, 300));
+</script></body>
 HTML
-    flags=""
-    [ "$scheme" = dark ] && flags="--force-dark-mode"
-    # A host that cannot be resolved would log an error; the log also holds console messages.
-    # shellcheck disable=SC2086
-    timeout 60 "$browser" --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --user-data-dir="$folder/profile" \
-      --no-first-run --disable-background-networking --host-resolver-rules='MAP * ~NOTFOUND' --enable-logging=stderr --v=0 \
-      --window-size=1400,900 --virtual-time-budget=3000 $flags --dump-dom "file://$folder/frame.html" > dom.html 2> log.txt
-    if grep -E 'CONSOLE|net::ERR' log.txt; then echo "console message or request at $width px, $scheme"; bad=1; fi
-    wide=$(grep -o 'data-wide="[0-9]*"' dom.html | grep -o '[0-9]*')
-    if [ -z "$wide" ] || [ "$wide" -gt "$width" ]; then echo "at $width px ($scheme) the page is '$wide' px wide"; bad=1; fi
+examine() {  # REPORT-FOLDER WIDTH SCHEME
+  sed -e '/<\/body>/{r probe.html' -e 'd}' "$1/report.html" >page.html
+  cat >frame.html <<HTML
+<!DOCTYPE html><html><head><link rel="icon" href="data:,"></head><body style="margin: 0">
+<script>addEventListener("message", event => { document.documentElement.dataset.answer = event.data; });</script>
+<iframe src="page.html" style="width: ${2}px; height: 1500px; border: 0"></iframe></body></html>
+HTML
+  local flags=() name="$1-$2-$3"
+  [ "$3" = dark ] && flags+=(--blink-settings=preferredColorScheme=0)
+  [ "$3" = light ] && flags+=(--blink-settings=preferredColorScheme=1)
+  # No host can be resolved: a request would be an error in the log, which also holds console messages.
+  local common=(--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --user-data-dir="$folder/profile"
+    --no-first-run --disable-background-networking --disable-component-update --host-resolver-rules='MAP * ~NOTFOUND'
+    --enable-logging=stderr --v=0 --virtual-time-budget=8000 "${flags[@]}")
+  timeout 90 "$browser" "${common[@]}" --window-size=1400,1500 --dump-dom "file://$folder/frame.html" >dom.html 2>log.txt ||
+    complain "$name: Chromium failed: $(tail -3 log.txt)"
+  if grep -E 'CONSOLE|net::ERR' log.txt; then complain "$name: a console message or a request"; fi
+  local answer
+  answer=$(grep -o 'data-answer="[^"]*"' dom.html | sed 's/&quot;/"/g; s/^data-answer="//; s/"$//')
+  [ -n "$answer" ] || { complain "$name: the page said nothing"; return; }
+  value() { printf '%s' "$answer" | grep -o "\"$1\":[^,}]*" | cut -d: -f2; }
+  [ "$(value wide)" -le "$2" ] || complain "$name: the page is $(value wide) px wide"
+  [ "$(value dark)" = "$([ "$3" = dark ] && echo true || echo false)" ] || complain "$name: the wrong scheme was tested"
+  # 4.5 is what WCAG 2.1 asks of text.
+  awk -v c="$(value contrast)" 'BEGIN { exit !(c >= 4.5) }' || complain "$name: contrast $(value contrast) at $(value where)"
+  if [ "$1" = o ]; then
+    [ "$(value moves)" = true ] || complain "$name: the bed does not move"
+    [ "$(value downloads)" -ge 8 ] || complain "$name: $(value downloads) downloads"
+  fi
+  if [ -n "$pictures" ]; then
+    timeout 90 "$browser" "${common[@]}" --hide-scrollbars --window-size="$([ "$2" = 375 ] && echo 500 || echo "$2"),6000" \
+      --screenshot="$pictures/$name.png" "file://$folder/$([ "$2" = 375 ] && echo tall.html || echo page.html)" >/dev/null 2>&1 || true
+  fi
+}
+# For pictures narrower than a window can be.
+echo '<!DOCTYPE html><body style="margin: 0"><iframe src="page.html" style="width: 375px; height: 6000px; border: 0"></iframe>' >tall.html
+for report in o s; do
+  for width in 375 1280; do
+    for scheme in light dark; do examine "$report" "$width" "$scheme"; done
   done
 done
-grep -q '<svg class="plot"' o/report.html || { echo "no figure in the report"; bad=1; }
-if grep -nE '(src|href)=["'"'"'](https?:)?//' o/report.html; then echo "the report points outside"; bad=1; fi
-[ "$bad" = 0 ] && echo "the report is whole, alone, and fits"
+grep -q '<svg class="plot"' o/report.html || complain "no figure in the report"
+grep -q '<svg class="plot"' s/report.html || complain "no figure in the sweep's report"
+if grep -nE '(src|href|url\()=?["'"'"']?(https?:)?//' o/report.html s/report.html; then complain "a report points outside"; fi
+# What can be downloaded is what was written.
+for file in extract/profile.csv fit/fit.json; do
+  grep -o "download=\"${file/\//-}\" href=\"data:[^\"]*" o/report.html | sed 's/.*base64,//' | base64 -d | cmp - "o/$file" ||
+    complain "$file: its download is not the file"
+done
+[ "$bad" = 0 ] && echo "both reports are whole, alone, move, and fit"
 exit "$bad"

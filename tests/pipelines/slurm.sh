@@ -3,7 +3,7 @@
 # cancelled midway, submitted again; every point is there once, and right.
 # usage: slurm.sh SHAKEBED   (exit 77: Slurm is not installed here)
 set -eu
-shakebed=$1
+shakebed=$(realpath "$1")
 export PATH="$PATH:/usr/sbin:/sbin"
 for program in munged slurmctld slurmd sbatch squeue scancel; do
   command -v "$program" >/dev/null || { echo "SKIPPED: $program is not installed (Debian: slurm-wlm, munge)"; exit 77; }
