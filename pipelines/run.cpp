@@ -256,12 +256,12 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
   StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
   stage.stage->run(context);
   context.check_interrupted();
+  fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
+  fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
   fresh.outputs = fingerprint_directory(working, true);
   fresh.warnings = context.warnings;
   fresh.failed_checks = context.failed_checks;
   fresh.timings = context.timings;
-  fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
-  fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
   if (!context.log_text().empty()) write_file(working / "log.txt", context.log_text());
   write_file(working / record_name, dump(fresh.to_json()));
   publish(working, place);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "pipelines/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -59,6 +60,43 @@ TEST(Speed, ValidatingAMegabyteTakesAtMost100Milliseconds) {
   const double seconds = median_seconds({"validate", "large.json"}, folder.path(), 7);
   std::printf("validate %.2f MB: %.1f ms\n", 1e-6 * static_cast<double>(recipe.size()), 1e3 * seconds);
   EXPECT_LE(seconds, 0.100);
+}
+
+// The points' own work is what their stages took by themselves (wall_seconds and cpu_seconds of their records); the
+// rest is reading the recipe at every point, fingerprints, records, folders, locks and gathering.
+TEST(Speed, TenThousandPointsCostAtMost2MillisecondsEachAnd200Megabytes) {
+  ScratchFolder folder;
+  constexpr int points = 10'000;
+  write_text(folder / "sweep.json", R"({ "name": "tiny", "stages": [
+  { "stage": "simulate", "id": "bed", "units": "reduced",
+    "disks": { "count": 2, "restitution": 0.9 },
+    "box": { "width": 4, "sides": { "kind": "hard", "restitution": 0.9 }, "lid": "open" },
+    "floor": { "motion": "sinusoidal", "amplitude": 0.5, "frequency": 1, "restitution": 0.9 },
+    "settle": 0, "measure": 2, "frames": { "count": 0, "phases": 2 } } ],
+  "sweep": { "over": { "/stages/bed/floor/amplitude": { "from": 0.4, "to": 0.9, "count": 10000 } },
+             "collect": ["/bed/temperature_x", "/bed/collisions"] } })");
+  const ProgramResult first =
+      run_shakebed({"run", "sweep.json", "--out", "o", "--jobs", "1", "--quiet"}, folder.path());
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  double own_wall = 0, own_cpu = 0;
+  int found = 0;
+  for (const auto& point : std::filesystem::directory_iterator(folder / "o/points")) {
+    const auto record = shakebed::pipelines::read_json(point.path() / "bed/.record");
+    own_wall += record["wall_seconds"].get<double>(), own_cpu += record["cpu_seconds"].get<double>();
+    ++found;
+  }
+  ASSERT_EQ(found, points);
+  const double wall = (first.seconds - own_wall) / points, cpu = (first.cpu_seconds - own_cpu) / points;
+  std::printf(
+      "sweep of %d points: %.2f ms wall, %.2f ms CPU a point, of which its own work %.2f and %.2f: overhead "
+      "%.2f ms wall, %.2f ms CPU; %.0f MB\n",
+      points, 1e3 * first.seconds / points, 1e3 * first.cpu_seconds / points, 1e3 * own_wall / points,
+      1e3 * own_cpu / points, 1e3 * wall, 1e3 * cpu, 1e-3 * static_cast<double>(first.peak_kilobytes));
+  EXPECT_LE(wall, 0.002);
+  EXPECT_LE(first.peak_kilobytes, 200'000);
+  const ProgramResult again =
+      run_shakebed({"run", "sweep.json", "--out", "o", "--jobs", "1", "--quiet"}, folder.path());
+  std::printf("the same again, all up to date: %.2f s\n", again.seconds);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -52,7 +53,16 @@ ProgramResult run_shakebed(const std::vector<std::string>& arguments, const fs::
   ScratchFolder scratch;
   const auto start = std::chrono::steady_clock::now();
   ProgramResult result;
-  result.exit_code = wait_for(spawn(arguments, directory, scratch / "out", scratch / "err"));
+  const int process = spawn(arguments, directory, scratch / "out", scratch / "err");
+  int status = 0;
+  rusage usage{};
+  while (::wait4(process, &status, 0, &usage) < 0 && errno == EINTR) {}
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  result.cpu_seconds = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  result.peak_kilobytes = usage.ru_maxrss;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.out = read_text(scratch / "out");
   result.err = read_text(scratch / "err");

@@ -10,7 +10,9 @@ namespace shakebed::tests {
 struct ProgramResult {
   int exit_code = -1;  // 128 + signal when killed by one
   std::string out, err;
-  double seconds = 0;  // wall
+  double seconds = 0;       // wall
+  double cpu_seconds = 0;   // user and system
+  long peak_kilobytes = 0;  // of resident memory
 };
 // Runs it in `directory` with these arguments.
 ProgramResult run_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory);
