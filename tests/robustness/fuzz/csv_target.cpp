@@ -1,0 +1,28 @@
+// A profile of the user's: what is read has finite numbers and is written and read back the same.
+#include <cmath>
+
+#include "pipelines/errors.hpp"
+#include "pipelines/files.hpp"
+#include "tests/robustness/fuzz/fuzz.hpp"
+
+using namespace shakebed::pipelines;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto path = shakebed::fuzz::as_file({reinterpret_cast<const char*>(data), size}, ".csv");
+  try {
+    const ProfileTable table = read_profile_csv(path);
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      if (!std::isfinite(table.height[i]) || !std::isfinite(table.number_density[i]) ||
+          !std::isfinite(table.area_fraction[i]) || std::isnan(table.std_error[i]) || std::isnan(table.samples[i]))
+        shakebed::fuzz::fail("a number that is none");
+      if (i > 0 && table.height[i] < table.height[i - 1]) shakebed::fuzz::fail("rows are not sorted");
+    }
+    const std::string text = profile_text(table);
+    const ProfileTable again = read_profile_csv(shakebed::fuzz::as_file(text, ".csv"));
+    if (again.height != table.height || again.number_density != table.number_density)
+      shakebed::fuzz::fail("written and read back, not the same:\n" + text);
+  } catch (const InputError& error) {
+    if (std::string_view(error.what()).empty()) shakebed::fuzz::fail("an error without words");
+  }
+  return 0;
+}

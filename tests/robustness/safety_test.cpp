@@ -1,0 +1,259 @@
+// A recipe, a profile or a picture from a stranger: it starts no program, writes nothing outside OUT, asks for no
+// unbounded memory, and puts nothing into a report that a browser would run.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+
+#include "pipelines/files.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+namespace fs = std::filesystem;
+
+void replace(std::string& text, const std::string& what, const std::string& with) {
+  const std::size_t at = text.find(what);
+  ASSERT_NE(at, std::string::npos) << what;
+  text.replace(at, what.size(), with);
+}
+
+std::string with_figure(const std::string& title) {
+  std::string text = small_recipe();
+  replace(text, "{ \"stage\": \"check\"",
+          "{ \"stage\": \"figure\", \"from\": [\"bed\", \"fit\"], \"title\": \"" + title +
+              "\" },\n    { \"stage\": \"check\"");
+  return text;
+}
+
+// Everything below a folder, but for one of its folders.
+std::vector<std::string> listing(const fs::path& folder, const std::string& without) {
+  std::vector<std::string> names;
+  for (auto entry = fs::recursive_directory_iterator(folder); entry != fs::recursive_directory_iterator(); ++entry) {
+    if (entry.depth() == 0 && entry->path().filename() == without) {
+      entry.disable_recursion_pending();
+      continue;
+    }
+    names.push_back(fs::relative(entry->path(), folder).string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+TEST(Safety, TitlesAndNamesStartNoProgram) {
+  // What gnuplot, a shell or a format string would act on.
+  const char* titles[] = {"$(touch pwned)",
+                          "`touch pwned`",
+                          "\\\"; system(\\\"touch pwned\\\"); \\\"",
+                          "'; !touch pwned; '",
+                          "@system('touch pwned')",
+                          "%s%s%s%n",
+                          "\\n!touch pwned\\n",
+                          "| touch pwned",
+                          "<touch pwned",
+                          "\\\\\\\"\\nsystem 'touch pwned'\\n#"};
+  for (const char* title : titles) {
+    ScratchFolder folder;
+    write_text(folder / "r.json", with_figure(title));
+    const auto before = listing(folder.path(), "o");
+    const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+    EXPECT_TRUE(result.exit_code == 0 || result.exit_code == 5)
+        << title << ": " << result.exit_code << " " << result.err;
+    EXPECT_EQ(listing(folder.path(), "o"), before) << title;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / "o"))
+      EXPECT_NE(entry.path().filename(), "pwned") << title;
+    EXPECT_EQ(result.exit_code, 0) << title << ": a title is only a title; " << result.err;
+  }
+}
+
+TEST(Safety, FileNamesOfTheUsersStartNoProgram) {
+  for (const char* name : {"$(touch pwned).csv", "`touch pwned`.csv", "a'b\"c;touch pwned;.csv", "| touch pwned.csv",
+                           "< touch pwned.csv"}) {
+    ScratchFolder folder;
+    write_text(folder / "r.json", with_figure("t"));
+    write_text(folder / name, "height,number_density\n1,0.5\n2,0.4\n");
+    const auto before = listing(folder.path(), "o");
+    const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o", "--data", name}, folder.path());
+    EXPECT_EQ(result.exit_code, 0) << name << ": " << result.err;
+    EXPECT_EQ(listing(folder.path(), "o"), before) << name;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / "o"))
+      EXPECT_NE(entry.path().filename(), "pwned") << name;
+  }
+}
+
+TEST(Safety, ResultsStayBelowOut) {
+  for (const char* id : {"../bed", "..", ".", "/tmp/shakebed-escaped", "a/b", "a\\u0000b", "", "o/../../x", ".hidden",
+                         ".lock", "manifest.json", "report.html"}) {
+    ScratchFolder folder;
+    fs::create_directory(folder / "inner");
+    std::string text = small_recipe();
+    replace(text, "\"id\": \"bed\"", std::string("\"id\": \"") + id + "\"");
+    replace(text, "\"from\": \"bed\"", std::string("\"from\": \"") + id + "\"");
+    write_text(folder / "inner/r.json", text);
+    const auto before = listing(folder.path(), "");
+    const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder / "inner");
+    EXPECT_EQ(result.exit_code, 3) << "id \"" << id << "\" " << result.err;
+    EXPECT_EQ(listing(folder.path(), ""), before) << id;
+  }
+  EXPECT_FALSE(fs::exists("/tmp/shakebed-escaped"));
+}
+
+TEST(Safety, LinksBelowOutDoNotLeadResultsElsewhere) {
+  ScratchFolder folder;
+  write_text(folder / "r.json", small_recipe());
+  fs::create_directories(folder / "o");
+  fs::create_directories(folder / "precious");
+  write_text(folder / "precious/keep.txt", "kept");
+  fs::create_directory_symlink(folder / "precious", folder / "o/bed");
+  write_text(folder / "target.json", "kept");
+  fs::create_symlink(folder / "target.json", folder / "o/manifest.json");
+  const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  EXPECT_TRUE(result.exit_code == 0 || result.exit_code == 5) << result.exit_code << result.err;
+  EXPECT_EQ(read_text(folder / "precious/keep.txt"), "kept");
+  EXPECT_EQ(listing(folder / "precious", ""), (std::vector<std::string>{"keep.txt"}));
+  EXPECT_EQ(read_text(folder / "target.json"), "kept");
+}
+
+TEST(Safety, CleanRemovesOnlyResultsOfOurs) {
+  ScratchFolder folder;
+  write_text(folder / "r.json", small_recipe());
+  ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "results/a"}, folder.path()).exit_code, 0);
+  fs::create_directories(folder / "results/mine");
+  write_text(folder / "results/mine/notes.txt", "kept");
+  fs::create_directories(folder / "elsewhere");
+  write_text(folder / "elsewhere/manifest.json", "{}");
+  fs::create_directory_symlink(folder / "elsewhere", folder / "results/link");
+  ASSERT_EQ(run_shakebed({"clean", "results"}, folder.path()).exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder / "results/a"));
+  EXPECT_EQ(read_text(folder / "results/mine/notes.txt"), "kept");
+  EXPECT_TRUE(fs::exists(folder / "elsewhere/manifest.json"));
+}
+
+TEST(Safety, ReportsEscapeWhatTheyShow) {
+  const std::string attack = "<script>alert(1)</script><img src=x onerror=alert(2)>\\\" onload=alert(3) '&amp;";
+  ScratchFolder folder;
+  std::string text = with_figure(attack);
+  replace(text, "\"name\": \"small\",",
+          "\"name\": \"small\", \"description\": \"" + attack + "\", \"report\": { \"title\": \"" + attack +
+              "\", \"text\": [\"" + attack + "\"], \"published\": [{ \"number\": \"/fit/temperature\", \"label\": \"" +
+              attack + "\", \"value\": \"1\", \"place\": \"" + attack +
+              "\" }], \"assumed\": [{ \"input\": \"/stages/bed/disks/count\", \"why\": \"" + attack + "\" }] },");
+  write_text(folder / "r.json", text);
+  const std::string data = "<script>alert(4)<&.csv";
+  write_text(folder / data, "height,number_density\n1,0.5\n");
+  const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o", "--data", data}, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string page = read_text(folder / "o/report.html");
+  EXPECT_EQ(page.find("<script>alert"), std::string::npos);
+  EXPECT_EQ(page.find("<img src=x"), std::string::npos);
+  EXPECT_NE(page.find("&lt;script&gt;"), std::string::npos) << "the text itself must be shown";
+  EXPECT_EQ(read_text(folder / "o/figure/profile.svg").find("<script>alert"), std::string::npos);
+}
+
+// Runs with an address space of so many bytes and says whether it ended by itself within 10 s.
+ProgramResult within(rlim_t bytes, const std::vector<std::string>& arguments, const fs::path& folder) {
+  rlimit before{};
+  ::getrlimit(RLIMIT_AS, &before);
+  const rlimit now{std::min(bytes, before.rlim_max), before.rlim_max};
+  ::setrlimit(RLIMIT_AS, &now);
+  const ProgramResult result = run_shakebed(arguments, folder);
+  ::setrlimit(RLIMIT_AS, &before);
+  EXPECT_LT(result.seconds, 10) << arguments.back();
+  return result;
+}
+
+void put32(std::string& out, std::uint32_t value) {
+  for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>(value >> shift & 0xff);
+}
+std::uint32_t crc32(std::string_view bytes) {
+  std::uint32_t crc = 0xffffffff;
+  for (const char c : bytes) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int k = 0; k < 8; ++k) crc = crc & 1 ? 0xedb88320u ^ crc >> 1 : crc >> 1;
+  }
+  return ~crc;
+}
+std::string png(std::uint32_t width, std::uint32_t height, const std::string& data) {
+  std::string out = "\x89PNG\r\n\x1a\n";
+  const auto chunk = [&](const std::string& kind, const std::string& body) {
+    put32(out, static_cast<std::uint32_t>(body.size()));
+    out += kind + body;
+    put32(out, crc32(kind + body));
+  };
+  std::string header;
+  put32(header, width), put32(header, height);
+  header += std::string("\x08\x00\x00\x00\x00", 5);
+  chunk("IHDR", header), chunk("IDAT", data), chunk("IEND", "");
+  return out;
+}
+
+TEST(Safety, PicturesThatClaimToBeHugeAreRefused) {
+  ScratchFolder folder;
+  write_text(folder / "bomb.png", png(60'000, 60'000, std::string("\x78\x9c\x63\x60\x60\x00\x00\x00\x04\x00\x01", 11)));
+  write_text(folder / "bomb.pgm", "P5\n60000 60000\n255\nx");
+  std::string bmp("BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x60\xea\0\0\x60\xea\0\0\x01\0\x08\0", 30);
+  bmp += std::string(1100, '\0');
+  write_text(folder / "bomb.bmp", bmp);
+  for (const char* name : {"bomb.png", "bomb.pgm", "bomb.bmp"}) {
+    const ProgramResult result =
+        within(4ull << 30, {"fit-images", name, "--diameter", "3 mm", "--out", "o"}, folder.path());
+    EXPECT_EQ(result.exit_code, 4) << name << " " << result.err;
+    EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+  }
+}
+
+TEST(Safety, CompressedTrajectoriesThatUnfoldToGigabytesAreRefused) {
+  ScratchFolder folder;
+  // One line of 2 GB of digits: some kB of zstd.
+  const std::string zeros = shakebed::pipelines::compress(std::string(200'000'000, '1'), 19);
+  std::string bomb;
+  for (int i = 0; i < 20; ++i) bomb += zeros;
+  write_text(folder / "bomb.extxyz.zst", bomb);
+  std::string text = small_recipe();
+  replace(text, "\"settle\"", "\"start\": {\"kind\": \"file\", \"file\": \"bomb.extxyz.zst\"}, \"settle\"");
+  write_text(folder / "r.json", text);
+  const ProgramResult result = within(1ull << 30, {"validate", "r.json"}, folder.path());
+  EXPECT_TRUE(result.exit_code == 3 || result.exit_code == 4) << result.exit_code << " " << result.err;
+  EXPECT_NE(result.err.find("bomb.extxyz.zst"), std::string::npos) << result.err;
+}
+
+TEST(Safety, LargeRecipesCostNoMoreThanTheyAre) {
+  ScratchFolder folder;
+  // 10 MB of each kind of repetition, in 1 GB of address space.
+  const std::string shapes[] = {"[" +
+                                    [] {
+                                      std::string s;
+                                      while (s.size() < 10'000'000) s += "[],";
+                                      return s + "[]]";
+                                    }(),
+                                "{\"name\": \"x\", \"stages\": [" +
+                                    [] {
+                                      std::string s;
+                                      while (s.size() < 10'000'000) s += "{},";
+                                      return s + "{}]}";
+                                    }(),
+                                "{\"name\": \"" + std::string(10'000'000, 'x') + "\", \"stages\": []}",
+                                "{\"name\": " + std::string(10'000'000, '1') + "}",
+                                std::string(10'000'000, '\\'),
+                                std::string(10'000'000, '{')};
+  for (const std::string& shape : shapes) {
+    write_text(folder / "large.json", shape);
+    const ProgramResult result = within(1ull << 30, {"validate", "large.json"}, folder.path());
+    EXPECT_EQ(result.exit_code, 3) << shape.substr(0, 40) << ": " << result.err.substr(0, 500);
+    EXPECT_LT(result.err.size(), 20'000'000u);
+  }
+}
+
+TEST(Safety, ASweepIsNotUnfoldedBeforeItsSizeIsKnown) {
+  ScratchFolder folder;
+  write_text(folder / "r.json",
+             small_recipe(R"({ "over": { "/stages/bed/seed": { "from": 1, "to": 100000, "count": 100000 },
+    "/stages/bed/disks/restitution": { "from": 0.1, "to": 0.9, "count": 100000 } } })"));
+  const ProgramResult result = within(1ull << 30, {"validate", "r.json"}, folder.path());
+  EXPECT_EQ(result.exit_code, 3) << result.err.substr(0, 500);
+}
+
+}  // namespace
