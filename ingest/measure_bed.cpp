@@ -485,6 +485,10 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
                     (disk.y_px - bed.floor_px - bed.floor_slope * disk.x_px) * cosine * bed.floor_slope) /
                    diameter_px;
       measured.quality = disk.quality;
+      measured.variance_x = disk.variance_x;
+      measured.variance_y = disk.variance_y;
+      measured.covariance_xy = disk.covariance_xy;
+      measured.contrast = disk.contrast;
       measured.std_error_px = std::sqrt(std::max(0.0, 0.5 * (disk.variance_x + disk.variance_y)));
       measured.cut = disk.cut;
       measured.half_hidden = disk.half_hidden;
@@ -660,18 +664,38 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
   return measurement;
 }
 
-void write_disks_csv(const std::filesystem::path& path, const Measurement& measurement,
-                     const std::vector<std::string>& comments) {
+std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks) {
   std::string text;
-  for (const std::string& comment : comments) text += "# " + comment + "\n";
-  text += "frame,x_px,y_px,radius_px,x,z,quality\n";
-  text.reserve(text.size() + 90 * measurement.disks.size());
+  text.reserve(90 * disks.size());
   char line[256];
-  for (const MeasuredDisk& disk : measurement.disks) {
+  for (const MeasuredDisk& disk : disks) {
     std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.4f,%.6f,%.6f,%.4f\n", disk.frame, disk.x_px, disk.y_px,
                   disk.radius_px, disk.x, disk.z, disk.quality);
     text += line;
   }
+  return text;
+}
+
+std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks) {
+  std::string text;
+  text.reserve(90 * disks.size());
+  char line[256];
+  for (const MeasuredDisk& disk : disks) {
+    const double x = std::sqrt(std::max(0.0, disk.variance_x)), y = std::sqrt(std::max(0.0, disk.variance_y));
+    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.5f,%.5f,%.4f,%.4f,%d,%d\n", disk.frame, disk.x_px, disk.y_px, x,
+                  y, x * y > 0 ? disk.covariance_xy / (x * y) : 0.0, disk.contrast, disk.cut ? 1 : 0,
+                  disk.half_hidden ? 1 : 0);
+    text += line;
+  }
+  return text;
+}
+
+void write_disks_csv(const std::filesystem::path& path, const Measurement& measurement,
+                     const std::vector<std::string>& comments) {
+  std::string text;
+  for (const std::string& comment : comments) text += "# " + comment + "\n";
+  text += disks_csv_head;
+  text += disks_csv_rows(measurement.disks);
   write_file_atomically(path, text);
 }
 

@@ -18,7 +18,9 @@ struct MeasuredDisk {
   double x_px = 0, y_px = 0, radius_px = 0;
   double x = 0, z = 0;  // D, from the left wall and from the floor
   double quality = 0;
-  double std_error_px = 0;
+  double std_error_px = 0;                                   // rms of the two below
+  double variance_x = 0, variance_y = 0, covariance_xy = 0;  // px^2
+  double contrast = 0;                                       // 1 for a typical bead
   bool cut = false, half_hidden = false;
 };
 
@@ -109,6 +111,14 @@ struct Measurement {
 // InputError when no frame at all could be read or no frame shows a disk; single bad frames are reported in `frames`
 // instead.
 Measurement measure_bed(FrameSource& source, const MeasureOptions& options);
+
+// Rows of that table, to be written while frames come in: heads and lines end with a newline.
+inline constexpr const char* disks_csv_head = "frame,x_px,y_px,radius_px,x,z,quality\n";
+std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks);
+// What else is known of each disk: errors of its centre, contrast, flags.
+inline constexpr const char* disk_details_csv_head =
+    "frame,x_px,y_px,std_error_x_px,std_error_y_px,correlation,contrast,cut,half_hidden\n";
+std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks);
 
 // CSV: frame,x_px,y_px,radius_px,x,z,quality. Atomic.
 void write_disks_csv(const std::filesystem::path& path, const Measurement& measurement,

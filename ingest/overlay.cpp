@@ -50,4 +50,30 @@ void write_overlay(const std::filesystem::path& path, const GrayFrame& frame, co
   write_file_atomically(path, std::string(bytes.begin(), bytes.end()));
 }
 
+GrayFrame bead_picture(const FinderCalibration& calibration, int magnification) {
+  const BeadProfile& profile = calibration.profile;
+  const double reach = profile.reach_px();
+  const int wanted = std::max(1, magnification);
+  const double scale = std::min<double>(wanted, std::max(1.0, 400 / std::max(1.0, reach)));
+  GrayFrame picture;
+  picture.width = picture.height = 2 * static_cast<int>(std::ceil(reach * scale)) + 1;
+  const double middle = 0.5 * (picture.width - 1);
+  const std::size_t node =
+      static_cast<std::size_t>(calibration.light.rows / 2) * static_cast<std::size_t>(calibration.light.columns) +
+      static_cast<std::size_t>(calibration.light.columns / 2);
+  const float background = node < calibration.light.background.size() ? calibration.light.background[node] : 0.0F;
+  for (int row = 0; row < picture.height; ++row)
+    for (int column = 0; column < picture.width; ++column) {
+      const double x = (column - middle) / scale, y = (row - middle) / scale, r = std::hypot(x, y);
+      const auto cell = static_cast<std::size_t>(r / profile.step_px);
+      float level = 0;
+      if (cell < profile.level.size()) {
+        const double cosine = r > 0 ? std::cos(4 * std::atan2(y, x)) : 0;
+        level = profile.level[cell] + profile.fourth_harmonic[cell] * static_cast<float>(cosine);
+      }
+      picture.pixels.push_back(background + static_cast<float>(calibration.contrast_level) * level);
+    }
+  return picture;
+}
+
 }  // namespace shakebed::ingest

@@ -22,4 +22,7 @@ struct OverlayOptions {
 void write_overlay(const std::filesystem::path& path, const GrayFrame& frame, const std::vector<FoundDisk>& disks,
                    const OverlayOptions& options = {});
 
+// The learned bead as a picture, `magnification` px of it per px of the frame, in the frame's own grey levels.
+GrayFrame bead_picture(const FinderCalibration& calibration, int magnification);
+
 }  // namespace shakebed::ingest

@@ -194,4 +194,65 @@ VelocityMeasurement measure_velocities(const Measurement& measurement, const Vel
   return result;
 }
 
+VelocityMeter::VelocityMeter(double bead_diameter_m, const VelocityOptions& options, std::size_t stretch_frames)
+    : bead_diameter_m_(bead_diameter_m), options_(options), stretch_frames_(std::max<std::size_t>(3, stretch_frames)) {}
+
+void VelocityMeter::add(const std::vector<MeasuredDisk>& disks_of_frame) {
+  for (MeasuredDisk disk : disks_of_frame) {
+    disk.frame = frames_;
+    stretch_.disks.push_back(disk);
+  }
+  ++frames_;
+  if (frames_ < stretch_frames_) return;
+  measure_stretch();
+  stretch_.disks.clear();
+  frames_ = 0;
+  add(disks_of_frame);
+}
+
+void VelocityMeter::measure_stretch() {
+  if (frames_ < 2 || stretch_.disks.empty()) return;
+  stretch_.calibration.radius_px = stretch_.disks.front().radius_px;
+  stretch_.calibration.scale_m_per_px = bead_diameter_m_ / (2 * stretch_.calibration.radius_px);
+  measured_.push_back(measure_velocities(stretch_, options_));
+}
+
+VelocityMeasurement VelocityMeter::result() {
+  // A last stretch of a few frames says little: it counts only if it is the only one.
+  if (measured_.empty() || 2 * frames_ > stretch_frames_) measure_stretch();
+  if (measured_.empty()) {
+    VelocityMeasurement nothing;
+    nothing.warnings.emplace_back("No two frames with disks follow one another: there are no velocities.");
+    return nothing;
+  }
+  if (measured_.size() == 1) return measured_.front();
+  VelocityMeasurement all;
+  const double n = static_cast<double>(measured_.size());
+  const auto mean_of = [&](KineticTemperature VelocityMeasurement::*component) {
+    KineticTemperature mean;
+    mean.finite_time_factor = 0;
+    std::vector<double> series;
+    for (const VelocityMeasurement& one : measured_) {
+      const KineticTemperature& t = one.*component;
+      series.push_back(t.over_mg_m);
+      mean.localisation_bias_m += t.localisation_bias_m / n;
+      mean.finite_time_factor += t.finite_time_factor / n;
+    }
+    const BlockedError error = blocked_error(series);
+    mean.over_mg_m = error.mean;
+    mean.std_error_m = error.std_error;
+    return mean;
+  };
+  all.horizontal = mean_of(&VelocityMeasurement::horizontal);
+  all.vertical = mean_of(&VelocityMeasurement::vertical);
+  for (const VelocityMeasurement& one : measured_) {
+    all.links += one.links;
+    all.linked_share += one.linked_share / n;
+    all.mean_step += one.mean_step / n;
+    for (const std::string& warning : one.warnings)
+      if (all.warnings.size() < 3) all.warnings.push_back(warning);
+  }
+  return all;
+}
+
 }  // namespace shakebed::ingest

@@ -47,4 +47,23 @@ std::vector<Link> link_disks(const Measurement& measurement, double largest_step
 // Throws std::invalid_argument without a frame rate.
 VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options);
 
+// The same while frames come in, in bounded memory: stretches of `stretch_frames` frames are measured one after another
+// (each begins with the last frame of the one before), T is their mean, its error by blocking over them.
+class VelocityMeter {
+ public:
+  // `bead_diameter_m`: D in metres.
+  VelocityMeter(double bead_diameter_m, const VelocityOptions& options, std::size_t stretch_frames = 50);
+  void add(const std::vector<MeasuredDisk>& disks_of_frame);
+  VelocityMeasurement result();
+
+ private:
+  void measure_stretch();
+  double bead_diameter_m_;
+  VelocityOptions options_;
+  std::size_t stretch_frames_;
+  Measurement stretch_;
+  std::size_t frames_ = 0;  // in the stretch
+  std::vector<VelocityMeasurement> measured_;
+};
+
 }  // namespace shakebed::ingest

@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <map>
 #include <mutex>
 #include <thread>
 
 #include "ingest/measure_bed.hpp"
 #include "ingest/overlay.hpp"
 #include "ingest/synthetic_frames.hpp"
+#include "ingest/velocities.hpp"
 #include "pipelines/bed.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/images_module.hpp"
@@ -90,7 +94,11 @@ void render_frames(const RenderOptions& options, RunContext& context) {
   TrajectoryReader reader(path);
   std::mutex reading, failing;
   std::size_t next = 0;
-  std::vector<std::string> truth(count);
+  std::ofstream truth(context.output("truth.csv"), std::ios::binary);
+  truth << "# true centres at the middle of the exposure; pixels from the centre of the top-left one, y downwards\n"
+           "frame,disk,x_px,y_px,radius_px\n";
+  std::map<std::size_t, std::string> drawn;  // truth of frames that wait for one before them
+  std::size_t written = 0;
   std::exception_ptr failure;
   std::atomic<bool> stop{false};
   std::atomic<std::size_t> done{0};
@@ -105,7 +113,7 @@ void render_frames(const RenderOptions& options, RunContext& context) {
           index = next++;
         }
         std::vector<ingest::RenderedDisk> disks(frame.size());
-        std::string& text = truth[index];
+        std::string text;
         for (std::size_t i = 0; i < frame.size(); ++i) {
           disks[i] = {.x_px = geometry.left_wall + frame.x[i] * pixels_per_diameter,
                       .y_px = geometry.floor - frame.z[i] * pixels_per_diameter,
@@ -116,6 +124,14 @@ void render_frames(const RenderOptions& options, RunContext& context) {
               fmt::format("{},{},{:.6f},{:.6f},{:.6f}\n", index, i, disks[i].x_px, disks[i].y_px, disks[i].radius_px);
         }
         ingest::write_png(context.output("frames") / fmt::format("{:06d}.png", index), renderer.render(disks, index));
+        {
+          const std::lock_guard lock(reading);
+          drawn.emplace(index, std::move(text));
+          for (auto at = drawn.find(written); at != drawn.end(); at = drawn.find(++written)) {
+            truth << at->second;
+            drawn.erase(at);
+          }
+        }
         context.progress(static_cast<double>(++done) / static_cast<double>(count), "drawing");
       }
     } catch (...) {
@@ -131,11 +147,8 @@ void render_frames(const RenderOptions& options, RunContext& context) {
   context.check_interrupted();
   if (failure) std::rethrow_exception(failure);
 
-  std::string table =
-      "# true centres at the middle of the exposure; pixels from the centre of the top-left one, y downwards\n"
-      "frame,disk,x_px,y_px,radius_px\n";
-  for (const std::string& text : truth) table += text;
-  write_file(context.output("truth.csv"), table);
+  truth.close();
+  if (!truth) throw StageError("truth.csv could not be written: is the disk full?");
   write_file(context.output("geometry.json"), dump(geometry.to_json()));
   write_file(context.output("bed.json"), dump(bed.to_json()));
   Json result;
@@ -175,6 +188,222 @@ ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::
         std::round(profile.number_density[i] * width * profile.bins.width * static_cast<double>(profile.samples)));
   }
   return table;
+}
+
+// What is done with each frame's disks as they come, so that memory does not grow with the film.
+class DisksOnTheWay {
+ public:
+  DisksOnTheWay(RunContext& context, const ExtractOptions& options, std::istream* truth)
+      : options_(options),
+        disks_(context.output("disks.csv"), std::ios::binary),
+        details_(context.output("disk_details.csv"), std::ios::binary),
+        truth_(truth) {
+    disks_ << ingest::disks_csv_head;
+    details_ << ingest::disk_details_csv_head;
+    if (options.frame_rate) {
+      ingest::VelocityOptions velocity;
+      velocity.frame_rate_hz = *options.frame_rate / static_cast<double>(options.stride);
+      meter_.emplace(options.diameter, velocity);
+    }
+  }
+
+  void take(const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks) {
+    disks_ << ingest::disks_csv_rows(disks);
+    details_ << ingest::disk_details_csv_rows(disks);
+    for (const ingest::MeasuredDisk& disk : disks) {
+      ++quality_[std::min<std::size_t>(quality_.size() - 1,
+                                       static_cast<std::size_t>(disk.quality * static_cast<double>(quality_.size())))];
+      cut_ += disk.cut, half_hidden_ += disk.half_hidden;
+    }
+    if (meter_) meter_->add(disks);
+    if (truth_ != nullptr) compare(frame.index * options_.stride, disks);
+    // Frames to be drawn in the end, spread over a film of unknown length: every so many, thinned out as it goes on.
+    if (options_.overlays == 0 || frame.status != ingest::FrameStatus::good || frame.index % every_ != 0) return;
+    to_draw_.emplace(frame.index, disks);
+    if (to_draw_.size() <= 2 * options_.overlays) return;
+    every_ *= 2;
+    std::erase_if(to_draw_, [&](const auto& one) { return one.first % every_ != 0; });
+  }
+
+  void close() {
+    for (std::ofstream* file : {&disks_, &details_}) {
+      file->close();
+      if (!*file) throw StageError("the tables of disks could not be written: is the disk full?");
+    }
+  }
+
+  // `options.overlays` of the frames kept, spread evenly.
+  [[nodiscard]] std::map<std::size_t, std::vector<ingest::MeasuredDisk>> to_draw() const {
+    std::map<std::size_t, std::vector<ingest::MeasuredDisk>> chosen;
+    std::size_t number = 0;
+    const std::size_t wanted = std::min<std::size_t>(options_.overlays, to_draw_.size());
+    for (const auto& [index, disks] : to_draw_) {
+      if (chosen.size() < wanted && number * wanted >= chosen.size() * to_draw_.size()) chosen.emplace(index, disks);
+      ++number;
+    }
+    return chosen;
+  }
+  [[nodiscard]] std::size_t cut() const { return cut_; }
+  [[nodiscard]] std::size_t half_hidden() const { return half_hidden_; }
+  [[nodiscard]] std::optional<ingest::VelocityMeasurement> velocities() {
+    if (!meter_) return std::nullopt;
+    return meter_->result();
+  }
+  // Share of the disks below which quality is rare, and the table it is told from.
+  [[nodiscard]] Json quality() const {
+    std::size_t all = 0, below = 0;
+    for (const std::size_t count : quality_) all += count;
+    Json json;
+    for (const double share : {0.01, 0.5}) {
+      below = 0;
+      std::size_t bin = 0;
+      while (bin < quality_.size() && static_cast<double>(below + quality_[bin]) < share * static_cast<double>(all))
+        below += quality_[bin++];
+      json[share < 0.1 ? "lowest_percent" : "median"] =
+          static_cast<double>(bin + 1) / static_cast<double>(quality_.size());
+    }
+    return json;
+  }
+  [[nodiscard]] std::string quality_table() const {
+    std::string text = "# number of disks by quality: 1 is a bead like all the others\nfrom,to,disks\n";
+    for (std::size_t k = 0; k < quality_.size(); ++k)
+      text += fmt::format("{:.2f},{:.2f},{}\n", 0.02 * static_cast<double>(k), 0.02 * static_cast<double>(k + 1),
+                          quality_[k]);
+    return text;
+  }
+  // Where the truth is known, how near we came.
+  [[nodiscard]] std::optional<Json> truth() const {
+    if (real_ == 0 || matched_ == 0) return std::nullopt;
+    return Json{{"recall", static_cast<double>(matched_) / static_cast<double>(real_)},
+                {"precision", static_cast<double>(matched_) / static_cast<double>(std::max<std::size_t>(reported_, 1))},
+                {"center_rms_error", quantity_json(std::sqrt(squares_ / static_cast<double>(matched_)), "px")}};
+  }
+
+ private:
+  using Centres = std::vector<std::pair<double, double>>;
+
+  // The true centres of a frame: the table is in the order of frames.
+  Centres truth_of(std::size_t frame) {
+    Centres centres;
+    for (;;) {
+      if (pending_.empty()) {
+        if (!std::getline(*truth_, pending_)) return centres;
+        if (pending_.empty() || std::isdigit(static_cast<unsigned char>(pending_.front())) == 0) {
+          pending_.clear();
+          continue;
+        }
+      }
+      const auto cells = split_csv_line(pending_);
+      const std::size_t of = cells.size() < 4 ? 0 : static_cast<std::size_t>(std::stoull(cells[0]));
+      if (cells.size() >= 4 && of > frame) return centres;
+      if (cells.size() >= 4 && of == frame) centres.emplace_back(std::stod(cells[2]), std::stod(cells[3]));
+      pending_.clear();
+    }
+  }
+
+  // Nearest true centre of each disk found, each true centre used once.
+  void compare(std::size_t frame, const std::vector<ingest::MeasuredDisk>& disks) {
+    Centres truth = truth_of(frame);
+    std::sort(truth.begin(), truth.end());
+    real_ += truth.size(), reported_ += disks.size();
+    std::vector<bool> used(truth.size(), false);
+    for (const ingest::MeasuredDisk& disk : disks) {
+      const double reach = disk.radius_px / 2;
+      auto at = std::lower_bound(truth.begin(), truth.end(), std::pair(disk.x_px - reach, -1e300));
+      std::ptrdiff_t best = -1;
+      double best_distance = reach * reach;
+      for (; at != truth.end() && at->first <= disk.x_px + reach; ++at) {
+        const double dx = at->first - disk.x_px, dy = at->second - disk.y_px;
+        if (dx * dx + dy * dy < best_distance && !used[static_cast<std::size_t>(at - truth.begin())])
+          best_distance = dx * dx + dy * dy, best = at - truth.begin();
+      }
+      if (best < 0) continue;
+      used[static_cast<std::size_t>(best)] = true;
+      ++matched_;
+      squares_ += best_distance;
+    }
+  }
+
+  const ExtractOptions& options_;
+  std::ofstream disks_, details_;
+  std::istream* truth_;
+  std::string pending_;
+  std::optional<ingest::VelocityMeter> meter_;
+  std::array<std::size_t, 50> quality_{};
+  std::size_t cut_ = 0, half_hidden_ = 0, matched_ = 0, reported_ = 0, real_ = 0;
+  double squares_ = 0;
+  std::size_t every_ = 1;
+  std::map<std::size_t, std::vector<ingest::MeasuredDisk>> to_draw_;
+};
+
+std::string bead_table(const ingest::FinderCalibration& finder) {
+  std::string text =
+      "# the bead as learned from the frames: 1 inside a flat bead, 0 far "
+      "outside\nradius_px,contrast,fourth_harmonic\n";
+  for (std::size_t k = 0; k < finder.profile.level.size(); ++k)
+    text += fmt::format("{:.4f},{:.6f},{:.6f}\n", static_cast<double>(k) * finder.profile.step_px,
+                        finder.profile.level[k], finder.profile.fourth_harmonic[k]);
+  return text;
+}
+
+// Disks found and places rejected, frame by frame: missing and doubled beads show as dips and spikes.
+std::string count_figure(const std::vector<ingest::FrameReport>& frames) {
+  constexpr double left = 60, top = 20, wide = 560, high = 200;
+  std::size_t most = 1;
+  for (const ingest::FrameReport& frame : frames) most = std::max({most, frame.disks, frame.rejected});
+  const std::size_t stride = std::max<std::size_t>(1, frames.size() / 2000);
+  const auto line = [&](auto member, const char* colour) {
+    std::string points;
+    for (std::size_t k = 0; k < frames.size(); k += stride)
+      points += fmt::format("{:.1f},{:.1f} ",
+                            left + wide * (static_cast<double>(k) + 0.5) / static_cast<double>(frames.size()),
+                            top + high * (1 - static_cast<double>(frames[k].*member) / static_cast<double>(most)));
+    return fmt::format("<polyline fill=\"none\" stroke=\"{}\" points=\"{}\"/>\n", colour, points);
+  };
+  return fmt::format(
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"640\" height=\"270\" font-family=\"sans-serif\" "
+             "font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" fill=\"none\" "
+             "stroke=\"#888\"/>\n<text x=\"{4}\" y=\"{5}\" text-anchor=\"end\">{6}</text>\n<text x=\"{4}\" y=\"{7}\" "
+             "text-anchor=\"end\">0</text>\n<text x=\"{0}\" y=\"{8}\">frame 0 to {9}: disks found (blue), places "
+             "rejected (orange)</text>\n",
+             left, top, wide, high, left - 6, top + 12, most, top + high, top + high + 25,
+             frames.empty() ? 0 : frames.size() - 1) +
+         line(&ingest::FrameReport::disks, "#1f6fb4") + line(&ingest::FrameReport::rejected, "#e08214") + "</svg>\n";
+}
+
+// The frames kept with the disks found, and of the first of them what the model leaves.
+void draw_overlays(const ExtractOptions& options, RunContext& context, const std::vector<std::string>& paths,
+                   const ingest::FrameSourceOptions& source_options, const ingest::Measurement& found,
+                   const DisksOnTheWay& on_the_way) {
+  const auto to_draw = on_the_way.to_draw();
+  if (options.overlays == 0 || to_draw.empty()) return;
+  const ingest::BedCalibration& bed = found.calibration;
+  ingest::FrameSource again = ingest::FrameSource::open(paths, source_options);
+  bool first = true;
+  for (auto item = again.next_item(); item && item->index <= to_draw.rbegin()->first; item = again.next_item()) {
+    const auto at = to_draw.find(item->index);
+    if (at == to_draw.end()) continue;
+    context.check_interrupted();
+    const ingest::GrayFrame frame = item->decode();
+    ingest::FindResult shown;
+    for (const ingest::MeasuredDisk& disk : at->second) {
+      ingest::FoundDisk circle;
+      circle.x_px = disk.x_px, circle.y_px = disk.y_px, circle.radius_px = disk.radius_px;
+      circle.quality = disk.quality, circle.cut = disk.cut, circle.half_hidden = disk.half_hidden;
+      shown.disks.push_back(circle);
+    }
+    ingest::OverlayOptions overlay;
+    overlay.magnification = frame.width <= 700 ? 2 : 1;
+    overlay.floor_px = bed.floor_px, overlay.floor_slope = bed.floor_slope;
+    if (!bed.walls_are_frame_sides) overlay.left_wall_px = bed.left_wall_px, overlay.right_wall_px = bed.right_wall_px;
+    ingest::write_overlay(context.output(fmt::format("overlay_{:06d}.png", item->index)), frame, shown.disks, overlay);
+    if (first) {
+      ingest::GrayFrame residual = ingest::residual_frame(frame, shown, found.finder);
+      for (float& level : residual.pixels) level += 128;  // grey where the model explains all
+      ingest::write_png(context.output(fmt::format("residual_{:06d}.png", item->index)), residual);
+    }
+    first = false;
+  }
 }
 
 void extract_disks(const ExtractOptions& options, RunContext& context) {
@@ -226,8 +455,15 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     context.check_interrupted();
     if (total && *total > 0) context.progress(static_cast<double>(done) / static_cast<double>(*total), "finding disks");
   };
+  std::optional<std::ifstream> truth_file;
+  if (rendered != nullptr && rendered->has("truth.csv")) truth_file.emplace(rendered->file("truth.csv"));
+  DisksOnTheWay on_the_way(context, options, truth_file ? &*truth_file : nullptr);
+  measure.disk_sink = [&](const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks) {
+    on_the_way.take(frame, disks);
+  };
   const ingest::Measurement found = ingest::measure_bed(source, measure);
   context.check_interrupted();
+  on_the_way.close();
 
   const ingest::BedCalibration& bed = found.calibration;
   for (const std::string& warning : found.warnings) context.warning(warning);
@@ -273,7 +509,6 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     }
     write_file(context.output("covariance.csv"), text);
   }
-  ingest::write_disks_csv(context.output("disks.csv"), found);
   {
     std::string text = "frame,file,page,status,disks,rejected,residual_level\n";
     constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
@@ -314,92 +549,30 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["profile"] = profile_numbers(found.profile);
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
 
-  // Where the truth is known, say how near we came.
-  if (rendered != nullptr && rendered->has("truth.csv")) {
-    const std::string text = read_file(rendered->file("truth.csv"));
-    std::vector<std::vector<std::pair<double, double>>> truth;
-    std::size_t begin = 0;
-    while (begin < text.size()) {
-      const std::size_t end = std::min(text.find('\n', begin), text.size());
-      const std::string_view line = std::string_view(text).substr(begin, end - begin);
-      begin = end + 1;
-      if (line.empty() || !std::isdigit(static_cast<unsigned char>(line.front()))) continue;
-      const auto cells = split_csv_line(line);
-      if (cells.size() < 4) continue;
-      const auto frame = static_cast<std::size_t>(std::stoull(cells[0]));
-      if (frame >= truth.size()) truth.resize(frame + 1);
-      truth[frame].emplace_back(std::stod(cells[2]), std::stod(cells[3]));
-    }
-    // Nearest true centre of each disk found, each true centre used once.
-    std::vector<std::vector<const ingest::MeasuredDisk*>> disks(truth.size());
-    for (const ingest::MeasuredDisk& disk : found.disks) {
-      const std::size_t frame = disk.frame * options.stride;
-      if (frame < disks.size()) disks[frame].push_back(&disk);
-    }
-    std::size_t matched = 0, reported = 0, real = 0;
-    double squares = 0;
-    const double reach = bed.radius_px / 2;
-    for (std::size_t f = 0; f < truth.size(); f += options.stride) {
-      real += truth[f].size(), reported += disks[f].size();
-      std::sort(truth[f].begin(), truth[f].end());
-      std::vector<bool> used(truth[f].size(), false);
-      for (const ingest::MeasuredDisk* disk : disks[f]) {
-        auto at = std::lower_bound(truth[f].begin(), truth[f].end(), std::pair(disk->x_px - reach, -1e300));
-        std::ptrdiff_t best = -1;
-        double best_distance = reach * reach;
-        for (; at != truth[f].end() && at->first <= disk->x_px + reach; ++at) {
-          const double dx = at->first - disk->x_px, dy = at->second - disk->y_px;
-          if (dx * dx + dy * dy < best_distance && !used[static_cast<std::size_t>(at - truth[f].begin())]) {
-            best_distance = dx * dx + dy * dy, best = at - truth[f].begin();
-          }
-        }
-        if (best < 0) continue;
-        used[static_cast<std::size_t>(best)] = true;
-        ++matched;
-        squares += best_distance;
-      }
-    }
-    if (real > 0 && matched > 0) {
-      result["truth"] =
-          Json{{"recall", static_cast<double>(matched) / static_cast<double>(real)},
-               {"precision", static_cast<double>(matched) / static_cast<double>(std::max<std::size_t>(reported, 1))},
-               {"center_rms_error", quantity_json(std::sqrt(squares / static_cast<double>(matched)), "px")}};
-    }
+  result["quality"] = on_the_way.quality();
+  result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
+  if (const auto velocities = on_the_way.velocities()) {
+    for (const std::string& warning : velocities->warnings) context.warning(warning);
+    const auto temperature = [](const ingest::KineticTemperature& t) {
+      Json json = quantity_json(t.over_mg_m, "m", t.std_error_m);
+      json["localisation_bias"] = t.localisation_bias_m, json["finite_time_factor"] = t.finite_time_factor;
+      return json;
+    };
+    result["velocities"] = Json{{"temperature_x_over_mg", temperature(velocities->horizontal)},
+                                {"temperature_z_over_mg", temperature(velocities->vertical)},
+                                {"linked_share", velocities->linked_share},
+                                {"mean_step", quantity_json(velocities->mean_step, "D")}};
   }
+  if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
   write_file(context.output("extract.json"), dump(result));
   if (rendered != nullptr && rendered->has("bed.json"))
     write_file(context.output("bed.json"), read_file(rendered->file("bed.json")));
 
-  // Overlays, spread over the film.
-  if (options.overlays > 0 && !found.frames.empty()) {
-    ingest::FrameSource again = ingest::FrameSource::open(paths, source_options);
-    const std::size_t frames = found.frames.size();
-    const std::size_t wanted = std::min<std::size_t>(options.overlays, frames);
-    std::size_t drawn = 0;
-    for (std::size_t index = 0; index < frames && drawn < wanted; ++index) {
-      auto item = again.next_item();
-      if (!item) break;
-      if (index < drawn * frames / wanted || found.frames[index].status != ingest::FrameStatus::good) continue;
-      const ingest::GrayFrame frame = item->decode();
-      std::vector<ingest::FoundDisk> disks;
-      for (const ingest::MeasuredDisk& disk : found.disks) {
-        if (disk.frame != found.frames[index].index) continue;
-        ingest::FoundDisk circle;
-        circle.x_px = disk.x_px, circle.y_px = disk.y_px, circle.radius_px = disk.radius_px,
-        circle.quality = disk.quality;
-        circle.cut = disk.cut, circle.half_hidden = disk.half_hidden;
-        disks.push_back(circle);
-      }
-      ingest::OverlayOptions overlay;
-      overlay.magnification = frame.width <= 700 ? 2 : 1;
-      overlay.floor_px = bed.floor_px, overlay.floor_slope = bed.floor_slope;
-      if (!bed.walls_are_frame_sides)
-        overlay.left_wall_px = bed.left_wall_px, overlay.right_wall_px = bed.right_wall_px;
-      ingest::write_overlay(context.output(fmt::format("overlay_{:06d}.png", found.frames[index].index)), frame, disks,
-                            overlay);
-      ++drawn;
-    }
-  }
+  write_file(context.output("quality.csv"), on_the_way.quality_table());
+  write_file(context.output("bead.csv"), bead_table(found.finder));
+  ingest::write_png(context.output("bead.png"), ingest::bead_picture(found.finder, 8));
+  write_file(context.output("count.svg"), count_figure(found.frames));
+  draw_overlays(options, context, paths, source_options, found, on_the_way);
 }
 
 // ingest's own errors become ours.

@@ -43,7 +43,8 @@ class Extract : public Stage {
     fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
     fields.quantity("frequency", o.frequency, dimension::frequency,
                     {.help = "of the shaking, for profiles by phase (needs frame_rate)", .range = positive});
-    fields.quantity("frame_rate", o.frame_rate, dimension::frequency, {.help = "of the film", .range = positive});
+    fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
+                    {.help = "of the film as recorded; given, velocities are measured", .range = positive});
     fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
     fields.integer("overlays", o.overlays,
                    {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
@@ -60,8 +61,7 @@ class Extract : public Stage {
                    "both walls or none must be given");
     if (o.left_wall && o.right_wall)
       fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
-    fields.require(o.frequency.has_value() == o.frame_rate.has_value(), "frequency",
-                   "profiles by phase need both frequency and frame_rate");
+    fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
   }
   void run(RunContext& context) const override { images_module().extract(options_, context); }
 
@@ -73,7 +73,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 1,
+          .version = 2,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,
