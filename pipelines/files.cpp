@@ -13,6 +13,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <memory>
+#include <new>
 #include <numbers>
 #include <numeric>
 
@@ -49,6 +51,15 @@ class MappedFile {
     if (size_ > 0) ::munmap(data_, size_);
   }
   std::string_view bytes() const { return {static_cast<const char*>(data_), size_}; }
+  // The bytes a few at a time, each piece let go of before the next: a large file does not fill the memory.
+  template <class Work>
+  void in_pieces(const Work& work) const {
+    constexpr std::size_t piece = std::size_t{4} << 20;  // a multiple of any page size
+    for (std::size_t from = 0; from < size_; from += piece) {
+      work(bytes().substr(from, piece));
+      ::madvise(static_cast<char*>(data_) + from, std::min(piece, size_ - from), MADV_DONTNEED);
+    }
+  }
 
  private:
   void* data_ = nullptr;
@@ -172,13 +183,25 @@ std::string sha256(std::string_view bytes) {
   hash.update(bytes);
   return hash.hex();
 }
-std::string sha256_of_file(const std::filesystem::path& path) { return sha256(MappedFile(path).bytes()); }
-
-std::string fast_hash(std::string_view bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+std::string sha256_of_file(const std::filesystem::path& path) {
+  Sha256 hash;
+  MappedFile(path).in_pieces([&](std::string_view piece) { hash.update(piece); });
+  return hash.hex();
 }
-std::string fast_hash_of_file(const std::filesystem::path& path) { return fast_hash(MappedFile(path).bytes()); }
+
+namespace {
+std::string hex(const XXH128_hash_t& hash) { return fmt::format("{:016x}{:016x}", hash.high64, hash.low64); }
+}  // namespace
+
+std::string fast_hash(std::string_view bytes) { return hex(XXH3_128bits(bytes.data(), bytes.size())); }
+std::string fast_hash_of_file(const std::filesystem::path& path) {
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  MappedFile(path).in_pieces(
+      [&](std::string_view piece) { XXH3_128bits_update(state.get(), piece.data(), piece.size()); });
+  return hex(XXH3_128bits_digest(state.get()));
+}
 
 // --- zstd
 
