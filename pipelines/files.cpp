@@ -373,12 +373,13 @@ ProfileTable read_profile_csv(const std::filesystem::path& path) {
       return column >= 0 && !cells[static_cast<std::size_t>(column)].empty();
     };
     profile.height.push_back(number(height));
-    const double covered = given(area) ? number(area) : std::numbers::pi / 4 * number(density);
+    const double covered = given(area) || density < 0 ? number(area) : std::numbers::pi / 4 * number(density);
     profile.number_density.push_back(density >= 0 ? number(density) : covered * 4 / std::numbers::pi);
     profile.area_fraction.push_back(covered);
     profile.std_error.push_back(given(error) ? number(error) : -1);
     profile.samples.push_back(given(samples) ? number(samples) : 0);
     if (profile.number_density.back() < 0) throw fail("a negative density");
+    if (!std::isfinite(profile.number_density.back())) throw fail("a density beyond a double");
     if (given(error) && profile.std_error.back() < 0) throw fail("a negative standard error");
   }
   if (header.empty()) throw InputError(path.string() + ": holds no header line");
