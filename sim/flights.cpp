@@ -141,8 +141,10 @@ std::vector<FlightObserver::Layer> FlightObserver::layers() const {
   std::vector<Layer> result;
   if (means_.samples() == 0) return result;
   std::size_t first = 0, last = grid_.count;
-  while (first < last && means_.mean(quantities * first + density) == 0) ++first;
-  while (last > first && means_.mean(quantities * (last - 1) + density) == 0) --last;
+  // A disk that turns back on an edge leaves a rounding error's time beyond it.
+  constexpr double nothing = 1e-12;
+  while (first < last && means_.mean(quantities * first + density) < nothing) ++first;
+  while (last > first && means_.mean(quantities * (last - 1) + density) < nothing) --last;
   for (std::size_t layer = first; layer < last; ++layer) {
     const std::size_t at = quantities * layer;
     const auto plain = [&](Quantity q) { return Measured{means_.mean(at + q), means_.std_error(at + q)}; };
@@ -155,7 +157,7 @@ std::vector<FlightObserver::Layer> FlightObserver::layers() const {
     out.pressure_xx = plain(p_xx);
     out.weight_above = plain(weight);
     out.collision_rate = plain(rate);
-    if (n > 0) {
+    if (n > nothing) {
       const std::vector<double> covariance = covariance_.of_means(at, at + momentum + 1);
       const double gx[] = {-kx / (n * n), 0, 1 / n, 0, 0};
       out.temperature_x = propagated(kx / n, gx, covariance);

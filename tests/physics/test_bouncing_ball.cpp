@@ -103,6 +103,27 @@ TEST(BouncingBall, HasTheWindowOfThePeriodOneMode) {
   }
 }
 
+// A plastic ball leaves the floor where this falls as fast as it. Above Gamma = sqrt(1 + pi^2) it lands so late that it
+// leaves at once, one period after another at the phase where Gamma cos p = pi, up to sqrt(4 + pi^2); beyond, its
+// flights are longer and shorter by turns. Near the edge a disturbance fades by a thousandth a period only.
+TEST(BouncingBall, PlasticModeDoublesAtItsEdge) {
+  const auto repeats = [](double gamma) {
+    Scene scene = ball(gamma, 0, 0.5, 0);
+    scene.disks.contact_duration = 1e-6;
+    const auto simulation = simulate(scene);
+    return unrest(*simulation, 1, 20'000) < 1e-5;
+  };
+  const double expected = std::sqrt(4 + pi * pi);
+  double once = expected - 0.1, twice = expected + 0.1;
+  ASSERT_TRUE(repeats(once));
+  ASSERT_FALSE(repeats(twice));
+  while (twice - once > 2e-4) {
+    const double middle = (once + twice) / 2;
+    (repeats(middle) ? once : twice) = middle;
+  }
+  expect_law("e = 0: period doubles at Gamma", (once + twice) / 2, 1e-4, expected, 1e-3);
+}
+
 TEST(BouncingBall, StaysOnAFloorThatNeverFallsFasterThanIt) {
   for (double e : {0.0, 0.5, 0.9}) {
     Scene scene = ball(0.9, e, 0.8, 0);

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <memory>
 #include <numbers>
+#include <vector>
 
 #include "sim/simulation.hpp"
 #include "tests/physics/law.hpp"
@@ -26,8 +29,9 @@ Scene bed(std::uint32_t count, double width, double restitution) {
 
 // Runs to `until`, looking `looks` times: no overlap, nothing below the floor, the ledger closed, events bounded.
 // most_events: a disk and unit of time, over the last half of the run.
-void survive(const char* name, const Scene& scene, double until, int looks, double most_events) {
-  const auto simulation = simulate(scene);
+// Returns the simulation as it stands then.
+std::unique_ptr<Simulation> survive(const char* name, const Scene& scene, double until, int looks, double most_events) {
+  auto simulation = simulate(scene);
   const DiskProperties disks = simulation->properties();
   const double count = static_cast<double>(std::max<std::size_t>(disks.radius.size(), 1));
   const bool floor = !std::holds_alternative<PeriodicTop>(scene.box.top);
@@ -55,6 +59,7 @@ void survive(const char* name, const Scene& scene, double until, int looks, doub
   expect_law("energy ledger, of the energy turned over", ledger.imbalance() / turned_over, 0, 0, 1e-10);
   std::printf("  %-58s %.6g, at most %.6g\n", "events a disk and unit of time, last half", rate, most_events);
   EXPECT_LE(rate, most_events) << name;
+  return simulation;
 }
 
 TEST(HardCases, ClosePackedStart) {
@@ -146,6 +151,77 @@ TEST(HardCases, BedAtRestOnAGentleFloor) {
   scene.start_temperature = 0.01;
   scene.box.floor = SinusoidalFloor{0.8 / std::pow(2 * std::numbers::pi, 2), 1};
   survive("Gamma = 0.8, bed of 200", scene, 8, 16, 1e5);
+}
+
+// 5,000 disks rain down from up to 130 D, 30 m g D each, and come to rest: at the end a disk has less than lifts it by
+// a hundredth of its diameter.
+TEST(HardCases, HeapOfFiveThousandComesToRest) {
+  Scene scene = bed(5000, 100, 0.3);
+  scene.disks.contact_duration = 1e-2;
+  scene.start = RandomStart{};
+  scene.start_temperature = 1;
+  const auto heap = survive("heap of 5,000, e = 0.3", scene, 40, 8, 2e3);
+  expect_law("kinetic energy a disk [m g D]", heap->energy().kinetic / 5000, 0, 0, 1e-2);
+}
+
+// Every disk of a triangular lattice is hit from below at once by the row that a floor throws up: contacts of equal
+// times everywhere.
+TEST(HardCases, LatticeHitAtOneInstant) {
+  for (const double e : {0.6, 1.0}) {
+    Scene scene = bed(80, 10, e);
+    scene.box.sides = PeriodicSides{};
+    scene.disks.contact_duration = e < 1 ? 1e-3 : 0;
+    scene.start = PlacedStart{};
+    for (int k = 0; k < 80; ++k) {
+      const int row = k / 10;
+      std::get<PlacedStart>(scene.start)
+          .disks.push_back({k % 10 + 0.25 + 0.5 * (row % 2), 0.5 + row * (std::numbers::sqrt3 / 2 + 0.01) + 0.01, 0,
+                            row == 0 ? 2.0 : 0.0, 0, 0});
+    }
+    // A disk's width of free room a row, so that rows are not locked.
+    scene.box.width = 10.5;
+    survive("lattice hit by its lowest row", scene, 20, 40, 1e5);
+  }
+}
+
+// The clock is counted from the last synchronisation, so its resolution is the same after 1e10 collisions as after 1e4:
+// the same state put 2^33 synchronisation intervals later goes on to the same bytes.
+TEST(HardCases, ClockIsAsFineAfterTenBillionCollisions) {
+  Scene scene = bed(200, 20, 0.9);
+  scene.disks.contact_duration = 1e-4;
+  scene.box.floor = SinusoidalFloor{0.8, 0.35};
+  scene.start_temperature = 0.01;
+  const auto early = simulate(scene);
+  for (int k = 0; k < 5; ++k) early->advance_to(early->next_synchronisation());
+  std::vector<std::uint8_t> state = early->checkpoint();
+  // After the magic number, the number of disks and the intervals between synchronisations: intervals done. The last
+  // eight bytes are the checksum.
+  constexpr std::size_t place = 8 + 4 + 8;
+  std::uint64_t done = 0;
+  std::memcpy(&done, &state[place], sizeof done);
+  ASSERT_NEAR(static_cast<double>(done) / 0.35, early->time(), 1e-9 * early->time())
+      << "the checkpoint's form is another";
+  const std::uint64_t much_later = done + (std::uint64_t{1} << 33);
+  std::memcpy(&state[place], &much_later, sizeof done);
+  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a
+  for (std::size_t k = 0; k + 8 < state.size(); ++k) hash = (hash ^ state[k]) * 0x100000001b3;
+  std::memcpy(&state[state.size() - 8], &hash, sizeof hash);
+  const auto late = simulate(scene);
+  late->restore(state);
+  const std::uint64_t before = early->counters().collisions();
+  for (int k = 0; k < 20; ++k) {
+    early->advance_to(early->next_synchronisation());
+    late->advance_to(late->next_synchronisation());
+  }
+  Snapshot a, b;
+  early->snapshot(a);
+  late->snapshot(b);
+  const double rate = static_cast<double>(early->counters().collisions()) / early->time();
+  std::printf("  %.3g collisions at time %.6g; the late run at time %.6g, where there would have been %.3g\n",
+              static_cast<double>(early->counters().collisions() - before), a.time, b.time, rate * b.time);
+  EXPECT_GT(rate * b.time, 1e10);
+  EXPECT_EQ(early->counters().collisions(), late->counters().collisions());
+  EXPECT_TRUE(a.x == b.x && a.z == b.z && a.vx == b.vx && a.vz == b.vz);
 }
 
 }  // namespace
