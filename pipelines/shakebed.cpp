@@ -216,8 +216,8 @@ int run_program(int argc, char** argv) {
                             "  shakebed bench --quick\n  shakebed bench simulate --out o\n  shakebed bench --json > "
                             "now.json\n  shakebed bench --against now.json",
                             command_bench);
-  bench->add_option("stage", arguments.bench.stage, "all (the default), simulate, fit, map, pipeline")
-      ->check(CLI::IsMember({"all", "simulate", "fit", "map", "pipeline"}));
+  bench->add_option("stage", arguments.bench.stage, "all (the default), simulate, extract, fit, map, pipeline")
+      ->check(CLI::IsMember({"all", "simulate", "extract", "fit", "map", "pipeline"}));
   bench->add_flag("--quick", arguments.bench.quick, "minutes instead of an hour: fewer repeats, smaller beds");
   bench->add_option("--against", arguments.bench.against, "an earlier bench.json to set this run against")
       ->type_name("FILE.json");

@@ -20,6 +20,7 @@ int command_bench(const Arguments& arguments) {
     bench::StageResult (*measure)(const bench::Effort&);
   };
   constexpr Row rows[] = {{"simulate", bench::bench_simulate},
+                          {"extract", bench::bench_extract},
                           {"fit", bench::bench_fit},
                           {"map", bench::bench_map},
                           {"pipeline", bench::bench_pipeline}};

@@ -89,11 +89,11 @@ Table hard_case_table(const std::vector<HardCase>& cases) {
 Table digits_table(const Json& digits) {
   Table table{"Digits kept, against high precision",
               digits.value("note", ""),
-              {"kernel", "inputs", "digits kept, worst", "median", "worst case", "condition there"},
+              {"kernel", "inputs", "error relative to", "digits kept, worst", "median", "worst case"},
               {}};
   for (const Json& row : digits["rows"]) {
-    table.rows.push_back({row["kernel"], row["inputs"], row["worst_digits"], row["median_digits"], row["worst_case"],
-                          row.value("condition", Json())});
+    table.rows.push_back({row["kernel"], row["inputs"], row["relative_to"], row["worst_digits"], row["median_digits"],
+                          row["worst_case"]});
   }
   return table;
 }

@@ -65,7 +65,7 @@ void finder(const Effort& effort, StageResult& result) {
       Curve bound{"Cramer-Rao bound", {}, {}};
       bound.limit = true;
       figure.curves = {
-          std::move(bound), {"shakebed (map, 1, 2, 4 sweeps, joint fit)", {}, {}}, {"HoughCircles", {}, {}}};
+          std::move(bound), {"shakebed (map, 1, 2, 3 sweeps, joint fit)", {}, {}}, {"HoughCircles", {}, {}}};
     }
     Curve& curve = figure.curves[row.method == "hough" ? 2 : 1];
     curve.cost.push_back(1e-3 * row.cpu_ms), curve.error.push_back(row.rms_px);
