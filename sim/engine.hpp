@@ -1,19 +1,26 @@
-// The event loop. One class template, specialised by run_scene.cpp for what the scene names.
+// The event loop. One class template, specialised by run_scene.cpp for what the
+// scene names.
 //
-// Every disk has one next event, kept in its record: with another disk, with a wall, or with the edge of its shell. It
-// is predicted when something happens to the disk, and only then. A pair's contact is taken when it is earlier than the
-// partner's own next event; the partner's former partner is not told, it finds out when its old time comes and then
-// predicts anew. Between events disks fly freely: straight lines in pairs' relative coordinates, gravity or not.
+// Every disk has one next event, kept in its record: with another disk, with a
+// wall, or with the edge of its shell. It is predicted when something happens
+// to the disk, and only then. A pair's contact is taken when it is earlier than
+// the partner's own next event; the partner's former partner is not told, it
+// finds out when its old time comes and then predicts anew. Between events
+// disks fly freely: straight lines in pairs' relative coordinates, gravity or
+// not.
 //
-// Time is counted from the last rebasing, so its resolution does not fade in long runs. At fixed moments (every
-// `synchronisation interval`) the engine brings all disks to one time, rebases it by a whole number of floor periods
-// and predicts everything from scratch: its state there is nothing but positions, velocities, spins and contact clocks,
-// so a run continued from a checkpoint taken there gives the same bytes as one that was never stopped.
+// Time is counted from the last rebasing, so its resolution does not fade in
+// long runs. At fixed moments (every `synchronisation interval`) the engine
+// brings all disks to one time, rebases it by a whole number of floor periods
+// and predicts everything from scratch: its state there is nothing but
+// positions, velocities, spins and contact clocks, so a run continued from a
+// checkpoint taken there gives the same bytes as one that was never stopped.
 #pragma once
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <numbers>
@@ -62,7 +69,8 @@ class Engine final : public Simulation {
     std::int32_t partner;
   };
 
-  // A disk's state at one moment, in registers: what is predicted from it must not wait for the record to be written.
+  // A disk's state at one moment, in registers: what is predicted from it must
+  // not wait for the record to be written.
   struct Motion {
     double x, z, vx, vz;
   };
@@ -86,13 +94,22 @@ class Engine final : public Simulation {
   // --- shells
   void centre_shell(std::uint32_t i);
   void look_round(std::uint32_t i);
+  FloatLanes skins_and_radii(WordLanes ids) const;
   void choose_skin(std::uint32_t i);
   void find_neighbours(std::uint32_t i);
   void mark_near_walls(std::uint32_t i);
   void leave_shell(std::uint32_t i);
 
   // --- contacts
+  template <bool watched>
   void process_until(double until);
+  void process(std::uint32_t i);
+  void process_and_tell(std::uint32_t i);
+  void tell(std::uint32_t i) const;
+  void tell_all() const;
+  bool is_mutual(std::uint32_t i, std::uint32_t j) const {
+    return disks_[j].event_time == now_ && disks_[j].partner == static_cast<std::int32_t>(i);
+  }
   void fetch_neighbours_of_upcoming() const;
   void collide(std::uint32_t i, std::uint32_t j);
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
@@ -151,15 +168,17 @@ class Engine final : public Simulation {
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
 
   // --- bookkeeping
-  struct Nearby {
-    double reached_by;  // the radius of a shell that would just reach this disk's
-    std::uint32_t disk;
-  };
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
   bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;
-  std::vector<Nearby> nearby_;
+  // Of the disk that look_round() was called for: those nearby, and the radius
+  // of a shell of its own that would just reach theirs. The arrays are longer
+  // than their counts, see compress().
+  LargeVector<std::uint32_t> round_, nearby_;
+  LargeVector<float> reached_by_;
+  std::size_t nearby_count_ = 0;
+  float shell_slack_ = 0;  // covers the rounding of shells' centres, distances and exit times
   std::vector<std::uint32_t> found_;
 };
 

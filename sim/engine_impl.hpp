@@ -1,14 +1,16 @@
-// The engine's member functions, in the order in which a run uses them. Included by engine.hpp only.
+// The engine's member functions, in the order in which a run uses them.
+// Included by engine.hpp only.
 #pragma once
 
 namespace shakebed::sim {
 
-inline constexpr double rest_hop = 1e-4;     // length of the hop of a disk at rest on the floor without a contact clock
-inline constexpr double shell_slack = 1e-9;  // covers the rounding of shells' centres and exit times
-inline constexpr std::uint32_t fits_cache = 8'000;  // that many disks and their lists stay in a second-level cache
-inline constexpr double longest_interval = 64;      // between synchronisations, unless the floor's period is longer
+inline constexpr double rest_hop = 1e-4;        // length of the hop of a disk at rest
+                                                // on the floor without a contact clock
+inline constexpr double shell_slack = 1e-9;     // covers the rounding of shells' centres and exit times
+inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
 
-// ------------------------------------------------------------------------------------------------ start
+// ------------------------------------------------------------------------------------------------
+// start
 
 template <class Space, class Rule, class Sizes>
 Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const std::vector<Placed>& placed)
@@ -67,7 +69,8 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   begin_interval();
 }
 
-// ------------------------------------------------------------------------------------------------ flight
+// ------------------------------------------------------------------------------------------------
+// flight
 
 template <class Space, class Rule, class Sizes>
 auto Engine<Space, Rule, Sizes>::motion_at(const Disk& disk, double time) const -> Motion {
@@ -90,28 +93,25 @@ void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motio
   disk.own_time = now_;
 }
 
-// ------------------------------------------------------------------------------------------------ prediction
+// ------------------------------------------------------------------------------------------------
+// prediction
 
-// Contact times of one disk, whose state is that at now_, with four others; `never` where there is none or where the
-// other has something earlier to do.
+// Contact times of one disk, whose state is that at now_, with four others;
+// `never` where there is none or where the other has something earlier to do.
 template <class Space, class Rule, class Sizes>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
                                                                               const Motion& motion,
                                                                               [[maybe_unused]] double radius) const {
   const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[2]], &k3 = disks_[ids[3]];
-  Lanes s0, s1, s2, s3;
-  std::memcpy(&s0, &k0.x, sizeof s0);
-  std::memcpy(&s1, &k1.x, sizeof s1);
-  std::memcpy(&s2, &k2.x, sizeof s2);
-  std::memcpy(&s3, &k3.x, sizeof s3);
-  const Lanes low01 = __builtin_shufflevector(s0, s1, 0, 4, 2, 6), high01 = __builtin_shufflevector(s0, s1, 1, 5, 3, 7);
-  const Lanes low23 = __builtin_shufflevector(s2, s3, 0, 4, 2, 6), high23 = __builtin_shufflevector(s2, s3, 1, 5, 3, 7);
-  const Lanes x = __builtin_shufflevector(low01, low23, 0, 1, 4, 5),
-              vx = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
-  const Lanes z = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
-  Lanes vz = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
-  const Lanes own_time = {k0.own_time, k1.own_time, k2.own_time, k3.own_time};
-  const Lanes event_time = {k0.event_time, k1.event_time, k2.event_time, k3.event_time};
+  const Lanes position02 = two_pairs(&k0.x, &k2.x), position13 = two_pairs(&k1.x, &k3.x);
+  const Lanes velocity02 = two_pairs(&k0.vx, &k2.vx), velocity13 = two_pairs(&k1.vx, &k3.vx);
+  const Lanes x = __builtin_shufflevector(position02, position13, 0, 4, 2, 6),
+              z = __builtin_shufflevector(position02, position13, 1, 5, 3, 7);
+  const Lanes vx = __builtin_shufflevector(velocity02, velocity13, 0, 4, 2, 6);
+  Lanes vz = __builtin_shufflevector(velocity02, velocity13, 1, 5, 3, 7);
+  const Lanes times02 = two_pairs(&k0.own_time, &k2.own_time), times13 = two_pairs(&k1.own_time, &k3.own_time);
+  const Lanes own_time = __builtin_shufflevector(times02, times13, 0, 4, 2, 6),
+              event_time = __builtin_shufflevector(times02, times13, 1, 5, 3, 7);
 
   const Lanes time = all_lanes(now_);
   const Lanes dt = time - own_time;
@@ -134,13 +134,13 @@ template <class Space, class Rule, class Sizes>
                                                      sizes_.radius(ids[2]), sizes_.radius(ids[3])};
     contact_squared = distance * distance;
   }
-  // As time_to_disk() in contact_time.hpp.
-  const Lanes zero = all_lanes(0);
+  // As time_to_disk() in contact_time.hpp; of a negative discriminant the root
+  // is NaN, which is not before anything.
   const Lanes b = fused(dx, dvx, dz * dvz);
-  const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), zero);
-  const Lanes discriminant = fused(b, b, -(fused(dvx, dvx, dvz * dvz) * c));
-  const Lanes contact = time + c / (sqrt_lanes(larger(discriminant, zero)) - b);
-  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (discriminant >= zero) & (contact < event_time);
+  const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), all_lanes(0));
+  const Lanes root = sqrt_lanes(fused(b, b, -(fused(dvx, dvx, dvz * dvz) * c)));
+  const Lanes contact = time + c / (root - b);
+  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (contact < event_time);
   return select(meets, contact, all_lanes(never));
 }
 
@@ -192,7 +192,7 @@ auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion
 }
 
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const
+[[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const
     -> Candidate {
   const Candidate next = next_contact(i, motion);
   if constexpr (Space::has_walls) {
@@ -201,11 +201,10 @@ template <class Space, class Rule, class Sizes>
   return next;
 }
 
-// Writes down what comes next for disk i, whose state now is `motion`, unless it leaves its shell before.
+// Writes down what comes next for disk i, whose state now is `motion`, unless
+// it leaves its shell before.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, const Candidate& next) {
-  if (watcher_ != nullptr) [[unlikely]]
-    watcher_->flies(base_ + now_, labels_[i], motion.x, motion.z, motion.vx, motion.vz);
   Disk& disk = disks_[i];
   const double dt = next.time - now_;
   const double ox = motion.x - static_cast<double>(disk.shell_x), oz = motion.z - static_cast<double>(disk.shell_z);
@@ -241,8 +240,9 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, c
   }
 }
 
-// Everything anew. Every disk must be predicted, even one that another has already claimed: its own best event may be
-// an earlier one with a third, or the edge of its shell.
+// Everything anew. Every disk must be predicted, even one that another has
+// already claimed: its own best event may be an earlier one with a third, or
+// the edge of its shell.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::predict_all() {
   queue_.reset(disks_.data(), count_, now_, event_rate_);
@@ -255,11 +255,13 @@ void Engine<Space, Rule, Sizes>::predict_all() {
     Candidate next = next_event(i, motion);
     const Disk& disk = disks_[i];
     if (disk.partner >= 0 && next.time >= disk.event_time) next = {disk.event_time, disk.partner};
-    commit(i, motion, next);  // also where it stands already: the disk may leave its shell before
+    commit(i, motion, next);  // also where it stands already: the disk may leave
+                              // its shell before
   }
 }
 
-// ------------------------------------------------------------------------------------------------ shells
+// ------------------------------------------------------------------------------------------------
+// shells
 
 // Centres the disk's shell on where it is now.
 template <class Space, class Rule, class Sizes>
@@ -271,44 +273,76 @@ void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
   disk.shell_z = static_cast<float>(disk.z);
 }
 
-// Fills nearby_ with the disks round i and with how large a shell of i's would just reach theirs.
+// Fills nearby_ with the disks round i and with how large a shell of i's would
+// just reach theirs.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
-  nearby_.clear();
-  const double x = static_cast<double>(disks_[i].shell_x), z = static_cast<double>(disks_[i].shell_z);
-  const double farthest = sizes_.radius(i) + largest_skin_ + shell_slack;
-  shells_.search(i, [&](std::uint32_t k) {
-    double dx = static_cast<double>(disks_[k].shell_x) - x, dz = static_cast<double>(disks_[k].shell_z) - z;
+  const std::size_t count = shells_.search(i, round_);
+  if (nearby_.size() < count + inline_neighbours) {
+    nearby_.resize(2 * (count + inline_neighbours));
+    reached_by_.resize(2 * (count + inline_neighbours));
+  }
+  const FloatLanes x = all_floats(disks_[i].shell_x), z = all_floats(disks_[i].shell_z);
+  const FloatLanes mine = all_floats(static_cast<float>(sizes_.radius(i)) + shell_slack_);
+  const FloatLanes largest = all_floats(static_cast<float>(largest_skin_));
+  const auto me = static_cast<std::int32_t>(i), end = static_cast<std::int32_t>(count);
+  WordLanes place = {0, 1, 2, 3, 4, 5, 6, 7};
+  nearby_count_ = 0;
+  for (std::size_t q = 0; q < count; q += inline_neighbours, place += inline_neighbours) {
+    WordLanes ids;
+    std::memcpy(&ids, &round_[q], sizeof ids);
+    const WordLanes here = place < end;
+    ids &= here;  // what stands behind the last has no meaning
+    const WordLanes xs = gather_lines(&disks_[0].shell_x, ids), zs = gather_lines(&disks_[0].shell_z, ids);
+    FloatLanes dx = reinterpret_cast<FloatLanes>(xs) - x, dz = reinterpret_cast<FloatLanes>(zs) - z;
     if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
     if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-    const double distance_squared = dx * dx + dz * dz;
-    const double others = sizes_.radius(k) + disks_[k].skin * skin_unit;
-    if (distance_squared < (farthest + others) * (farthest + others))
-      nearby_.push_back({std::sqrt(distance_squared) - others - sizes_.radius(i) - shell_slack, k});
-  });
+    const FloatLanes others = skins_and_radii(ids);
+    const FloatLanes reached_by = sqrt_floats(fused(dx, dx, dz * dz)) - others - mine;
+    const WordLanes near = (reached_by < largest) & (ids != me) & here;
+    nearby_count_ += compress(near, ids, reached_by, &nearby_[nearby_count_], &reached_by_[nearby_count_]);
+  }
 }
 
-// The largest shell with which i would have no more than eight neighbours, within bounds.
+// Radius and skin of eight disks, each its sum.
+template <class Space, class Rule, class Sizes>
+FloatLanes Engine<Space, Rule, Sizes>::skins_and_radii(WordLanes ids) const {
+  static_assert(offsetof(Disk, skin) == offsetof(Disk, neighbours) + 3);
+  const WordLanes skins = gather_lines(&disks_[0].neighbours, ids) >> 24 & 255;
+  FloatLanes radii = all_floats(static_cast<float>(sizes_.radius(0)));
+  if constexpr (!Sizes::equal) {
+    for (int k = 0; k < 8; ++k) radii[k] = static_cast<float>(sizes_.radius(static_cast<std::uint32_t>(ids[k])));
+  }
+  return __builtin_convertvector(skins, FloatLanes) * all_floats(static_cast<float>(skin_unit)) + radii;
+}
+
+// The largest shell with which i would have no more than eight neighbours,
+// within bounds.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
-  double skin = largest_skin_;
-  if (nearby_.size() > inline_neighbours) {
-    const auto ninth = nearby_.begin() + inline_neighbours;
-    std::nth_element(nearby_.begin(), ninth, nearby_.end(), [](const Nearby& l, const Nearby& r) {
-      return l.reached_by != r.reached_by ? l.reached_by < r.reached_by : l.disk < r.disk;
-    });
-    skin = std::clamp(ninth->reached_by, smallest_skin_, largest_skin_);
+  float skin = static_cast<float>(largest_skin_);
+  if (nearby_count_ > inline_neighbours) {
+    for (std::size_t q = nearby_count_; q % inline_neighbours != 0; ++q) reached_by_[q] = skin;
+    for (std::size_t q = 0; q < nearby_count_; q += inline_neighbours) {
+      FloatLanes mine;
+      std::memcpy(&mine, &reached_by_[q], sizeof mine);
+      WordLanes nearer{};
+      for (std::size_t k = 0; k < nearby_count_; ++k) nearer -= all_floats(reached_by_[k]) < mine;
+      for (int k = 0; k < 8; ++k)
+        skin = nearer[k] >= static_cast<std::int32_t>(inline_neighbours) ? std::min(skin, mine[k]) : skin;
+    }
+    skin = std::max(skin, static_cast<float>(smallest_skin_));
   }
-  disks_[i].skin = static_cast<std::uint8_t>(skin / skin_unit);
+  disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit));
 }
 
 // Fills found_ with those of nearby_ that i's shell reaches.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
-  const double skin = disks_[i].skin * skin_unit;
+  const auto skin = static_cast<float>(disks_[i].skin * skin_unit);
   found_.clear();
-  for (const Nearby& other : nearby_) {
-    if (other.reached_by < skin) found_.push_back(other.disk);
+  for (std::size_t k = 0; k < nearby_count_; ++k) {
+    if (reached_by_[k] < skin) found_.push_back(nearby_[k]);
   }
 }
 
@@ -339,21 +373,20 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
   shells_.relist(i, found_);
 }
 
-// ------------------------------------------------------------------------------------------------ the loop
+// ------------------------------------------------------------------------------------------------
+// the loop
 
 // Fetches the neighbours of disks that will collide soon.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::fetch_neighbours_of_upcoming() const {
   std::uint32_t a, b;
-  // At the start of a bucket those of its first events, later one more each time.
-  constexpr std::size_t ahead = 4;
-  for (std::size_t k = queue_.at_bucket_start() ? 0 : ahead; k <= ahead && queue_.upcoming(k, a, b); ++k) {
-    for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
-    for (std::uint32_t neighbour : shells_.first_block(b).disk) __builtin_prefetch(&disks_[neighbour]);
-  }
+  if (!queue_.upcoming(a, b)) return;
+  for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
+  for (std::uint32_t neighbour : shells_.first_block(b).disk) __builtin_prefetch(&disks_[neighbour]);
 }
 
 template <class Space, class Rule, class Sizes>
+template <bool watched>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i;
   const auto will_need = [this](std::uint32_t k) {
@@ -363,36 +396,87 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
   };
   while (queue_.pop(until, i, will_need)) {
     if (beyond_cache_) fetch_neighbours_of_upcoming();
-    const Disk& disk = disks_[i];
-    now_ = disk.event_time;
+    now_ = disks_[i].event_time;
     if (--events_to_check_ == 0) [[unlikely]] {
       if (locked()) {
         relieve();
+        tell_all();
         continue;
       }
     }
-    if (disk.partner >= 0) [[likely]] {
-      const auto j = static_cast<std::uint32_t>(disk.partner);
-      const Disk& other = disks_[j];
-      if (other.event_time == now_ && other.partner == static_cast<std::int32_t>(i)) [[likely]] {
-        collide(i, j);
-      } else {  // the partner was hit by another disk first
-        ++counters_.predictions_renewed;
-        const Motion motion = motion_at(disk, now_);
-        const Candidate next = next_event(i, motion);
-        write_down(i, motion);
-        commit(i, motion, next);
-      }
-    } else if (disk.partner == shell_exit) {
-      ++counters_.shell_exits;
-      bring_forward(i);
-      leave_shell(i);
-      predict(i, motion_at(disk, now_));
+    if constexpr (watched) {
+      process_and_tell(i);
     } else {
-      hit_wall(i);
+      process(i);
     }
   }
   now_ = until;
+}
+
+// The event of disk i that is due now.
+template <class Space, class Rule, class Sizes>
+[[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::process(std::uint32_t i) {
+  const Disk& disk = disks_[i];
+  if (disk.partner >= 0) [[likely]] {
+    const auto j = static_cast<std::uint32_t>(disk.partner);
+    if (is_mutual(i, j)) [[likely]] {
+      collide(i, j);
+    } else {  // the partner was hit by another disk first
+      ++counters_.predictions_renewed;
+      const Motion motion = motion_at(disk, now_);
+      const Candidate next = next_event(i, motion);
+      write_down(i, motion);
+      commit(i, motion, next);
+    }
+  } else if (disk.partner == shell_exit) {
+    ++counters_.shell_exits;
+    bring_forward(i);
+    leave_shell(i);
+    predict(i, motion_at(disk, now_));
+  } else {
+    hit_wall(i);
+  }
+}
+
+// The same, and the watcher is told what it did: apart from the loop that
+// nobody watches, which must not pay for it.
+template <class Space, class Rule, class Sizes>
+[[gnu::noinline]] void Engine<Space, Rule, Sizes>::process_and_tell(std::uint32_t i) {
+  const Disk before = disks_[i];
+  const auto j = static_cast<std::uint32_t>(before.partner);
+  const bool touches = before.partner >= 0 && is_mutual(i, j);
+  const Motion first = motion_at(before, now_);
+  const Motion second = touches ? motion_at(disks_[j], now_) : first;
+  process(i);
+  const double time = base_ + now_;
+  if (touches) {
+    double dx = second.x - first.x, dz = second.z - first.z;
+    if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+    if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+    const double mass = sizes_.mass(j);
+    watcher_->touched(time, first.x, first.z, dx, dz, mass * (disks_[j].vx - second.vx),
+                      mass * (disks_[j].vz - second.vz));
+    tell(i);
+    tell(j);
+  } else if (before.partner < 0 && before.partner != shell_exit) {
+    const double mass = sizes_.mass(i);
+    watcher_->touched_wall(time, labels_[i], before.partner == floor_below, first.z, mass * (disks_[i].vx - first.vx),
+                           mass * (disks_[i].vz - first.vz));
+    tell(i);
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::tell(std::uint32_t i) const {
+  if (watcher_ == nullptr) return;
+  const Motion motion = motion_at(disks_[i], now_);
+  watcher_->flies(time(), labels_[i], motion.x, motion.z, motion.vx, motion.vz);
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::tell_all() const {
+  if (watcher_ == nullptr) return;
+  for (std::uint32_t i = 0; i < count_; ++i) tell(i);
 }
 
 template <class Space, class Rule, class Sizes>
@@ -402,7 +486,8 @@ void Engine<Space, Rule, Sizes>::advance_to(double time) {
     if (std::abs(goal - synchronise_at_) <= 8 * std::numeric_limits<double>::epsilon() * std::abs(time))
       goal = synchronise_at_;
     if (!(goal > now_)) return;
-    process_until(std::min({goal, synchronise_at_, bath_at_}));
+    const double until = std::min({goal, synchronise_at_, bath_at_});
+    watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
     if (now_ == bath_at_) act_bath();
     if (now_ == synchronise_at_) {
       synchronise();
@@ -411,9 +496,11 @@ void Engine<Space, Rule, Sizes>::advance_to(double time) {
   }
 }
 
-// ------------------------------------------------------------------------------------------------ contacts
+// ------------------------------------------------------------------------------------------------
+// contacts
 
-// The TC model: a contact is elastic if either partner was hit less than t_c ago. Sets the clocks.
+// The TC model: a contact is elastic if either partner was hit less than t_c
+// ago. Sets the clocks.
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   if (contact_duration_ <= 0) return false;
@@ -428,8 +515,9 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   Motion first = motion_at(disks_[i], now_), second = motion_at(disks_[j], now_);
   exchange(i, j, first, second);
   ++counters_.disk_collisions;
-  // Both are predicted before either record changes, so that the two predictions overlap in the processor. Neither sees
-  // the other: they separate.
+  // Both are predicted before either record changes, so that the two
+  // predictions overlap in the processor. Neither sees the other: they
+  // separate.
   const Candidate next_first = next_event(i, first);
   Candidate next_second = next_event(j, second);
   write_down(i, first);
@@ -473,8 +561,6 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
       spins_[j] += inverse_inertia_ratio_ * p.tangential * inverse_second / rj;
       counters_.virial -= p.px * dx + p.pz * dz;
       dissipated_ += p.dissipated;
-      if (watcher_ != nullptr) [[unlikely]]
-        watcher_->touched(base_ + now_, first.x, first.z, dx, dz, -p.px, -p.pz);
       return;
     }
   }
@@ -486,14 +572,11 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   second.vz += share_second * impulse.jz;
   counters_.virial += reduced_mass * (impulse.jx * dx + impulse.jz * dz);
   if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
-  if (watcher_ != nullptr) [[unlikely]]
-    watcher_->touched(base_ + now_, first.x, first.z, dx, dz, reduced_mass * impulse.jx, reduced_mass * impulse.jz);
 }
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   Motion motion = motion_at(disks_[i], now_);
-  const double vx_before = motion.vx, vz_before = motion.vz;
   switch (disks_[i].partner) {
     case left_wall:
       bounce(i, motion, -1, 0, 0, side_surface_);
@@ -509,11 +592,6 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
-  if (watcher_ != nullptr) [[unlikely]] {
-    const double mass = sizes_.mass(i);
-    watcher_->touched_wall(base_ + now_, labels_[i], disks_[i].partner == floor_below, motion.z,
-                           mass * (motion.vx - vx_before), mass * (motion.vz - vz_before));
-  }
   const Candidate next = next_event(i, motion);
   write_down(i, motion);
   commit(i, motion, next);
@@ -534,7 +612,8 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   const double vz_before = motion.vz;
   bounce(i, motion, 0, -1, floor_velocity, floor_surface_);
   floor_work_ += mass * (motion.vz - vz_before) * floor_velocity;
-  // A disk that lies still on the floor is carried in small hops: a contact has to end before the next can begin.
+  // A disk that lies still on the floor is carried in small hops: a contact has
+  // to end before the next can begin.
   const double pressing = gravity_ + floor_.acceleration(now_);
   const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
   const double slowest = 0.5 * pressing * hop;
@@ -545,7 +624,8 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   }
 }
 
-// One disk against a wall that moves vertically; (nx, nz) points from the disk to the wall.
+// One disk against a wall that moves vertically; (nx, nz) points from the disk
+// to the wall.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz,
                                         const Surface& surface) {
@@ -572,10 +652,12 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
   }
 }
 
-// ------------------------------------------------------------------------------------------------ locked rows
+// ------------------------------------------------------------------------------------------------
+// locked rows
 
-// Disks that fill a gap exactly, a row from wall to wall say, hand their momenta on without end at one instant. Called
-// after every so many events: has time stood still meanwhile?
+// Disks that fill a gap exactly, a row from wall to wall say, hand their
+// momenta on without end at one instant. Called after every so many events: has
+// time stood still meanwhile?
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::locked() {
   const bool stood_still = now_ - checked_at_ < 1e-12;
@@ -584,9 +666,10 @@ bool Engine<Space, Rule, Sizes>::locked() {
   return stood_still;
 }
 
-// Lets every contact without a gap lose its approach (a perfectly plastic impulse, momentum kept, the energy written
-// down as dissipated), again and again until nothing approaches: what physics does to a locked row in a real contact's
-// time.
+// Lets every contact without a gap lose its approach (a perfectly plastic
+// impulse, momentum kept, the energy written down as dissipated), again and
+// again until nothing approaches: what physics does to a locked row in a real
+// contact's time.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::relieve() {
   constexpr double touching = 1e-11;
@@ -632,12 +715,14 @@ void Engine<Space, Rule, Sizes>::relieve() {
       }
     }
   }
-  // The floor's work is in the ledger by its impulses; the rest of what is missing was dissipated.
+  // The floor's work is in the ledger by its impulses; the rest of what is
+  // missing was dissipated.
   dissipated_ += before + (floor_work_ - work_before) - kinetic_energy();
   predict_all();
 }
 
-// ------------------------------------------------------------------------------------------------ reservoirs
+// ------------------------------------------------------------------------------------------------
+// reservoirs
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::act_bath() {
@@ -654,6 +739,7 @@ void Engine<Space, Rule, Sizes>::act_bath() {
     disk.vz = speed * draw.second;
     bath_work_ += kinetic(disk, i) - before;
     predict(i, motion_at(disk, now_));
+    tell(i);
     bath_at_ = now_ - std::log(random_.uniform_positive()) / (bath->rate * count_);
     return;
   }
@@ -693,9 +779,11 @@ void Engine<Space, Rule, Sizes>::act_bath() {
     bath_at_ = now_ + noise->interval;
   }
   predict_all();
+  tell_all();
 }
 
-// ------------------------------------------------------------------------------------------------ synchronisation
+// ------------------------------------------------------------------------------------------------
+// synchronisation
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::synchronise() {
@@ -710,7 +798,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   intervals_done_ += intervals_;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
-  // Often enough for the clock's resolution, seldom enough to cost nothing: 150 to 1000 events a disk apart.
+  // Often enough for the clock's resolution, seldom enough to cost nothing: 150
+  // to 1000 events a disk apart.
   const std::uint64_t events = counters_.events() - events_at_synchronisation_;
   events_at_synchronisation_ = counters_.events();
   event_rate_ = std::max(static_cast<double>(events), 1.0) / elapsed;
@@ -720,8 +809,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   begin_interval();
 }
 
-// Numbers the disks along a space-filling curve. Sorting what is sorted changes nothing, so a resumed run has the
-// numbers of the one it continues.
+// Numbers the disks along a space-filling curve. Sorting what is sorted changes
+// nothing, so a resumed run has the numbers of the one it continues.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::renumber() {
   const auto cell = [](double value) { return static_cast<std::uint32_t>(std::clamp(value + 16, 0.0, 65535.0)); };
@@ -759,12 +848,16 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average; a bed under gravity
-  // has a gas above it, where larger ones save work.
+  // Bounds of the shells: in a uniform fluid the radius that gives eight
+  // neighbours on the average; a bed under gravity has a gas above it, where
+  // larger ones save work.
   const double density = count_ / (width_ * height);
   largest_skin_ = std::clamp(0.5 * (std::sqrt(8.3 / (std::numbers::pi * density)) - 1), 0.25, 1.5);
   if constexpr (Space::falls) largest_skin_ = std::max(largest_skin_, 0.5);
-  shells_.reset(disks_.data(), count_, largest_contact + 2 * largest_skin_ + shell_slack, width_, height);
+  // Distances of shells' centres are taken in single precision.
+  const double extent = std::max(width_, std::max(height, top));
+  shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
+  shells_.reset(disks_.data(), count_, largest_contact + 2 * largest_skin_ + shell_slack_, width_, height);
   for (std::uint32_t i = 0; i < count_; ++i) {
     centre_shell(i);
     disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
@@ -799,8 +892,8 @@ void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
   at += sizeof value;
 }
 
-// The last eight bytes: FNV-1a of all others. A state that was damaged on a disk must not be run from: it may never
-// end.
+// The last eight bytes: FNV-1a of all others. A state that was damaged on a
+// disk must not be run from: it may never end.
 inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
   std::uint64_t hash = 0xcbf29ce484222325;
   for (; at != end; ++at) hash = (hash ^ *at) * 0x100000001b3;
@@ -809,7 +902,8 @@ inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
 
 }  // namespace checkpoint_bytes
 
-// Calls visit(value) for everything that the future depends on besides the disks, in a fixed order.
+// Calls visit(value) for everything that the future depends on besides the
+// disks, in a fixed order.
 template <class Space, class Rule, class Sizes>
 template <class Self, class Visit>
 void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
@@ -870,7 +964,10 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   visit_state(*this, [&](auto& value) { checkpoint_bytes::take(at, end, value); });
   std::array<std::uint64_t, 4> random_state{};
   checkpoint_bytes::take(at, end, random_state);
-  if (at != end) throw std::invalid_argument("the checkpoint is of another scene: it holds more than this one needs");
+  if (at != end)
+    throw std::invalid_argument(
+        "the checkpoint is of another scene: it holds "
+        "more than this one needs");
   if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
     throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
   random_.set_state(random_state);
@@ -880,16 +977,13 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   begin_interval();
 }
 
-// ------------------------------------------------------------------------------------------------ looking
+// ------------------------------------------------------------------------------------------------
+// looking
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   watcher_ = watcher;
-  if (watcher_ == nullptr) return;
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    const Motion motion = motion_at(disks_[i], now_);
-    watcher_->flies(time(), labels_[i], motion.x, motion.z, motion.vx, motion.vz);
-  }
+  tell_all();
 }
 
 template <class Space, class Rule, class Sizes>

@@ -1,14 +1,16 @@
-// Which disk has the next event: a ring of coarse time buckets that hold bare pairs of disk numbers.
+// Which disk has the next event: a ring of coarse time buckets.
 //
-// An entry carries no time. The truth about a disk's next event stands in its own record (Disk::event_time); an entry
-// whose disks' events have moved elsewhere is simply worthless when its bucket comes up, so nothing is ever deleted.
-// A bucket is sorted when it becomes the current one. The order is exact: by time, then by the order of insertion.
+// An entry holds an event's time and its pair of disks. The truth about a
+// disk's next event stands in its own record (Disk::event_time); an entry of
+// which neither disk has an event at its time any more is worthless, so nothing
+// is ever deleted. A bucket is sorted when it becomes the current one. The
+// order is exact: by time, then by the order of insertion. Events beyond the
+// ring wait in a list of their own, which is looked through once a turn.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -20,50 +22,71 @@
 
 namespace shakebed::sim {
 
+inline constexpr std::size_t fits_cache = 8'000;  // that many disks and their lists stay in a second-level cache
+
 class EventQueue {
  public:
-  // Forgets everything. disks: the records that the entries refer to; events_a_time: the expected rate of events.
+  // Forgets everything. disks: the records that the entries refer to;
+  // events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
-    const double events_a_bucket = 7;
     buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
-    const auto wanted = static_cast<std::size_t>(std::clamp(static_cast<double>(count) / events_a_bucket, 256.0, 1e8));
-    const std::size_t size = std::bit_ceil(wanted);
-    heads_.assign(size, 0);
-    held_.assign(size, 0);
-    slots_.resize(size * pairs_a_bucket);
-    mask_ = size - 1;
-    chunks_.resize(1);
-    free_chunk_ = 0;
-    current_ = bucket_of(start) - 1;
+    size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
+    ring_.resize(static_cast<std::size_t>(size_));
+    for (Bucket& bucket : ring_) bucket.held = bucket.next = 0;
+    full_.resize(1);
+    free_ = 0;
+    far_.clear();
+    far_limit_ = 256 + 2 * count;
+    beyond_cache_ = count > fits_cache;
+    pushed_ = 0;
+    current_ = static_cast<std::int64_t>(start * buckets_a_time_) - 1;
+    here_ = 0;
+    look_far_at_ = current_ + size_;
     next_ = end_ = 0;
     grow(256);
   }
 
-  // The event of disk a (with b; a itself when alone) now stands at `time`, which both records say already.
+  // The event of disk a (with b; a itself when alone) now stands at `time`,
+  // which both records say already.
   void push(double time, std::uint32_t a, std::uint32_t b) {
-    const std::int64_t bucket = bucket_of(time);
-    if (bucket <= current_) [[unlikely]] {
-      insert_into_run(time, a, b);
-      return;
+    const Entry entry{time, pair_of(a, b)};
+    const double place = time * buckets_a_time_;
+    if (place < static_cast<double>(current_ + 1)) [[unlikely]] {
+      insert_into_run(entry);
+    } else if (place >= static_cast<double>(current_ + size_)) [[unlikely]] {
+      if (far_.size() == far_limit_) [[unlikely]]
+        tidy_far();
+      far_.push_back(entry);
+    } else {
+      const std::size_t index = index_of(static_cast<std::int64_t>(place));
+      if (!beyond_cache_) {
+        put(index, entry);
+        return;
+      }
+      // The bucket is far from the cache: it is sent for, and written to some
+      // pushes later.
+      __builtin_prefetch(&ring_[index], 1);
+      const std::size_t turn_of = pushed_++ % most_waiting;
+      if (pushed_ > most_waiting) put(waiting_[turn_of].index, waiting_[turn_of].entry);
+      waiting_[turn_of] = {index, entry};
     }
-    put(static_cast<std::size_t>(bucket) & mask_, a, b);
   }
 
-  // The earliest valid event at or before `until`: its disk, and its time in disks[disk].event_time. False if none.
-  // will_need(disk) is called some time before a disk comes up, to fetch its record into the cache.
+  // The earliest valid event at or before `until`: its disk, and its time in
+  // disks[disk].event_time. False if none. will_need(disk) is called some time
+  // before a disk comes up, to fetch its record into the cache.
   template <class WillNeed>
   bool pop(double until, std::uint32_t& disk, WillNeed will_need) {
     for (;;) {
-      if (next_ == end_) [[unlikely]] {
-        if (!load_next_bucket(until)) return false;
-        const std::size_t after = static_cast<std::size_t>(current_ + 1) & mask_;
-        const std::uint64_t* later = &slots_[(static_cast<std::size_t>(current_ + 2) & mask_) * pairs_a_bucket];
-        for (std::uint32_t k = 0; k < pairs_a_bucket; k += 8) __builtin_prefetch(later + k);
-        for (std::uint32_t k = 0; k < held_[after]; ++k) {
-          const std::uint64_t pair = slots_[after * pairs_a_bucket + k];
-          will_need(static_cast<std::uint32_t>(pair));
-          will_need(static_cast<std::uint32_t>(pair >> 32));
+      if (next_ + looks_ahead >= end_) [[unlikely]] {
+        if (!lengthen_run(until)) return false;
+        const Bucket& after = ring_[index_of(current_ + 1)];
+        const char* later = reinterpret_cast<const char*>(&ring_[index_of(current_ + 2)]);
+        for (std::size_t line = 0; line < sizeof(Bucket); line += 64) __builtin_prefetch(later + line);
+        for (std::uint32_t k = 0; k < after.held; ++k) {
+          will_need(static_cast<std::uint32_t>(after.entries[k].pair));
+          will_need(static_cast<std::uint32_t>(after.entries[k].pair >> 32));
         }
       }
       const double time = times_[next_];
@@ -71,8 +94,8 @@ class EventQueue {
       if (time > until) [[unlikely]]
         return false;
       ++next_;
-      // The partner counts too: a disk may have found another one at the very same time, and its former partner must
-      // still have its turn.
+      // The partner counts too: a disk may have found another one at the very
+      // same time, and its former partner must still have its turn.
       const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
       disk = first;
       if (stands(first, second, time)) [[likely]]
@@ -82,70 +105,78 @@ class EventQueue {
     }
   }
 
-  bool at_bucket_start() const { return next_ <= 1; }  // its first event was just popped
-  // The pair of disks that comes up `ahead` events from now, if it is already in order.
-  bool upcoming(std::size_t ahead, std::uint32_t& a, std::uint32_t& b) const {
-    if (next_ + ahead >= end_) return false;
-    a = static_cast<std::uint32_t>(pairs_[next_ + ahead]);
-    b = static_cast<std::uint32_t>(pairs_[next_ + ahead] >> 32);
+  // The pair of disks that comes up some events from now.
+  bool upcoming(std::uint32_t& a, std::uint32_t& b) const {
+    if (next_ + looks_ahead > end_) return false;
+    a = static_cast<std::uint32_t>(pairs_[next_ + looks_ahead - 1]);
+    b = static_cast<std::uint32_t>(pairs_[next_ + looks_ahead - 1] >> 32);
     return true;
   }
 
   std::size_t bytes() const {
-    return (heads_.capacity() + held_.capacity()) * sizeof(std::uint32_t) + slots_.capacity() * sizeof(std::uint64_t) +
-           chunks_.capacity() * sizeof(Chunk) +
+    return (ring_.capacity() + full_.capacity()) * sizeof(Bucket) + far_.capacity() * sizeof(Entry) +
            2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
-  static constexpr std::uint32_t pairs_a_bucket = 32, pairs_a_chunk = 15;
-  struct alignas(128) Chunk {
-    std::uint32_t next = 0;
-    std::array<std::uint64_t, pairs_a_chunk> pairs{};
+  static constexpr double events_a_bucket = 8,
+                          turn = 1.2;  // the ring spans as many mean times between two events of a disk
+  static constexpr std::uint32_t entries_a_bucket = 15;
+
+  struct Entry {
+    double time;
+    std::uint64_t pair;  // the second disk in the upper half
   };
+  struct alignas(64) Bucket {
+    std::uint32_t held, next;  // entries here; where in full_ the earlier ones
+                               // are, 0 for nowhere
+    std::array<Entry, entries_a_bucket> entries;
+  };
+
+  static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
+  std::size_t index_of(std::int64_t bucket) const {
+    const std::int64_t index = here_ + (bucket - current_);
+    return static_cast<std::size_t>(index >= size_ ? index - size_ : index);
+  }
 
   // Is a's next event still that with b (alone: a == b) at this time?
   bool stands(std::uint32_t a, std::uint32_t b, double time) const {
     const Disk& disk = disks_[a];
     return disk.event_time == time && (disk.partner == static_cast<std::int32_t>(b) || a == b);
   }
-
-  std::int64_t bucket_of(double time) const {
-    const double bucket = time * buckets_a_time_;
-    return bucket < 4e18 ? static_cast<std::int64_t>(bucket) : std::int64_t{4'000'000'000'000'000'000};
-  }
-  static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
-
-  // A bucket's first pairs stand in its own slots, the rest in a list of chunks.
-  void put(std::size_t bucket, std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t held = held_[bucket];
-    if (held == pairs_a_bucket) [[unlikely]] {
-      put_in_chunk(bucket, pair_of(a, b));
-      return;
-    }
-    slots_[bucket * pairs_a_bucket + held] = pair_of(a, b);
-    held_[bucket] = held + 1;
+  // Does any of the two disks have an event at the entry's time? (With whom is
+  // asked when it comes up.)
+  unsigned counts(const Entry& entry) const {
+    const Disk &first = disks_[static_cast<std::uint32_t>(entry.pair)], &second = disks_[entry.pair >> 32];
+    return static_cast<unsigned>(first.event_time == entry.time) |
+           static_cast<unsigned>(second.event_time == entry.time);
   }
 
-  // A head holds the number of its first chunk times 16 plus how many pairs that one holds; 0: empty. The chunks that
-  // follow are full.
-  [[gnu::noinline]] void put_in_chunk(std::size_t bucket, std::uint64_t pair) {
-    std::uint32_t& head = heads_[bucket];
-    std::uint32_t chunk = head >> 4, used = head & 15;
-    if (chunk == 0 || used == pairs_a_chunk) {
-      std::uint32_t fresh = free_chunk_;
-      if (fresh != 0) {
-        free_chunk_ = chunks_[fresh].next;
-      } else {
-        fresh = static_cast<std::uint32_t>(chunks_.size());
-        chunks_.emplace_back();
-      }
-      chunks_[fresh].next = chunk;
-      chunk = fresh;
-      used = 0;
+  void put(std::size_t index, const Entry& entry) {
+    Bucket& into = ring_[index];
+    if (into.held == entries_a_bucket) [[unlikely]]
+      make_room(into);
+    into.entries[into.held++] = entry;
+  }
+  void put_waiting() {
+    const std::size_t first = pushed_ > most_waiting ? pushed_ - most_waiting : 0;
+    for (std::size_t k = first; k < pushed_; ++k)
+      put(waiting_[k % most_waiting].index, waiting_[k % most_waiting].entry);
+    pushed_ = 0;
+  }
+
+  // Moves a bucket's entries away, behind those moved before.
+  [[gnu::noinline]] void make_room(Bucket& bucket) {
+    std::uint32_t place = free_;
+    if (place != 0) {
+      free_ = full_[place].next;
+    } else {
+      place = static_cast<std::uint32_t>(full_.size());
+      full_.emplace_back();
     }
-    chunks_[chunk].pairs[used] = pair;
-    head = chunk << 4 | (used + 1);
+    full_[place] = bucket;
+    bucket.held = 0;
+    bucket.next = place;
   }
 
   void grow(std::size_t size) {
@@ -157,81 +188,100 @@ class EventQueue {
     unsorted_pairs_.resize(size);
   }
 
-  void insert_into_run(double time, std::uint32_t a, std::uint32_t b) {
+  [[gnu::noinline]] void insert_into_run(const Entry& entry) {
     grow(end_ + 1);
     std::size_t place = end_++;
-    while (place > next_ && times_[place - 1] > time) {
+    while (place > next_ && times_[place - 1] > entry.time) {
       times_[place] = times_[place - 1];
       pairs_[place] = pairs_[place - 1];
       --place;
     }
-    times_[place] = time;
-    pairs_[place] = pair_of(a, b);
+    times_[place] = entry.time;
+    pairs_[place] = entry.pair;
   }
 
-  // Makes the next bucket that holds a valid event the current one. False when every bucket up to `until` is empty.
-  [[gnu::noinline]] bool load_next_bucket(double until) {
-    const std::int64_t last = bucket_of(until);
-    next_ = end_ = 0;
-    while (end_ == 0) {
-      if (current_ >= last) return false;
-      ++current_;
-      const std::size_t bucket = static_cast<std::size_t>(current_) & mask_;
-      if (held_[bucket] != 0) sort_run(collect(bucket));
+  // Takes the next bucket into the run; where the run was empty, the next one
+  // that holds a valid event. False when every bucket up to `until` is empty.
+  [[gnu::noinline]] bool lengthen_run(double until) {
+    if (beyond_cache_) put_waiting();
+    const std::size_t left = end_ - next_;
+    for (std::size_t k = 0; k < left; ++k) {
+      times_[k] = times_[next_ + k];
+      pairs_[k] = pairs_[next_ + k];
     }
+    next_ = 0;
+    end_ = left;
+    const double last = until * buckets_a_time_;
+    do {
+      if (left == 0 && static_cast<double>(current_ + 1) > last) return false;
+      ++current_;
+      if (++here_ == size_) here_ = 0;
+      if (current_ == look_far_at_) [[unlikely]]
+        look_far();
+      Bucket& bucket = ring_[static_cast<std::size_t>(here_)];
+      if (bucket.held != 0) sort_into_run(collect(bucket));
+    } while (end_ == 0);
     return true;
   }
 
-  // Empties a bucket: events due now are collected unsorted, and counted; those a whole turn of the ring or more away
-  // go back.
-  std::size_t collect(std::size_t bucket) {
-    std::size_t count = 0;
-    again_.clear();
-    grow(2 * pairs_a_bucket);
-    const std::uint32_t held = held_[bucket];
-    for (std::uint32_t k = 0; k < held; ++k) count = consider(slots_[bucket * pairs_a_bucket + k], count);
-    held_[bucket] = 0;
-    std::uint32_t chunk = heads_[bucket] >> 4, used = heads_[bucket] & 15;
-    heads_[bucket] = 0;
-    while (chunk != 0) {
-      grow(count + 2 * pairs_a_chunk);
-      for (std::uint32_t k = 0; k < used; ++k) count = consider(chunks_[chunk].pairs[k], count);
-      const std::uint32_t following = chunks_[chunk].next;
-      chunks_[chunk].next = free_chunk_;
-      free_chunk_ = chunk;
-      chunk = following;
-      used = pairs_a_chunk;
+  // Puts what has come near into the ring; forgets what is worthless.
+  [[gnu::noinline]] void look_far() {
+    look_far_at_ = current_ + size_;
+    const auto end = static_cast<double>(current_ + size_);
+    std::size_t kept = 0;
+    for (const Entry& entry : far_) {
+      if (counts(entry) == 0) continue;
+      if (entry.time * buckets_a_time_ >= end) {
+        far_[kept++] = entry;
+        continue;
+      }
+      put(index_of(static_cast<std::int64_t>(entry.time * buckets_a_time_)), entry);
     }
-    for (std::uint64_t pair : again_)
-      put(bucket, static_cast<std::uint32_t>(pair), static_cast<std::uint32_t>(pair >> 32));
+    far_.resize(kept);
+  }
+
+  // Forgets what is worthless, lest it pile up.
+  [[gnu::noinline]] void tidy_far() {
+    std::erase_if(far_, [this](const Entry& entry) { return counts(entry) == 0; });
+    far_limit_ = std::max(far_limit_, 2 * far_.size());
+  }
+
+  // Empties a bucket: what still counts is collected unsorted, and counted.
+  std::size_t collect(Bucket& bucket) {
+    std::size_t count = 0;
+    if (bucket.next != 0) [[unlikely]]
+      count = collect_earlier(bucket.next);
+    count = take_up(bucket, count);
+    bucket.held = bucket.next = 0;
+    return count;
+  }
+  [[gnu::noinline]] std::size_t collect_earlier(std::uint32_t place) {
+    Bucket& bucket = full_[place];
+    std::size_t count = bucket.next != 0 ? collect_earlier(bucket.next) : 0;
+    grow(count + 4 * entries_a_bucket);
+    count = take_up(bucket, count);
+    bucket.next = free_;
+    free_ = place;
+    return count;
+  }
+  std::size_t take_up(const Bucket& bucket, std::size_t count) {
+    for (std::uint32_t k = 0; k < bucket.held; ++k) {
+      const Entry entry = bucket.entries[k];
+      unsorted_times_[count] = entry.time;
+      unsorted_pairs_[count] = entry.pair;
+      count += counts(entry);
+    }
     return count;
   }
 
-  // Takes up the events that a pair stands for: that of each disk whose next event is still with the other one. (With
-  // itself: an event alone.)
-  std::size_t consider(std::uint64_t pair, std::size_t count) {
-    const auto a = static_cast<std::uint32_t>(pair), b = static_cast<std::uint32_t>(pair >> 32);
-    const Disk &first = disks_[a], &second = disks_[b];
-    const bool first_stands = first.partner == static_cast<std::int32_t>(b) || (a == b && first.partner < 0);
-    const bool second_stands =
-        second.partner == static_cast<std::int32_t>(a) && !(first_stands && second.event_time == first.event_time);
-    if (first_stands) count = take_up(first.event_time, pair, count);
-    if (second_stands) count = take_up(second.event_time, pair_of(b, a), count);
-    return count;
-  }
-  std::size_t take_up(double time, std::uint64_t pair, std::size_t count) {
-    const std::int64_t bucket = bucket_of(time);
-    unsorted_times_[count] = time;
-    unsorted_pairs_[count] = pair;
-    if (bucket > current_ && ((bucket ^ current_) & static_cast<std::int64_t>(mask_)) == 0) [[unlikely]]
-      again_.push_back(pair);
-    return count + (bucket == current_);
-  }
-
-  // Sorts what collect() found into the run. Small ones by rank: an entry's place is the number of entries before it,
-  // counted without a branch. Equal times keep their order.
-  void sort_run(std::size_t count) {
-    end_ = count;
+  // Sorts what collect() found and puts it behind the run. Small ones by rank:
+  // an entry's place is the number of entries before it, counted without a
+  // branch. Equal times keep their order.
+  void sort_into_run(std::size_t count) {
+    grow(end_ + count);
+    double* const times = times_.data() + end_;
+    std::uint64_t* const pairs = pairs_.data() + end_;
+    end_ += count;
     if (count <= largest_ranked) {
       std::array<std::int64_t, largest_ranked> ranks;
       for (std::size_t i = count; i % 4 != 0; ++i) unsorted_times_[i] = never;
@@ -242,14 +292,14 @@ class EventQueue {
         for (std::size_t j = 0; j < count; ++j) before -= all_lanes(unsorted_times_[j]) < mine;
         std::memcpy(&ranks[i], &before, sizeof before);
       }
-      for (std::size_t i = 0; i < count; ++i) times_[i] = -1;
+      for (std::size_t i = 0; i < count; ++i) times[i] = -1;
       for (std::size_t i = 0; i < count; ++i) {
         const auto rank = static_cast<std::size_t>(ranks[i]);
-        times_[rank] = unsorted_times_[i];
-        pairs_[rank] = unsorted_pairs_[i];
+        times[rank] = unsorted_times_[i];
+        pairs[rank] = unsorted_pairs_[i];
       }
       bool tied = false;  // two of one rank leave a place empty
-      for (std::size_t i = 0; i < count; ++i) tied |= times_[i] < 0;
+      for (std::size_t i = 0; i < count; ++i) tied |= times[i] < 0;
       if (!tied) return;
     }
     order_.resize(count);
@@ -257,24 +307,33 @@ class EventQueue {
     std::stable_sort(order_.begin(), order_.end(),
                      [&](std::uint32_t l, std::uint32_t r) { return unsorted_times_[l] < unsorted_times_[r]; });
     for (std::size_t i = 0; i < count; ++i) {
-      times_[i] = unsorted_times_[order_[i]];
-      pairs_[i] = unsorted_pairs_[order_[i]];
+      times[i] = unsorted_times_[order_[i]];
+      pairs[i] = unsorted_pairs_[order_[i]];
     }
   }
 
-  static constexpr std::size_t largest_ranked = 64;
+  static constexpr std::size_t largest_ranked = 64, most_waiting = 8, looks_ahead = 4;
+  struct Waiting {
+    std::size_t index;
+    Entry entry;
+  };
   const Disk* disks_ = nullptr;
   double buckets_a_time_ = 1;
-  LargeVector<std::uint32_t> held_;   // pairs in a bucket's slots
-  LargeVector<std::uint64_t> slots_;  // pairs_a_bucket a bucket
-  std::vector<std::uint32_t> heads_;  // of its chunks
-  std::size_t mask_ = 0;
-  std::vector<Chunk> chunks_;
-  std::uint32_t free_chunk_ = 0;
-  std::int64_t current_ = -1;
-  // The current bucket's events from next_ to end_, in order; the second id in a pair's upper half.
+  LargeVector<Bucket> ring_;
+  std::vector<Bucket> full_;  // what did not fit; the first place is not used
+  std::uint32_t free_ = 0;
+  std::vector<Entry> far_;
+  std::size_t far_limit_ = 0;
+  std::int64_t size_ = 0;
+  std::int64_t current_ = -1,
+               here_ = 0;  // the current bucket and its place in the ring
+  std::int64_t look_far_at_ = 0;
+  bool beyond_cache_ = false;
+  std::array<Waiting, most_waiting> waiting_;  // pushed_ of them, the latest ones
+  std::size_t pushed_ = 0;
+  // The current bucket's events from next_ to end_, in order.
   std::vector<double> times_, unsorted_times_;
-  std::vector<std::uint64_t> pairs_, unsorted_pairs_, again_;
+  std::vector<std::uint64_t> pairs_, unsorted_pairs_;
   std::vector<std::uint32_t> order_;
   std::size_t next_ = 0, end_ = 0;
 };

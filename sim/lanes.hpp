@@ -1,10 +1,13 @@
-// Four doubles at a time, in the compilers' own vector types: one instruction each where the machine has it, the same
-// bytes where it has not (add, subtract, multiply, divide, square root and fused multiply-add are all correctly
-// rounded).
+// Four doubles at a time, in the compilers' own vector types: one instruction
+// each where the machine has it, the same bytes where it has not (add,
+// subtract, multiply, divide, square root and fused multiply-add are all
+// correctly rounded).
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #if defined(__AVX__)
 #include <immintrin.h>
 #endif
@@ -15,6 +18,15 @@ using Lanes = double __attribute__((vector_size(32)));
 using LaneMask = std::int64_t __attribute__((vector_size(32)));
 
 inline Lanes all_lanes(double value) { return Lanes{value, value, value, value}; }
+
+// {a[0], a[1], b[0], b[1]}. Both 16-byte aligned.
+inline Lanes two_pairs(const double* a, const double* b) {
+#if defined(__AVX__)
+  return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_load_pd(a)), _mm_load_pd(b), 1);
+#else
+  return Lanes{a[0], a[1], b[0], b[1]};
+#endif
+}
 
 inline Lanes select(LaneMask mask, Lanes if_true, Lanes if_false) {
 #if defined(__AVX__)
@@ -65,6 +77,74 @@ inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
   unsigned mask = 0;
   for (unsigned k = 0; k < 8; ++k) mask |= static_cast<unsigned>(words[k] == value) << k;
   return mask;
+#endif
+}
+
+// Eight floats or 32-bit words at a time.
+using FloatLanes = float __attribute__((vector_size(32)));
+using WordLanes = std::int32_t __attribute__((vector_size(32)));
+
+inline FloatLanes all_floats(float value) { return FloatLanes{value, value, value, value, value, value, value, value}; }
+inline FloatLanes sqrt_floats(FloatLanes value) {
+#if defined(__AVX__)
+  return _mm256_sqrt_ps(value);
+#else
+  for (int k = 0; k < 8; ++k) value[k] = std::sqrt(value[k]);
+  return value;
+#endif
+}
+inline FloatLanes nearest_integer(FloatLanes value) {
+#if defined(__AVX__)
+  return _mm256_round_ps(value, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
+#else
+  for (int k = 0; k < 8; ++k) value[k] = std::nearbyint(value[k]);
+  return value;
+#endif
+}
+inline FloatLanes fused(FloatLanes a, FloatLanes b, FloatLanes c) {
+#if defined(__FMA__)
+  return _mm256_fmadd_ps(a, b, c);
+#else
+  for (int k = 0; k < 8; ++k) c[k] = std::fma(a[k], b[k], c[k]);
+  return c;
+#endif
+}
+// The words at base + 64 place[k] bytes, k = 0 to 7.
+inline WordLanes gather_lines(const void* base, WordLanes place) {
+#if defined(__AVX2__)
+  const __m256i index = _mm256_slli_epi32(reinterpret_cast<__m256i>(place), 3);
+  return reinterpret_cast<WordLanes>(_mm256_i32gather_epi32(static_cast<const int*>(base), index, 8));
+#else
+  WordLanes words;
+  for (int k = 0; k < 8; ++k) {
+    std::int32_t word;
+    std::memcpy(&word, static_cast<const char*>(base) + 64 * static_cast<std::ptrdiff_t>(place[k]), sizeof word);
+    words[k] = word;
+  }
+  return words;
+#endif
+}
+// Writes the lanes whose mask is set, in order, to the start of out; all eight
+// places may be written. How many they are.
+inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std::uint32_t* words_out,
+                         float* floats_out) {
+#if defined(__AVX2__) && defined(__BMI2__)
+  const auto bits = static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+  const std::uint64_t bytes = _pdep_u64(bits, 0x0101010101010101) * 0xff;
+  const auto order = static_cast<long long>(_pext_u64(0x0706050403020100, bytes));
+  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(words_out),
+                      _mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(words), lanes));
+  _mm256_storeu_ps(floats_out, _mm256_permutevar8x32_ps(floats, lanes));
+  return static_cast<unsigned>(__builtin_popcount(bits));
+#else
+  unsigned count = 0;
+  for (int k = 0; k < 8; ++k) {
+    words_out[count] = static_cast<std::uint32_t>(words[k]);
+    floats_out[count] = floats[k];
+    count += mask[k] != 0;
+  }
+  return count;
 #endif
 }
 

@@ -1,5 +1,5 @@
-// Vectors that may be large: on pages of 2 MiB where the system has them, since what the event loop touches next is
-// scattered over all of it.
+// Vectors that may be large: on pages of 2 MiB where the system has them, since
+// what the event loop touches next is scattered over all of it.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct LargePageAllocator {
     void* memory = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
     if (memory == nullptr) throw std::bad_alloc();
 #if defined(__linux__)
-    if (bytes >= page) madvise(memory, bytes, MADV_HUGEPAGE);
+    if (bytes >= page) madvise(memory, (bytes + page - 1) / page * page, MADV_HUGEPAGE);
 #endif
     return static_cast<T*>(memory);
   }

@@ -1,16 +1,21 @@
-// Who can touch whom soon. Every disk lives in a shell, a circle round the place where the disk was when the shell was
-// last drawn; while all disks stay in their shells, only pairs whose shells' centres are closer than the disks' contact
-// distance plus the two shells' radii can touch, and those stand in each other's lists. A disk that leaves its shell
-// draws a new one, as large as it can be without more than eight neighbours: large in a gas, small in a crystal.
+// Who can touch whom soon. Every disk lives in a shell, a circle round the
+// place where the disk was when the shell was last drawn; while all disks stay
+// in their shells, only pairs whose shells' centres are closer than the disks'
+// contact distance plus the two shells' radii can touch, and those stand in
+// each other's lists. A disk that leaves its shell draws a new one, as large as
+// it can be without more than eight neighbours: large in a gas, small in a
+// crystal.
 //
-// Centres are filed in a grid of cells that wraps round in both directions (for open boxes too: a far cell shared by
-// chance only costs a distance check), so there is no event for crossing a cell and no edge to the world.
+// Centres are filed in a grid of cells that wraps round in both directions (for
+// open boxes too: a far cell shared by chance only costs a distance check), so
+// there is no event for crossing a cell and no edge to the world.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "sim/disk.hpp"
@@ -20,7 +25,6 @@
 namespace shakebed::sim {
 
 inline constexpr std::uint32_t inline_neighbours = 8;
-inline constexpr int rings = 1;  // of cells round one's own in which others are searched
 
 struct alignas(32) NeighbourBlock {
   std::array<std::uint32_t, inline_neighbours> disk;
@@ -28,19 +32,20 @@ struct alignas(32) NeighbourBlock {
 
 class NeighbourShells {
  public:
-  // disks: the records, one more than count (the last is the sentinel that fills empty places of lists).
-  // reach: the largest distance of centres that can make a pair; cells are that wide. width, height: of the periodic
-  // box, or of the region to grid when it is not.
+  // disks: the records, one more than count (the last is the sentinel that
+  // fills empty places of lists). reach: the largest distance of centres that
+  // can make a pair; cells are that wide. width, height: of the periodic box,
+  // or of the region to grid when it is not.
   void reset(Disk* disks, std::uint32_t count, double reach, double width, double height) {
-    const double cell = reach / rings;
     disks_ = disks;
     sentinel_ = count;
-    columns_ = std::max(1, static_cast<int>(std::min(width / cell, 30'000.0)));
-    rows_ = std::max(1, static_cast<int>(std::min(height / cell, 30'000.0)));
+    columns_ = std::max(1, static_cast<int>(std::min(width / reach, 30'000.0)));
+    rows_ = std::max(1, static_cast<int>(std::min(height / reach, 30'000.0)));
     per_x_ = columns_ / width;
     per_z_ = rows_ / height;
-    heads_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), sentinel_);
-    following_.assign(count, sentinel_);
+    cells_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), Cell{});
+    crowded_.assign(1, Cell{});
+    free_cell_ = 0;
     lists_.resize(count + 1);
     for (NeighbourBlock& block : lists_) block.disk.fill(sentinel_);
     overflow_.assign(count, 0);
@@ -51,7 +56,8 @@ class NeighbourShells {
   }
 
   const NeighbourBlock& first_block(std::uint32_t i) const { return lists_[i]; }
-  // Calls visit(block) for the blocks that hold the neighbours beyond the first eight.
+  // Calls visit(block) for the blocks that hold the neighbours beyond the first
+  // eight.
   template <class Visit>
   void further_blocks(std::uint32_t i, Visit visit) const {
     for (std::uint32_t block = overflow_[i]; block != 0; block = links_[block]) visit(blocks_[block]);
@@ -65,15 +71,19 @@ class NeighbourShells {
   }
 
   void file(std::uint32_t i) {
-    std::uint32_t& head = heads_[cell_of(disks_[i])];
-    following_[i] = head;
-    head = i;
+    Cell& cell = cells_[cell_of(disks_[i])];
+    if (cell.held == disks_a_cell) [[unlikely]]
+      make_room(cell);
+    cell.disk[cell.held++] = i;
   }
   // To be called while the record still holds the old centre.
   void unfile(std::uint32_t i) {
-    std::uint32_t* link = &heads_[cell_of(disks_[i])];
-    while (*link != i) link = &following_[*link];
-    *link = following_[i];
+    Cell& cell = cells_[cell_of(disks_[i])];
+    std::uint32_t* here = find(cell, i);
+    for (std::uint32_t next = cell.next; here == nullptr; next = crowded_[next].next) here = find(crowded_[next], i);
+    *here = cell.disk[--cell.held];
+    if (cell.held == 0 && cell.next != 0) [[unlikely]]
+      take_back(cell);
   }
   std::size_t cell_of(const Disk& disk) const {
     const int column = wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_);
@@ -81,32 +91,40 @@ class NeighbourShells {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   }
 
-  // Calls visit(k) for every other disk whose shell's centre may be within reach of i's.
-  template <class Visit>
-  void search(std::uint32_t i, Visit visit) const {
+  // Writes down every disk, itself too, whose shell's centre may be within
+  // reach of i's, and how many they are. found grows as needed; behind the last
+  // stand seven more words or so of no meaning.
+  std::size_t search(std::uint32_t i, LargeVector<std::uint32_t>& found) const {
     const Disk& disk = disks_[i];
     const int column = static_cast<int>(std::floor(disk.shell_x * per_x_));
     const int row = static_cast<int>(std::floor(disk.shell_z * per_z_));
     // A grid of few columns or rows would meet the same cell twice.
-    const int side = 2 * rings + 1;
-    const int left = columns_ >= side ? -rings : 0, right = columns_ >= side ? rings : columns_ - 1;
-    const int down = rows_ >= side ? -rings : 0, up = rows_ >= side ? rings : rows_ - 1;
+    const int left = columns_ >= 3 ? -1 : 0, right = columns_ >= 3 ? 1 : columns_ - 1;
+    const int down = rows_ >= 3 ? -1 : 0, up = rows_ >= 3 ? 1 : rows_ - 1;
+    if (found.size() < 16 * disks_a_cell) found.resize(16 * disks_a_cell);
+    std::size_t count = 0;
     for (int dr = down; dr <= up; ++dr) {
-      const std::size_t base = static_cast<std::size_t>(wrap(row + dr, rows_)) * static_cast<std::size_t>(columns_);
+      const Cell* cells = &cells_[static_cast<std::size_t>(wrap(row + dr, rows_)) * static_cast<std::size_t>(columns_)];
       for (int dc = left; dc <= right; ++dc) {
-        std::uint32_t k = heads_[base + static_cast<std::size_t>(wrap(column + dc, columns_))];
-        for (; k != sentinel_; k = following_[k]) {
-          if (k != i) visit(k);
+        const Cell& cell = cells[wrap(column + dc, columns_)];
+        std::memcpy(&found[count], cell.disk.data(), sizeof cell.disk);
+        count += cell.held;
+        for (std::uint32_t next = cell.next; next != 0; next = crowded_[next].next) {
+          if (found.size() < count + 12 * disks_a_cell) found.resize(2 * found.size());
+          std::memcpy(&found[count], crowded_[next].disk.data(), sizeof cell.disk);
+          count += crowded_[next].held;
         }
       }
     }
+    return count;
   }
 
   // Gives i the neighbours `found`; the others' lists are not touched.
   void list(std::uint32_t i, const std::vector<std::uint32_t>& found) {
     for (std::uint32_t k : found) append(i, k);
   }
-  // Gives i exactly the neighbours `found`, and mends the lists of those that it lost or won.
+  // Gives i exactly the neighbours `found`, and mends the lists of those that
+  // it lost or won.
   void relist(std::uint32_t i, const std::vector<std::uint32_t>& found) {
     alignas(32) std::array<std::uint32_t, inline_neighbours> first;
     first.fill(sentinel_);
@@ -133,12 +151,44 @@ class NeighbourShells {
   }
 
   std::size_t bytes() const {
-    return (heads_.capacity() + following_.capacity() + overflow_.capacity() + links_.capacity()) *
-               sizeof(std::uint32_t) +
+    return (overflow_.capacity() + links_.capacity()) * sizeof(std::uint32_t) +
+           (cells_.capacity() + crowded_.capacity()) * sizeof(Cell) +
            (lists_.capacity() + blocks_.capacity()) * sizeof(NeighbourBlock);
   }
 
  private:
+  static constexpr std::uint32_t disks_a_cell = 6;
+  struct alignas(32) Cell {
+    std::array<std::uint32_t, disks_a_cell> disk{};
+    std::uint32_t held = 0,
+                  next = 0;  // disks here; where in crowded_ the others are, 0 for nowhere
+  };
+
+  static std::uint32_t* find(Cell& cell, std::uint32_t i) {
+    for (std::uint32_t k = 0; k < cell.held; ++k) {
+      if (cell.disk[k] == i) return &cell.disk[k];
+    }
+    return nullptr;
+  }
+  [[gnu::noinline]] void make_room(Cell& cell) {
+    std::uint32_t place = free_cell_;
+    if (place != 0) {
+      free_cell_ = crowded_[place].next;
+    } else {
+      place = static_cast<std::uint32_t>(crowded_.size());
+      crowded_.emplace_back();
+    }
+    crowded_[place] = cell;
+    cell.held = 0;
+    cell.next = place;
+  }
+  [[gnu::noinline]] void take_back(Cell& cell) {
+    const std::uint32_t place = cell.next;
+    cell = crowded_[place];
+    crowded_[place].next = free_cell_;
+    free_cell_ = place;
+  }
+
   static int wrap(int index, int size) {
     if (static_cast<unsigned>(index) < static_cast<unsigned>(size)) return index;
     index %= size;
@@ -208,9 +258,11 @@ class NeighbourShells {
   std::uint32_t sentinel_ = 0;
   int columns_ = 1, rows_ = 1;
   double per_x_ = 1, per_z_ = 1;
-  LargeVector<std::uint32_t> heads_, following_;  // the grid: a linked list a cell
-  LargeVector<NeighbourBlock> lists_;             // the first eight neighbours of each disk
-  std::vector<std::uint32_t> overflow_;           // first of the blocks that hold the rest, 0 for none
+  LargeVector<Cell> cells_;    // the grid
+  std::vector<Cell> crowded_;  // what did not fit; the first place is not used
+  std::uint32_t free_cell_ = 0;
+  LargeVector<NeighbourBlock> lists_;    // the first eight neighbours of each disk
+  std::vector<std::uint32_t> overflow_;  // first of the blocks that hold the rest, 0 for none
   std::vector<NeighbourBlock> blocks_;
   std::vector<std::uint32_t> links_;
   std::uint32_t free_block_ = 0;

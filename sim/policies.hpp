@@ -1,5 +1,6 @@
-// The choices for which the engine is specialised because they are hot: space (gravity and boundaries), rule (what a
-// contact does) and sizes. Everything else is chosen at run time where the branch is free.
+// The choices for which the engine is specialised because they are hot: space
+// (gravity and boundaries), rule (what a contact does) and sizes. Everything
+// else is chosen at run time where the branch is free.
 #pragma once
 
 #include <cmath>
@@ -27,7 +28,8 @@ struct PeriodicSidesBox {
   static constexpr bool falls = true, has_walls = true, wraps_x = true, wraps_z = false;
 };
 
-// Periods of a space; where a direction does not wrap, the period counts as 0 and nearest() changes nothing.
+// Periods of a space; where a direction does not wrap, the period counts as 0
+// and nearest() changes nothing.
 struct Period {
   double length = 0, minus_length = 0, inverse = 0;
   explicit Period(double period = 0) : length(period), minus_length(-period), inverse(period > 0 ? 1 / period : 0) {}
@@ -35,10 +37,15 @@ struct Period {
   Lanes nearest(Lanes difference) const {
     return fused(all_lanes(minus_length), nearest_integer(difference * all_lanes(inverse)), difference);
   }
+  FloatLanes nearest(FloatLanes difference) const {
+    return fused(all_floats(static_cast<float>(minus_length)),
+                 nearest_integer(difference * all_floats(static_cast<float>(inverse))), difference);
+  }
   double wrapped(double position) const { return position - length * std::floor(position * inverse); }
 };
 
-// Rules. `clocked`: dissipative rules know when each disk was last hit, for the TC model.
+// Rules. `clocked`: dissipative rules know when each disk was last hit, for the
+// TC model.
 struct ElasticRule {
   static constexpr bool dissipates = false, spins = false;
 };

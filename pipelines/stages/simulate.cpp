@@ -756,7 +756,7 @@ void Simulate::run(RunContext& context) const {
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 4,
+          .version = 5,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,
