@@ -79,7 +79,7 @@ std::vector<double> contrast_by_row(const FinderCalibration& finder) {
 }
 
 FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, const MeasureOptions& options,
-                      double per_area) {
+                      const LensMap& lens, int recorded_width, int recorded_height, double per_area) {
   FrameFindings findings;
   findings.report.index = item.index;
   findings.report.origin = item.origin;
@@ -91,14 +91,20 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
     findings.report.why = error.what();
     return findings;
   }
-  if (frame.width != finder.width || frame.height != finder.height) {
+  if (frame.width != recorded_width || frame.height != recorded_height) {
     findings.report.status = FrameStatus::size_changed;
     findings.report.why = "the frame is " + std::to_string(frame.width) + " x " + std::to_string(frame.height) +
-                          " px, the frames before it " + std::to_string(finder.width) + " x " +
-                          std::to_string(finder.height);
+                          " px, the frames before it " + std::to_string(recorded_width) + " x " +
+                          std::to_string(recorded_height);
     return findings;
   }
+  if (!lens.lens().plain()) frame = lens.corrected(frame);
   FindResult found = find_disks(frame, finder, options.find);
+  if (!lens.lens().plain())  // what a margin repeats is no disk
+    std::erase_if(found.disks, [&](const FoundDisk& disk) {
+      const PixelPlace place = lens.to_recorded({disk.x_px, disk.y_px});
+      return place.x < -0.5 || place.y < -0.5 || place.x >= recorded_width - 0.5 || place.y >= recorded_height - 0.5;
+    });
   findings.report.disks = found.disks.size();
   findings.report.rejected = found.rejected;
   findings.report.residual_level = found.residual_level;
@@ -263,10 +269,15 @@ FloorMotion find_floor_motion(const std::vector<FrameFindings>& frames, double s
 
 }  // namespace
 
-Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
-  check(options);
+Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
+  check(asked);
+  MeasureOptions options = asked;  // its places become those of true frames
   Measurement measurement;
   FindOptions find = options.find;
+  Lens lens{options.pixel_aspect.value_or(1.0), options.lens_radial.value_or(0.0)};
+  const auto straightened = [&](const GrayFrame& frame) {
+    return lens.plain() ? frame : LensMap(lens, frame.width, frame.height).corrected(frame);
+  };
   if (options.scale_m_per_px && !find.radius_px) {
     find.radius_px =
         0.5 * options.bead_diameter_m / *options.scale_m_per_px;  // a good first value; refined all the same
@@ -275,7 +286,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
   // Learn the bead from the first frames that show any; one full frame is enough, sparse ones are taken together.
   constexpr std::size_t enough_disks = 150;
   constexpr std::size_t most_tried = 40;
-  std::vector<GrayFrame> learned_from;
+  std::vector<GrayFrame> learned_from, recorded;  // true and as recorded
   CalibrationResult calibrated;
   std::string first_reason, first_error;
   std::size_t read = 0;
@@ -291,7 +302,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
       continue;
     }
     ++read;
-    learned_from.push_back(std::move(frame));
+    learned_from.push_back(straightened(frame));
+    recorded.push_back(std::move(frame));
     std::vector<const GrayFrame*> pointers;
     if (calibrated.found)
       for (const GrayFrame& one : learned_from) pointers.push_back(&one);
@@ -301,6 +313,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;
       learned_from.pop_back();
+      recorded.pop_back();
       continue;
     }
     calibrated = std::move(attempt);
@@ -313,8 +326,83 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
     throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", first_reason,
                      "check that the beads are in view, or give their radius and polarity");
   }
+  // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
+  const int recorded_width = recorded.front().width, recorded_height = recorded.front().height;
+  std::erase_if(recorded, [&](const GrayFrame& frame) {
+    return frame.width != recorded_width || frame.height != recorded_height;
+  });
+  constexpr int lens_rounds = 5;
+  for (int round = 0; round < lens_rounds && !(options.pixel_aspect && options.lens_radial); ++round) {
+    std::vector<const GrayFrame*> pointers;
+    std::vector<FindResult> found;
+    learned_from.clear();
+    for (const GrayFrame& frame : recorded) learned_from.push_back(straightened(frame));
+    for (const GrayFrame& frame : learned_from) {
+      pointers.push_back(&frame);
+      found.push_back(find_disks(frame, calibrated.calibration, find));
+    }
+    const LensEstimate left = estimate_lens(pointers, found, calibrated.calibration);
+    BedCalibration& bed = measurement.calibration;
+    bed.aspect_std_error = options.pixel_aspect ? 0 : left.aspect_std_error;
+    bed.lens_radial_std_error = options.lens_radial ? 0 : left.radial_std_error;
+    if (!left.known) break;
+    // Below a few thousandths it may as well be streaks or shading, and does no harm.
+    constexpr double worth_it = 0.004, settled = 3e-4, most = 0.25;
+    const double least = lens.plain() ? worth_it : settled;
+    const auto clear = [&](double value, double std_error) { return std::abs(value) > std::max(least, 5 * std_error); };
+    Lens better = lens;
+    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error))
+      better.pixel_aspect = std::clamp(lens.pixel_aspect * left.lens.pixel_aspect, 1 - most, 1 + most);
+    if (!options.lens_radial && clear(left.lens.radial, left.radial_std_error))
+      better.radial = std::clamp(lens.radial + left.lens.radial, -most, most);
+    if (better.pixel_aspect == lens.pixel_aspect && better.radial == lens.radial) break;
+    const Lens before = lens;
+    lens = better;
+    learned_from.clear();
+    pointers.clear();
+    for (const GrayFrame& frame : recorded) learned_from.push_back(straightened(frame));
+    for (const GrayFrame& frame : learned_from) pointers.push_back(&frame);
+    CalibrationResult again = calibrate_finder(pointers, find);
+    if (!again.found) {
+      lens = before;
+      break;
+    }
+    calibrated = std::move(again);
+  }
   learned_from.clear();
   learned_from.shrink_to_fit();
+  recorded.clear();
+  recorded.shrink_to_fit();
+  const LensMap lens_map(lens, recorded_width, recorded_height);
+  measurement.calibration.lens = lens;
+  measurement.calibration.lens_given = options.pixel_aspect && options.lens_radial;
+  if (!lens.plain()) {
+    if (!measurement.calibration.lens_given) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "Beads are no circles of one size in these frames: pixels are taken to be %.4f times as wide as "
+                    "high, and the lens to bend by %+.4f at the corners.",
+                    lens.pixel_aspect, lens.radial);
+      measurement.warnings.emplace_back(text);
+    }
+    const auto place_of = [&](double x, double y) { return lens_map.to_true({x, y}); };
+    if (options.floor_px) {
+      const double slope = options.floor_slope.value_or(0.0), right = recorded_width - 1;
+      const PixelPlace a = place_of(0, *options.floor_px), b = place_of(right, *options.floor_px + slope * right);
+      options.floor_slope = (b.y - a.y) / (b.x - a.x);
+      options.floor_px = a.y - *options.floor_slope * a.x;
+    }
+    const double half_way = 0.5 * (recorded_height - 1);
+    if (options.left_wall_px) options.left_wall_px = place_of(*options.left_wall_px, half_way).x;
+    if (options.right_wall_px) options.right_wall_px = place_of(*options.right_wall_px, half_way).x;
+    if (options.find.roi) {
+      const PixelRectangle& roi = *options.find.roi;
+      const PixelPlace a = place_of(roi.left, roi.top), b = place_of(roi.left + roi.width, roi.top + roi.height);
+      options.find.roi =
+          PixelRectangle{static_cast<int>(std::lround(a.x)), static_cast<int>(std::lround(a.y)),
+                         static_cast<int>(std::lround(b.x - a.x)), static_cast<int>(std::lround(b.y - a.y))};
+    }
+  }
   measurement.finder = calibrated.calibration;
   const FinderCalibration& finder = measurement.finder;
 
@@ -477,8 +565,10 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
     for (const FoundDisk& disk : frame.disks) {
       MeasuredDisk measured;
       measured.frame = frame.report.index;
-      measured.x_px = disk.x_px;
-      measured.y_px = disk.y_px;
+      const PixelPlace seen_at =
+          lens.plain() ? PixelPlace{disk.x_px, disk.y_px} : lens_map.to_recorded({disk.x_px, disk.y_px});
+      measured.x_px = seen_at.x;
+      measured.y_px = seen_at.y;
       measured.radius_px = disk.radius_px;
       measured.z = (bed.floor_px + bed.floor_slope * disk.x_px - disk.y_px) * cosine / diameter_px;
       measured.x = ((disk.x_px - bed.left_wall_px) * cosine +
@@ -545,7 +635,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& options) {
           taken_up.wait(lock, [&] { return failure || item->index < done + run_ahead; });
           if (failure) return;
         }
-        FrameFindings one = examine(*item, finder, options, per_area);
+        FrameFindings one = examine(*item, finder, options, lens_map, recorded_width, recorded_height, per_area);
         const std::lock_guard<std::mutex> lock(result_mutex);
         if (failure) return;
         early.emplace(one.report.index, std::move(one));

@@ -10,6 +10,7 @@
 #include "ingest/density.hpp"
 #include "ingest/find_disks.hpp"
 #include "ingest/frames.hpp"
+#include "ingest/lens.hpp"
 
 namespace shakebed::ingest {
 
@@ -35,7 +36,8 @@ struct FrameReport {
   double residual_level = 0;  // grey levels
 };
 
-// Only the diameter is needed; each other member overrides something that is otherwise found.
+// Only the diameter is needed; each other member overrides something that is otherwise found. Places are those of the
+// recorded frame.
 struct MeasureOptions {
   double bead_diameter_m = 0;            // required, > 0
   std::optional<double> scale_m_per_px;  // else bead_diameter_m / (2 radius_px)
@@ -43,6 +45,9 @@ struct MeasureOptions {
   std::optional<double> floor_slope;     // px down per px right; 0 when floor_px is given without it
   std::optional<double> left_wall_px;    // x_px of the walls' inner faces
   std::optional<double> right_wall_px;
+  // Found on the beads' rims unless given (1 and 0: taken for plain); scale_m_per_px is that of rows.
+  std::optional<double> pixel_aspect;
+  std::optional<double> lens_radial;
   FindOptions find;                            // polarity, radius, roi, ...
   Kernel kernel;                               // widths in D
   double bin_width = 0.25;                     // D
@@ -62,7 +67,11 @@ struct MeasureOptions {
   std::size_t geometry_frames = 100;
 };
 
+// Places are those of the true frame (see lens.hpp), which is the recorded one unless pixels or lens say otherwise.
 struct BedCalibration {
+  Lens lens;
+  bool lens_given = false;                                 // both terms
+  double aspect_std_error = 0, lens_radial_std_error = 0;  // of what was found
   double scale_m_per_px = 0;
   double scale_relative_std_error = 0;
   double radius_px = 0;

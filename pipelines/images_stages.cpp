@@ -384,11 +384,14 @@ void draw_overlays(const ExtractOptions& options, RunContext& context, const std
     const auto at = to_draw.find(item->index);
     if (at == to_draw.end()) continue;
     context.check_interrupted();
-    const ingest::GrayFrame frame = item->decode();
+    ingest::GrayFrame frame = item->decode();
+    const ingest::LensMap lens(bed.lens, frame.width, frame.height);
+    if (!bed.lens.plain()) frame = lens.corrected(frame);
     ingest::FindResult shown;
     for (const ingest::MeasuredDisk& disk : at->second) {
       ingest::FoundDisk circle;
-      circle.x_px = disk.x_px, circle.y_px = disk.y_px, circle.radius_px = disk.radius_px;
+      const ingest::PixelPlace place = lens.to_true({disk.x_px, disk.y_px});
+      circle.x_px = place.x, circle.y_px = place.y, circle.radius_px = disk.radius_px;
       circle.quality = disk.quality, circle.cut = disk.cut, circle.half_hidden = disk.half_hidden;
       shown.disks.push_back(circle);
     }
@@ -413,6 +416,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   measure.scale_m_per_px = options.scale;
   measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
   measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
+  measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
   measure.find.polarity = options.polarity == BeadPolarity::dark     ? ingest::Polarity::dark_beads
                           : options.polarity == BeadPolarity::bright ? ingest::Polarity::bright_beads
                                                                      : ingest::Polarity::automatic;
@@ -434,6 +438,8 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   if (rendered != nullptr) {
     const FrameGeometry geometry = FrameGeometry::read(rendered->file("geometry.json"));
     if (options.use_geometry) {
+      if (!measure.pixel_aspect) measure.pixel_aspect = 1;
+      if (!measure.lens_radial) measure.lens_radial = 0;
       if (!measure.scale_m_per_px) measure.scale_m_per_px = geometry.scale;
       if (!measure.floor_px) measure.floor_px = geometry.floor;
       if (!measure.left_wall_px) measure.left_wall_px = geometry.left_wall, measure.right_wall_px = geometry.right_wall;
@@ -529,6 +535,8 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["diameter"] = quantity_json(options.diameter, "m");
   result["scale"] = quantity_json(bed.scale_m_per_px, "m/px", bed.scale_m_per_px * bed.scale_relative_std_error);
   result["scale_given"] = bed.scale_given;
+  result["pixel_aspect"] = quantity_json(bed.lens.pixel_aspect, "1", bed.aspect_std_error);
+  result["lens"] = quantity_json(bed.lens.radial, "1", bed.lens_radial_std_error);
   result["radius"] = quantity_json(bed.radius_px, "px", bed.radius_std_error_px);
   result["edge_width"] = quantity_json(bed.edge_width_px, "px");
   result["noise"] = quantity_json(bed.noise_level, "grey levels");

@@ -27,6 +27,13 @@ class Extract : public Stage {
     fields.number("right_wall", o.right_wall,
                   {.help = "column of the right wall's inner face in pixels; found if left out"});
     fields.numbers("roi", o.roi, {.help = "region of interest in pixels: left, top, width, height"});
+    fields.number(
+        "pixel_aspect", o.pixel_aspect,
+        {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
+    fields.number("lens", o.lens_radial,
+                  {.help = "the lens's bend: how far the frame's corners truly lie further out, in half diagonals (a "
+                           "barrel is positive); found on the beads' rims if left out",
+                   .range = from_to(-0.3, 0.3)});
     fields.choice(
         "polarity", o.polarity,
         {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},

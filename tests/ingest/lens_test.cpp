@@ -1,0 +1,128 @@
+#include "ingest/lens.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ingest/measure_bed.hpp"
+#include "ingest/random_stream.hpp"
+#include "ingest/synthetic_frames.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+// A camera with unequal pixels and a bent lens looks at disks: each pixel is the share of 8 x 8 points, spread over two
+// pixels' width as by a slightly blurred lens, that lie in a disk, by the lens's formula itself and not by LensMap.
+GrayFrame seen_through(const std::vector<RenderedDisk>& disks, double aspect, double radial, int width, int height) {
+  GrayFrame frame;
+  frame.width = width;
+  frame.height = height;
+  RandomStream random(7);
+  const double middle_x = 0.5 * width * aspect, middle_y = 0.5 * height;
+  const double h2 = middle_x * middle_x + middle_y * middle_y;
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      const auto true_place = [&](double x, double y) {
+        const double dx = x * aspect - middle_x, dy = y - middle_y, s = 1 + radial * (dx * dx + dy * dy) / h2;
+        return PixelPlace{middle_x + s * dx - 0.5, middle_y + s * dy - 0.5};
+      };
+      const PixelPlace here = true_place(column + 0.5, row + 0.5);
+      int inside = 0;
+      for (const RenderedDisk& disk : disks) {
+        if (std::hypot(here.x - disk.x_px, here.y - disk.y_px) > disk.radius_px + 3) continue;
+        for (int j = 0; j < 8; ++j)
+          for (int i = 0; i < 8; ++i) {
+            const PixelPlace p = true_place(column - 0.5 + (i + 0.5) / 4, row - 0.5 + (j + 0.5) / 4);
+            inside += std::hypot(p.x - disk.x_px, p.y - disk.y_px) < disk.radius_px;
+          }
+      }
+      frame.pixels.push_back(static_cast<float>(200 - 140 * inside / 64.0 + 3 * random.normal()));
+    }
+  return frame;
+}
+
+std::vector<RenderedDisk> bed(double wide, int height) {
+  SyntheticBed bed;
+  bed.left_wall_px = 14;
+  bed.right_wall_px = wide - 15;
+  bed.floor_px = height - 16;
+  bed.radius_px = 8;
+  bed.rows = 9;
+  bed.gas_count = 40;
+  bed.gas_height_px = 60;
+  std::vector<RenderedDisk> disks = make_synthetic_bed(bed);
+  std::erase_if(disks, [](const RenderedDisk& disk) { return disk.y_px < 10; });  // all in view
+  return disks;
+}
+
+TEST(Lens, ThereAndBackAgain) {
+  for (const double radial : {-0.1, 0.0, 0.1}) {
+    const LensMap map({1.07, radial}, 640, 480);
+    for (const PixelPlace place : {PixelPlace{0, 0}, {639, 479}, {320, 240}, {12.5, 400}}) {
+      const PixelPlace again = map.to_recorded(map.to_true(place));
+      EXPECT_NEAR(again.x, place.x, 1e-9);
+      EXPECT_NEAR(again.y, place.y, 1e-9);
+    }
+  }
+  EXPECT_THROW(LensMap({3, 0}, 640, 480), std::invalid_argument);
+  EXPECT_THROW(LensMap({1, 0.5}, 640, 480), std::invalid_argument);
+}
+
+struct Case {
+  const char* name;
+  double aspect, radial;
+};
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
+
+class Lenses : public testing::TestWithParam<Case> {};
+
+TEST_P(Lenses, AreToldFromTheBeadsAndDisksAreFoundWhereTheyAre) {
+  const auto [name, aspect, radial] = GetParam();
+  const int width = 320, height = 300;
+  const auto truth = bed(width * aspect, height);
+  FrameSource source = FrameSource::from_frames({seen_through(truth, aspect, radial, width, height)});
+  MeasureOptions options;
+  options.bead_diameter_m = 16e-3;
+  const Measurement found = measure_bed(source, options);
+  EXPECT_NEAR(found.calibration.lens.pixel_aspect, aspect, 0.0015);
+  EXPECT_NEAR(found.calibration.lens.radial, radial, 0.004);
+  // Every disk whose centre is in view, at its true place in the bed.
+  const double middle_x = 0.5 * width * aspect, middle_y = 0.5 * height;
+  std::size_t hits = 0;
+  double square = 0;
+  for (const RenderedDisk& disk : truth) {
+    for (const MeasuredDisk& one : found.disks) {
+      const double dx = (one.x_px + 0.5) * aspect - middle_x, dy = one.y_px + 0.5 - middle_y;
+      const double s = 1 + radial * (dx * dx + dy * dy) / (middle_x * middle_x + middle_y * middle_y);
+      const double distance = std::hypot(middle_x + s * dx - 0.5 - disk.x_px, middle_y + s * dy - 0.5 - disk.y_px);
+      if (distance > 4) continue;
+      ++hits;
+      square += distance * distance;
+    }
+  }
+  EXPECT_EQ(hits, truth.size());
+  EXPECT_EQ(hits, found.disks.size());
+  EXPECT_LT(std::sqrt(square / 2 / static_cast<double>(hits)), 0.06);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lens, Lenses,
+                         testing::Values(Case{"plain", 1, 0}, Case{"wide_pixels", 1.0667, 0},
+                                         Case{"narrow_pixels", 0.94, 0}, Case{"barrel", 1, 0.04},
+                                         Case{"pincushion", 1, -0.03}, Case{"both", 1.03, 0.03}),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+TEST(Lens, GivenTermsAreTaken) {
+  const auto truth = bed(320, 300);
+  FrameSource source = FrameSource::from_frames({seen_through(truth, 1, 0.03, 320, 300)});
+  MeasureOptions options;
+  options.bead_diameter_m = 16e-3;
+  options.pixel_aspect = 1;
+  options.lens_radial = 0.03;
+  const Measurement found = measure_bed(source, options);
+  EXPECT_TRUE(found.calibration.lens_given);
+  EXPECT_EQ(found.calibration.lens.radial, 0.03);
+  EXPECT_EQ(found.disks.size(), truth.size());
+}
+
+}  // namespace
+}  // namespace shakebed::ingest
