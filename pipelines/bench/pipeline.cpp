@@ -163,7 +163,7 @@ std::vector<Dial> all_dials(bool quick) {
       {"frames and disks", {}}};
   for (const auto& [frames, width] :
        quick ? std::vector<std::pair<int, int>>{{15, 10}, {240, 60}}
-             : std::vector<std::pair<int, int>>{{4, 5}, {15, 10}, {60, 30}, {240, 90}, {480, 180}}) {
+             : std::vector<std::pair<int, int>>{{4, 5}, {15, 10}, {60, 30}, {240, 60}, {480, 90}}) {
     Settings s;
     s.frames = frames, s.width = width, s.pixels_a_diameter = 8;
     dials.back().values.push_back(s);
@@ -172,7 +172,7 @@ std::vector<Dial> all_dials(bool quick) {
 }
 
 void errors_by_dial(const Effort& effort, StageResult& result) {
-  const int seeds = effort.quick ? 4 : 16;
+  const int seeds = effort.quick ? 4 : 8;
   Table table{
       "Error of T by what can be dialled",
       fmt::format("{} beds a row, each with a seed of its own; T is held at m g D by the reservoir; rms and bias of "
@@ -266,7 +266,7 @@ void errors_by_dial(const Effort& effort, StageResult& result) {
 void error_budget(const Effort& effort, StageResult& result) {
   effort.step("pipeline: where the error comes from");
   const fs::path scratch = effort.scratch;
-  const int seeds = effort.quick ? 4 : 16;
+  const int seeds = effort.quick ? 4 : 8;
   const double seconds = effort.quick ? 200 : 2000;
   const Settings usual;
   // One long bed without a camera.
