@@ -611,6 +611,14 @@ std::string number_text(double value) {
 
 namespace {
 void write_string(std::string& out, const std::string& text) {
+  const bool plain =
+      std::all_of(text.begin(), text.end(), [](char c) { return c >= 32 && c < 127 && c != '"' && c != '\\'; });
+  if (plain) {  // nearly all: ASCII with nothing to escape
+    out += '"';
+    out += text;
+    out += '"';
+    return;
+  }
   // nlohmann's escaping; invalid UTF-8 (a file name, say) is replaced rather than thrown at.
   out += Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
