@@ -191,14 +191,13 @@ void draw(const Figure& figure, const fs::path& directory) {
   if (index == 0) throw StageError(fmt::format("there is nothing to draw in {}.svg", figure.name));
   write_file(directory / (figure.name + ".dat"), data);
   const std::string script =
-      "set encoding utf8\nset terminal svg size 860,560 noenhanced font 'Helvetica,16' background '#ffffff' linewidth "
+      "set encoding utf8\nset terminal svg size 860,620 noenhanced font 'Helvetica,16' background '#ffffff' linewidth "
       "1.4\n" +
       fmt::format("set output {}\nset xlabel {}\nset ylabel {}\nset title {}\n", gnuplot_text(figure.name + ".svg"),
                   gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label), gnuplot_text(figure.title)) +
       "set logscale xy\nset format xy '%.0e'\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
       "'#dddddd' "
-      "lt 1 lw 0.6\nset offsets graph 0.04, graph 0.04, graph 0.08, graph 0.08\nset key outside right top vertical "
-      "spacing 1.2 "
+      "lt 1 lw 0.6\nset offsets graph 0.04, graph 0.04, graph 0.08, graph 0.08\nset key below horizontal spacing 1.2 "
       "samplen 2 font ',13'\n" +
       plot + "\n";
   write_file(directory / (figure.name + ".gp"), script);

@@ -281,7 +281,7 @@ void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effor
   }
   const auto simulation = sim::simulate(scene);
   const double start = cpu_seconds();
-  while (simulation->time() < until && cpu_seconds() - start < 2 * one.time_limit) {
+  while (simulation->time() < until && cpu_seconds() - start < one.time_limit) {
     effort.check_interrupted();
     simulation->advance_to(std::min(until, simulation->time() + until / 20000));
   }
