@@ -455,6 +455,8 @@ class Simulate::Run {
   void start() {
     try {
       simulation_ = sim::simulate(scene_);
+    } catch (const std::bad_alloc&) {
+      throw;  // the runner says that memory is short
     } catch (const std::exception& error) {
       throw StageError(error.what());
     }
