@@ -217,11 +217,10 @@ TEST_F(Faults, MemoryIsShort) {
   // Below about 100 MB not even the program's libraries can be loaded; from there on every amount gives an end of ours.
   int failed = 0, started = 0;
   std::string text = recipe();
-  text.replace(text.find("\"count\": 40"), 11, "\"count\": 20000");
-  text.replace(text.find("\"30 mm\""), 7, "\"15 m\"");
+  text.replace(text.find("\"count\": 40"), 11, "\"count\": 8000");
+  text.replace(text.find("\"30 mm\""), 7, "\"6 m\"");
   text.replace(text.find("\"0.2 s\""), 7, "0");
   text.replace(text.find("\"0.5 s\""), 7, "\"0.05 s\"");
-  text.replace(text.find("\"value\": 4,"), 11, "\"value\": 4,");
   write_text(folder_ / "large.json", text);
   for (const rlim_t megabytes : {16, 20, 24, 32, 64}) {
     fs::remove_all(folder_ / "m");
@@ -324,7 +323,7 @@ TEST_F(Faults, SignalsAtAnyMoment) {
     // Before the handler is there, a signal ends the program as it ends any other.
     EXPECT_TRUE(code == 0 || code == 128 + signal || (signal != SIGKILL && code == 130))
         << "signal " << signal << ": " << code;
-    EXPECT_LT(seconds, 10) << "did not stop";
+    EXPECT_LT(seconds, 60) << "did not stop";
     stopped += code != 0;
     if (i % 6 == 5) {
       expect_goes_on();
