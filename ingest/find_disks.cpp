@@ -606,6 +606,41 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   std::vector<double> explained;
   for (const ModelDisk& disk : disks) explained.push_back(disk.explained);
   const double typical = std::max(0.3, median_of(explained));
+  // A bead of another size, modelled as one of these, pushes its neighbours about; one half hidden holds them in place.
+  // What is doubtful is taken out, and stays out where its neighbours then fit better.
+  constexpr int most_steps = 4;
+  const auto fit_again = [&] {
+    for (int step = 0; step < std::min(most_steps, options.joint_fit_sweeps); ++step)
+      if (step_all(fit, flat, disks, tolerance, bound, options.joint_fit_sweeps)) break;
+    fit.judge(disks, radius + 1);
+  };
+  std::vector<ModelDisk> taken_out;
+  std::erase_if(disks, [&](const ModelDisk& disk) {
+    if (disk.explained >= least_explained * typical) return false;
+    fit.subtract(disk.x, disk.y, -1.0F);
+    taken_out.push_back(disk);
+    return true;
+  });
+  if (!taken_out.empty() || dropped_last > 0) {
+    const std::vector<ModelDisk> before = disks;
+    fit_again();
+    bool put_back = false;
+    for (const ModelDisk& disk : taken_out) {
+      double gain = 0;
+      for (std::size_t i = 0; i < before.size(); ++i)
+        if (std::hypot(before[i].x - disk.x, before[i].y - disk.y) < 2.6 * radius)
+          gain += disks[i].explained - before[i].explained;
+      const bool reported = disk.explained >= 0.5 * typical && options.keep_half_hidden;
+      if (gain > 0 && !reported) {
+        ++dropped;
+        continue;
+      }
+      fit.subtract(disk.x, disk.y, 1.0F);
+      disks.push_back(disk);
+      put_back = true;
+    }
+    if (put_back) fit_again();
+  }
   double residual_sum = 0;
   std::size_t residual_count = 0;
   const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;

@@ -452,14 +452,17 @@ void JointFit::judge(std::vector<ModelDisk>& disks, double radius) const {
       contrast[quarter + 1] += static_cast<double>(sum_of(own_right));
       cross += static_cast<double>(sum_of(both));
     }
-    double all_left = 0, all_contrast = 0, worst = 1;
+    double all_left = 0, all_contrast = 0, worst = 1, best = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       all_left += left_over[k];
       all_contrast += contrast[k];
-      if (contrast[k] > 0) worst = std::min(worst, 1 - left_over[k] / contrast[k]);
+      if (!(contrast[k] > 0)) continue;
+      worst = std::min(worst, 1 - left_over[k] / contrast[k]);
+      best = std::max(best, 1 - left_over[k] / contrast[k]);
     }
     disk.explained = all_contrast > 0 ? 1 - all_left / all_contrast : 0;
     disk.rim_explained = worst;
+    disk.best_explained = best;
     disk.amplitude = all_contrast > 0 ? cross / all_contrast : 0;
   }
 }

@@ -20,6 +20,7 @@ struct ModelDisk {
   double former_x = 0, former_y = 0;                      // where it was before it was moved elsewhere on suspicion ...
   double former_unexplained = -1;  // ... and what it left unexplained there; negative: was not moved
   double rim_explained = 1;        // the worst quarter of it, likewise
+  double best_explained = 1;       // and the best
 };
 
 // A bead's profile tabulated against the squared distance, so that no square root is taken per pixel.

@@ -20,7 +20,7 @@ namespace {
 // What one frame gave, before heights are known.
 struct FrameFindings {
   FrameReport report;
-  std::vector<FoundDisk> disks;
+  std::vector<FoundDisk> disks, second;
   std::vector<float> coverage_of_row;  // covered px of each row
 };
 
@@ -30,6 +30,8 @@ void check(const MeasureOptions& options) {
   };
   require(std::isfinite(options.bead_diameter_m) && options.bead_diameter_m > 0, "bead_diameter_m must be positive");
   require(!options.scale_m_per_px || *options.scale_m_per_px > 0, "scale_m_per_px must be positive");
+  require(!options.second_diameter_m || (std::isfinite(*options.second_diameter_m) && *options.second_diameter_m > 0),
+          "second_diameter_m must be positive");
   require(options.bin_width > 0 && options.kernel.width > 0, "bin_width and kernel.width must be positive");
   require(!options.left_wall_px || !options.right_wall_px || *options.left_wall_px < *options.right_wall_px,
           "the left wall must lie left of the right wall");
@@ -78,8 +80,33 @@ std::vector<double> contrast_by_row(const FinderCalibration& finder) {
   return below;
 }
 
-FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, const MeasureOptions& options,
-                      const LensMap& lens, int recorded_width, int recorded_height, double per_area) {
+// The frame with the disks found painted over by the background behind them.
+GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder) {
+  GrayFrame left = residual_frame(frame, found, finder);
+  const LightField& light = finder.light;
+  const float background =
+      light.background[static_cast<std::size_t>(light.rows / 2) * static_cast<std::size_t>(light.columns) +
+                       static_cast<std::size_t>(light.columns / 2)];
+  for (float& level : left.pixels) level += background;
+  return left;
+}
+
+// Disks of the second species, none where the first has one.
+std::vector<FoundDisk> find_second(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder,
+                                   const FinderCalibration& second, const FindOptions& options) {
+  std::vector<FoundDisk> disks = find_disks(without_disks(frame, found, finder), second, options).disks;
+  const double near = 0.72 * (finder.radius_px + second.radius_px);
+  std::erase_if(disks, [&](const FoundDisk& disk) {
+    return std::any_of(found.disks.begin(), found.disks.end(), [&](const FoundDisk& other) {
+      return std::hypot(disk.x_px - other.x_px, disk.y_px - other.y_px) < near;
+    });
+  });
+  return disks;
+}
+
+FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, const FinderCalibration* second,
+                      const MeasureOptions& options, const LensMap& lens, int recorded_width, int recorded_height,
+                      double per_area) {
   FrameFindings findings;
   findings.report.index = item.index;
   findings.report.origin = item.origin;
@@ -100,6 +127,10 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
   }
   if (!lens.lens().plain()) frame = lens.corrected(frame);
   FindResult found = find_disks(frame, finder, options.find);
+  if (second) {
+    findings.second = find_second(frame, found, finder, *second, options.find);
+    findings.report.second = findings.second.size();
+  }
   if (!lens.lens().plain())  // what a margin repeats is no disk
     std::erase_if(found.disks, [&](const FoundDisk& disk) {
       const PixelPlace place = lens.to_recorded({disk.x_px, disk.y_px});
@@ -369,6 +400,30 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     }
     calibrated = std::move(again);
   }
+  if (options.second_diameter_m) {
+    const double expected = calibrated.calibration.radius_px * *options.second_diameter_m / options.bead_diameter_m;
+    FindOptions find_second_kind = find;
+    find_second_kind.polarity = Polarity::automatic;
+    find_second_kind.radius_px = expected;
+    std::vector<GrayFrame> painted;
+    std::vector<const GrayFrame*> pointers;
+    for (const GrayFrame& frame : recorded) {
+      const GrayFrame straight = straightened(frame);
+      painted.push_back(
+          without_disks(straight, find_disks(straight, calibrated.calibration, find), calibrated.calibration));
+    }
+    for (const GrayFrame& frame : painted) pointers.push_back(&frame);
+    CalibrationResult result = calibrate_finder(pointers, find_second_kind);
+    constexpr double nearly = 0.08;
+    if (result.found && std::abs(result.calibration.radius_px / expected - 1) < nearly)
+      measurement.second_finder = std::move(result.calibration);
+    else
+      measurement.warnings.push_back("No beads of the second diameter were found: " +
+                                     (result.found ? "what there is has a radius of " +
+                                                         std::to_string(result.calibration.radius_px) +
+                                                         " px instead of " + std::to_string(expected) + " px."
+                                                   : result.why_not + "."));
+  }
   learned_from.clear();
   learned_from.shrink_to_fit();
   recorded.clear();
@@ -405,6 +460,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   }
   measurement.finder = calibrated.calibration;
   const FinderCalibration& finder = measurement.finder;
+  const FinderCalibration* second = measurement.second_finder ? &*measurement.second_finder : nullptr;
 
   // Every frame on its own: what a frame gives depends on nothing but the calibration, so threads change nothing.
   const double per_area = contrast_per_area(finder);
@@ -508,7 +564,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   double highest = 0;
   std::vector<double> counts;
   std::size_t good = 0, cut_below = 0;
-  std::vector<std::vector<double>> densities, covered;
+  std::vector<std::vector<double>> densities, second_densities, covered;
   std::vector<std::size_t> frame_of;
   std::vector<double> through_chord;  // what the centres say, seen through the bead as covered area sees it
   // Part of a bead's own contrast below a height (D) from its centre: a flat bead's is its chord's, a shaded one's is
@@ -560,10 +616,11 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       ++good;
       counts.push_back(static_cast<double>(frame.disks.size()));
     }
-    std::vector<double> heights;
+    std::vector<double> heights, second_heights;
     std::vector<MeasuredDisk> disks;
-    for (const FoundDisk& disk : frame.disks) {
+    const auto add = [&](const FoundDisk& disk, int species) {
       MeasuredDisk measured;
+      measured.species = species;
       measured.frame = frame.report.index;
       const PixelPlace seen_at =
           lens.plain() ? PixelPlace{disk.x_px, disk.y_px} : lens_map.to_recorded({disk.x_px, disk.y_px});
@@ -584,13 +641,16 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       measured.half_hidden = disk.half_hidden;
       disks.push_back(measured);
       const bool in_width = disk.x_px >= bed.left_wall_px && disk.x_px < bed.right_wall_px;
-      if (in_width) heights.push_back(measured.z);
+      if (in_width) (species == 1 ? heights : second_heights).push_back(measured.z);
       highest = std::max(highest, measured.z);
-      cut_below += disk.cut && disk.y_px > finder.height - finder.radius_px;
-    }
+      cut_below += species == 1 && disk.cut && disk.y_px > finder.height - finder.radius_px;
+    };
+    for (const FoundDisk& disk : frame.disks) add(disk, 1);
+    for (const FoundDisk& disk : frame.second) add(disk, 2);
     measurement.disk_total += disks.size();
     if (frame.report.status != FrameStatus::unreadable && frame.report.status != FrameStatus::size_changed) {
       densities.push_back(density_of_frame(heights, bed.width, bins, options.kernel));
+      if (second) second_densities.push_back(density_of_frame(second_heights, bed.width, bins, options.kernel));
       frame_of.push_back(frame.report.index);
       if (options.profile_from_coverage) add_coverage(frame.coverage_of_row, heights);
     }
@@ -635,7 +695,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
           taken_up.wait(lock, [&] { return failure || item->index < done + run_ahead; });
           if (failure) return;
         }
-        FrameFindings one = examine(*item, finder, options, lens_map, recorded_width, recorded_height, per_area);
+        FrameFindings one =
+            examine(*item, finder, second, options, lens_map, recorded_width, recorded_height, per_area);
         const std::lock_guard<std::mutex> lock(result_mutex);
         if (failure) return;
         early.emplace(one.report.index, std::move(one));
@@ -669,6 +730,13 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   };
   bins.count = std::min(bins.count, bins_up_to(options.highest.value_or(highest + 1)));
   cut_to_bins(densities);
+  if (second) {
+    cut_to_bins(second_densities);
+    measurement.second_profile = average_profile(second_densities, bins, options.kernel, bed.scale_relative_std_error);
+    for (std::size_t bin = 0; bin < bins.count; ++bin)
+      measurement.second_profile->area_fraction[bin] *=
+          std::pow(second->radius_px / finder.radius_px, 2);  // of their own size
+  }
   measurement.profile = average_profile(densities, bins, options.kernel, bed.scale_relative_std_error);
 
   if (options.profile_from_coverage) {
@@ -772,9 +840,9 @@ std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks) {
   char line[256];
   for (const MeasuredDisk& disk : disks) {
     const double x = std::sqrt(std::max(0.0, disk.variance_x)), y = std::sqrt(std::max(0.0, disk.variance_y));
-    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.5f,%.5f,%.4f,%.4f,%d,%d\n", disk.frame, disk.x_px, disk.y_px, x,
-                  y, x * y > 0 ? disk.covariance_xy / (x * y) : 0.0, disk.contrast, disk.cut ? 1 : 0,
-                  disk.half_hidden ? 1 : 0);
+    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.5f,%.5f,%.4f,%.4f,%d,%d,%d\n", disk.frame, disk.x_px, disk.y_px,
+                  x, y, x * y > 0 ? disk.covariance_xy / (x * y) : 0.0, disk.contrast, disk.cut ? 1 : 0,
+                  disk.half_hidden ? 1 : 0, disk.species);
     text += line;
   }
   return text;

@@ -23,6 +23,7 @@ struct MeasuredDisk {
   double variance_x = 0, variance_y = 0, covariance_xy = 0;  // px^2
   double contrast = 0;                                       // 1 for a typical bead
   bool cut = false, half_hidden = false;
+  int species = 1;  // 2: of the second diameter; x and z are in D of the first all the same
 };
 
 enum class FrameStatus { good, nothing_found, unreadable, size_changed };
@@ -32,6 +33,7 @@ struct FrameReport {
   FrameStatus status = FrameStatus::good;
   std::string why;  // a sentence unless good
   std::size_t disks = 0;
+  std::size_t second = 0;  // disks of the second species
   std::size_t rejected = 0;
   double residual_level = 0;  // grey levels
 };
@@ -45,6 +47,9 @@ struct MeasureOptions {
   std::optional<double> floor_slope;     // px down per px right; 0 when floor_px is given without it
   std::optional<double> left_wall_px;    // x_px of the walls' inner faces
   std::optional<double> right_wall_px;
+  // Beads of another size that are to be found too, filled like the first or in a shade of their own. They come with
+  // the disks as species 2 and have a profile of their own; the first's is that of the first alone.
+  std::optional<double> second_diameter_m;
   // Found on the beads' rims unless given (1 and 0: taken for plain); scale_m_per_px is that of rows.
   std::optional<double> pixel_aspect;
   std::optional<double> lens_radial;
@@ -101,6 +106,8 @@ struct PhaseProfile {
 
 struct Measurement {
   FinderCalibration finder;
+  std::optional<FinderCalibration> second_finder;  // when a second species was asked for and seen
+  std::optional<DensityProfile> second_profile;    // n D^2, D of the first
   BedCalibration calibration;
   std::vector<MeasuredDisk> disks;   // frame after frame; empty with a disk_sink
   std::size_t disk_total = 0;        // over all frames, with a disk_sink or without
@@ -126,7 +133,7 @@ inline constexpr const char* disks_csv_head = "frame,x_px,y_px,radius_px,x,z,qua
 std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks);
 // What else is known of each disk: errors of its centre, contrast, flags.
 inline constexpr const char* disk_details_csv_head =
-    "frame,x_px,y_px,std_error_x_px,std_error_y_px,correlation,contrast,cut,half_hidden\n";
+    "frame,x_px,y_px,std_error_x_px,std_error_y_px,correlation,contrast,cut,half_hidden,species\n";
 std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks);
 
 // CSV: frame,x_px,y_px,radius_px,x,z,quality. Atomic.

@@ -288,6 +288,51 @@ TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {
   EXPECT_TRUE(told);
 }
 
+TEST(MeasureBed, ASecondSpeciesIsRejectedUnlessAskedFor) {
+  SyntheticBed bed;
+  bed.left_wall_px = 12;
+  bed.right_wall_px = 388;
+  bed.floor_px = 386;
+  bed.radius_px = 10;
+  bed.rows = 7;
+  bed.gas_count = 30;
+  bed.gas_height_px = 60;
+  std::vector<RenderedDisk> truth = make_synthetic_bed(bed);
+  std::erase_if(truth, [](const RenderedDisk& disk) { return disk.y_px < 12; });
+  std::size_t small = 0;
+  for (std::size_t k = 0; k < truth.size(); k += 4, ++small) truth[k].radius_px = 7;
+  Camera camera;
+  camera.width = camera.height = 400;
+  camera.blur_px = 0.8;
+  camera.read_noise = 4;
+  FrameSource source = FrameSource::from_frames({render_frame(truth, camera)});
+  MeasureOptions options;
+  options.bead_diameter_m = 3e-3;
+  options.profile_from_coverage = false;
+  const Measurement alone = measure_bed(source, options);
+  EXPECT_EQ(alone.disks.size(), truth.size() - small);
+  EXPECT_GT(alone.frames[0].rejected, 0U);
+  options.second_diameter_m = 2.1e-3;
+  const Measurement both = measure_bed(source, options);
+  ASSERT_TRUE(both.second_finder && both.second_profile);
+  EXPECT_NEAR(both.second_finder->radius_px, 7, 0.05);
+  EXPECT_EQ(both.disks.size(), truth.size());
+  EXPECT_EQ(both.frames[0].second, small);
+  for (std::size_t k = 0; k < alone.profile.number_density.size(); ++k)
+    EXPECT_EQ(both.profile.number_density[k], alone.profile.number_density[k]) << k;
+  for (const MeasuredDisk& disk : both.disks) {
+    double nearest = 100;
+    for (const RenderedDisk& one : truth)
+      if ((one.radius_px < 10) == (disk.species == 2))
+        nearest = std::min(nearest, std::hypot(one.x_px - disk.x_px, one.y_px - disk.y_px));
+    EXPECT_LT(nearest, 0.15) << disk.species << " at " << disk.x_px << " " << disk.y_px;
+  }
+  options.second_diameter_m = 1.2e-3;
+  const Measurement none = measure_bed(source, options);
+  EXPECT_FALSE(none.second_finder);
+  EXPECT_NE(none.warnings.front().find("second diameter"), std::string::npos);
+}
+
 TEST(MeasureBed, TablesAndOverlayAreWritten) {
   const test::ScratchFolder folder;
   const Film film = film_of(1);
