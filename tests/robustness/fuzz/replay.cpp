@@ -2,8 +2,9 @@
 //   fuzz_json FOLDER_OR_FILE...                          every file once
 //   fuzz_json --mutate SECONDS [--seed N] FOLDER...      and then inputs made of them by random changes
 // The last input tried is kept in `fuzz-last-input` of the working folder while it runs, and left there by a crash. An
-// input that takes longer than 10 s ends the process (SIGALRM).
+// input that takes more than 10 s of processor time ends the process (SIGPROF).
 #include <fcntl.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,9 +30,10 @@ Bytes read(const fs::path& path) {
 void try_one(const Bytes& input, int keep) {
   if (::pwrite(keep, input.data(), input.size(), 0) < 0 || ::ftruncate(keep, static_cast<off_t>(input.size())) != 0)
     shakebed::fuzz::fail("fuzz-last-input cannot be written");
-  ::alarm(10);
+  const itimerval limit{{0, 0}, {10, 0}}, none{};
+  ::setitimer(ITIMER_PROF, &limit, nullptr);
   LLVMFuzzerTestOneInput(input.data(), input.size());
-  ::alarm(0);
+  ::setitimer(ITIMER_PROF, &none, nullptr);
 }
 
 // A few changes of the kinds that parsers trip over.
