@@ -276,7 +276,7 @@ TEST(FloorRoots, AgreeWithExtendedPrecisionOnTenMillionRandomFlights) {
   expect_no_fault("random, extended precision", judge_random<long double>(10'000'000, 34));
 }
 TEST(FloorRoots, AgreeWith60DigitsOnManyAdversarialFlights) {
-  expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(40'000, 35));
+  expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(112'500, 35));
 }
 
 #endif
