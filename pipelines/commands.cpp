@@ -115,6 +115,36 @@ Json explanation_json(const std::vector<StageOutcome>& stages) {
   return out;
 }
 
+// What people look for first: the temperature of every fit.
+std::string temperatures_text(const Plan& plan, const RunOutcome& outcome) {
+  std::string text;
+  for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
+    const PlannedStage& stage = plan.stages[i];
+    const fs::path path = outcome.out / stage.id / stage.row->result;
+    std::error_code error;
+    if (stage.row->name != "fit" || !outcome.stages[i].record || !fs::is_regular_file(path, error)) continue;
+    const Json fit = read_json(path);
+    std::string numbers;
+    const auto add = [&](const char* key, const char* label, double factor, const char* unit) {
+      const Json* value = find_pointer(fit, fmt::format("/{}/value", key));
+      const Json* spread = find_pointer(fit, fmt::format("/{}/std_error", key));
+      if (value == nullptr || !value->is_number()) return false;
+      numbers += fmt::format("{}{} = {:.4g}", numbers.empty() ? "" : ", ", label, factor * value->get<double>());
+      if (spread != nullptr && spread->is_number() && spread->get<double>() > 0)
+        numbers += fmt::format(" ± {:.2g}", factor * spread->get<double>());
+      numbers += unit;
+      return true;
+    };
+    const Json* unit = find_pointer(fit, "/temperature_over_mg/unit");
+    if (unit == nullptr || *unit != "m" || !add("temperature_over_mg", "T/(m g)", 1e3, " mm"))
+      add("temperature", "T", 1, " m g D");
+    add("reduced_temperature", "T/T_c", 1, "");
+    add("solid_height", "solid", 1, " D high");
+    if (!numbers.empty()) text += fmt::format("{}: {}\n", stage.id, numbers);
+  }
+  return text;
+}
+
 // Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
 int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result = nullptr) {
   const RunOptions options = run_options(arguments, plan);
@@ -149,7 +179,7 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
     answer(outcome_json(plan, outcome));
   } else {
     std::string text = published_text(plan, outcome);
-    if (!text.empty()) text = "\n" + text + "\n";
+    text = text.empty() ? temperatures_text(plan, outcome) : "\n" + text + "\n";
     text += fmt::format("results: {}\nreport:  {}\n", outcome.out.string(), (outcome.out / "report.html").string());
     print(text);
   }
@@ -287,6 +317,7 @@ int command_fit_images(const Arguments& arguments) {
   Json document;
   document["name"] = "fit-images";
   document["stages"] = Json::array({extract, fit});
+  document["stages"].push_back(Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}});
   if (image.frequency && image.amplitude) {
     const double frequency = quantity_argument("--frequency", *image.frequency, dimension::frequency);
     const double amplitude = quantity_argument("--amplitude", *image.amplitude, dimension::length);
@@ -296,15 +327,20 @@ int command_fit_images(const Arguments& arguments) {
         require_positive("--gravity", gravity);
     const double omega = 2 * std::numbers::pi * frequency;
     document["stages"].push_back(Json{{"stage", "map"},
-                                      {"from", "fit"},
+                                      {"from", Json::array({"fit", "extract"})},
                                       {"gamma", amplitude * omega * omega / gravity},
                                       {"frequency", *image.frequency},
                                       {"diameter", image.diameter},
                                       {"gravity", gravity}});
+    if (image.initial_height) {
+      const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
+      const double height = diameters_argument("--initial-height", *image.initial_height, diameter);
+      require_positive("--initial-height", height);
+      document["stages"].back()["initial_height"] = height;
+    }
   } else if (image.amplitude) {
     throw UsageError("--amplitude: Gamma also needs --frequency");
   }
-  document["stages"].push_back(Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}});
   document["report"] = Json{{"title", "A bed in photographs"},
                             {"text",
                              "Disks were found in the frames given, the scale follows from the bead's diameter, the "

@@ -20,7 +20,7 @@ struct RunArguments {
 struct ImageArguments {
   std::vector<std::string> files;
   std::string diameter;
-  std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, polarity;
+  std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity;
   std::optional<double> plateau_density, floor, left_wall, right_wall;
   std::vector<double> roi;
 };

@@ -228,6 +228,7 @@ Json Fields::number_schema(const About& about, const char* type) const {
 }
 
 Json Fields::quantity_schema(const Dimension& wanted, const About& about) const {
+  if (reduced_) return number_schema(about, "number");
   Json with_unit;
   with_unit["type"] = "string";
   with_unit["pattern"] = "^\\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\\s*\\S+";
@@ -411,7 +412,10 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
       std::sort(found.begin(), found.end());
     }
     if (found.empty()) {
-      complain(item, where, fmt::format("there is no file \"{}\"", item.text),
+      complain(item, where,
+               folder      ? fmt::format("the folder \"{}\" holds no file", item.text)
+               : wildcards ? fmt::format("no file is named like \"{}\"", item.text)
+                           : fmt::format("there is no file \"{}\"", item.text),
                fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
     }
     files.paths.insert(files.paths.end(), found.begin(), found.end());

@@ -94,7 +94,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
     out["stages"].push_back(std::move(entry));
   }
   out["outputs"] = Json::array();
-  for (const char* name : {"resolved.json", "summary.json", "report.html"}) {
+  for (const char* name : {"resolved.json", "summary.json", "summary.md", "report.html"}) {
     const fs::path path = outcome.out / name;
     if (fs::is_regular_file(path, error))
       out["outputs"].push_back(file_entry(name, fs::file_size(path), sha256_of_file(path)));

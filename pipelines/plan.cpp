@@ -11,9 +11,10 @@
 namespace shakebed::pipelines {
 namespace {
 
-// Names that OUT uses itself.
+// Names that OUT uses itself, with any ending: manifest.json, summary.md, ...
 const std::vector<std::string> reserved_ids = {"pipeline", "status",   "warnings", "points", "report",
-                                               "manifest", "resolved", "summary",  "sweep",  "cache"};
+                                               "manifest", "resolved", "summary",  "sweep",  "cache",
+                                               "shared",   "slurm",    "figures"};
 
 bool good_id(std::string_view id) {
   return !id.empty() && id.size() <= 64 && id.front() != '.' && id.front() != '-' &&
@@ -36,7 +37,7 @@ void describe_common(Fields& fields, CommonOptions& common, const StageRow& row)
   fields.texts("from", common.from, {.help = "ids of the stages whose results it reads"});
   fields.integer("version", common.version, {.help = "refuse to run with another version of this stage"});
   if (row.uses_seed) fields.integer("seed", common.seed, {.help = "of its random numbers"});
-  if (fields.mode() == Fields::Mode::decode || row.name == "simulate" || common.reduced) {
+  if (fields.mode() != Fields::Mode::encode || row.name == "simulate" || common.reduced) {
     const std::vector<Choice<bool>> units{{false, "SI"}, {true, "reduced"}};
     fields.choice(
         "units", common.reduced, units,
@@ -451,7 +452,8 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
       draft.common.id = row->name;
       if (const JsonNode* id = item.find("id"); id != nullptr && id->is_string()) {
         draft.common.id = id->text;
-        const bool reserved = std::find(reserved_ids.begin(), reserved_ids.end(), id->text) != reserved_ids.end();
+        const bool reserved = std::find(reserved_ids.begin(), reserved_ids.end(),
+                                        id->text.substr(0, id->text.find('.'))) != reserved_ids.end();
         if (!good_id(id->text) || reserved) {
           problem(*id, pointer + "/id",
                   reserved ? fmt::format("the id \"{}\" is one that OUT uses itself", id->text)
@@ -632,18 +634,25 @@ Json recipe_schema() {
   Json choices = Json::array();
   for (const StageRow& row : stage_table()) {
     kinds.push_back(row.name);
-    Json body;
-    Fields stage_fields = Fields::schema(body);
-    CommonOptions common;
-    describe_common(stage_fields, common, row);
-    row.make()->describe(stage_fields);
-    stage_fields.finish();
-    body["description"] = row.summary;
-    body["properties"]["stage"] = Json{{"const", row.name}};
-    Json choice;
-    choice["if"]["properties"]["stage"]["const"] = row.name;
-    choice["then"] = std::move(body);
-    choices.push_back(std::move(choice));
+    // In SI, and in reduced units: there quantities are plain numbers, and some options need not be given.
+    for (const bool reduced : {false, true}) {
+      Json body;
+      Fields stage_fields = Fields::schema(body);
+      CommonOptions common;
+      describe_common(stage_fields, common, row);
+      stage_fields.set_reduced(reduced);
+      row.make()->describe(stage_fields);
+      stage_fields.finish();
+      body["description"] = row.summary;
+      body["properties"]["stage"] = Json{{"const", row.name}};
+      Json is_reduced{{"properties", {{"units", {{"const", "reduced"}}}}}, {"required", Json::array({"units"})}};
+      Json choice;
+      choice["if"]["properties"]["stage"]["const"] = row.name;
+      choice["if"]["required"] = Json::array({"stage"});
+      choice["if"]["allOf"] = Json::array({reduced ? is_reduced : Json{{"not", is_reduced}}});
+      choice["then"] = std::move(body);
+      choices.push_back(std::move(choice));
+    }
   }
   stages["items"]["type"] = "object";
   stages["items"]["properties"]["stage"]["enum"] = std::move(kinds);

@@ -621,4 +621,91 @@ std::string published_text(const Plan& plan, const RunOutcome& outcome) {
   return out;
 }
 
+namespace {
+// A cell of a Markdown table, or a line of text, with nothing in it that Markdown or HTML would take as its own.
+std::string markdown(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '\n' || c == '\r')
+      out += ' ';
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '&')
+      out += "&amp;";
+    else if (std::string_view("|`*_[]\\#").find(c) != std::string_view::npos)
+      out += '\\', out += c;
+    else
+      out += c;
+  }
+  return out;
+}
+}  // namespace
+
+std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
+  const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
+  std::string out = fmt::format("# {}\n\n**{}** in {}\n", markdown(title),
+                                outcome.code == exit_ok             ? "Passed"
+                                : outcome.code == exit_check_failed ? "A check failed"
+                                : outcome.code == exit_interrupted  ? "Interrupted"
+                                                                    : "Stopped",
+                                duration_text(outcome.wall_seconds));
+  if (!outcome.error.empty()) out += fmt::format("\n> {}\n", markdown(outcome.error));
+  for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
+    const PlannedStage& stage = plan.stages[i];
+    const fs::path path = outcome.out / stage.id / "check.json";
+    std::error_code error;
+    if (stage.row->name != "check" || !outcome.stages[i].record || !fs::is_regular_file(path, error)) continue;
+    out += fmt::format("\n## Checks ({})\n\n| | result | expected | found | |\n|---|---|---|---|---|\n",
+                       markdown(stage.id));
+    const Json result = read_json(path);
+    for (const Json& row : result.value("checks", Json::array())) {
+      out += fmt::format("| {} | {} | {} | {} | {} |\n", row.value("passed", false) ? "passed" : "**failed**",
+                         markdown(row.value("pointer", "")), markdown(row.value("expected", "")),
+                         markdown(row.value("found", "")), markdown(row.value("why", row.value("note", ""))));
+    }
+  }
+  if (const auto rows = Report(plan, outcome).published_rows(); !rows.empty()) {
+    out += "\n## Beside the published numbers\n\n| number | ours | published | verdict |\n|---|---|---|---|\n";
+    for (const auto& row : rows) {
+      out += fmt::format("| {} | {} | {} | {} |\n", markdown(row.label), markdown(row.ours), markdown(row.published),
+                         markdown(row.verdict));
+    }
+  }
+  if (!outcome.warnings.empty()) {
+    out += "\n## Warnings\n\n";
+    for (const std::string& warning : outcome.warnings) out += fmt::format("- {}\n", markdown(warning));
+  }
+  out += "\n## Stages\n\n| stage | kind | | time |\n|---|---|---|---|\n";
+  for (const StageOutcome& stage : outcome.stages) {
+    out += fmt::format("| {} | {} | {} | {} |\n", markdown(stage.id), stage.kind, to_string(stage.state),
+                       stage.record ? duration_text(stage.record->wall_seconds) : "");
+  }
+  return out + fmt::format("\nshakebed {} ({})\n", program_version(), source_revision());
+}
+
+std::string sweep_summary_markdown(const Plan& plan, const std::vector<std::vector<std::string>>& table,
+                                   const std::vector<std::string>& problems) {
+  constexpr std::size_t most_rows = 50;
+  std::size_t good = 0;
+  for (std::size_t i = 1; i < table.size(); ++i) good += table[i][2] == "ok";
+  const std::size_t points = table.size() - 1;
+  std::string out = fmt::format("# {}\n\n**{} of {} points are well**\n",
+                                markdown(plan.report.title.empty() ? plan.name : plan.report.title), good, points);
+  if (!problems.empty()) {
+    out += "\n## Points that failed\n\n";
+    for (const std::string& problem : problems) out += fmt::format("- {}\n", markdown(problem));
+  }
+  out += "\n## Points\n\n";
+  for (std::size_t i = 0; i < table.size() && i <= most_rows; ++i) {
+    for (const std::string& cell : table[i]) out += fmt::format("| {} ", markdown(cell));
+    out += "|\n";
+    if (i == 0) {
+      for (std::size_t k = 0; k < table[i].size(); ++k) out += "|---";
+      out += "|\n";
+    }
+  }
+  if (points > most_rows) out += fmt::format("\nThe first {}; all are in sweep.csv.\n", most_rows);
+  return out;
+}
+
 }  // namespace shakebed::pipelines

@@ -25,4 +25,11 @@ std::string page_head(const std::string& title);
 // An SVG file as part of a page: without its prolog, its ids made its own by the number.
 std::string inline_svg(const std::filesystem::path& path, int number);
 
+// One page in Markdown, for the summary of a CI job: verdict, checks, numbers beside the published ones, warnings,
+// stages.
+std::string summary_markdown(const Plan& plan, const RunOutcome& outcome);
+// The same of a sweep: counts, failed points, the first rows of its table.
+std::string sweep_summary_markdown(const Plan& plan, const std::vector<std::vector<std::string>>& table,
+                                   const std::vector<std::string>& problems);
+
 }  // namespace shakebed::pipelines

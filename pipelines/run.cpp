@@ -478,6 +478,7 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& co
   write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
   write_file_atomically(options.out / "summary.json", dump(summary_json(plan, outcome)));
   write_file_atomically(options.out / "report.html", report_html(plan, outcome));
+  write_file_atomically(options.out / "summary.md", summary_markdown(plan, outcome));
   write_file_atomically(options.out / "manifest.json", dump(manifest_json(plan, options, outcome, started)));
   return outcome;
 }

@@ -116,6 +116,9 @@ int run_program(int argc, char** argv) {
   images->add_option("--frequency", image.frequency, "of the shaking: \"20 Hz\"; with --amplitude also Gamma → T");
   images->add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
   images->add_option("--frame-rate", image.frame_rate, "of a film: \"500 Hz\"; with --frequency profiles by phase");
+  images->add_option(
+      "--initial-height", image.initial_height,
+      "height mu of the bed at rest, in D or a length (default: from the beads counted between the walls)");
   images->add_option("--gravity", image.gravity, "default \"9.81 m/s^2\"");
   add_run(*images, arguments.run);
 

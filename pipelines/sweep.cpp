@@ -603,6 +603,7 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   // Shards that end at the same time write the same bytes; the last one sees all points.
   write_file_atomically(options.out / "sweep.csv", csv);
   write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
+  write_file_atomically(options.out / "summary.md", sweep_summary_markdown(plan, table, failures));
   for (const std::string& failure : failures) console.error(failure);
   // Pictures and page when the whole sweep is there: a shard alone has nothing to show yet.
   if (!interrupted && there == all.size()) {

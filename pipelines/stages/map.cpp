@@ -20,9 +20,9 @@ class Map : public Stage {
                     {.help = "of a disk; left out, that of the simulated bed", .range = positive});
     fields.quantity("gravity", gravity_, dimension::acceleration,
                     {.help = "left out, that of the simulated bed, else 9.81 m/s^2", .range = positive});
-    fields.number(
-        "initial_height", initial_height_,
-        {.help = "height mu of the bed at rest in D; left out, N D/W of the bed over phi_0", .range = positive});
+    fields.number("initial_height", initial_height_,
+                  {.help = "height mu of the bed at rest in D; left out, N D/W of the bed or of the frames over phi_0",
+                   .range = positive});
     fields.number("plateau_density", plateau_density_,
                   {.help = "phi_0 in 1/D^2; left out, that of the fit", .range = positive});
     fields.number("restitution", restitution_,
@@ -37,8 +37,9 @@ class Map : public Stage {
       }
     }
     if (!fields.has_upstream("simulate")) {
-      for (const char* key : {"gamma", "frequency", "diameter", "initial_height"}) {
-        fields.require(fields.has(key), key,
+      for (const std::string key : {"gamma", "frequency", "diameter", "initial_height"}) {
+        const bool from_frames = key == "initial_height" && fields.has_upstream("extract");
+        fields.require(fields.has(key) || from_frames, key,
                        fmt::format("\"{}\" is missing, and no simulate stage in \"from\" can say it", key));
       }
     }
@@ -68,6 +69,14 @@ class Map : public Stage {
       question.frequency = bed.frequency, question.diameter = bed.diameter;
       if (!bed.reduced) question.gravity = bed.gravity;
       question.initial_height = bed.column_number() / question.plateau_density;
+    }
+    if (const Input* frames = context.find_input("extract"); frames != nullptr && !initial_height_) {
+      const Json extract = frames->result();
+      const Json* column = find_pointer(extract, "/column_number/value");
+      if (column == nullptr || !column->is_number())
+        throw InputError(
+            "the frames do not tell the height of the bed at rest (no walls were found): give initial_height");
+      question.initial_height = column->get<double>() / question.plateau_density;
     }
     if (gamma_) question.gamma = *gamma_;
     if (frequency_) question.frequency = *frequency_;
@@ -110,9 +119,9 @@ StageRow map_stage() {
   return {.name = "map",
           .version = 1,
           .summary = "maps Gamma to T/T_c by every named reading",
-          .accepts = {"fit", "simulate"},
+          .accepts = {"fit", "simulate", "extract"},
           .fewest_inputs = 0,
-          .most_inputs = 2,
+          .most_inputs = 3,
           .result = "map.json",
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Map>(); }};
 }

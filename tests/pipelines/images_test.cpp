@@ -138,7 +138,8 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   std::vector<std::string> arguments{"fit-images"};
   for (int i = 0; i < 8; ++i)
     arguments.push_back((*folder_ / "o/render/frames" / ("00000" + std::to_string(i) + ".png")).string());
-  for (const char* more : {"--diameter", "3 mm", "--plateau-density", "1.1", "--out", "photos"})
+  for (const char* more : {"--diameter", "3 mm", "--plateau-density", "1.1", "--frequency", "20 Hz", "--amplitude",
+                           "2 mm", "--out", "photos"})
     arguments.emplace_back(more);
   const ProgramResult result = run_shakebed(arguments, folder_->path());
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -147,6 +148,11 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   EXPECT_NEAR(extract["scale"]["value"].get<double>(), 0.15e-3, 0.01 * 0.15e-3) << "within 1 % from the diameter alone";
   EXPECT_EQ(extract["frames_used"], 8);
   EXPECT_TRUE(fs::is_regular_file(*folder_ / "photos/report.html"));
+  // Gamma with the height of the bed at rest counted between the walls that were found.
+  const Json map = read_json(*folder_ / "photos/map/map.json");
+  EXPECT_GT(map["readings"].size(), 4u);
+  EXPECT_NEAR(map["gamma"].is_number() ? map["gamma"].get<double>() : map["gamma"]["value"].get<double>(), 3.2194,
+              1e-3);
   std::size_t overlays = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(*folder_ / "photos/extract"))
     overlays += entry.path().extension() == ".png";

@@ -41,9 +41,9 @@ class Pipeline : public testing::Test {
 
 TEST_F(Pipeline, WritesTheFixedResultFiles) {
   ASSERT_EQ(run_recipe().exit_code, 0);
-  for (const char* name :
-       {"manifest.json", "resolved.json", "summary.json", "report.html", "bed/profile.csv", "bed/observables.json",
-        "bed/trajectory.extxyz.zst", "simulate/profile.csv", "fit/fit.json", "check/check.json", "check/junit.xml"}) {
+  for (const char* name : {"manifest.json", "resolved.json", "summary.json", "summary.md", "report.html",
+                           "bed/profile.csv", "bed/observables.json", "bed/trajectory.extxyz.zst",
+                           "simulate/profile.csv", "fit/fit.json", "check/check.json", "check/junit.xml"}) {
     EXPECT_TRUE(fs::is_regular_file(folder_ / "o" / name)) << name;
   }
   const Json manifest = read_json(folder_ / "o" / "manifest.json");
@@ -212,6 +212,9 @@ TEST_F(Pipeline, AFailedCheckEndsWith6AndAReport) {
   EXPECT_THAT(result.err, HasSubstr("check failed: /bed/column_number"));
   EXPECT_THAT(read_text(folder_ / "o/check/junit.xml"), HasSubstr("failures=\"1\""));
   EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("failed"));
+  const std::string summary = read_text(folder_ / "o/summary.md");
+  EXPECT_THAT(summary, HasSubstr("**A check failed**"));
+  EXPECT_THAT(summary, HasSubstr("| **failed** | /bed/column\\_number |"));
   EXPECT_EQ(run_recipe({"--set", "/stages/check/expect/~1bed~1column_number/value=5"}).exit_code, 6)
       << "also when nothing has to run";
 }
@@ -263,6 +266,42 @@ TEST_F(Pipeline, CtrlCEndsWith130AndKeepsWhatWasFinished) {
   EXPECT_EQ(read_text(folder_ / "o/bed/profile.csv"), profile);
   EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 130);
   EXPECT_EQ(run_recipe().exit_code, 0);
+}
+
+TEST_F(Pipeline, AStageThatFailsKeepsWhatWasFinishedBefore) {
+  // A window far above the bed: only running shows that there is nothing to fit in it.
+  const ProgramResult failed = run_recipe({"--set", R"(/stages/fit/window={"low": 300, "high": 400})"});
+  EXPECT_EQ(failed.exit_code, 5) << failed.err;
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "o/bed/profile.csv"));
+  EXPECT_FALSE(fs::exists(folder_ / "o/fit"));
+  EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 5);
+  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("What stopped it"));
+  EXPECT_THAT(run_recipe().err, HasSubstr("bed: up to date"));
+}
+
+TEST_F(Pipeline, AReadOnlyFolderIsSaidAndKeepsWhatItHolds) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may write anywhere; the full disk is tested with the faults";
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  fs::permissions(folder_ / "o", fs::perms::owner_read | fs::perms::owner_exec);
+  const ProgramResult result = run_recipe({"--force"});
+  fs::permissions(folder_ / "o", fs::perms::owner_all);
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, HasSubstr("cannot be written"));
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "o/bed/profile.csv"));
+}
+
+TEST(FirstMinutes, FoldersAndPatternsWithoutFilesAreSaidInWords) {
+  ScratchFolder folder;
+  fs::create_directory(folder / "photos");
+  const auto fit = [&](const char* files) {
+    return run_shakebed({"fit-images", files, "--diameter", "3 mm", "--out", "o"}, folder.path());
+  };
+  const ProgramResult empty = fit("photos"), none = fit("photos/*.png"), missing = fit("photo");
+  for (const ProgramResult* result : {&empty, &none, &missing}) EXPECT_EQ(result->exit_code, 4) << result->err;
+  EXPECT_THAT(empty.err, HasSubstr("holds no file"));
+  EXPECT_THAT(none.err, HasSubstr("no file is named like"));
+  EXPECT_THAT(missing.err, HasSubstr("there is no file"));
+  EXPECT_FALSE(fs::exists(folder / "o"));
 }
 
 TEST_F(Pipeline, AFolderThatCannotBeWrittenIsSaid) {
