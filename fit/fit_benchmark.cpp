@@ -7,6 +7,7 @@
 #include "fit/expansion.hpp"
 #include "fit/fit_profile.hpp"
 #include "fit/hydrostatic_profile.hpp"
+#include "fit/inverse_table.hpp"
 
 namespace shakebed::fit {
 
@@ -79,7 +80,114 @@ FitBenchmarkRow fit_row(const Kernel& kernel, int bins, bool covariance, int rep
   return row;
 }
 
+FitOptions bare_fit(const Kernel& kernel) {
+  FitOptions options;
+  options.plateau_density = 1.10;
+  options.kernel = kernel;
+  options.interval = options.sweep = options.compare = false;
+  options.curve_points = 0;
+  return options;
+}
+
+// A bed at T = 0.12 m g D seen through bins of 13 D in all, each disk counted once: variances go as density over width.
+Profile counted_profile(int bins, const Kernel& kernel, double disks_times_width) {
+  const HydrostaticProfile truth = HydrostaticProfile::of_column(enskog(), 0.12, {11.22, 1.10});
+  Profile data;
+  const double width = 13.0 / bins;
+  for (int i = 0; i < bins; ++i) data.height.push_back(width * (i + 0.5));
+  data.number_density.resize(data.height.size());
+  truth.sample(data.height, kernel, data.number_density);
+  for (const double density : data.number_density) {
+    data.std_error.push_back(std::sqrt((density + 1e-3) / (disks_times_width * width)));
+  }
+  return data;
+}
+
+void add_iterations(double effort, std::vector<FitTradeOff>& rows) {
+  for (const Kernel& kernel : {Kernel{KernelKind::top_hat, 0.25}, Kernel{KernelKind::gaussian, 0.3}}) {
+    Profile data = counted_profile(100, kernel, 1e4);
+    for (std::size_t i = 0; i < data.height.size(); ++i) {
+      data.number_density[i] += data.std_error[i] * std::sin(7.0 * static_cast<double>(i * i));  // some misfit
+    }
+    FitOptions options = bare_fit(kernel);
+    const double converged = fit_profile(data, options).temperature.value;
+    const int standard = options.max_iterations;
+    for (const int iterations : {1, 2, 3, 4, 5, 6, 8, 10, standard}) {
+      options.max_iterations = iterations;
+      FitTradeOff row{
+          "iterations",          "kernel " + std::string(to_string(kernel.kind)), 1.0 * iterations, 0.0, 0.0,
+          iterations == standard};
+      FitResult fit;
+      row.nanoseconds =
+          least_time(std::max(3, static_cast<int>(10 * effort)), [&] { fit = fit_profile(data, options); });
+      row.error = std::abs(fit.temperature.value / converged - 1.0);
+      rows.push_back(row);
+    }
+  }
+}
+
+void add_tables(double effort, std::vector<FitTradeOff>& rows) {
+  const EquationOfState& equation = enskog();
+  const double constant = equation.f(1e-30).value - std::log(1e-30);
+  const auto big_f = [&](double phi) { return equation.f(phi).value - constant; };
+  const auto stiffness = [&](double phi) { return equation.stiffness(phi).value; };
+  const double top = equation.largest_invertible_density();
+  constexpr int count = 20000;
+  std::vector<double> f, exact, found(count);
+  for (int i = 0; i < count; ++i) {
+    exact.push_back(std::min(top, 1.15) * std::exp(-30.0 * std::pow(std::fmod(0.61803398875 * i, 1.0), 2)));
+    f.push_back(big_f(exact.back()));
+  }
+  for (const bool newton : {false, true}) {
+    for (const double spacing : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625}) {
+      const InverseTable table({InverseTable::Piece{0.0, top, 0.0, spacing, big_f, stiffness}});
+      FitTradeOff row{"table size",
+                      newton ? "with one Newton step" : "interpolation alone",
+                      (big_f(top) - InverseTable::lowest_f) / spacing,
+                      0.0,
+                      0.0,
+                      newton && spacing == 0.0625};
+      row.nanoseconds = least_time(std::max(3, static_cast<int>(3 * effort)),
+                                   [&] {
+                                     for (std::size_t i = 0; i < f.size(); ++i) {
+                                       double density = table.density(f[i]);
+                                       if (newton) density *= 1.0 - (big_f(density) - f[i]) / stiffness(density);
+                                       found[i] = density;
+                                     }
+                                   }) /
+                        count;
+      for (std::size_t i = 0; i < f.size(); ++i) {
+        // One rounding of F moves phi by |F| eps/kappa: the input's part.
+        const double input = 1.2e-16 * std::abs(f[i]) / stiffness(exact[i]);
+        row.error = std::max(row.error, std::abs(found[i] / exact[i] - 1.0) - input);
+      }
+      rows.push_back(row);
+    }
+  }
+}
+
+void add_bins(double effort, std::vector<FitTradeOff>& rows) {
+  for (const int bins : {10, 13, 26, 52, 104, 208, 520, 1040, 5200}) {
+    const Kernel kernel{KernelKind::top_hat, 13.0 / bins};
+    const Profile data = counted_profile(bins, kernel, 1e5);
+    const FitOptions options = bare_fit(kernel);
+    FitTradeOff row{"bins", "top hat as wide as a bin", 1.0 * bins, 0.0, 0.0, bins == 52};
+    FitResult fit;
+    row.nanoseconds = least_time(std::max(3, static_cast<int>(5 * effort)), [&] { fit = fit_profile(data, options); });
+    row.error = fit.ok() ? fit.temperature.std_error / fit.temperature.value : 1.0;
+    rows.push_back(row);
+  }
+}
+
 }  // namespace
+
+std::vector<FitTradeOff> benchmark_fit_trade_offs(double effort) {
+  std::vector<FitTradeOff> rows;
+  add_iterations(effort, rows);
+  add_tables(effort, rows);
+  add_bins(effort, rows);
+  return rows;
+}
 
 std::vector<FitBenchmarkRow> benchmark_fit(double effort) {
   const auto repeats = [effort](double count) { return static_cast<int>(std::max(1.0, count * effort)); };

@@ -81,6 +81,20 @@ FitStatus check_numbers(const Profile& profile, FitResult& result) {
   for (const double entry : profile.covariance) {
     if (!std::isfinite(entry)) return bad_input(result, "the covariance has an entry that is not a finite number");
   }
+  for (std::size_t i = 0; i < n && !profile.covariance.empty(); ++i) {
+    const auto entry = [&](std::size_t a, std::size_t b) { return profile.covariance[a * n + b]; };
+    if (entry(i, i) < 0.0) return bad_input(result, "the covariance says that a variance is negative" + at_bin(i));
+    for (std::size_t j = 0; j < i; ++j) {
+      const double limit = std::sqrt(entry(i, i)) * std::sqrt(entry(j, j));
+      const std::string pair = " between bins " + std::to_string(j) + " and " + std::to_string(i);
+      if (std::abs(entry(i, j) - entry(j, i)) > 1e-6 * limit) {
+        return bad_input(result, "the covariance is not symmetric" + pair);
+      }
+      if (std::abs(entry(i, j)) > limit * (1.0 + 1e-6)) {
+        return bad_input(result, "the covariance has a correlation beyond 1" + pair);
+      }
+    }
+  }
   return FitStatus::ok;
 }
 
@@ -312,20 +326,39 @@ Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_sample
       covariance(i, j) = cleaned.covariance(chosen[static_cast<std::size_t>(i)], chosen[static_cast<std::size_t>(j)]);
     }
   }
-  // The inverse of a covariance estimated from m samples is too large by (m - 1)/(m - n - 2) [Hartlap2007].
+  bins.samples = covariance_samples;
+  const Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
+  Eigen::MatrixXd correlation = sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
+  // The inverse of a covariance estimated from m samples is too large by (m - 1)/(m - n - 2) [Hartlap2007]. Where that
+  // is 2 or more, weighing by it would add more noise than it takes away.
   if (covariance_samples > 0) {
     const double m = covariance_samples;
     const double correction = (m - static_cast<double>(n) - 2.0) / (m - 1.0);
-    if (correction > 0.0) {
-      covariance /= correction;
-    } else if (result != nullptr) {
-      result->warnings.push_back("the covariance comes from " + std::to_string(covariance_samples) +
-                                 " samples, too few for " + std::to_string(n) + " bins: its inverse is not reliable");
+    if (correction < 0.5) {
+      if (result != nullptr) {
+        result->warnings.push_back("the covariance comes from " + std::to_string(covariance_samples) +
+                                   " independent samples, too few to weigh " + std::to_string(n) +
+                                   " bins by it: the weights are diagonal, the errors come through the covariance");
+      }
+      // A bin that happens to hold few disks also happens to have a small error: weights of its own would pull the
+      // curve down to it. Its neighbours' errors say as much of its weight without knowing its fluctuation.
+      Eigen::VectorXd weight_error(n);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        double sum = 0.0;
+        double count = 0.0;
+        for (const Eigen::Index j : {i - 2, i - 1, i + 1, i + 2}) {
+          if (j >= 0 && j < n) sum += std::log(sigma[j]), count += 1.0;
+        }
+        weight_error[i] = count > 0.0 ? std::exp(sum / count) : sigma[i];
+        bins.inverse_error[static_cast<std::size_t>(i)] = 1.0 / weight_error[i];
+      }
+      bins.correlation =
+          weight_error.cwiseInverse().asDiagonal() * covariance * weight_error.cwiseInverse().asDiagonal();
+      return bins;
     }
+    covariance /= correction;
   }
   // Shrink the correlations until the matrix is safely positive.
-  const Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
-  Eigen::MatrixXd correlation = sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
   double shrink = 0.0;
   Eigen::LLT<Eigen::MatrixXd> cholesky(correlation);
   const auto safe = [&] {
@@ -343,7 +376,7 @@ Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_sample
     result->warnings.push_back("the covariance is not positive definite; its correlations were shrunk by " +
                                number(100.0 * shrink, 2) + " %");
   }
-  bins.whitening = sigma.asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
+  bins.whitening = covariance.diagonal().cwiseSqrt().asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
   return bins;
 }
 
@@ -540,14 +573,22 @@ struct Goodness {
   bool scaled = false;
 };
 
-Goodness goodness(double chi2, std::size_t bins, int parameters, bool errors_known, bool robust) {
+Goodness goodness(const Solution& solution, const Bins& bins, int parameters, bool errors_known, bool robust) {
   Goodness g;
-  g.dof = static_cast<int>(bins) - parameters;
-  const auto n = static_cast<double>(bins);
-  g.chi2_per_dof = g.dof > 0 ? chi2 / g.dof : 0.0;
+  g.dof = static_cast<int>(bins.size()) - parameters;
+  auto n = static_cast<double>(bins.size());
+  double chi2 = solution.chi2;
+  double dof = g.dof;
+  if (bins.correlation.size() > 0 && g.dof > 0) {
+    // As a chi-squared number of as many degrees of freedom as its mean and variance tell.
+    dof = 2.0 * solution.expected_chi2 * solution.expected_chi2 / solution.chi2_variance;
+    chi2 *= dof / solution.expected_chi2;
+    n = dof + parameters;
+  }
+  g.chi2_per_dof = g.dof > 0 ? chi2 / dof : 0.0;
   const double k = parameters;
   if (errors_known) {
-    g.p_value = g.dof > 0 ? gsl_cdf_chisq_Q(chi2, g.dof) : 1.0;
+    g.p_value = g.dof > 0 ? gsl_cdf_chisq_Q(chi2, dof) : 1.0;
     g.aic = chi2 + 2.0 * k;
     g.bic = chi2 + k * std::log(n);
   } else {  // the variance is one more parameter
@@ -557,26 +598,115 @@ Goodness goodness(double chi2, std::size_t bins, int parameters, bool errors_kno
   }
   g.scaled = !robust && g.dof > 0 && (!errors_known || g.p_value < 1e-3);
   if (g.scaled) g.error_scale = std::sqrt(g.chi2_per_dof);
+  if (bins.whitening.size() > 0 && bins.samples > 0) {
+    // Weights that are themselves uncertain: the estimate scatters more than its covariance says [Percival2014].
+    const double m = bins.samples;
+    const double a = 2.0 / ((m - n - 1.0) * (m - n - 4.0));
+    const double b = (m - n - 2.0) / ((m - n - 1.0) * (m - n - 4.0));
+    if (m > n + 4.0) g.error_scale *= std::sqrt((1.0 + b * (n - k)) / (1.0 + a + b * (k + 1.0)));
+  }
   if (robust && !errors_known) g.scaled = true;
   return g;
+}
+
+// A solution with what it says of the data and of its own errors.
+struct Fitted {
+  Solution solution;
+  Bins bins;                 // with the errors it was found with
+  Goodness good;             // by the measured errors
+  double error_scale = 1.0;  // of the solution's covariance
+  double model_error = 0.0;
+};
+
+// Fits the window; where the model misses the data, finds the error of the model that makes up for it.
+Fitted fit_window(const Cleaned& cleaned, const Window& window, int covariance_samples, const FitOptions& options,
+                  Setup& setup, Bins bins, const std::vector<FitModel::Parameters>& starts) {
+  Fitted fitted;
+  fitted.solution = fit_from(bins, setup, starts);
+  fitted.good = goodness(fitted.solution, bins, setup.parameters, cleaned.errors_known, options.robust);
+  fitted.error_scale = fitted.good.error_scale;
+  fitted.bins = std::move(bins);
+  const bool misses = fitted.good.scaled && cleaned.errors_known && fitted.solution.has_curve;
+  if (!options.model_error || options.robust || !misses || setup.parameters == 0) return fitted;
+
+  const auto with_error = [&](double error) {
+    Cleaned wider = cleaned;
+    for (double& sigma : wider.error) sigma = std::hypot(sigma, error);
+    if (wider.covariance.size() > 0) wider.covariance.diagonal().array() += error * error;
+    Fitted trial;
+    trial.bins = bins_of(wider, window, covariance_samples, nullptr);
+    std::vector<FitModel::Parameters> from{fitted.solution.parameters};
+    from.insert(from.end(), starts.begin(), starts.end());
+    trial.solution = fit_from(trial.bins, setup, from);
+    trial.good = goodness(trial.solution, trial.bins, setup.parameters, true, false);
+    trial.model_error = error;
+    return trial;
+  };
+  // chi2/dof falls as the error grows: a bracket in ln(error), then the false position with halved ends.
+  double square = 0.0;
+  for (std::size_t i = 0; i < fitted.bins.size(); ++i) {
+    setup.model->set(fitted.solution.parameters);
+    square +=
+        std::pow(setup.model->smoothed(fitted.bins.height[i], setup.least_squares.kernel) - fitted.bins.density[i], 2) /
+        static_cast<double>(fitted.bins.size());
+  }
+  if (!(square > 0.0)) return fitted;
+  double high = 0.5 * std::log(square);
+  double low = high;
+  const auto misfit = [&](double log_error, Fitted& trial) {
+    trial = with_error(std::exp(log_error));
+    return trial.solution.has_curve ? std::log(std::max(trial.good.chi2_per_dof, 1e-300)) : -1e3;
+  };
+  Fitted trial;
+  double at_high = misfit(high, trial);
+  double at_low = at_high;
+  for (int i = 0; i < 40 && at_high > 0.0; ++i) low = high, at_low = at_high, at_high = misfit(high += 1.0, trial);
+  for (int i = 0; i < 40 && at_low < 0.0; ++i) high = low, at_high = at_low, at_low = misfit(low -= 1.0, trial);
+  if (at_high > 0.0 || at_low < 0.0) return fitted;
+  for (int i = 0; i < 60 && high - low > 1e-9; ++i) {
+    const double middle = at_low > at_high ? low + (high - low) * at_low / (at_low - at_high) : 0.5 * (low + high);
+    const double value = misfit(i % 4 == 3 ? 0.5 * (low + high) : middle, trial);
+    const double place = std::log(trial.model_error);
+    if (value > 0.0) {
+      low = place, at_low = value, at_high *= 0.5;
+    } else {
+      high = place, at_high = value, at_low *= 0.5;
+    }
+    if (std::abs(value) < 1e-4) break;
+  }
+  if (!trial.solution.has_curve || !trial.solution.converged) {
+    setup.model->set(fitted.solution.parameters);
+    return fitted;
+  }
+  trial.solution.chi2 = fitted.solution.chi2;
+  trial.error_scale = trial.good.error_scale;
+  trial.good = fitted.good;
+  setup.model->set(trial.solution.parameters);
+  return trial;
 }
 
 // --- beyond the fit
 // ----------------------------------------------------------------------------------------------------
 
 // Ends of the temperatures whose best chi2 exceeds the least by the quantile of chi2 with one degree of freedom.
-Interval likelihood_interval(const Bins& bins, Setup& setup, const Solution& solution, const Goodness& good,
-                             double confidence) {
+Interval likelihood_interval(const Fitted& fitted, Setup& setup, double confidence) {
+  const Bins& bins = fitted.bins;
+  const Solution& solution = fitted.solution;
+  const Goodness& good = fitted.good;
   Interval interval;
   interval.confidence = confidence;
   if (!setup.least_squares.free[0]) return interval;
-  const double quantile = good.scaled && good.dof > 0
-                              ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, good.dof), 2)
-                              : gsl_cdf_chisq_Pinv(confidence, 1.0);
-  const double unit = good.error_scale * good.error_scale;
+  // Errors that come from few samples, or from the scatter, have Student's tails.
+  const double samples_dof = bins.correlation.size() > 0 && bins.samples > 1 ? bins.samples - 1.0 : 1e300;
+  const double scatter_dof = good.scaled && good.dof > 0 ? static_cast<double>(good.dof) : 1e300;
+  const double tail_dof = std::min(samples_dof, scatter_dof);
+  const double quantile = tail_dof < 1e300 ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, tail_dof), 2)
+                                           : gsl_cdf_chisq_Pinv(confidence, 1.0);
+  const double unit = fitted.error_scale * fitted.error_scale * solution.inflation;
   LeastSquaresOptions fixed = setup.least_squares;
   fixed.free[0] = false;
-  const double sigma = std::sqrt(std::max(0.0, solution.covariance(0, 0))) * good.error_scale / solution.parameters[0];
+  const double sigma =
+      std::sqrt(std::max(0.0, solution.covariance(0, 0))) * fitted.error_scale / solution.parameters[0];
   const double limit_low = setup.least_squares.lowest_temperature;
   // sqrt(delta chi2) is nearly linear in ln T: a secant search on it.
   const auto search = [&](int side, double& end, bool& open) {
@@ -644,8 +774,8 @@ Interval likelihood_interval(const Bins& bins, Setup& setup, const Solution& sol
   return interval;
 }
 
-void sweep_windows(const Cleaned& cleaned, const Window& window, const Profile& profile, Setup& setup,
-                   const Solution& solution, FitResult& result) {
+void sweep_windows(const Cleaned& cleaned, const Window& window, const Profile& profile, const FitOptions& options,
+                   Setup& setup, const Solution& solution, FitResult& result) {
   std::vector<Window> windows;
   // Lower ends from the window's own up to where a quarter of the greatest density is left; upper ends down to a fifth.
   double surface = window.high;
@@ -690,27 +820,27 @@ void sweep_windows(const Cleaned& cleaned, const Window& window, const Profile& 
       continue;
     }
     std::vector<FitModel::Parameters> starts{solution.parameters};
-    const Solution fit = fit_from(bins, setup, starts);
+    const Fitted fitted = fit_window(cleaned, other, profile.covariance_samples, options, setup, bins, starts);
+    const Solution& fit = fitted.solution;
     if (fit.has_curve) {
-      const Goodness good =
-          goodness(fit.chi2, bins.size(), setup.parameters, cleaned.errors_known, setup.least_squares.robust);
       row.status = fit.converged ? FitStatus::ok : FitStatus::not_converged;
       row.temperature.value = fit.parameters[0];
-      row.temperature.std_error = parameter_error(setup, fit, 0, good.error_scale);
+      row.temperature.std_error = parameter_error(setup, fit, 0, fitted.error_scale);
       if (row.temperature.std_error > 0.5 * fit.parameters[0] || fit.temperature_at_bound) {
         row.status = FitStatus::unresolved_temperature;
       }
       row.shift.value = setup.model->shift();
-      row.shift.std_error = propagated_error(setup, fit, good.error_scale,
+      row.shift.std_error = propagated_error(setup, fit, fitted.error_scale,
                                              [&](const FitModel::Parameters&) { return setup.model->shift(); });
-      row.chi2_per_dof = good.chi2_per_dof;
+      row.chi2_per_dof = fitted.good.chi2_per_dof;
     }
     result.window_sweep.push_back(row);
   }
   setup.model->set(solution.parameters);
 }
 
-ModelFit model_row(const FitOptions& options, Setup& setup, const Solution& solution, const Goodness& good) {
+ModelFit model_row(const FitOptions& options, Setup& setup, const Fitted& fitted) {
+  const Solution& solution = fitted.solution;
   ModelFit row;
   row.model = options.model;
   row.plateau_density_free = setup.least_squares.free[2];
@@ -721,25 +851,26 @@ ModelFit model_row(const FitOptions& options, Setup& setup, const Solution& solu
   }
   row.status = solution.converged ? FitStatus::ok : FitStatus::not_converged;
   row.temperature = {setup.model->uses_temperature() ? solution.parameters[0] : 0.0,
-                     parameter_error(setup, solution, 0, good.error_scale), !setup.least_squares.free[0]};
+                     parameter_error(setup, solution, 0, fitted.error_scale), !setup.least_squares.free[0]};
   if (setup.least_squares.free[0] &&
       (solution.temperature_at_bound || row.temperature.std_error > 0.5 * row.temperature.value)) {
     row.status = FitStatus::unresolved_temperature;
   }
   row.shift = {setup.model->shift(),
-               propagated_error(setup, solution, good.error_scale,
+               propagated_error(setup, solution, fitted.error_scale,
                                 [&](const FitModel::Parameters&) { return setup.model->shift(); }),
                !setup.least_squares.free[1]};
-  row.plateau_density = {solution.parameters[2], parameter_error(setup, solution, 2, good.error_scale),
+  row.plateau_density = {solution.parameters[2], parameter_error(setup, solution, 2, fitted.error_scale),
                          !setup.least_squares.free[2]};
   row.chi2 = solution.chi2;
-  row.chi2_per_dof = good.chi2_per_dof;
-  row.aic = good.aic;
-  row.bic = good.bic;
+  row.chi2_per_dof = fitted.good.chi2_per_dof;
+  row.aic = fitted.good.aic;
+  row.bic = fitted.good.bic;
   return row;
 }
 
-void compare_models(const Cleaned& cleaned, const Bins& bins, const FitOptions& options, FitResult& result) {
+void compare_models(const Cleaned& cleaned, const Window& window, const Profile& profile, const Bins& bins,
+                    const FitOptions& options, FitResult& result) {
   std::vector<FitOptions> others;
   const auto add = [&](const char* model, bool plateau_free, bool constrained) {
     FitOptions other = options;
@@ -770,9 +901,9 @@ void compare_models(const Cleaned& cleaned, const Bins& bins, const FitOptions& 
       if (static_cast<int>(bins.size()) < setup.parameters + 1) {
         row.status = FitStatus::too_few_bins;
       } else {
-        const Solution fit = fit_from(bins, setup, find_starts(cleaned, bins, setup));
-        const Goodness good = goodness(fit.chi2, bins.size(), setup.parameters, cleaned.errors_known, other.robust);
-        row = model_row(other, setup, fit, good);
+        row = model_row(other, setup,
+                        fit_window(cleaned, window, profile.covariance_samples, other, setup, bins,
+                                   find_starts(cleaned, bins, setup)));
       }
     }
     result.model_comparison.push_back(std::move(row));
@@ -833,7 +964,10 @@ void warn_about_fit(const Cleaned& cleaned, const FitOptions& options, const Set
     result.warnings.push_back(
         "the model does not describe the data: chi2/dof = " + number(result.chi2_per_dof) + " (chance " +
         number(result.p_value, 2) + ")" +
-        (result.errors_scaled ? "; the errors were multiplied by " + number(std::sqrt(result.chi2_per_dof)) : ""));
+        (result.model_error > 0.0
+             ? "; what it misses counts as an error of " + number(result.model_error) + " of every density"
+         : result.errors_scaled ? "; the errors were multiplied by " + number(std::sqrt(result.chi2_per_dof))
+                                : ""));
   }
   // A single bin far off.
   double worst = 0.0;
@@ -975,13 +1109,15 @@ FitResult fit_profile(const Profile& profile, const FitOptions& options) {
     return result;
   }
 
-  const Solution solution = fit_from(bins, setup, find_starts(cleaned, bins, setup));
+  const Fitted fitted =
+      fit_window(cleaned, window, profile.covariance_samples, options, setup, bins, find_starts(cleaned, bins, setup));
+  const Solution& solution = fitted.solution;
   if (!solution.has_curve) {
     result.status = FitStatus::undefined_model;
     result.message = "the model has no curve for this profile: the equation of state ends below the densities it needs";
     return result;
   }
-  const Goodness good = goodness(solution.chi2, bins.size(), setup.parameters, cleaned.errors_known, options.robust);
+  const Goodness& good = fitted.good;
   FitModel& model = *setup.model;
   const auto free = setup.least_squares.free;
 
@@ -998,8 +1134,9 @@ FitResult fit_profile(const Profile& profile, const FitOptions& options) {
   result.aic = good.aic;
   result.bic = good.bic;
   result.errors_scaled = good.scaled;
+  result.model_error = fitted.model_error;
 
-  const double scale = good.error_scale;
+  const double scale = fitted.error_scale;
   const double variance_scale = scale * scale;
   for (std::size_t i = 0; i < 3; ++i) {
     if (free[i]) {
@@ -1058,14 +1195,14 @@ FitResult fit_profile(const Profile& profile, const FitOptions& options) {
   }
   fill_curve(cleaned, options, model, result);
   if (options.interval) {
-    result.temperature_interval = likelihood_interval(bins, setup, solution, good, options.confidence);
+    result.temperature_interval = likelihood_interval(fitted, setup, options.confidence);
   }
   if (options.sweep && free[0] && result.status == FitStatus::ok) {
-    sweep_windows(cleaned, window, profile, setup, solution, result);
+    sweep_windows(cleaned, window, profile, options, setup, solution, result);
   }
   if (options.compare) {
-    result.model_comparison.push_back(model_row(options, setup, solution, good));
-    compare_models(cleaned, bins, options, result);
+    result.model_comparison.push_back(model_row(options, setup, fitted));
+    compare_models(cleaned, window, profile, bins, options, result);
     model.set(solution.parameters);
   }
   warn_about_fit(cleaned, options, setup, result);

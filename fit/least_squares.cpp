@@ -173,7 +173,7 @@ class Solver {
       const Matrix old_jacobian = jacobian_;
       // What this step and the undamped one promise to gain.
       const double promise = -g.dot(step);
-      const bool worth = promise > (1e-13 / dof + 1e-15) * solution.objective + 1e-30 * signal;
+      const bool worth = promise > (1e-16 / dof + 1e-18) * solution.objective + 1e-30 * signal;
       if (!moved || !worth || !step.allFinite()) {
         if (damping <= 1e-3 || !moved) return true;
         damping = 1e-6;  // only the damping made the step small
@@ -221,7 +221,13 @@ class Solver {
     for (Eigen::Index i = 0; i < columns; ++i) unit[i] = 1.0 / std::sqrt(std::max(a(i, i), 1e-300));
     const Matrix scaled = unit.asDiagonal() * a * unit.asDiagonal();
     Matrix inverse = scaled.ldlt().solve(Matrix::Identity(columns, columns));
-    if (threshold_ > 0.0) inverse *= huber_inflation();
+    solution.expected_chi2 = static_cast<double>(residual_.size() - columns);
+    solution.chi2_variance = 2.0 * solution.expected_chi2;
+    if (bins_.correlation.size() > 0 && columns > 0) {
+      through_correlations(unit, inverse, solution);
+    } else if (threshold_ > 0.0) {
+      inverse *= huber_inflation();
+    }
     solution.covariance = Matrix::Zero(columns, columns);
     for (Eigen::Index i = 0; i < columns; ++i) {
       for (Eigen::Index j = 0; j < columns; ++j) {
@@ -231,6 +237,34 @@ class Solver {
         solution.covariance(i, j) = std::isfinite(entry) ? entry : 0.0;
       }
     }
+  }
+
+  // Diagonal weights, correlated bins: the covariance of the estimate is B J^T R J B with B the inverse of J^T J and R
+  // the bins' correlations; chi2 is no longer a chi-squared number, but its mean and variance are known:
+  // tr(P R) and 2 tr(P R P R), P projecting off the tangent plane. The latter is freed of what the few samples behind R
+  // add to it [Srivastava2005].
+  void through_correlations(const Vector& unit, Matrix& inverse, Solution& solution) const {
+    const double naive = inverse(0, 0);
+    Matrix weighted = jacobian_ * unit.asDiagonal();
+    if (threshold_ > 0.0) {
+      for (Eigen::Index i = 0; i < weighted.rows(); ++i)
+        weighted.row(i) *= std::min(1.0, threshold_ / std::max(std::abs(residual_[i]), 1e-300));
+    }
+    const Matrix& r = bins_.correlation;
+    inverse = (inverse * (weighted.transpose() * r * weighted) * inverse).eval();
+    if (naive > 0.0) solution.inflation = inverse(0, 0) / naive;
+    const Matrix q =
+        Eigen::HouseholderQR<Matrix>(jacobian_).householderQ() * Matrix::Identity(jacobian_.rows(), jacobian_.cols());
+    Matrix projected = r - q * (q.transpose() * r);
+    projected = (projected - (projected * q) * q.transpose()).eval();
+    const double trace = projected.trace();
+    double trace2 = projected.squaredNorm();
+    const double v = static_cast<double>(bins_.samples) - 1.0;
+    if (v > 1.0) trace2 = v * v / ((v + 2.0) * (v - 1.0)) * (trace2 - trace * trace / v);
+    // At least that of as many equal and independent parts as there are bins.
+    trace2 = std::max(trace2, trace * trace / static_cast<double>(residual_.size()));
+    solution.expected_chi2 = trace;
+    solution.chi2_variance = 2.0 * trace2;
   }
 
   // A Huber estimate of normal data is less certain than least squares by E psi^2/(E psi')^2; J^T W J already has E

@@ -15,6 +15,10 @@ struct Bins {
   std::vector<double> height, density;
   std::vector<double> inverse_error;  // 1/sigma; used when there is no covariance
   Eigen::MatrixXd whitening;          // lower Cholesky factor of the covariance; empty: diagonal
+  // Correlations of the bins where they are known too badly to weigh by: the weights are then diagonal and the errors
+  // come through these (the "sandwich" [White1980]). Empty: none.
+  Eigen::MatrixXd correlation;
+  int samples = 0;  // independent ones behind covariance or correlation, 0 if not known
   [[nodiscard]] std::size_t size() const { return height.size(); }
 };
 
@@ -36,6 +40,9 @@ struct Solution {
   FitModel::Parameters parameters{};
   Eigen::MatrixXd covariance;  // of the free parameters in natural units, before any scaling by chi2 (robust: final)
   double chi2 = 0.0;           // sum of squared weighted residuals
+  double expected_chi2 = 0.0;  // its mean and variance, were the model true; bins - parameters and twice that unless
+  double chi2_variance = 0.0;  // the bins are correlated and weighted diagonally
+  double inflation = 1.0;      // variance of ln T over what the curvature of the objective says
   double objective = 0.0;      // what was minimised: chi2, or Huber's loss
   int iterations = 0;
   int evaluations = 0;
