@@ -45,6 +45,7 @@ struct ExtractOptions {
   std::optional<double> floor_slope;            // px down per px right
   std::optional<double> left_wall, right_wall;  // columns [px]
   std::vector<double> roi;                      // left, top, width, height [px]
+  std::optional<double> second_diameter;        // of beads of another size, to be found too [m]
   std::optional<double> pixel_aspect;           // a pixel's width over its height; found if left out
   std::optional<double> lens_radial;            // how far the corners move, in half diagonals; found if left out
   BeadPolarity polarity = BeadPolarity::automatic;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -215,7 +216,12 @@ class DisksOnTheWay {
                                        static_cast<std::size_t>(disk.quality * static_cast<double>(quality_.size())))];
       cut_ += disk.cut, half_hidden_ += disk.half_hidden;
     }
-    if (meter_) meter_->add(disks);
+    if (meter_) {
+      std::vector<ingest::MeasuredDisk> first;
+      std::copy_if(disks.begin(), disks.end(), std::back_inserter(first),
+                   [](const ingest::MeasuredDisk& disk) { return disk.species == 1; });
+      meter_->add(first);
+    }
     if (truth_ != nullptr) compare(frame.index * options_.stride, disks);
     // Frames to be drawn in the end, spread over a film of unknown length: every so many, thinned out as it goes on.
     if (options_.overlays == 0 || frame.status != ingest::FrameStatus::good || frame.index % every_ != 0) return;
@@ -416,6 +422,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   measure.scale_m_per_px = options.scale;
   measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
   measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
+  measure.second_diameter_m = options.second_diameter;
   measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
   measure.find.polarity = options.polarity == BeadPolarity::dark     ? ingest::Polarity::dark_beads
                           : options.polarity == BeadPolarity::bright ? ingest::Polarity::bright_beads
@@ -488,6 +495,13 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
       table_of(found.profile, bed.width,
                {"heights in D above the floor's mean position", "kernel: " + kernel,
                 "kernel_width: " + number_text(options.kernel_width), "column_number: " + number_text(column_number)}));
+  if (found.second_profile) {
+    write_profile_csv(
+        context.output("second_profile.csv"),
+        table_of(*found.second_profile, bed.width,
+                 {"beads of the second diameter; heights in D of the first above the floor's mean position",
+                  "kernel: " + kernel, "kernel_width: " + number_text(options.kernel_width)}));
+  }
   if (found.coverage_profile) {
     write_profile_csv(context.output("coverage_profile.csv"),
                       table_of(*found.coverage_profile, bed.width,
@@ -516,12 +530,12 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     write_file(context.output("covariance.csv"), text);
   }
   {
-    std::string text = "frame,file,page,status,disks,rejected,residual_level\n";
+    std::string text = "frame,file,page,status,disks,second,rejected,residual_level\n";
     constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
     for (const ingest::FrameReport& frame : found.frames) {
-      text += fmt::format("{},{},{},{},{},{},{}\n", frame.index,
+      text += fmt::format("{},{},{},{},{},{},{},{}\n", frame.index,
                           std::filesystem::path(frame.origin.path).filename().string(), frame.origin.page,
-                          names[static_cast<std::size_t>(frame.status)], frame.disks, frame.rejected,
+                          names[static_cast<std::size_t>(frame.status)], frame.disks, frame.second, frame.rejected,
                           number_text(frame.residual_level));
     }
     write_file(context.output("frames.csv"), text);
@@ -558,6 +572,13 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
 
   result["quality"] = on_the_way.quality();
+  if (found.second_finder) {
+    std::size_t second = 0;
+    for (const ingest::FrameReport& frame : found.frames) second += frame.second;
+    result["second_species"] =
+        Json{{"radius", quantity_json(found.second_finder->radius_px, "px", found.second_finder->radius_std_error_px)},
+             {"disks_per_frame", static_cast<double>(second) / static_cast<double>(found.frames.size())}};
+  }
   result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
   if (const auto velocities = on_the_way.velocities()) {
     for (const std::string& warning : velocities->warnings) context.warning(warning);

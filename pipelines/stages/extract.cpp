@@ -11,6 +11,10 @@ class Extract : public Stage {
     ExtractOptions& o = options_;
     fields.quantity("diameter", o.diameter, dimension::length,
                     {.help = "diameter of a bead", .required = true, .range = positive, .example = "\"2.99 mm\""});
+    fields.quantity("second_diameter", o.second_diameter, dimension::length,
+                    {.help = "diameter of beads of another size that are to be found too; left out, they are counted "
+                             "as rejected",
+                     .range = positive});
     fields.input_files("images", o.images,
                        {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
                         .example = "\"photos/*.tif\""});
