@@ -269,14 +269,27 @@ TEST_F(Pipeline, CtrlCEndsWith130AndKeepsWhatWasFinished) {
 }
 
 TEST_F(Pipeline, AStageThatFailsKeepsWhatWasFinishedBefore) {
-  // A window far above the bed: only running shows that there is nothing to fit in it.
-  const ProgramResult failed = run_recipe({"--set", R"(/stages/fit/window={"low": 300, "high": 400})"});
-  EXPECT_EQ(failed.exit_code, 5) << failed.err;
+  // A profile of the user's with a word for a number: found when its stage runs.
+  write_text(folder_ / "bad.csv", "height,number_density\n1,many\n");
+  std::string recipe = small_recipe();
+  recipe.replace(recipe.find("{ \"stage\": \"check\""), 0,
+                 R"({ "stage": "fit", "id": "other", "profile": "bad.csv", "plateau_density": 1.1 },)");
+  write_text(folder_ / "r.json", recipe);
+  const ProgramResult failed = run_recipe();
+  EXPECT_EQ(failed.exit_code, 4) << failed.err;
+  EXPECT_THAT(failed.err, HasSubstr("bad.csv"));
   EXPECT_TRUE(fs::is_regular_file(folder_ / "o/bed/profile.csv"));
-  EXPECT_FALSE(fs::exists(folder_ / "o/fit"));
-  EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 5);
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "o/fit/fit.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "o/other"));
+  EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 4);
   EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("What stopped it"));
-  EXPECT_THAT(run_recipe().err, HasSubstr("bed: up to date"));
+  EXPECT_THAT(read_text(folder_ / "o/summary.md"), HasSubstr("**Stopped**"));
+  // Put right, only what is left runs.
+  write_text(folder_ / "bad.csv", read_text(folder_ / "o/bed/profile.csv"));
+  const ProgramResult mended = run_recipe();
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+  EXPECT_THAT(mended.err, HasSubstr("bed: up to date"));
+  EXPECT_THAT(mended.err, HasSubstr("other: done"));
 }
 
 TEST_F(Pipeline, AReadOnlyFolderIsSaidAndKeepsWhatItHolds) {
