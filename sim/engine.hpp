@@ -26,6 +26,7 @@
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "sim/collision.hpp"
@@ -162,6 +163,7 @@ class Engine final : public Simulation {
   double bath_at_ = never;  // next action of the reservoir
   double checked_at_ = -1;  // for rows that lock, see locked()
   std::uint64_t events_to_check_ = 1;
+  std::uint32_t crawls_ = 0;
   Random random_;
   Counters counters_;
   Watcher* watcher_ = nullptr;

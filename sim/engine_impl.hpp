@@ -420,8 +420,8 @@ template <class Space, class Rule, class Sizes>
   if (disk.partner >= 0) [[likely]] {
     const auto j = static_cast<std::uint32_t>(disk.partner);
     if (is_mutual(i, j)) [[likely]] {
-      collide(i, j);
-    } else {  // the partner was hit by another disk first
+      collide(std::min(i, j), std::max(i, j));  // so that its rounding does not depend on who predicted it
+    } else {                                    // the partner was hit by another disk first
       ++counters_.predictions_renewed;
       const Motion motion = motion_at(disk, now_);
       const Candidate next = next_event(i, motion);
@@ -655,15 +655,27 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
 // ------------------------------------------------------------------------------------------------
 // locked rows
 
-// Disks that fill a gap exactly, a row from wall to wall say, hand their
-// momenta on without end at one instant. Called after every so many events: has
-// time stood still meanwhile?
+// Disks that fill a gap exactly, a row from wall to wall say, hand their momenta on without end at one instant. Called
+// after every so many events: has time stood still meanwhile? Where it crawls instead, dissipative disks without a
+// contact clock have collapsed: infinitely many contacts in a finite time, which no event-driven run can follow.
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::locked() {
-  const bool stood_still = now_ - checked_at_ < 1e-12;
+  const double passed = now_ - checked_at_;
+  const std::uint64_t events = 4096 + 200 * static_cast<std::uint64_t>(count_);
   checked_at_ = now_;
-  events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
-  return stood_still;
+  events_to_check_ = events;
+  if constexpr (Rule::dissipates) {
+    constexpr double crawl = 1e-6;
+    constexpr std::uint32_t most_crawls = 3;
+    if (passed >= 1e-12) crawls_ = contact_duration_ <= 0 && passed < crawl ? crawls_ + 1 : 0;
+    if (crawls_ == most_crawls)
+      throw std::runtime_error("inelastic collapse at time " + std::to_string(base_ + now_) + ": " +
+                               std::to_string(most_crawls * events) + " contacts within " +
+                               std::to_string(most_crawls * crawl) +
+                               ", and no end of them. Disks that dissipate and rest on one another need a contact "
+                               "duration (1e-4 of the time unit does)");
+  }
+  return passed < 1e-12;
 }
 
 // Lets every contact without a gap lose its approach (a perfectly plastic
@@ -842,6 +854,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   renumber();
   synchronise_at_ = static_cast<double>(intervals_) * interval_;
   checked_at_ = -1;
+  crawls_ = 0;
   events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
   double largest_contact = 1;
   if constexpr (!Sizes::equal) largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);

@@ -30,21 +30,12 @@ class EventQueue {
   // events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
-    buckets_a_time_ = std::clamp(events_a_time / events_a_bucket, 1e-6, 1e12);
+    count_ = static_cast<std::uint32_t>(count);
     size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
     ring_.resize(static_cast<std::size_t>(size_));
-    for (Bucket& bucket : ring_) bucket.held = bucket.next = 0;
-    full_.resize(1);
-    free_ = 0;
-    far_.clear();
-    far_limit_ = 256 + 2 * count;
     beyond_cache_ = count > fits_cache;
-    pushed_ = 0;
-    current_ = static_cast<std::int64_t>(start * buckets_a_time_) - 1;
-    here_ = 0;
-    look_far_at_ = current_ + size_;
-    next_ = end_ = 0;
     grow(256);
+    clear(start, events_a_time / events_a_bucket);
   }
 
   // The event of disk a (with b; a itself when alone) now stands at `time`,
@@ -94,6 +85,7 @@ class EventQueue {
       if (time > until) [[unlikely]]
         return false;
       ++next_;
+      now_ = time;
       // The partner counts too: a disk may have found another one at the very
       // same time, and its former partner must still have its turn.
       const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
@@ -188,6 +180,36 @@ class EventQueue {
     unsorted_pairs_.resize(size);
   }
 
+  // Empties the queue and chooses the width of its buckets.
+  void clear(double start, double buckets_a_time) {
+    now_ = start;
+    buckets_a_time_ = std::clamp(buckets_a_time, coarsest, finest);
+    for (Bucket& bucket : ring_) bucket.held = bucket.next = 0;
+    full_.resize(1);
+    free_ = 0;
+    far_.clear();
+    far_limit_ = 256 + 2 * static_cast<std::size_t>(count_);
+    pushed_ = 0;
+    current_ = static_cast<std::int64_t>(start * buckets_a_time_) - 1;
+    here_ = 0;
+    look_far_at_ = current_ + size_;
+    next_ = end_ = 0;
+    taken_up_ = moved_ = 0;
+  }
+
+  // Where events come in bursts the buckets can become far too wide or too narrow: everything is queued anew, from the
+  // disks' records.
+  [[gnu::noinline]] void rebuild(double buckets_a_time) {
+    clear(now_, buckets_a_time);
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const Disk& disk = disks_[i];
+      if (!(disk.event_time < never)) continue;
+      const std::uint32_t other = disk.partner < 0 ? i : static_cast<std::uint32_t>(disk.partner);
+      const bool pushed_by_other = other < i && stands(other, i, disk.event_time);
+      if (!pushed_by_other) push(disk.event_time, i, other);
+    }
+  }
+
   [[gnu::noinline]] void insert_into_run(const Entry& entry) {
     grow(end_ + 1);
     std::size_t place = end_++;
@@ -198,6 +220,10 @@ class EventQueue {
     }
     times_[place] = entry.time;
     pairs_[place] = entry.pair;
+    moved_ += end_ - place;
+    if (moved_ > 8192 + 32 * std::size_t{count_} && buckets_a_time_ < finest) [[unlikely]] {  // what rebuilding costs
+      rebuild(8 * buckets_a_time_);
+    }
   }
 
   // Takes the next bucket into the run; where the run was empty, the next one
@@ -211,22 +237,32 @@ class EventQueue {
     }
     next_ = 0;
     end_ = left;
-    const double last = until * buckets_a_time_;
     do {
-      if (left == 0 && static_cast<double>(current_ + 1) > last) return false;
+      if (left == 0 && static_cast<double>(current_ + 1) > until * buckets_a_time_) return false;
       ++current_;
       if (++here_ == size_) here_ = 0;
-      if (current_ == look_far_at_) [[unlikely]]
+      if (current_ == look_far_at_) [[unlikely]] {
+        if (left == 0 && is_too_fine()) {
+          rebuild(buckets_a_time_ / 8);
+          continue;
+        }
         look_far();
+      }
       Bucket& bucket = ring_[static_cast<std::size_t>(here_)];
       if (bucket.held != 0) sort_into_run(collect(bucket));
     } while (end_ == 0);
     return true;
   }
 
+  bool is_too_fine() const {
+    return 32 * static_cast<double>(taken_up_) < events_a_bucket * static_cast<double>(size_) &&
+           buckets_a_time_ > coarsest;
+  }
+
   // Puts what has come near into the ring; forgets what is worthless.
   [[gnu::noinline]] void look_far() {
     look_far_at_ = current_ + size_;
+    taken_up_ = moved_ = 0;
     const auto end = static_cast<double>(current_ + size_);
     std::size_t kept = 0;
     for (const Entry& entry : far_) {
@@ -253,6 +289,7 @@ class EventQueue {
       count = collect_earlier(bucket.next);
     count = take_up(bucket, count);
     bucket.held = bucket.next = 0;
+    taken_up_ += count;
     return count;
   }
   [[gnu::noinline]] std::size_t collect_earlier(std::uint32_t place) {
@@ -313,12 +350,15 @@ class EventQueue {
   }
 
   static constexpr std::size_t largest_ranked = 64, most_waiting = 8, looks_ahead = 4;
+  static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
     std::size_t index;
     Entry entry;
   };
   const Disk* disks_ = nullptr;
+  std::uint32_t count_ = 0;
   double buckets_a_time_ = 1;
+  double now_ = 0;  // of the latest event that was popped
   LargeVector<Bucket> ring_;
   std::vector<Bucket> full_;  // what did not fit; the first place is not used
   std::uint32_t free_ = 0;
@@ -328,6 +368,7 @@ class EventQueue {
   std::int64_t current_ = -1,
                here_ = 0;  // the current bucket and its place in the ring
   std::int64_t look_far_at_ = 0;
+  std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
   bool beyond_cache_ = false;
   std::array<Waiting, most_waiting> waiting_;  // pushed_ of them, the latest ones
   std::size_t pushed_ = 0;

@@ -1,8 +1,10 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <stdexcept>
 #include <utility>
 
 #include "sim/simulation.hpp"
@@ -159,6 +161,48 @@ TEST(Engine, LetsTheFloorFallAwayFromAPlasticBall) {
   EXPECT_GE(ball->counters().floor_collisions, 190u);
   EXPECT_LE(ball->counters().floor_collisions, 400u);  // rounding makes some of them double
   EXPECT_LT(std::abs(ball->energy().imbalance()), 1e-12);
+}
+
+// Dissipative disks at rest on one another without a contact clock: infinitely many contacts in a finite time.
+TEST(Engine, SaysWhereDisksCollapse) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{200, 1, 1}};
+  scene.disks.contact = {0.5, 0, 0};
+  scene.box.width = 15;
+  scene.box.sides = HardSides{{0.5, 0, 0}};
+  scene.box.floor_surface = {0.5, 0, 0};
+  const auto pile = simulate(scene);
+  try {
+    pile->advance_to(10);
+    FAIL() << "ran through an inelastic collapse";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("inelastic collapse at time 0.000"));
+  }
+  scene.disks.contact_duration = 1e-4;
+  const auto soft = simulate(scene);
+  soft->advance_to(10);
+  EXPECT_LT(soft->energy().kinetic, 0.1);  // hops of a contact's duration are all that is left
+  EXPECT_LE(soft->largest_overlap(), 1e-12);
+}
+
+// The queue's buckets follow a rate of events that changes a million times over.
+TEST(Engine, KeepsItsOrderThroughBursts) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{400, 1, 1}};
+  scene.disks.contact = {0.7, 0, 0};
+  scene.disks.contact_duration = 1e-3;
+  scene.box.width = 10;
+  scene.box.sides = HardSides{};
+  scene.box.floor = SinusoidalFloor{200, 0.02};  // flies for tens of time units, then lands all at once
+  scene.box.floor_surface = {0.7, 0, 0};
+  const auto bed = simulate(scene);
+  for (double time = 3; time < 120; time += 3) {
+    bed->advance_to(time);
+    ASSERT_LE(bed->largest_overlap(), 1e-12) << "time " << time;
+  }
+  EXPECT_LE(std::abs(bed->energy().imbalance()), 1e-10 * bed->energy().dissipated);
 }
 
 }  // namespace
