@@ -38,8 +38,9 @@ std::vector<Row> full_search() {
   return rows;
 }
 
-// Same seed, same beds: where a change of the simulator changes trajectories, the full search has to be run again (six
-// minutes), since the nearest pairs lie closer together than one run's scatter.
+// The nearest pairs lie closer together than the scatter between beds, so which of them wins is not asked: only that
+// the full search's pair is among those that the coarse one cannot tell from its nearest, and that every bed's
+// temperature is the full search's within three standard errors of the difference (12 points: one false alarm in 30).
 TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   const std::vector<Row> full = full_search();
   ASSERT_EQ(full.size(), 88u);
@@ -55,17 +56,21 @@ TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const pipelines::Json found = pipelines::read_json(folder / "out/search/infer.json");
   ASSERT_EQ(found["points"].size(), 12u);
-  EXPECT_EQ(found["nearest"]["restitution"], nearest.restitution);
-  EXPECT_EQ(found["nearest"]["friction"], nearest.friction);
-  EXPECT_EQ(found["nearest"]["side_friction"], nearest.side_friction);
-  // Every point is the same bed as in the full search: the same number within its error (3 standard errors).
+  bool is_as_near = false;
+  for (const auto& point : found["as_near"]) {
+    is_as_near = is_as_near || (point["restitution"] == nearest.restitution && point["friction"] == nearest.friction &&
+                                point["side_friction"] == nearest.side_friction);
+  }
+  EXPECT_TRUE(is_as_near) << found["as_near"].dump(1);
   for (const auto& point : found["points"]) {
     for (const Row& row : full) {
       if (row.restitution != point["restitution"] || row.friction != point["friction"] ||
           row.side_friction != point["side_friction"])
         continue;
       const double temperature = point["temperature_over_mg"]["value"].get<double>() / 2.99e-3;
-      EXPECT_NEAR(temperature, row.temperature, 3 * row.temperature_error) << row.restitution << " " << row.friction;
+      const double error =
+          std::hypot(point["temperature_over_mg"]["std_error"].get<double>() / 2.99e-3, row.temperature_error);
+      EXPECT_NEAR(temperature, row.temperature, 3 * error) << row.restitution << " " << row.friction;
     }
   }
 }
