@@ -13,10 +13,11 @@ trap 'rm -rf "$folder"' EXIT
 [ -z "$pictures" ] || { mkdir -p "$pictures"; pictures=$(cd "$pictures" && pwd); }
 cd "$folder"
 "$shakebed" init bed.json >/dev/null
-"$shakebed" run bed.json --out o --quiet >/dev/null 2>&1
-sed 's#"name": "my-bed",#&\n  "sweep": { "over": { "/stages/bed/floor/amplitude": ["1.5 mm", "2 mm"] } },#' bed.json >sweep.json
+# Short runs: whether their numbers are good (exit code 6) is not the question here.
+"$shakebed" run bed.json --preset quick --out o --quiet >/dev/null 2>&1 || [ $? = 6 ]
+sed 's#"name": "my-bed",#&\n  "sweep": { "over": { "/stages/bed/floor/amplitude": ["2.5 mm", "2.8 mm"] } },#' bed.json >sweep.json
 "$shakebed" run sweep.json --out s --quiet --set /stages/bed/measure="0.5 s" --set /stages/bed/settle="0.2 s" \
-  --set /stages/bed/frames/count=16 >/dev/null 2>&1
+  --set /stages/bed/frames/count=16 >/dev/null 2>&1 || [ $? = 6 ]
 bad=0
 complain() { echo "$*"; bad=1; }
 
