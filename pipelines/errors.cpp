@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <new>
 
 namespace shakebed::pipelines {
 
@@ -34,5 +37,10 @@ std::string join(const std::vector<Problem>& problems) {
 
 ConfigError::ConfigError(std::vector<Problem> problems)
     : Error(code_of(problems), join(problems)), problems_(std::move(problems)) {}
+
+void fail_to_read(const std::string& path) {
+  if (errno == ENOMEM) throw std::bad_alloc();
+  throw InputError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
+}
 
 }  // namespace shakebed::pipelines

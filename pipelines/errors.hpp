@@ -71,4 +71,7 @@ class ConfigError : public Error {
   std::vector<Problem> problems_;
 };
 
+// Of a file that could not be opened or read, by errno; where memory was short it is not the file's fault.
+[[noreturn]] void fail_to_read(const std::string& path);
+
 }  // namespace shakebed::pipelines

@@ -29,7 +29,7 @@ class MappedFile {
  public:
   explicit MappedFile(const std::filesystem::path& path) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    if (descriptor < 0) fail_to_read(path.string());
     struct stat status {};
     if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
       ::close(descriptor);
@@ -40,7 +40,7 @@ class MappedFile {
       data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
       if (data_ == MAP_FAILED) {
         ::close(descriptor);
-        throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+        fail_to_read(path.string());
       }
     }
     ::close(descriptor);

@@ -415,7 +415,7 @@ static std::string read_text(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, error))
     throw InputError(path.string() + ": is a directory, a file is needed");
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+  if (!stream) fail_to_read(path.string());
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();

@@ -108,7 +108,7 @@ struct TrajectoryReader::Decompressor {
 
 TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(path.string()) {
   file_ = std::fopen(path_.c_str(), "rbe");
-  if (file_ == nullptr) throw InputError(fmt::format("{}: cannot be read: {}", path_, std::strerror(errno)));
+  if (file_ == nullptr) fail_to_read(path_);
   if (path.extension() == ".zst") decompressor_ = std::make_unique<Decompressor>();
 }
 

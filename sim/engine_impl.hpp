@@ -443,21 +443,24 @@ template <class Space, class Rule, class Sizes>
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] void Engine<Space, Rule, Sizes>::process_and_tell(std::uint32_t i) {
   const Disk before = disks_[i];
-  const auto j = static_cast<std::uint32_t>(before.partner);
-  const bool touches = before.partner >= 0 && is_mutual(i, j);
-  const Motion first = motion_at(before, now_);
-  const Motion second = touches ? motion_at(disks_[j], now_) : first;
+  const bool touches = before.partner >= 0 && is_mutual(i, static_cast<std::uint32_t>(before.partner));
+  // The lower first, whoever predicted it: so that what the watcher sums up is the same to the last bit after a
+  // restart.
+  const std::uint32_t a = touches ? std::min(i, static_cast<std::uint32_t>(before.partner)) : i;
+  const std::uint32_t b = touches ? std::max(i, static_cast<std::uint32_t>(before.partner)) : i;
+  const Motion first = motion_at(disks_[a], now_);
+  const Motion second = touches ? motion_at(disks_[b], now_) : first;
   process(i);
   const double time = base_ + now_;
   if (touches) {
     double dx = second.x - first.x, dz = second.z - first.z;
     if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
     if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-    const double mass = sizes_.mass(j);
-    watcher_->touched(time, first.x, first.z, dx, dz, mass * (disks_[j].vx - second.vx),
-                      mass * (disks_[j].vz - second.vz));
-    tell(i);
-    tell(j);
+    const double mass = sizes_.mass(b);
+    watcher_->touched(time, first.x, first.z, dx, dz, mass * (disks_[b].vx - second.vx),
+                      mass * (disks_[b].vz - second.vz));
+    tell(a);
+    tell(b);
   } else if (before.partner < 0 && before.partner != shell_exit) {
     const double mass = sizes_.mass(i);
     watcher_->touched_wall(time, labels_[i], before.partner == floor_below, first.z, mass * (disks_[i].vx - first.vx),
@@ -810,6 +813,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   intervals_done_ += intervals_;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
+  tell_all();  // as a run that goes on from here will be: what the watcher sums up is then cut at the same moments
   // Often enough for the clock's resolution, seldom enough to cost nothing: 150
   // to 1000 events a disk apart.
   const std::uint64_t events = counters_.events() - events_at_synchronisation_;
