@@ -51,7 +51,7 @@ TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   ScratchFolder folder;
   const ProgramResult result = run_shakebed(
       {"run", source + "/pipelines/recipes/clement-rajchenbach/infer.json", "--out", "out", "--jobs", "2", "--set",
-       "/stages/search/grid/restitution=[0.4,0.7,0.95]", "--set", "/stages/search/grid/friction=[0.2,0.6]"},
+       "/stages/search/grid/restitution=[0.6,0.8,0.95]", "--set", "/stages/search/grid/friction=[0.2,0.8]"},
       folder.path());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const pipelines::Json found = pipelines::read_json(folder / "out/search/infer.json");
