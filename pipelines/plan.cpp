@@ -505,7 +505,7 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
         problem(*node, where, fmt::format("names \"{}\" twice", node->text));
       } else if (std::find(row.accepts.begin(), row.accepts.end(), kind) == row.accepts.end()) {
         problem(*node, where,
-                fmt::format("\"{}\" is a {} stage, and {} does not read its results", node->text, kind, row.name),
+                fmt::format("\"{}\" is a stage of kind {}, and {} does not read its results", node->text, kind, row.name),
                 row.accepts.empty() ? "" : fmt::format("It reads those of {}", fmt::join(row.accepts, ", ")));
       } else {
         arrows[i].push_back(target);
