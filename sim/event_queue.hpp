@@ -31,9 +31,10 @@ class EventQueue {
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
     disks_ = disks;
     count_ = static_cast<std::uint32_t>(count);
+    beyond_cache_ = count > fits_cache;
+    const double turn = beyond_cache_ ? 1.2 : 2;  // the ring spans as many mean times between two events of a disk
     size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
     ring_.resize(static_cast<std::size_t>(size_));
-    beyond_cache_ = count > fits_cache;
     grow(256);
     clear(start, events_a_time / events_a_bucket);
   }
@@ -111,8 +112,7 @@ class EventQueue {
   }
 
  private:
-  static constexpr double events_a_bucket = 8,
-                          turn = 1.2;  // the ring spans as many mean times between two events of a disk
+  static constexpr double events_a_bucket = 8;
   static constexpr std::uint32_t entries_a_bucket = 15;
 
   struct Entry {
