@@ -70,12 +70,12 @@ float quantile(std::vector<float>& values, double fraction) {
 }
 
 // Points of a circle.
-struct CirclePoint {
-  float unit_x, unit_y;
+struct Point {
+  float x, y;
 };
-std::vector<CirclePoint> circle_points(double radius) {
+std::vector<Point> circle_points(double radius) {
   const int samples = std::clamp(static_cast<int>(4 * radius), 12, 48);
-  std::vector<CirclePoint> points;
+  std::vector<Point> points;
   for (int k = 0; k < samples; ++k) {
     const double angle = 2 * std::numbers::pi * k / samples;
     points.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))});
@@ -84,19 +84,19 @@ std::vector<CirclePoint> circle_points(double radius) {
 }
 
 // Share of the rim of a circle where the gradient points along the radius with at least `threshold`.
-double rim_support(const Gradient& gradient, int x, int y, double radius, const std::vector<CirclePoint>& points,
-                   float sign, float threshold) {
+double rim_support(const Gradient& gradient, int x, int y, double radius, const std::vector<Point>& points, float sign,
+                   float threshold) {
   std::size_t supported = 0, inside = 0;
   const float centre_x = static_cast<float>(x) + 0.5F, centre_y = static_cast<float>(y) + 0.5F;
-  for (const CirclePoint& point : points) {
-    const float to_x = centre_x + static_cast<float>(radius) * point.unit_x,
-                to_y = centre_y + static_cast<float>(radius) * point.unit_y;
+  for (const Point& point : points) {
+    const float to_x = centre_x + static_cast<float>(radius) * point.x,
+                to_y = centre_y + static_cast<float>(radius) * point.y;
     if (to_x < 1 || to_y < 1) continue;
     const int column = static_cast<int>(to_x), row = static_cast<int>(to_y);
     if (column >= gradient.width - 1 || row >= gradient.height - 1) continue;
     ++inside;
     const std::size_t at = gradient.at(column, row);
-    const float along = sign * (gradient.x[at] * point.unit_x + gradient.y[at] * point.unit_y);
+    const float along = sign * (gradient.x[at] * point.x + gradient.y[at] * point.y);
     const float size = std::sqrt(gradient.x[at] * gradient.x[at] + gradient.y[at] * gradient.y[at]);
     if (size > threshold && along > 0.8F * size) ++supported;
   }
@@ -148,12 +148,38 @@ GrayFrame busiest_window(const GrayFrame& frame, int side) {
   return window;
 }
 
+struct Spacing {
+  double median = 0, scatter = 0;
+};
 struct Candidate {
   double radius = 0, sign = 1, explained = 0, support = 0;
+  Spacing spacing;  // of its centres, px of the frame
 };
 
+// Median distance from a place to its second nearest neighbour (of the three in a honeycomb the one in the middle), and
+// half the width of its middle half; 0 for fewer than ten places.
+Spacing typical_spacing(const std::vector<Point>& places) {
+  if (places.size() < 10) return {};
+  std::vector<float> distances;
+  const std::size_t step = places.size() / 300 + 1;
+  for (std::size_t i = 0; i < places.size(); i += step) {
+    float nearest = 1e30F, second = 1e30F;
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      const float dx = places[j].x - places[i].x, dy = places[j].y - places[i].y;
+      const float squared = dx * dx + dy * dy;
+      if (j == i || squared >= second) continue;
+      second = std::max(nearest, squared);
+      nearest = std::min(nearest, squared);
+    }
+    distances.push_back(std::sqrt(second));
+  }
+  const double low = static_cast<double>(quantile(distances, 0.25)),
+               high = static_cast<double>(quantile(distances, 0.75));
+  return {static_cast<double>(quantile(distances, 0.5)), 0.5 * (high - low)};
+}
+
 // All radii of one level of the pyramid, both polarities.
-void vote(const GrayFrame& frame, double scale, double from_radius, double to_radius, Polarity polarity,
+void vote(const GrayFrame& frame, double scale, double from_radius, double to_radius,
           std::vector<Candidate>& candidates) {
   if (frame.width < 5 || frame.height < 5) return;
   const Gradient gradient = sobel(frame);
@@ -196,8 +222,6 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
   const double ratio = 1.04;
   const int count = static_cast<int>(std::ceil(std::log(to_radius / from_radius) / std::log(ratio))) + 1;
   for (const double sign : {1.0, -1.0}) {  // +1: brighter outwards (dark beads)
-    if (sign > 0 && polarity == Polarity::bright_beads) continue;
-    if (sign < 0 && polarity == Polarity::dark_beads) continue;
     std::vector<double> sharpness(static_cast<std::size_t>(count), 0.0);
     const auto fill = [&](double radius) {
       std::fill(votes.begin(), votes.end(), 0.0F);
@@ -251,7 +275,7 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
       }
       const double radius = from_radius * std::pow(ratio, position);
       fill(radius);
-      const std::vector<CirclePoint> circle = circle_points(radius);
+      const std::vector<Point> circle = circle_points(radius);
       std::vector<Peak> peaks;
       for (int row = 1; row + 1 < frame.height; ++row)
         for (int column = 1; column + 1 < frame.width; ++column) {
@@ -270,6 +294,7 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
       if (peaks.size() > 4000) peaks.resize(4000);
       std::vector<std::uint8_t> taken(width * height, 0);
       double explained = 0, support_sum = 0, support_weight = 0;
+      std::vector<Point> centres;
       const int keep_off = std::max(1, static_cast<int>(1.2 * radius));
       for (const Peak& peak : peaks) {
         const std::size_t at = gradient.at(peak.column, peak.row);
@@ -285,11 +310,17 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
         explained += votes_here;
         support_sum += support * votes_here;
         support_weight += votes_here;
+        centres.push_back({static_cast<float>(peak.column), static_cast<float>(peak.row)});
       }
       double chosen_weight = 0;
       for (const EdgePixel& edge : chosen) chosen_weight += static_cast<double>(edge.weight);
       if (support_weight <= 0) continue;
-      candidates.push_back({radius * scale, sign, explained / chosen_weight, support_sum / support_weight});
+      const Spacing spacing = typical_spacing(centres);
+      candidates.push_back({radius * scale,
+                            sign,
+                            explained / chosen_weight,
+                            support_sum / support_weight,
+                            {spacing.median * scale, spacing.scatter * scale}});
     }
   }
 }
@@ -311,7 +342,7 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
     const double high = std::min(largest_radius_px, 8.5 * scale);
     if (high > low) {
       const GrayFrame window = busiest_window(level, 340);
-      vote(window, scale, low / scale, high / scale, polarity, candidates);
+      vote(window, scale, low / scale, high / scale, candidates);
     }
     low = 7.5 * scale;
     level = halved(level);
@@ -319,8 +350,11 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
   }
   const Candidate* best = nullptr;
   const auto merit = [](const Candidate& c) { return c.explained * c.support * c.support; };
+  const auto allowed = [&](const Candidate& c) {
+    return polarity == Polarity::automatic || (c.sign > 0) == (polarity == Polarity::dark_beads);
+  };
   for (const Candidate& candidate : candidates)
-    if (!best || merit(candidate) > merit(*best)) best = &candidate;
+    if (allowed(candidate) && (!best || merit(candidate) > merit(*best))) best = &candidate;
   // The rims of a crystal are explained as well by the small voids between its beads, of the other polarity: if circles
   // a few times larger do nearly as well, they are the beads.
   if (best) {
@@ -328,7 +362,7 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
     const Candidate* beads = nullptr;
     for (const Candidate& candidate : candidates) {
       const double ratio = candidate.radius / best->radius;
-      if (candidate.sign == best->sign || ratio < least_ratio || ratio > most_ratio) continue;
+      if (candidate.sign == best->sign || !allowed(candidate) || ratio < least_ratio || ratio > most_ratio) continue;
       if (merit(candidate) > nearly * merit(*best) && (!beads || merit(candidate) > merit(*beads))) beads = &candidate;
     }
     if (beads) best = beads;
@@ -342,6 +376,26 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
   estimate.radius_px = best->radius;
   estimate.polarity = best->sign > 0 ? Polarity::dark_beads : Polarity::bright_beads;
   estimate.score = best->explained * best->support;
+  // Three touching beads leave a void of 0.15 radii or, blurred, up to 0.4, and the voids of a crystal are 1.155 radii
+  // apart; touching beads of that size would be 2 of their radii apart.
+  constexpr double fair = 0.3, least_spread = 2.6, most_spread = 9, same = 0.1;
+  const Candidate* voids = nullptr;
+  for (const Candidate& candidate : candidates) {
+    const double spread = candidate.spacing.median / candidate.radius;
+    if (spread < least_spread || spread > most_spread || merit(candidate) < fair * merit(*best)) continue;
+    if (polarity != Polarity::automatic && allowed(candidate)) continue;
+    if (!voids || merit(candidate) > merit(*voids)) voids = &candidate;
+  }
+  if (voids) {
+    const double radius = 0.5 * std::numbers::sqrt3 * voids->spacing.median;
+    const Polarity other = voids->sign > 0 ? Polarity::bright_beads : Polarity::dark_beads;
+    if (other != estimate.polarity || std::abs(radius / estimate.radius_px - 1) > same) {
+      estimate.packed_radius_px = radius;
+      estimate.packed_polarity = other;
+      constexpr double regular = 0.1;
+      estimate.packed_likely = voids->spacing.scatter < regular * voids->spacing.median;
+    }
+  }
   return estimate;
 }
 

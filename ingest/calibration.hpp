@@ -28,7 +28,12 @@ struct RadiusEstimate {
   double radius_px = 0;
   Polarity polarity = Polarity::automatic;  // dark_beads or bright_beads when found
   double score = 0;                         // how much of a typical disk's rim votes for its centre, 0 .. 1
-  std::string why_not;                      // when not found: a sentence
+  // A packed bed's rims are explained as well by the small voids between its beads. When there are such voids and the
+  // beads around them would have another radius than the one above: that radius and polarity, else 0.
+  double packed_radius_px = 0;
+  Polarity packed_polarity = Polarity::automatic;
+  bool packed_likely = false;  // the voids are evenly spaced
+  std::string why_not;         // when not found: a sentence
 };
 
 // Radius and polarity by gradient voting over all radii from `smallest_radius_px` to `largest_radius_px` (0: a third of

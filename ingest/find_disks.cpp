@@ -105,7 +105,7 @@ struct TileSums {
 
 void add_tile_sums(const GrayFrame& flat, const JointFit& fit, double spread, std::vector<TileSums>& tiles) {
   constexpr int side = 32;
-  const float bound = static_cast<float>(4 * spread);
+  const float bound = static_cast<float>(std::max(0.1, 4 * spread));
   for (int top = 0; top < flat.height; top += side)
     for (int left = 0; left < flat.width; left += side) {
       const int bottom = std::min(flat.height, top + side), right = std::min(flat.width, left + side);
@@ -135,7 +135,8 @@ void add_tile_sums(const GrayFrame& flat, const JointFit& fit, double spread, st
     }
 }
 
-void refine_light(LightField& light, const std::vector<TileSums>& tiles, int width, int height) {
+// Returns the largest change of a flattened level it makes.
+double refine_light(LightField& light, const std::vector<TileSums>& tiles, int width, int height) {
   const int order = std::min(width, height) >= 200 && tiles.size() >= 60 ? 4 : tiles.size() >= 20 ? 2 : 0;
   const std::size_t terms = polynomial_terms(order), size = 2 * terms;
   std::vector<double> matrix(size * size, 0.0), right(size, 0.0), basis(terms);
@@ -157,7 +158,8 @@ void refine_light(LightField& light, const std::vector<TileSums>& tiles, int wid
     matrix[a * size + a] += 1e-4 * matrix[0] + 1e-9;
     matrix[(terms + a) * size + terms + a] += 1e-3 * matrix[terms * size + terms] + 1e-9;
   }
-  if (!solve_symmetric(matrix, right, size)) return;
+  if (!solve_symmetric(matrix, right, size)) return 0;
+  double largest = 0;
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.columns; ++column) {
       const double u = std::clamp((2 * column * light.spacing_px + 1) / width - 1, -1.0, 1.05);
@@ -174,7 +176,9 @@ void refine_light(LightField& light, const std::vector<TileSums>& tiles, int wid
           static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
       light.background[at] += light.contrast[at] * static_cast<float>(beta);
       light.contrast[at] *= static_cast<float>(gamma);
+      largest = std::max({largest, std::abs(beta), std::abs(gamma - 1)});
     }
+  return largest;
 }
 
 // Typical size of the residual, robust against what is no bead at all.
@@ -358,37 +362,40 @@ bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disk
 
 }  // namespace
 
-CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
-  CalibrationResult result;
-  FinderCalibration& calibration = result.calibration;
-  if (frames.empty()) {
-    result.why_not = "there is no frame to learn from";
-    return result;
+namespace {
+
+// What remains of the frame, in squares of grey levels, once background and beads are taken out.
+double unexplained_of(const JointFit& fit, const LightField& light) {
+  double sum = 0;
+  for (int row = 0; row < fit.height(); ++row) {
+    const float* line = fit.residual_row(row);
+    const auto node_row = static_cast<std::size_t>(std::min(light.rows - 1.0, row / light.spacing_px + 0.5));
+    float part = 0;
+    for (int column = 0; column < fit.width(); ++column) {
+      const auto node = static_cast<std::size_t>(std::min(light.columns - 1.0, column / light.spacing_px + 0.5));
+      const float level = line[column] * light.contrast[node_row * static_cast<std::size_t>(light.columns) + node];
+      part += level * level;
+    }
+    sum += static_cast<double>(part);
   }
-  for (const GrayFrame* frame : frames) require_consistent(*frame);
+  return sum;
+}
+
+struct Learned {
+  CalibrationResult result;
+  double unexplained = 0;  // of the first frame, grey levels squared
+  bool complete = false;   // hardly more than its noise
+  bool astray = false;     // the radius went as far from the estimate as it may
+};
+
+// Learns all there is to learn, starting from a radius and a polarity.
+Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                   const RadiusEstimate& estimate) {
+  Learned all;
+  CalibrationResult& result = all.result;
+  FinderCalibration& calibration = result.calibration;
   calibration.width = frames.front()->width;
   calibration.height = frames.front()->height;
-
-  // A first radius and the polarity.
-  RadiusEstimate estimate;
-  if (options.radius_px && *options.radius_px > 0) {
-    estimate = estimate_radius(*frames.front(), options.polarity, std::max(1.0, 0.8 * *options.radius_px),
-                               1.25 * *options.radius_px);
-    if (!estimate.found && options.polarity != Polarity::automatic) {
-      estimate.found = true;
-      estimate.polarity = options.polarity;
-    }
-    if (estimate.found) estimate.radius_px = *options.radius_px;
-  } else {
-    for (const GrayFrame* frame : frames) {
-      estimate = estimate_radius(*frame, options.polarity);
-      if (estimate.found) break;
-    }
-  }
-  if (!estimate.found) {
-    result.why_not = "no disks seen: " + estimate.why_not;
-    return result;
-  }
   calibration.polarity = estimate.polarity;
   double radius = estimate.radius_px;
   double edge = std::clamp(0.08 * radius, 0.6, 1.5);
@@ -420,8 +427,13 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   }
   double spread = 0.1;
   double typical_explained = 1;
-  constexpr int rounds = 5;
-  for (int round = 0; round < rounds; ++round) {
+  // Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
+  // between the beads passes for a wider rim. So it goes on until the light settles within what noise
+  // allows, or does not settle: then there is more in the frame than beads and light.
+  constexpr int least_rounds = 5, most_rounds = 12;
+  bool settled = false;
+  double last_change = 0;
+  for (int round = 0; round < most_rounds; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
     std::size_t total = 0;
@@ -452,7 +464,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     if (total == 0) {
       result.why_not =
           "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but no filled disk fits";
-      return result;
+      return all;
     }
     std::vector<double> explained;
     for (const auto& one : disks)
@@ -463,7 +475,13 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     for (std::size_t f = 0; f < used.size(); ++f)
       prune(*fits[f], disks[f], radius, (round == 0 ? 0.3 : least_explained) * typical_explained);
     spread = std::max(1e-3, residual_spread(*fits.front()));
-    if (round + 1 == rounds) break;
+    constexpr double hopeless = 3;  // what is left is larger than the beads: light and bead run away from the frame
+    if (!(spread < hopeless)) {
+      result.why_not = "no disks seen: circles of " + std::to_string(radius) +
+                       " px were suspected, but no bead and no light make up the frame";
+      return all;
+    }
+    if (round + 1 == most_rounds || (round + 1 >= least_rounds && settled)) break;
 
     std::vector<const JointFit*> fit_pointers;
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
@@ -482,6 +500,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
         const double bound = round == 0 ? 0.05 : 0.12;
         if (!options.hold_radius)
           radius = std::clamp(rim.radius_px, (1 - bound) * estimate.radius_px, (1 + bound) * estimate.radius_px);
+        all.astray = !options.hold_radius && radius != rim.radius_px;
         edge = std::clamp(rim.edge_px, 0.29, std::max(0.5, 0.3 * radius));
       }
       profile = options.learn_profile ? learned : ideal_profile(radius, edge, reach_of(radius, edge));
@@ -494,7 +513,9 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
         fits[f]->reset(flats[f], disks[f]);
         add_tile_sums(flats[f], *fits[f], spread, tiles);
       }
-      refine_light(light, tiles, calibration.width, calibration.height);
+      const double change = refine_light(light, tiles, calibration.width, calibration.height);
+      settled = change < std::max(3e-4, 0.02 * spread) || change > 0.7 * last_change;
+      last_change = change;
     }
   }
   std::size_t total = 0;
@@ -502,7 +523,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   if (total == 0) {
     result.why_not =
         "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but none is filled like a bead";
-    return result;
+    return all;
   }
   calibration.radius_px = calibration.rim_radius_px = radius;
   // Rims that face open background tell the radius where the packed ones cannot: if the camera's tone curve bends, or
@@ -547,8 +568,69 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   if (total < 5)
     calibration.warnings.push_back("Only " + std::to_string(total) +
                                    " disks to learn the bead from: its radius is uncertain.");
+  all.unexplained = unexplained_of(*fits.front(), light);
+  all.complete = spread < 1.5 * noise_of(flats.front()) + 0.03;
   result.found = true;
-  return result;
+  return all;
+}
+
+}  // namespace
+
+CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
+  CalibrationResult result;
+  if (frames.empty()) {
+    result.why_not = "there is no frame to learn from";
+    return result;
+  }
+  for (const GrayFrame* frame : frames) require_consistent(*frame);
+  // A first radius and the polarity.
+  RadiusEstimate estimate;
+  if (options.radius_px && *options.radius_px > 0) {
+    estimate = estimate_radius(*frames.front(), options.polarity, std::max(1.0, 0.8 * *options.radius_px),
+                               1.25 * *options.radius_px);
+    if (!estimate.found && options.polarity != Polarity::automatic) {
+      estimate.found = true;
+      estimate.polarity = options.polarity;
+    }
+    if (estimate.found) estimate.radius_px = *options.radius_px;
+    estimate.packed_radius_px = 0;
+  } else {
+    for (const GrayFrame* frame : frames) {
+      estimate = estimate_radius(*frame, options.polarity);
+      if (estimate.found) break;
+    }
+  }
+  if (!estimate.found) {
+    result.why_not = "no disks seen: " + estimate.why_not;
+    return result;
+  }
+  const auto learn = [&](RadiusEstimate from) {
+    constexpr int most_starts = 3;
+    Learned best = learn_from(frames, options, from);
+    for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
+      from.radius_px = best.result.calibration.rim_radius_px;
+      Learned again = learn_from(frames, options, from);
+      if (!again.result.found || !again.complete || again.unexplained > 1.02 * best.unexplained) break;
+      best = std::move(again);
+    }
+    return best;
+  };
+  if (!(estimate.packed_radius_px > 0)) return learn(estimate).result;
+  // It may as well be a packed bed seen from its voids. The likelier is tried first; unless it explains the frame
+  // nearly down to its noise, so is the other. What was not seen at first is believed only when it does.
+  RadiusEstimate packed = estimate;
+  packed.radius_px = estimate.packed_radius_px;
+  packed.polarity = estimate.packed_polarity;
+  if (estimate.packed_likely) {
+    Learned as_packed = learn(packed);
+    if (as_packed.result.found && as_packed.complete) return as_packed.result;
+    return learn(estimate).result;
+  }
+  Learned as_seen = learn(estimate);
+  if (as_seen.result.found && as_seen.complete) return as_seen.result;
+  Learned as_packed = learn(packed);
+  const bool better = !as_seen.result.found || as_packed.unexplained < as_seen.unexplained;
+  return as_packed.result.found && as_packed.complete && better ? as_packed.result : as_seen.result;
 }
 
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

@@ -205,6 +205,7 @@ class HardCases {
              {350, 600, 150, 0, 0},
              {760, 580, 150, 0, 0}},
             camera_of(1000, 800), 0.05, 1, 5000);
+    picture("a packed bed, hardly any gas", bed_of(10, 420, 420, 18, 5), camera_of(420, 420), 0.02, 1);
     Disks flying = bed_of(10, 400, 400, 0, 90);
     for (RenderedDisk& disk : flying) {
       const double angle = 2 * std::numbers::pi * random.uniform();
