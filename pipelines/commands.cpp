@@ -230,19 +230,20 @@ int command_run(const Arguments& arguments) {
 }
 
 int command_reproduce(const Arguments& arguments) {
-  // A figure's name → its recipe: "clement-rajchenbach" is recipes/clement-rajchenbach/figure.json, "quinn-hong-fig1"
-  // is recipes/quinn-hong/fig1.json.
+  // A figure's name → its recipe: "quinn-hong-fig2" is recipes/quinn-hong-fig2/figure.json. The first one shipped comes
+  // first.
   std::vector<std::pair<std::string, const EmbeddedFile*>> figures;
   for (const EmbeddedFile& file : embedded_files()) {
     const fs::path path(file.name);
-    if (!file.name.starts_with("recipes/")) continue;
-    const std::string paper = path.parent_path().filename().string(), stem = path.stem().string();
-    if (stem == "figure")
-      figures.insert(figures.begin(), {paper, &file});
-    else if (stem.starts_with("fig"))
-      figures.emplace_back(paper + "-" + stem, &file);
+    if (!file.name.starts_with("recipes/") || path.stem() != "figure") continue;
+    figures.emplace_back(path.parent_path().filename().string(), &file);
   }
-  const std::string wanted = arguments.recipe.empty() ? "clement-rajchenbach" : arguments.recipe;
+  std::sort(figures.begin(), figures.end(), [](const auto& l, const auto& r) {
+    const auto order = [](const std::string& name) { return std::pair(name != "clement-rajchenbach", name); };
+    return order(l.first) < order(r.first);
+  });
+  const std::string wanted =
+      arguments.recipe.empty() || arguments.recipe == "quinn-hong-fig3" ? "clement-rajchenbach" : arguments.recipe;
   std::vector<std::string> names{"all"};
   for (const auto& [name, file] : figures) names.push_back(name);
   if (std::find(names.begin(), names.end(), wanted) == names.end()) {

@@ -150,8 +150,8 @@ class Report {
     for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
       out += fmt::format("<p>{}</p>\n", html(plan_.description));
-    out += banners() + warnings() + figures() + published() + checks() + bed_in_motion() + overlays() + fits() +
-           maps() + assumed() + graph() + downloads() + provenance();
+    out += banners() + warnings() + claims() + figures() + published() + checks() + bed_in_motion() + overlays() +
+           fits() + maps() + assumed() + graph() + downloads() + provenance();
     return out + "</main>\n</body>\n</html>\n";
   }
 
@@ -244,7 +244,7 @@ class Report {
   std::string figures() {
     std::string out;
     for (const PlannedStage& stage : plan_.stages) {
-      if (stage.row->name != "figure") continue;
+      if (stage.row->name != "figure" && stage.row->name != "chart") continue;
       std::vector<fs::path> files;
       std::error_code error;
       for (const fs::directory_entry& entry : fs::directory_iterator(directory(stage), error)) {
@@ -279,6 +279,31 @@ class Report {
           html(row.place));
     }
     return out + "</table></div>\n";
+  }
+
+  std::string claims() const {
+    std::string out;
+    for (const PlannedStage& stage : plan_.stages) {
+      if (stage.row->name != "claims" || !results_.contains(stage.id)) continue;
+      out +=
+          "<h2>Claim by claim</h2>\n<div class=\"scroll\"><table>\n<tr><th>claim</th><th>claimed</th><th>measured</th>"
+          "<th>verdict</th><th>where</th></tr>\n";
+      for (const Json& row : results_.at(stage.id).value("claims", Json::array())) {
+        const std::string verdict = row.value("verdict", "");
+        const auto aside = [&](const char* key) {
+          const std::string text = row.value(key, "");
+          return text.empty() ? "" : fmt::format("<br><span class=\"soft\">{}</span>", html(text));
+        };
+        out += fmt::format(
+            "<tr><td>{}{}</td><td>{}</td><td class=\"number\">{}</td><td><span class=\"{}\">{}</span>{}</td><td>{}</td>"
+            "</tr>\n",
+            html(row.value("claim", "")), aside("measured_as"), html(row.value("claimed", "")),
+            html(row.value("measured", "")), verdict == "holds" || verdict == "agrees within errors" ? "good" : "bad",
+            html(verdict), aside("note"), html(row.value("place", "")));
+      }
+      out += "</table></div>\n<p class=\"soft\">" + html(results_.at(stage.id).value("verdict_is", "")) + ".</p>\n";
+    }
+    return out;
   }
 
   std::string checks() const {

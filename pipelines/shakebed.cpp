@@ -79,8 +79,10 @@ int run_program(int argc, char** argv) {
                                 "  shakebed reproduce\n  shakebed reproduce --preset quick\n  shakebed reproduce "
                                 "clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce all",
                                 command_reproduce);
-  reproduce->add_option("figure", arguments.recipe,
-                        "clement-rajchenbach (the default), quinn-hong-fig1, -fig2, -fig3, all");
+  reproduce->add_option(
+      "figure", arguments.recipe,
+      "clement-rajchenbach (the default; also named quinn-hong-fig3), quinn-hong-fig1, quinn-hong-fig2, "
+      "quinn-hong-eq6, quinn-hong-beyond, all");
   add_preset(*reproduce, arguments.run);
   add_run(*reproduce, arguments.run);
 

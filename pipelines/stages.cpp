@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "pipelines/stages/chart.hpp"
 #include "pipelines/stages/check.hpp"
+#include "pipelines/stages/claims.hpp"
 #include "pipelines/stages/extract.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "pipelines/stages/fit.hpp"
@@ -10,12 +12,19 @@
 #include "pipelines/stages/map.hpp"
 #include "pipelines/stages/render.hpp"
 #include "pipelines/stages/simulate.hpp"
+#include "pipelines/stages/study.hpp"
 
 namespace shakebed::pipelines {
 
 const std::vector<StageRow>& stage_table() {
-  static const std::vector<StageRow> table = {simulate_stage(), infer_stage(), render_stage(), extract_stage(),
-                                              fit_stage(),      map_stage(),   figure_stage(), check_stage()};
+  static const std::vector<StageRow> table = [] {
+    std::vector<StageRow> rows = {simulate_stage(), infer_stage(),  render_stage(), extract_stage(), fit_stage(),
+                                  map_stage(),      figure_stage(), chart_stage(),  claims_stage(),  check_stage()};
+    int versions = 0;
+    for (const StageRow& row : rows) versions += row.version;
+    rows.insert(rows.begin() + 2, study_stage(versions));
+    return rows;
+  }();
   return table;
 }
 

@@ -263,6 +263,13 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
     plain("psi6_global", order_->psi6_global(), "1");
     plain("neighbours_per_disk", order_->neighbours_per_disk(), "1");
     plain("vacancies", order_->vacancies(), "1");
+    // Part of the disks that lie in layers whose mean |psi_6| is at least so large: a solid by order, not by density.
+    for (const int percent : {70, 80, 90}) {
+      double share = 0;
+      for (const sim::OrderObserver::Layer& layer : order_->layers())
+        share += layer.psi6_local >= percent / 100.0 ? layer.share : 0;
+      out[fmt::format("crystal_share_{}", percent)] = quantity_json(share, "1");
+    }
   }
   if (plan_.observe.velocities) {
     plain("a2", lab_->fourth_cumulant_of_all(), "1");

@@ -271,7 +271,7 @@ StageRow check_stage() {
   return {.name = "check",
           .version = 1,
           .summary = "compares results with expected values; exit code 6 when one is off",
-          .accepts = {"simulate", "infer", "render", "extract", "fit", "map", "figure"},
+          .accepts = {"simulate", "infer", "study", "render", "extract", "fit", "map", "figure", "chart", "claims"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "check.json",

@@ -43,65 +43,66 @@ std::string plain(std::string_view text) {
 
 }  // namespace
 
-void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name) {
-  std::string data;
-  for (const Series& series : picture.series) {
-    data += fmt::format("# {}\n# x y{}\n", series.label, series.error.empty() ? "" : " std_error");
-    for (std::size_t i = 0; i < series.x.size(); ++i) {
-      data += number_text(series.x[i]) + ' ' + number_text(series.y[i]);
-      if (!series.error.empty()) data += ' ' + number_text(std::max(0.0, series.error[i]));
-      data += '\n';
-    }
-    data += "\n\n";
-  }
-  write_file(directory / (name + ".dat"), data);
+namespace {
 
-  std::string script =
-      "set encoding utf8\nset terminal svg size 860,560 enhanced font 'Helvetica,16' background '#ffffff' linewidth "
-      "1.4\n";
-  script += fmt::format("set output {}\n", gnuplot_text(name + ".svg"));
-  script += fmt::format("set xlabel {}\nset ylabel {}\n", gnuplot_text(picture.x_label), gnuplot_text(picture.y_label));
-  if (!picture.title.empty()) script += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
-  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
-  script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
-                        bound(picture.y_low), bound(picture.y_high));
-  script +=
-      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
-      "pointintervalbox 0\n";
-  // Above the picture, where it hides nothing.
-  script += "set key above vertical maxrows 3 spacing 1.25 samplen 2.5\n";
-  int object = 1;
-  for (const auto& [low, high] : picture.bands) {
-    script += fmt::format(
-        "set object {} rectangle from {}, graph 0 to {}, graph 1 behind fillcolor rgb '#f0f0f0' fillstyle solid "
-        "noborder\n",
-        object++, number_text(low), number_text(high));
+// Both pictures from one script: it is drawn twice, and what differs (size, font, file) comes first. The PDF is as wide
+// as one column of a journal, 86 mm, with text that reads there.
+std::string twice(const std::string& name, double width, double height, const std::string& body) {
+  std::string script = "set encoding utf8\n";
+  script += fmt::format(
+      "set terminal svg size {:.0f},{:.0f} enhanced font 'Helvetica,16' background '#ffffff' linewidth 1.4\nset output "
+      "{}\nscale = 1.0\nkeyfont = ',14'\n",
+      width, height, gnuplot_text(name + ".svg"));
+  script += body + "unset output\n\nreset\nset encoding utf8\n";
+  script += fmt::format(
+      "set terminal pdfcairo size 8.6cm,{:.2f}cm enhanced font 'Helvetica,7' background '#ffffff' linewidth "
+      "0.6\nset output {}\nscale = 0.6\nkeyfont = ',6'\n",
+      8.6 * height / width, gnuplot_text(name + ".pdf"));
+  return script + body + "unset output\n";
+}
+
+void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script) {
+  write_file(directory / (name + ".gp"), script);
+  ProcessResult result;
+  try {
+    // Without a time of making in the PDF: the same data give the same bytes.
+    result = run_process({"env", "SOURCE_DATE_EPOCH=0", "gnuplot", name + ".gp"}, directory);
+  } catch (const StageError& error) {
+    throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", error.what()));
   }
-  script += "plot ";
-  bool first = true;
-  if (!picture.band_label.empty()) {
-    script += fmt::format("NaN with boxes fillcolor rgb '#e4e4e4' fillstyle solid noborder title {}",
-                          gnuplot_text(plain(picture.band_label)));
-    first = false;
+  if (result.exit_code == 127)
+    throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", result.output));
+  for (const char* kind : {".svg", ".pdf"}) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(directory / (name + kind), error);
+    if (result.exit_code != 0 || error || size == 0) {
+      throw StageError(
+          fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
+    }
   }
-  constexpr std::array points = {7, 5, 9, 13, 11};  // filled circle, square, triangle, diamond, triangle down
+}
+
+// The series as "plot" elements, their data at `index` and after in NAME.dat.
+std::string plot_elements(const std::vector<Series>& all, const std::string& name, std::size_t index, bool titles) {
+  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4};  // filled circle, square, triangle, diamond, ...; open ones
   std::size_t point = 0;
-  for (std::size_t i = 0; i < picture.series.size(); ++i) {
-    const Series& series = picture.series[i];
+  std::string script;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Series& series = all[i];
+    const std::size_t shape = series.style == Series::Style::points ? point++ : 0;
     if (series.x.empty()) continue;
-    script += first ? "" : ", \\\n     ";
-    first = false;
+    script += script.empty() ? "" : ", \\\n     ";
     const char* color = palette[static_cast<std::size_t>(series.color) % palette.size()];
     // The error bars as plain strokes below the points: gnuplot's own leave gaps around them.
     if (series.style == Series::Style::points && !series.error.empty()) {
       script += fmt::format(
           "{} index {} using 1:($2-$3):(0):(2*$3) with vectors nohead lw 1.2 lc rgb '{}' notitle, \\\n     ",
-          gnuplot_text(name + ".dat"), i, color);
+          gnuplot_text(name + ".dat"), index + i, color);
     }
-    script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), i);
+    script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), index + i);
     switch (series.style) {
       case Series::Style::points:
-        script += fmt::format("1:2 with points pt {} ps 0.55 lc rgb '{}'", points[point++ % points.size()], color);
+        script += fmt::format("1:2 with points pt {} ps 0.55*scale lc rgb '{}'", points[shape % points.size()], color);
         break;
       case Series::Style::line:
         script += fmt::format("1:2 with lines lw 2 lc rgb '{}'", color);
@@ -113,23 +114,110 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
         script += fmt::format("1:2 with lines lw 1.6 dashtype 3 lc rgb '{}'", color);
         break;
     }
-    script += fmt::format(" title {}", gnuplot_text(plain(series.label)));
+    script += titles ? fmt::format(" title {}", gnuplot_text(plain(series.label))) : std::string(" notitle");
   }
-  script += "\n";
-  if (first) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
-  write_file(directory / (name + ".gp"), script);
-  ProcessResult result;
-  try {
-    result = run_process({"gnuplot", name + ".gp"}, directory);
-  } catch (const StageError& error) {
-    throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", error.what()));
+  return script;
+}
+
+}  // namespace
+
+void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name) {
+  std::string data;
+  const auto add = [&](const std::vector<Series>& all) {
+    for (const Series& series : all) {
+      data += fmt::format("# {}\n# x y{}\n", series.label, series.error.empty() ? "" : " std_error");
+      for (std::size_t i = 0; i < series.x.size(); ++i) {
+        data += number_text(series.x[i]) + ' ' + number_text(series.y[i]);
+        if (!series.error.empty()) data += ' ' + number_text(std::max(0.0, series.error[i]));
+        data += '\n';
+      }
+      data += "\n\n";
+    }
+  };
+  // An empty one would not count as an index of gnuplot's.
+  Picture drawn = picture;
+  const auto is_empty = [](const Series& series) { return series.x.empty(); };
+  std::erase_if(drawn.series, is_empty);
+  std::erase_if(drawn.lower, is_empty);
+  if (drawn.series.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
+  add(drawn.series), add(drawn.lower);
+  write_file(directory / (name + ".dat"), data);
+
+  const bool two = !drawn.lower.empty();
+  std::string body;
+  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
+  body += fmt::format("set ylabel {}\n", gnuplot_text(picture.y_label));
+  if (!picture.title.empty()) body += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
+  body += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
+                      bound(picture.y_low), bound(picture.y_high));
+  if (picture.logarithmic_x) body += "set logscale x\n";
+  if (picture.logarithmic_y) body += "set logscale y\n";
+  body +=
+      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
+      "pointintervalbox 0\n";
+  // Above the picture, where it hides nothing.
+  body += "set key above vertical maxrows 3 font keyfont spacing 1.2 samplen 2\n";
+  int object = 1;
+  for (const auto& [low, high] : picture.bands) {
+    body += fmt::format(
+        "set object {} rectangle from {}, graph 0 to {}, graph 1 behind fillcolor rgb '#f0f0f0' fillstyle solid "
+        "noborder\n",
+        object++, number_text(low), number_text(high));
   }
-  std::error_code error;
-  const auto size = std::filesystem::file_size(directory / (name + ".svg"), error);
-  if (result.exit_code != 0 || error || size == 0) {
-    throw StageError(
-        fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
+  if (two) {
+    body +=
+        "set multiplot\nset lmargin at screen 0.14\nset rmargin at screen 0.97\nset tmargin at screen 0.84\nset "
+        "bmargin at screen 0.38\nset format x ''\n";
+  } else {
+    body += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
   }
+  body += "plot ";
+  if (!picture.band_label.empty()) {
+    body += fmt::format("NaN with boxes fillcolor rgb '#e4e4e4' fillstyle solid noborder title {}, \\\n     ",
+                        gnuplot_text(plain(picture.band_label)));
+  }
+  body += plot_elements(drawn.series, name, 0, true) + "\n";
+  if (two) {
+    body += fmt::format(
+        "set tmargin at screen 0.35\nset bmargin at screen 0.12\nunset key\nunset title\nset format x '% h'\nset "
+        "xlabel {}\nset ylabel {}\nset yrange [*:*]\nunset logscale y\nset xzeroaxis lc rgb "
+        "'#404040' lw 1\n",
+        gnuplot_text(picture.x_label), gnuplot_text(picture.lower_label));
+    // The two share their x: where the upper one found it by itself, the lower one takes it over.
+    if (!picture.x_low || !picture.x_high) body += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
+    body += "plot " + plot_elements(drawn.lower, name, drawn.series.size(), false) + "\nunset multiplot\n";
+  }
+  run_gnuplot(directory, name, twice(name, 860, two ? 720 : 560, body));
+}
+
+void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
+  if (picture.x.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
+  std::string data = "# disks: x y radius color\n";
+  double top = 0;
+  for (std::size_t i = 0; i < picture.x.size(); ++i) {
+    data += fmt::format("{} {} {} {}\n", picture.x[i], picture.y[i], picture.radius[i], picture.color[i]);
+    top = std::max(top, picture.y[i] + picture.radius[i]);
+  }
+  data += "\n\n# crosses: x y\n";
+  for (std::size_t i = 0; i < picture.cross_x.size(); ++i)
+    data += fmt::format("{} {}\n", picture.cross_x[i], picture.cross_y[i]);
+  data += "\n\n";
+  write_file(directory / (name + ".dat"), data);
+  std::string body = fmt::format(
+      "set xlabel {}\nset ylabel {}\nset cblabel {}\nset xrange [0:{}]\nset yrange [0:{}]\nset size ratio -1\nset "
+      "border lc rgb '#404040'\nset tics nomirror out\nset cbrange [{}:{}]\n"
+      // Dark blue to yellow: rises in lightness alone [cividis; Nunez, Anderton and Renslow 2018].
+      "set palette defined (0 '#00224e', 0.25 '#3b496c', 0.5 '#7b7b78', 0.75 '#bcae6c', 1 '#fee838')\nset style fill "
+      "solid 1 border lc rgb '#303030'\nset key above\n",
+      gnuplot_text(picture.x_label), gnuplot_text(picture.y_label), gnuplot_text(picture.color_label), picture.width,
+      std::ceil(top + 0.5), picture.color_low, picture.color_high);
+  body +=
+      fmt::format("plot {} index 0 using 1:2:3:4 with circles lc palette lw 0.5 notitle", gnuplot_text(name + ".dat"));
+  if (!picture.cross_x.empty())
+    body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 0.9*scale lw 2 lc rgb '#D55E00' title {}",
+                        gnuplot_text(name + ".dat"), gnuplot_text(plain(picture.cross_label)));
+  const double shape = std::clamp((top + 6) / (picture.width + 8), 0.3, 2.0);
+  run_gnuplot(directory, name, twice(name, 860, 860 * shape, body + "\n"));
 }
 
 namespace {
@@ -367,7 +455,7 @@ void Figure::run(RunContext& context) const {
 
 StageRow figure_stage() {
   return {.name = "figure",
-          .version = 1,
+          .version = 2,
           .summary = "draws profiles, fits and published curves",
           .accepts = {"extract", "simulate", "fit"},
           .fewest_inputs = 1,

@@ -1,7 +1,7 @@
 // figure: profiles, fits and published curves in one picture, by gnuplot.
 //
-// Files: profile.svg with its profile.dat and profile.gp; windows.svg/.dat/.gp (temperature against window, where a fit
-// is among the inputs); figure.json (how far the curves are from one another).
+// Files: profile.svg and profile.pdf with their profile.dat and profile.gp; windows.* (temperature against window,
+// where a fit is among the inputs); figure.json (how far the curves are from one another).
 #pragma once
 
 #include "pipelines/stages.hpp"
@@ -24,8 +24,19 @@ struct Picture {
   std::optional<double> x_low{}, x_high{}, y_low{}, y_high{};
   std::vector<std::pair<double, double>> bands{};  // shaded from x to x
   std::string band_label{};
+  std::vector<Series> lower{};  // a second panel below, on the same x: residuals; none: one panel
+  std::string lower_label{};
+  bool logarithmic_x = false, logarithmic_y = false;
 };
-// Writes NAME.dat, NAME.gp and NAME.svg into the folder. Throws StageError when gnuplot is missing or fails.
+// Disks to scale, coloured by a number from 0 to 1, with crosses where `cross_x` and `cross_y` say.
+struct DiskPicture {
+  double width = 0;  // of the box
+  std::vector<double> x{}, y{}, radius{}, color{}, cross_x{}, cross_y{};
+  std::string x_label{}, y_label{}, color_label{}, cross_label{};
+  double color_low = 0, color_high = 1;
+};
+void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
+// Writes NAME.dat, NAME.gp, NAME.svg and NAME.pdf into the folder. Throws StageError when gnuplot is missing or fails.
 void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name);
 
 }  // namespace shakebed::pipelines

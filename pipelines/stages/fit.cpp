@@ -47,6 +47,8 @@ class Fit : public Stage {
                    {.help = "fit it too (its T is biased low; printed beside the headline anyway)"});
     fields.number("temperature", options_.fixed_temperature,
                   {.help = "hold T at this value in m g D", .range = positive});
+    fields.boolean("temperature_measured", temperature_measured_,
+                   {.help = "hold T at the kinetic temperature of the simulated bed in \"from\", (T_x + T_z)/2"});
     fields.number("shift", options_.fixed_shift, {.help = "hold the shift at this height in D"});
     fields.number("column_number", options_.column_number,
                   {.help = "N D/W; left out, what the measurement says", .range = positive});
@@ -92,6 +94,10 @@ class Fit : public Stage {
     fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
     if (!fields.decoding()) return;
     const bool upstream = !fields.upstream().empty();
+    fields.require(!temperature_measured_ || fields.has_upstream("simulate"), "temperature_measured",
+                   "no simulate stage in \"from\" has measured a temperature");
+    fields.require(!temperature_measured_ || !options_.fixed_temperature, "temperature_measured",
+                   "T is held at \"temperature\" already");
     fields.require(upstream || fields.has("profile"), "",
                    "there is no profile: neither \"profile\" nor a stage in \"from\"", "Give one of the two");
     fields.require(profile_.paths.size() <= 1, "profile",
@@ -118,6 +124,7 @@ class Fit : public Stage {
   KernelOptions kernel_;
   WindowChoice window_;
   ErrorSource errors_ = ErrorSource::diagonal;
+  bool temperature_measured_ = false;
 };
 
 // Covariance between the heights of a profile, from covariance.csv.
@@ -174,6 +181,13 @@ void Fit::run(RunContext& context) const {
     }
   }
   if (!options.column_number) options.column_number = number_in(table.comment("column_number"));
+  if (temperature_measured_) {
+    const Json bed = context.input("simulate").result();
+    const Json *x = find_pointer(bed, "/temperature_x/value"), *z = find_pointer(bed, "/temperature_z/value");
+    if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
+      throw InputError("the simulated bed has no kinetic temperature at which T could be held");
+    options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
+  }
   fit::Profile profile;
   profile.height = table.height;
   profile.number_density = table.number_density;

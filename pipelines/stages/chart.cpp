@@ -1,0 +1,430 @@
+#include "pipelines/stages/chart.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <complex>
+
+#include "fit/straight_line.hpp"
+#include "pipelines/bed.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/stages/figure.hpp"
+#include "pipelines/trajectory.hpp"
+#include "sim/order.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+enum class Look { points, line, dashed, dotted };
+
+struct PointsOptions {
+  std::string name, from, file = "table.csv", label;
+  std::vector<std::pair<std::string, std::string>> where;  // column → value
+  std::string x, y, error;
+  Look look = Look::points;
+  int color = -1;
+  double times = 1, plus = 0, x_times = 1, x_plus = 0;
+  std::optional<double> x_least, x_most;  // of those drawn and used
+  bool line_fit = false;
+  std::optional<double> fit_least, fit_most;
+  std::uint32_t pool = 1;
+  std::string against;         // name of a curve
+  std::vector<double> levels;  // of y: where are they crossed
+  bool residuals = false;
+};
+struct CurveOptions {
+  std::string name, label;
+  std::vector<double> polynomial;
+  double from = 0, to = 1;
+  Look look = Look::line;
+  int color = 0;
+};
+struct ChartOptions {
+  std::string name, x_label, y_label, residual_label;
+  std::optional<double> x_low, x_high, y_low, y_high;
+  bool logarithmic_x = false, logarithmic_y = false;
+  std::vector<PointsOptions> points;
+  std::vector<CurveOptions> curves;
+};
+struct SnapshotOptions {
+  std::string name, from;
+};
+
+Series::Style style_of(Look look) {
+  return look == Look::points   ? Series::Style::points
+         : look == Look::line   ? Series::Style::line
+         : look == Look::dashed ? Series::Style::dashed
+                                : Series::Style::dotted;
+}
+const std::vector<Choice<Look>> looks{
+    {Look::points, "points"}, {Look::line, "line"}, {Look::dashed, "dashed"}, {Look::dotted, "dotted"}};
+
+double value_at(const CurveOptions& curve, double x) {
+  double y = 0;
+  for (std::size_t k = curve.polynomial.size(); k-- > 0;) y = y * x + curve.polynomial[k];
+  return y;
+}
+
+std::optional<double> number_in(const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+// Rows of a table that fulfil `where`, with x rising.
+struct Data {
+  std::vector<double> x, y, error;
+  bool has_errors = true;
+};
+Data read_data(const std::filesystem::path& path, const PointsOptions& options) {
+  const std::string text = read_file(path);
+  std::vector<std::string> header;
+  struct Row {
+    double x, y, error;
+  };
+  std::vector<Row> rows;
+  Data data;
+  bool any = false;
+  const auto column = [&](const std::string& name) {
+    const auto found = std::find(header.begin(), header.end(), name);
+    if (found == header.end()) {
+      const std::string nearest = nearest_name(name, header);
+      throw InputError(fmt::format("{}: has no column \"{}\"; {}", path.string(), name,
+                                   nearest.empty() ? fmt::format("there are {}", fmt::join(header, ", "))
+                                                   : fmt::format("did you mean \"{}\"?", nearest)));
+    }
+    return static_cast<std::size_t>(found - header.begin());
+  };
+  std::size_t x = 0, y = 0, error = 0;
+  std::vector<std::size_t> conditions;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    begin = end + 1;
+    if (line.empty() || line.front() == '#') continue;
+    const auto cells = split_csv_line(line);
+    if (header.empty()) {
+      header = cells;
+      x = column(options.x), y = column(options.y);
+      std::string of_error = options.error;
+      if (of_error.empty()) {
+        for (const std::string& name : {options.y + "_error", std::string("std_error")})
+          if (of_error.empty() && std::find(header.begin(), header.end(), name) != header.end()) of_error = name;
+      }
+      data.has_errors = !of_error.empty() && of_error != "none";
+      if (data.has_errors) error = column(of_error);
+      for (const auto& [name, ignored] : options.where) conditions.push_back(column(name));
+      continue;
+    }
+    const auto cell = [&](std::size_t k) { return k < cells.size() ? cells[k] : std::string(); };
+    bool wanted = true;
+    for (std::size_t k = 0; k < conditions.size(); ++k)
+      wanted = wanted && cell(conditions[k]) == options.where[k].second;
+    any = any || wanted;
+    const auto at = number_in(cell(x)), value = number_in(cell(y));
+    if (!wanted || !at || !value) continue;
+    const double place = options.x_plus + options.x_times * *at;
+    if (options.x_least && place < *options.x_least) continue;
+    if (options.x_most && place > *options.x_most) continue;
+    const auto spread = data.has_errors ? number_in(cell(error)) : std::nullopt;
+    rows.push_back({place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0});
+  }
+  if (!any) throw InputError(fmt::format("{}: no row is one of \"{}\"", path.string(), options.name));
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& l, const Row& r) { return l.x < r.x; });
+  for (const Row& row : rows) data.x.push_back(row.x), data.y.push_back(row.y), data.error.push_back(row.error);
+  return data;
+}
+
+// Errors from few replicas scatter themselves: each becomes the root mean square of those of the `pool` nearest points.
+std::vector<double> pooled(const std::vector<double>& errors, std::size_t pool) {
+  if (pool <= 1) return errors;
+  std::vector<double> out;
+  const std::size_t n = errors.size(), span = std::min(pool, n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t first = std::min(i - std::min(i, span / 2), n - span);
+    double squares = 0;
+    for (std::size_t k = first; k < first + span; ++k) squares += errors[k] * errors[k];
+    out.push_back(std::sqrt(squares / static_cast<double>(span)));
+  }
+  return out;
+}
+
+class Chart : public Stage {
+ public:
+  void describe(Fields& fields) override;
+  void run(RunContext& context) const override;
+
+ private:
+  Json draw(const RunContext& context, const ChartOptions& chart) const;
+  Json snapshot(const RunContext& context, const SnapshotOptions& snapshot) const;
+  std::vector<ChartOptions> charts_;
+  std::vector<SnapshotOptions> snapshots_;
+};
+
+const Input& input_named(const RunContext& context, const std::string& id) {
+  for (const Input& input : context.inputs()) {
+    if (input.id == id || (id.empty() && context.inputs().size() == 1)) return input;
+  }
+  throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
+}
+
+void describe_points(Fields& fields, PointsOptions& p) {
+  fields.text("name", p.name, {.help = "its name in chart.json", .required = true});
+  fields.text("from", p.from, {.help = "id of the stage whose table it is; may be left out when there is one"});
+  fields.text("file", p.file, {.help = "a CSV in that stage's folder"});
+  fields.text("label", p.label, {.help = "in the key; none: not in the key"});
+  Json where = Json::object();
+  for (const auto& [name, value] : p.where) where[name] = value;
+  fields.any("where", where, {.help = "only rows with: column → text"});
+  fields.text("x", p.x, {.help = "column", .required = true});
+  fields.text("y", p.y, {.help = "column", .required = true});
+  fields.text("error", p.error, {.help = "column of the errors of y; left out, y_error or std_error; \"none\""});
+  fields.choice("look", p.look, looks, {.help = "how it is drawn"});
+  fields.integer("color", p.color, {.help = "of the palette, 0 to 6; left out, one after the other"});
+  fields.number("times", p.times, {.help = "factor of y"});
+  fields.number("plus", p.plus, {.help = "added to y after the factor"});
+  fields.number("x_times", p.x_times, {.help = "factor of x"});
+  fields.number("x_plus", p.x_plus, {.help = "added to x after the factor"});
+  fields.number("x_least", p.x_least, {.help = "points with a smaller x are left out"});
+  fields.number("x_most", p.x_most, {.help = "points with a larger x are left out"});
+  fields.boolean("line_fit", p.line_fit, {.help = "fit a straight line, weighted by the errors"});
+  fields.number("fit_least", p.fit_least, {.help = "smallest x that fits and comparisons use"});
+  fields.number("fit_most", p.fit_most, {.help = "largest x that fits and comparisons use"});
+  fields.integer("pool", p.pool,
+                 {.help = "errors become the root mean square of those of so many neighbouring points (errors from few "
+                          "replicas are themselves uncertain)",
+                  .range = from_to(1, 1000)});
+  fields.text("against", p.against, {.help = "a curve of this chart: chi2 of the points about it"});
+  fields.numbers("levels", p.levels,
+                 {.help = "values of y: at which x are they first crossed (linear between points)"});
+  fields.boolean("residuals", p.residuals, {.help = "differences from \"against\" in a panel below"});
+  if (!fields.decoding()) return;
+  p.where.clear();
+  if (where.is_object()) {
+    for (const auto& [name, value] : where.items())
+      p.where.emplace_back(name, value.is_string() ? value.get<std::string>() : dump_canonical(value));
+  } else {
+    fields.problem("/where", "expected an object: column → text");
+  }
+  fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals from what? \"against\" names no curve");
+}
+
+void Chart::describe(Fields& fields) {
+  fields.array<ChartOptions>(
+      "charts", charts_,
+      [](Fields& f, ChartOptions& chart) {
+        f.text("name", chart.name, {.help = "of its files", .required = true});
+        f.text("x_label", chart.x_label, {.help = "with the unit", .required = true});
+        f.text("y_label", chart.y_label, {.help = "with the unit", .required = true});
+        f.text("residual_label", chart.residual_label, {.help = "of the panel of residuals"});
+        f.number("x_low", chart.x_low, {.help = "where the axis begins"});
+        f.number("x_high", chart.x_high, {.help = "where it ends"});
+        f.number("y_low", chart.y_low, {.help = "where the axis begins"});
+        f.number("y_high", chart.y_high, {.help = "where it ends"});
+        f.boolean("logarithmic_x", chart.logarithmic_x, {.help = "decades along x"});
+        f.boolean("logarithmic_y", chart.logarithmic_y, {.help = "decades along y"});
+        f.array<PointsOptions>("points", chart.points, describe_points, {.help = "what is drawn", .required = true});
+        f.array<CurveOptions>("curves", chart.curves,
+                              [](Fields& g, CurveOptions& c) {
+                                g.text("name", c.name, {.help = "for \"against\"", .required = true});
+                                g.text("label", c.label, {.help = "in the key"});
+                                g.numbers("polynomial", c.polynomial,
+                                          {.help = "coefficients, constant first", .required = true});
+                                g.number("from", c.from, {.help = "smallest x"});
+                                g.number("to", c.to, {.help = "largest x"});
+                                g.choice("look", c.look, looks, {.help = "how it is drawn"});
+                                g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
+                              },
+                              {.help = "polynomials to compare with"});
+        if (!f.decoding()) return;
+        f.require(!chart.name.empty() && chart.name.find_first_of("/\\ ") == std::string::npos && chart.name[0] != '.',
+                  "name", "is no name of a file");
+        f.require(!chart.points.empty(), "points", "nothing is drawn");
+        for (std::size_t i = 0; i < chart.points.size(); ++i) {
+          const std::string& against = chart.points[i].against;
+          f.require(against.empty() || std::any_of(chart.curves.begin(), chart.curves.end(),
+                                                   [&](const CurveOptions& c) { return c.name == against; }),
+                    "points/" + std::to_string(i) + "/against", "there is no curve \"" + against + "\"");
+        }
+      },
+      {.help = "pictures of tables"});
+  fields.array<SnapshotOptions>("snapshots", snapshots_,
+                                [](Fields& f, SnapshotOptions& s) {
+                                  f.text("name", s.name, {.help = "of its files", .required = true});
+                                  f.text("from", s.from,
+                                         {.help = "id of the simulate stage whose last state it is", .required = true});
+                                },
+                                {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
+  if (fields.decoding())
+    fields.require(!charts_.empty() || !snapshots_.empty(), "", "there is nothing to draw: no charts, no snapshots");
+}
+
+Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
+  Picture picture{.x_label = chart.x_label,
+                  .y_label = chart.y_label,
+                  .x_low = chart.x_low,
+                  .x_high = chart.x_high,
+                  .y_low = chart.y_low,
+                  .y_high = chart.y_high,
+                  .lower_label = chart.residual_label.empty() ? "difference" : chart.residual_label,
+                  .logarithmic_x = chart.logarithmic_x,
+                  .logarithmic_y = chart.logarithmic_y};
+  Json out = Json::object();
+  int color = 1;
+  for (const PointsOptions& options : chart.points) {
+    Data data = read_data(input_named(context, options.from).file(options.file), options);
+    if (data.has_errors) data.error = pooled(data.error, options.pool);
+    const int own = options.color >= 0 ? options.color : color++;
+    const bool bars = data.has_errors && options.look == Look::points;
+    picture.series.push_back(
+        {options.label, style_of(options.look), own, data.x, data.y, bars ? data.error : std::vector<double>{}});
+    Json found = Json::object();
+    found["points"] = data.x.size();
+    // What fits and comparisons use.
+    std::vector<double> x, y, error;
+    for (std::size_t i = 0; i < data.x.size(); ++i) {
+      if ((options.fit_least && data.x[i] < *options.fit_least) || (options.fit_most && data.x[i] > *options.fit_most))
+        continue;
+      x.push_back(data.x[i]), y.push_back(data.y[i]), error.push_back(data.error[i]);
+    }
+    const bool weighted =
+        data.has_errors && !error.empty() && std::all_of(error.begin(), error.end(), [](double e) { return e > 0; });
+    if (options.line_fit) {
+      const fit::StraightLine line = weighted ? fit::fit_straight_line(x, y, error) : fit::StraightLine{};
+      found["line_fit"] = line.ok ? "ok" : "needs two points with errors";
+      if (line.ok) {
+        found["slope"] = quantity_json(line.slope, "1", line.slope_error);
+        found["intercept"] = quantity_json(line.intercept, "1", line.intercept_error);
+        found["chi2"] = line.chi2, found["dof"] = line.dof, found["p_value"] = line.p_value;
+        if (line.slope != 0) {
+          const double zero = -line.intercept / line.slope;
+          const double variance = line.intercept_error * line.intercept_error + 2 * zero * line.covariance +
+                                  zero * zero * line.slope_error * line.slope_error;
+          found["zero"] = quantity_json(zero, "1", std::sqrt(std::max(0.0, variance)) / std::abs(line.slope));
+        }
+      }
+    }
+    if (!options.against.empty()) {
+      const CurveOptions& curve = *std::find_if(chart.curves.begin(), chart.curves.end(),
+                                                [&](const CurveOptions& c) { return c.name == options.against; });
+      Series below{options.label, style_of(options.look), own, {}, {}, {}};
+      double chi2 = 0, sum = 0, squares = 0, largest = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const double difference = y[i] - value_at(curve, x[i]);
+        if (weighted) chi2 += std::pow(difference / error[i], 2);
+        sum += difference, squares += difference * difference, largest = std::max(largest, std::abs(difference));
+      }
+      for (std::size_t i = 0; i < data.x.size(); ++i) {
+        if (data.x[i] < curve.from || data.x[i] > curve.to) continue;
+        below.x.push_back(data.x[i]), below.y.push_back(data.y[i] - value_at(curve, data.x[i]));
+        if (bars) below.error.push_back(data.error[i]);
+      }
+      const auto n = static_cast<double>(x.size());
+      if (!x.empty()) {
+        Json against{{"curve", curve.name}};
+        if (weighted) {
+          const int dof = static_cast<int>(x.size());
+          against["chi2"] = chi2, against["dof"] = dof;
+          against["chi2_per_dof"] = chi2 / n, against["p_value"] = fit::chance_of_chi2(chi2, dof);
+        }
+        const double mean = sum / n;
+        against["mean_difference"] =
+            x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
+                         : quantity_json(mean, "1");
+        against["rms_difference"] = std::sqrt(squares / n);
+        against["largest_difference"] = largest;
+        found["against"] = std::move(against);
+      }
+      if (options.residuals && !below.x.empty()) {
+        if (picture.lower.empty())
+          picture.lower.push_back({"zero", Series::Style::line, curve.color, {curve.from, curve.to}, {0, 0}, {}});
+        picture.lower.push_back(std::move(below));
+      }
+    }
+    if (!options.levels.empty()) {
+      Json crossings = Json::object();
+      for (const double level : options.levels) {
+        Json at = Json::object();
+        at["value"] = nullptr;
+        for (std::size_t i = 1; i < data.x.size(); ++i) {
+          const double a = data.y[i - 1] - level, b = data.y[i] - level;
+          if ((a > 0) == (b > 0)) continue;
+          const double u = a / (a - b), slope = (b - a) / (data.x[i] - data.x[i - 1]);
+          at = quantity_json(data.x[i - 1] + u * (data.x[i] - data.x[i - 1]), "1",
+                             std::hypot((1 - u) * data.error[i - 1], u * data.error[i]) / std::abs(slope));
+          break;
+        }
+        crossings[fmt::format("{:g}", level)] = std::move(at);
+      }
+      found["crossings"] = std::move(crossings);
+    }
+    out[options.name] = std::move(found);
+  }
+  for (const CurveOptions& curve : chart.curves) {
+    if (curve.label.empty()) continue;
+    Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}};
+    for (int i = 0; i <= 200; ++i) {
+      const double x = curve.from + (curve.to - curve.from) * i / 200;
+      series.x.push_back(x), series.y.push_back(value_at(curve, x));
+    }
+    picture.series.push_back(std::move(series));
+  }
+  draw_picture(picture, context.output_directory(), chart.name);
+  return out;
+}
+
+Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) const {
+  TrajectoryReader reader(input_named(context, options.from).file("final.extxyz"));
+  TrajectoryFrame frame;
+  if (!reader.read(frame)) throw InputError(options.from + "/final.extxyz holds no frame");
+  sim::Snapshot at;
+  at.x = frame.x, at.z = frame.z;
+  sim::DiskProperties disks;
+  disks.radius = frame.radius.empty() ? std::vector<double>(frame.size(), 0.5) : frame.radius;
+  disks.mass.assign(frame.size(), 1);
+  const sim::BondOrder order = sim::bond_order(at, disks, frame.periodic ? frame.width : 0, 0);
+  DiskPicture picture{.width = frame.width,
+                      .x = frame.x,
+                      .y = frame.z,
+                      .radius = disks.radius,
+                      .cross_x = order.vacancy_x,
+                      .cross_y = order.vacancy_z,
+                      .x_label = "x/D",
+                      .y_label = "z/D",
+                      .color_label = "|ψ_6|",
+                      .cross_label = "empty site"};
+  std::size_t crystal = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    picture.color.push_back(std::hypot(order.psi6_re[i], order.psi6_im[i]));
+    crystal += picture.color.back() >= 0.8;
+  }
+  draw_disks(picture, context.output_directory(), options.name);
+  return Json{{"disks", frame.size()}, {"empty_sites", order.vacancy_x.size()}, {"disks_with_psi6_above_0.8", crystal}};
+}
+
+void Chart::run(RunContext& context) const {
+  Json out = Json::object();
+  for (const ChartOptions& chart : charts_) out[chart.name] = draw(context, chart);
+  for (const SnapshotOptions& one : snapshots_) out[one.name] = snapshot(context, one);
+  write_file(context.output("chart.json"), dump(out));
+}
+
+}  // namespace
+
+StageRow chart_stage() {
+  return {.name = "chart",
+          .version = 1,
+          .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
+          .accepts = {"study", "simulate", "fit", "extract", "map"},
+          .fewest_inputs = 1,
+          .most_inputs = 64,
+          .result = "chart.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Chart>(); }};
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,156 @@
+#include "pipelines/stages/claims.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "pipelines/files.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+struct Claim {
+  std::string claim, place, pointer, note, measured_as;
+  std::optional<double> value, least, most;
+  double tolerance = 0;
+};
+
+// The interval of 95 % against what is claimed. A claim of a number to some tolerance is an interval too.
+enum class Verdict { holds, within_errors, fails, open };
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::holds:
+      return "holds";
+    case Verdict::within_errors:
+      return "agrees within errors";
+    case Verdict::fails:
+      return "does not hold";
+    default:
+      return "not measured";
+  }
+}
+
+class Claims : public Stage {
+ public:
+  void describe(Fields& fields) override {
+    fields.array<Claim>(
+        "claims", claims_,
+        [](Fields& f, Claim& c) {
+          f.text("claim", c.claim, {.help = "what is said", .required = true});
+          f.text("place", c.place, {.help = "where it stands"});
+          f.text("number", c.pointer, {.help = "/<stage id>/<name in its result>", .required = true});
+          f.text("measured_as", c.measured_as, {.help = "what the number is, in words"});
+          f.number("value", c.value, {.help = "claimed"});
+          f.number("tolerance", c.tolerance, {.help = "of the claimed value", .range = non_negative});
+          f.number("least", c.least, {.help = "claimed lower bound"});
+          f.number("most", c.most, {.help = "claimed upper bound"});
+          f.text("note", c.note, {.help = "what else there is to say"});
+          if (!f.decoding()) return;
+          f.require(c.value || c.least || c.most, "", "nothing is claimed: neither value nor least nor most");
+          f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
+          f.require(!c.pointer.empty() && c.pointer.front() == '/', "number", "is not a JSON pointer");
+        },
+        {.help = "sentence by sentence", .required = true});
+    if (fields.decoding()) fields.require(!claims_.empty() || !fields.has("claims"), "claims", "there are none");
+  }
+
+  void run(RunContext& context) const override {
+    Json rows = Json::array();
+    std::string csv = "claim,claimed,measured,std_error,verdict,place\n",
+                table = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
+    const auto cell = [](const std::string& text) {
+      std::string out;
+      for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
+      return out;
+    };
+    for (const Claim& c : claims_) {
+      const auto tokens = split_pointer(c.pointer);
+      const Json* found = nullptr;
+      Json result;
+      for (const Input& input : context.inputs()) {
+        if (input.id != tokens.front()) continue;
+        result = input.result();
+        found = find_pointer(result, std::string_view(c.pointer).substr(1 + escape_pointer_token(input.id).size()));
+        if (found == nullptr)
+          throw InputError(fmt::format("{}: there is no such number in {}", c.pointer, input.result_name));
+      }
+      if (found == nullptr) throw InputError(fmt::format("{}: \"from\" names no such stage", c.pointer));
+      double value = NAN, error = 0;
+      std::string unit;
+      if (found->is_object() && found->contains("value")) {
+        if ((*found)["value"].is_number()) value = (*found)["value"].get<double>();
+        if (found->contains("std_error") && (*found)["std_error"].is_number())
+          error = (*found)["std_error"].get<double>();
+        unit = found->value("unit", "");
+      } else if (found->is_number()) {
+        value = found->get<double>();
+      } else if (found->is_boolean()) {
+        value = found->get<bool>() ? 1 : 0;
+      }
+      const double low = c.value ? *c.value - c.tolerance : c.least.value_or(-INFINITY),
+                   high = c.value ? *c.value + c.tolerance : c.most.value_or(INFINITY);
+      const double reach = 1.96 * error;
+      const Verdict verdict = !std::isfinite(value)                           ? Verdict::open
+                              : value - reach >= low && value + reach <= high ? Verdict::holds
+                              : value + reach < low || value - reach > high   ? Verdict::fails
+                                                                              : Verdict::within_errors;
+      std::string claimed = c.value ? fmt::format("{:g}", *c.value) : "";
+      if (c.value && c.tolerance > 0) claimed += fmt::format(" ± {:g}", c.tolerance);
+      if (c.least) claimed += fmt::format("at least {:g}", *c.least);
+      if (c.most) claimed += fmt::format("{}at most {:g}", c.least ? ", " : "", *c.most);
+      std::string measured = "–";
+      if (std::isfinite(value)) {
+        if (error > 0) {
+          const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9);
+          measured = fmt::format("{:.{}f} ± {:.{}f}", value, decimals, error, decimals);
+        } else {
+          measured = fmt::format("{:.4g}", value);
+        }
+        if (!unit.empty() && unit != "1") measured += " " + unit;
+      }
+      Json row{{"claim", c.claim}, {"claimed", claimed}, {"measured", measured}, {"verdict", name_of(verdict)}};
+      row["value"] = std::isfinite(value) ? Json(value) : Json();
+      if (error > 0) row["std_error"] = error;
+      if (!c.place.empty()) row["place"] = c.place;
+      if (!c.measured_as.empty()) row["measured_as"] = c.measured_as;
+      if (!c.note.empty()) row["note"] = c.note;
+      row["number"] = c.pointer;
+      rows.push_back(std::move(row));
+      const auto quoted = [](std::string text) {
+        for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
+        return "\"" + text + "\"";
+      };
+      csv += fmt::format("{},{},{},{},{},{}\n", quoted(c.claim), quoted(claimed),
+                         std::isfinite(value) ? number_text(value) : "", error > 0 ? number_text(error) : "",
+                         name_of(verdict), quoted(c.place));
+      table += fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
+                           c.measured_as.empty() ? "" : " (" + cell(c.measured_as) + ")", claimed, cell(measured),
+                           name_of(verdict), c.note.empty() ? "" : ": " + cell(c.note), cell(c.place));
+    }
+    write_file(context.output("claims.json"),
+               dump(Json{{"verdict_is",
+                          "the interval of 95 % of the measured number (1.96 standard errors) lies within "
+                          "what is claimed (holds), outside of it (does not hold), or in both"},
+                         {"claims", std::move(rows)}}));
+    write_file(context.output("claims.csv"), csv);
+    write_file(context.output("claims.md"), table);
+  }
+
+ private:
+  std::vector<Claim> claims_;
+};
+
+}  // namespace
+
+StageRow claims_stage() {
+  return {.name = "claims",
+          .version = 1,
+          .summary = "sets a paper's claims beside what was measured, with verdicts",
+          .accepts = {"chart", "study", "simulate", "fit", "map", "extract"},
+          .fewest_inputs = 1,
+          .most_inputs = 64,
+          .result = "claims.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Claims>(); }};
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,304 @@
+#include "pipelines/stages/study.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "pipelines/files.hpp"
+#include "pipelines/plan.hpp"
+#include "pipelines/replica_seed.hpp"
+#include "pipelines/run.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Parameter {
+  std::string name = "x";
+  std::vector<double> values;
+  double times = 1;
+  std::vector<std::string> set;  // pointers into the chain that become value * times
+  std::string unit;
+};
+struct Change {  // of a series: pointer → value
+  std::vector<std::pair<std::string, Json>> set;
+};
+struct Collected {
+  std::string at;  // "/fit/temperature"
+  double times = 1, plus = 0;
+};
+// A number of one run: missing where the chain does not give it.
+struct Number {
+  double value = NAN, std_error = NAN;
+};
+
+class Study : public Stage {
+ public:
+  void describe(Fields& fields) override;
+  void run(RunContext& context) const override;
+
+ private:
+  struct Point {
+    std::size_t series, value;
+    std::uint32_t replica;
+  };
+  std::vector<Point> points() const;
+  Plan plan_of(const Point& point, std::uint64_t seed) const;
+  std::vector<Number> numbers(const Plan& plan, const fs::path& folder) const;
+  std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
+
+  Json chain_;
+  Parameter parameter_;
+  std::vector<std::pair<std::string, Change>> series_;
+  std::vector<std::pair<std::string, Collected>> collect_;
+  std::uint32_t replicas_ = 1;
+};
+
+void Study::describe(Fields& fields) {
+  fields.any("stages", chain_,
+             {.help = "the chain that is run at every point: stages as in a recipe, which read no files of their own",
+              .required = true});
+  fields.object<Parameter>(
+      "parameter", parameter_,
+      [](Fields& f, Parameter& p) {
+        f.text("name", p.name, {.help = "name of its column"});
+        f.numbers("values", p.values, {.help = "its values", .required = true});
+        f.number("times", p.times, {.help = "what is written into the chain is the value times this"});
+        f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
+        f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
+      },
+      {.help = "what is varied", .required = true});
+  fields.map<Change>("series", series_,
+                     [](Fields& f, Change& change) {
+                       Json set = Json::object();
+                       for (const auto& [pointer, value] : change.set) set[pointer] = value;
+                       f.any("set", set, {.help = "JSON pointer into the chain → value"});
+                       if (!f.decoding()) return;
+                       f.require(set.is_object(), "set", "expected an object: pointer → value");
+                       change.set.clear();
+                       if (set.is_object())
+                         for (const auto& [pointer, value] : set.items()) change.set.emplace_back(pointer, value);
+                     },
+                     {.help = "kinds of beds: name → what is changed in the chain for it; none: one series, \"all\""});
+  fields.map<Collected>("collect", collect_,
+                        [](Fields& f, Collected& c) {
+                          f.text("at", c.at, {.help = "/<stage id>/<name in its result>", .required = true});
+                          f.number("times", c.times, {.help = "factor"});
+                          f.number("plus", c.plus, {.help = "added after the factor"});
+                        },
+                        {.help = "name of a column → where its number is", .required = true});
+  fields.integer("replicas", replicas_,
+                 {.help = "runs at every point, each with seeds of its own", .range = from_to(1, 1000)});
+  if (!fields.decoding() || fields.problem_count() > 0) return;
+  fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
+  fields.require(!collect_.empty(), "collect", "nothing is collected");
+  if (parameter_.values.empty()) return;
+  // Every series is read now, so that a mistake in the last one is found before the first has run.
+  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
+    const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[k].first);
+    for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
+      try {
+        const Plan plan = plan_of({k, v, 0}, 1);
+        for (const PlannedStage& stage : plan.stages) {
+          if (!stage.input_files.empty()) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
+        }
+        for (const auto& [name, collected] : collect_) {
+          const auto tokens = split_pointer(collected.at);
+          if (tokens.size() < 2 || plan.find(tokens.front()) == nullptr)
+            fields.problem("/collect/" + escape_pointer_token(name) + "/at",
+                           "\"" + collected.at + "\" leads to no stage of the chain", "Write /<stage id>/<number>");
+        }
+      } catch (const ConfigError& error) {
+        for (const Problem& problem : error.problems())
+          fields.problem(
+              where,
+              fmt::format("{} (at {} = {}): {}", problem.pointer, parameter_.name, parameter_.values[v], problem.what),
+              problem.suggestion);
+      } catch (const Error& error) {
+        fields.problem(where, error.what());
+      }
+      if (fields.problem_count() > 0) return;
+    }
+  }
+}
+
+std::vector<Study::Point> Study::points() const {
+  std::vector<Point> points;
+  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k)
+    for (std::size_t v = 0; v < parameter_.values.size(); ++v)
+      for (std::uint32_t r = 0; r < replicas_; ++r) points.push_back({k, v, r});
+  return points;
+}
+
+// Seeds differ between all runs, also between values and series: their errors are independent.
+Plan Study::plan_of(const Point& point, std::uint64_t seed) const {
+  JsonNode document = to_node(Json{{"name", "study"}, {"stages", chain_}});
+  if (!series_.empty()) {
+    for (const auto& [pointer, value] : series_[point.series].second.set)
+      set_pointer(document, pointer, to_node(value));
+  }
+  const double value = parameter_.values[point.value] * parameter_.times;
+  for (const std::string& pointer : parameter_.set) {
+    set_pointer(document, pointer,
+                to_node(parameter_.unit.empty() ? Json(value) : Json(number_text(value) + " " + parameter_.unit)));
+  }
+  const std::uint64_t own =
+      replica_seed(seed, 1 + point.replica + 1000 * (point.value + 10'000 * static_cast<std::uint64_t>(point.series)));
+  if (JsonNode* stages = document.find("stages"); stages != nullptr && stages->is_array()) {
+    for (JsonNode& stage : stages->items) {
+      const JsonNode* kind = stage.find("stage");
+      const StageRow* row = kind != nullptr && kind->is_string() ? find_stage(kind->text) : nullptr;
+      if (row != nullptr && row->uses_seed) set_pointer(stage, "/seed", to_node(Json(own)));
+    }
+  }
+  return make_plan(std::move(document), "study", fs::current_path());
+}
+
+std::vector<Number> Study::numbers(const Plan& plan, const fs::path& folder) const {
+  std::map<std::string, Json> results;
+  std::vector<Number> out;
+  for (const auto& [name, collected] : collect_) {
+    const std::string id = split_pointer(collected.at).front();
+    if (!results.contains(id)) results[id] = read_json(folder / id / plan.find(id)->row->result);
+    const Json& result = results[id];
+    Number number;
+    // What says of itself that it did not succeed has no numbers.
+    const bool good = !result.contains("status") || result["status"] == "ok";
+    const Json* found =
+        good ? find_pointer(result, std::string_view(collected.at).substr(1 + escape_pointer_token(id).size()))
+             : nullptr;
+    if (found != nullptr && found->is_object() && found->contains("value")) {
+      if (found->contains("std_error") && (*found)["std_error"].is_number())
+        number.std_error = std::abs(collected.times) * (*found)["std_error"].get<double>();
+      found = &(*found)["value"];
+    }
+    if (found != nullptr && found->is_number())
+      number.value = collected.plus + collected.times * found->get<double>();
+    else if (found != nullptr && found->is_boolean())
+      number.value = found->get<bool>() ? 1 : 0;
+    out.push_back(number);
+  }
+  return out;
+}
+
+void Study::run(RunContext& context) const {
+  const std::vector<Point> all = points();
+  std::vector<std::vector<Number>> found(all.size());
+  const fs::path scratch = context.scratch();
+  std::atomic<std::size_t> next{0}, done{0};
+  std::mutex guard;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < all.size(); i = next++) {
+      try {
+        context.check_interrupted();
+        const fs::path kept = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
+        if (!fs::exists(kept)) {
+          const Plan plan = plan_of(all[i], context.seed());
+          RunOptions options;
+          options.out = folder;
+          options.jobs = 1;
+          fs::create_directories(folder);
+          remove_leftovers(folder);
+          RunOutcome outcome;
+          outcome.out = folder;
+          run_stages(plan, options, nullptr, outcome);
+          if (outcome.code == exit_interrupted) throw Interrupted();
+          if (outcome.code != exit_ok && outcome.code != exit_check_failed)
+            throw StageError(fmt::format("{}, {} = {}, replica {}: {}", series_name(all[i].series), parameter_.name,
+                                         parameter_.values[all[i].value], all[i].replica, outcome.error));
+          Json rows = Json::array();
+          for (const Number& n : numbers(plan, folder)) rows.push_back(Json::array({n.value, n.std_error}));
+          write_file_atomically(kept, dump(rows));
+          fs::remove_all(folder);
+        }
+        for (const Json& pair : read_json(kept)) {
+          const auto number = [](const Json& j) { return j.is_number() ? j.get<double>() : NAN; };
+          found[i].push_back({number(pair[0]), number(pair[1])});
+        }
+      } catch (...) {
+        const std::lock_guard lock(guard);
+        if (!failure) failure = std::current_exception();
+        next = all.size();
+      }
+      context.progress(static_cast<double>(++done) / static_cast<double>(all.size()),
+                       fmt::format("{} runs", all.size()));
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (int k = 1; k < context.jobs(); ++k) helpers.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+
+  const auto cell = [](double value) { return std::isfinite(value) ? number_text(value) : std::string(); };
+  std::string runs = "series," + parameter_.name + ",replica", table = "series," + parameter_.name;
+  for (const auto& [name, ignored] : collect_) {
+    runs += "," + name;
+    table += fmt::format(",{0},{0}_error", name);
+  }
+  runs += "\n", table += "\n";
+  std::string notes = fmt::format("# means over {} runs{}\n", replicas_,
+                                  replicas_ > 1 ? "; errors: standard errors of that mean, from the spread" : "");
+  Json series = Json::object();
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < all.size(); i += replicas_) {
+    const std::string where = fmt::format("{},{}", series_name(all[i].series), parameter_.values[all[i].value]);
+    table += where;
+    Json row;
+    row[parameter_.name] = parameter_.values[all[i].value];
+    for (std::size_t c = 0; c < collect_.size(); ++c) {
+      double n = 0, sum = 0, squares = 0, own = NAN;
+      for (std::size_t r = i; r < i + replicas_; ++r) {
+        const Number& number = found[r][c];
+        if (!std::isfinite(number.value)) continue;
+        n += 1, sum += number.value, own = number.std_error;
+      }
+      for (std::size_t r = i; r < i + replicas_; ++r) {
+        if (std::isfinite(found[r][c].value)) squares += std::pow(found[r][c].value - sum / n, 2);
+      }
+      missing += replicas_ - static_cast<std::size_t>(n);
+      const double mean = n > 0 ? sum / n : NAN, error = n > 1 ? std::sqrt(squares / (n - 1) / n) : own;
+      table += "," + cell(mean) + "," + cell(error);
+      Json quantity{{"value", std::isfinite(mean) ? Json(mean) : Json()}};
+      if (std::isfinite(error)) quantity["std_error"] = error;
+      quantity["runs"] = static_cast<int>(n);
+      row[collect_[c].first] = std::move(quantity);
+    }
+    table += "\n";
+    series[series_name(all[i].series)].push_back(std::move(row));
+    for (std::size_t r = i; r < i + replicas_; ++r) {
+      runs += where + fmt::format(",{}", all[r].replica);
+      for (const Number& number : found[r]) runs += "," + cell(number.value);
+      runs += "\n";
+    }
+  }
+  if (missing > 0)
+    context.warning(fmt::format("{} of {} numbers are missing: the chain did not give them", missing,
+                                all.size() * collect_.size()));
+  write_file(context.output("table.csv"), notes + table);
+  write_file(context.output("replicas.csv"), runs);
+  write_file(context.output("study.json"),
+             dump(Json{{"replicas", replicas_}, {"runs", all.size()}, {"series", std::move(series)}}));
+}
+
+}  // namespace
+
+StageRow study_stage(int inner_versions) {
+  return {.name = "study",
+          .version = 1 + inner_versions,
+          .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
+          .uses_seed = true,
+          .result = "study.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Study>(); }};
+}
+
+}  // namespace shakebed::pipelines

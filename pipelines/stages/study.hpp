@@ -1,0 +1,16 @@
+// study: a chain of stages at several values of a parameter, for several kinds of beds, each repeated with seeds of its
+// own; the numbers asked for, gathered in one table.
+//
+// Files: table.csv (one row a series and value: means over the replicas with their standard errors), replicas.csv (one
+// row a run), study.json. Finished runs outlive a kill.
+#pragma once
+
+#include "pipelines/stages.hpp"
+
+namespace shakebed::pipelines {
+
+// The inner chain reads what other stages write: `inner_versions` is the sum of those stages' versions, so that a study
+// runs again when one of them changes.
+StageRow study_stage(int inner_versions);
+
+}  // namespace shakebed::pipelines
