@@ -48,6 +48,22 @@ double safe_step(double value, double slope, double curvature) {
   return slope > 0.0 ? (slope + root) / curvature : 2.0 * std::max(0.0, value) / (root - slope);
 }
 
+// t - sin t and t^2/2 - (1 - cos t), to full relative accuracy.
+double sine_defect(double t) {
+  if (std::abs(t) > 2.0) return t - std::sin(t);
+  const double t2 = t * t;
+  double sum = 0.0;
+  for (int n = 27; n >= 3; n -= 2) sum = (1.0 - t2 * sum) / (n * (n - 1));
+  return t * t2 * sum;
+}
+double cosine_defect(double t) {
+  if (std::abs(t) > 2.0) return 0.5 * t * t - 2.0 * std::sin(0.5 * t) * std::sin(0.5 * t);
+  const double t2 = t * t;
+  double sum = 0.0;
+  for (int n = 28; n >= 4; n -= 2) sum = (1.0 - t2 * sum) / (n * (n - 1));
+  return t2 * t2 * 0.5 * sum;
+}
+
 struct Flight {
   double time = 0.0;             // until the floor is met again
   double launch_position = 0.0;  // of ball and floor
@@ -62,10 +78,19 @@ Flight fly(double gamma, const WaveForm& wave, double phase, double velocity) {
   flight.launch_position = gamma * wave.position(phase);
   const double launch_velocity = gamma * wave.velocity(phase) + velocity;
   flight.apex = flight.launch_position + (launch_velocity > 0.0 ? 0.5 * launch_velocity * launch_velocity : 0.0);
+  // Early in the flight as an expansion about the launch, so that a jump much lower than the floor's stroke keeps its
+  // digits. A ball that leaves from rest does so where nothing holds it any more.
+  double hold = 1.0 + gamma * wave.acceleration(phase);
+  if (velocity == 0.0) hold = std::min(hold, 0.0);
+  const double early = 1.0 / wave.highest_order();
   const auto gap = [&](double t) {
+    if (t < early) return (velocity - 0.5 * hold * t) * t - gamma * wave.deviation(phase, t);
     return flight.launch_position + launch_velocity * t - 0.5 * t * t - gamma * wave.position(phase + t);
   };
-  const auto gap_rate = [&](double t) { return launch_velocity - t - gamma * wave.velocity(phase + t); };
+  const auto gap_rate = [&](double t) {
+    if (t < early) return velocity - hold * t - gamma * wave.deviation_rate(phase, t);
+    return launch_velocity - t - gamma * wave.velocity(phase + t);
+  };
   const double curvature = 1.0 + gamma;  // bound on |gap''|
   // The first stretch, where the ball is certainly above the floor although the gap starts from 0: with
   //   gap'' = c >= 0 and |gap'''| <= J: gap >= c t^2/2 - J t^3/6, and with
@@ -138,6 +163,109 @@ double time_to_lift_off(double gamma, const WaveForm& wave, double phase) {
   return -1.0;
 }
 
+// On a sine the ball leaves with s = sqrt(Gamma^2 - 1), and its gap to the floor is s (t - sin t) - (t^2/2 - 1 + cos
+// t): the greatest gap before it lands, as {height, its derivative by s}. The gap's rate s (1 - cos t) - (t - sin t)
+// rises from each multiple of 2 pi to 2 atan(s) behind it and falls from there to the next, so that each period holds
+// at most one least and one greatest gap; those about t = s are the highest, and where the ball clears the first
+// periods it clears all up to there.
+struct GreatestGap {
+  double height = 0.0;
+  double slope = 0.0;
+};
+GreatestGap greatest_gap_on_sine(double s) {
+  const double bend = 2.0 * std::atan(s);
+  const auto rate = [&](double before, double u) {
+    const double half = std::sin(0.5 * u);
+    return 2.0 * s * half * half - before - sine_defect(u);
+  };
+  // The zero between low and high, where the rate rises (falls).
+  const auto zero = [&](double before, double low, double high, bool rises) {
+    double u = rises ? 0.5 * (low + high) : high;
+    for (int step = 0; step < 200; ++step) {
+      const double value = rate(before, u);
+      if (value == 0.0) break;
+      ((value > 0.0) == rises ? high : low) = u;
+      const double half = std::sin(0.5 * u);
+      double next = u - value / (s * std::sin(u) - 2.0 * half * half);
+      if (!(next > low && next < high)) next = 0.5 * (low + high);
+      if (std::abs(next - u) <= 4e-16 * u) break;
+      u = next;
+    }
+    return u;
+  };
+  const auto gap = [&](double before, double u) {
+    if (before == 0.0) return s * sine_defect(u) - cosine_defect(u);
+    const double t = before + u, half = std::sin(0.5 * u);
+    return s * (t - std::sin(u)) - 0.5 * t * t + 2.0 * half * half;
+  };
+  GreatestGap greatest;
+  const double middle = std::floor(s / two_pi);
+  for (double period = 0.0; period <= middle + 2.0; ++period) {
+    if (period == 4.0 && middle > 6.0) period = middle - 1.0;
+    const double before = period * two_pi;
+    if (period > 0.0) {
+      if (rate(before, bend) <= 0.0) break;
+      if (gap(before, zero(before, 0.0, bend, true)) <= 0.0) break;
+    }
+    const double u = zero(before, bend, period == 0.0 ? std::min(two_pi, 3.0 * s) : two_pi, false);
+    const double height = gap(before, u);
+    if (height > greatest.height) greatest = {height, before + sine_defect(u)};
+  }
+  return greatest;
+}
+
+double jump_of_sine(JumpHeight kind, double gamma) {
+  const double excess = gamma - 1.0;
+  switch (kind) {
+    case JumpHeight::relative_max:
+      return greatest_gap_on_sine(std::sqrt(excess) * std::sqrt(gamma + 1.0)).height;
+    case JumpHeight::above_launch:
+      return 0.5 * excess * (gamma + 1.0);
+    case JumpHeight::above_mean_floor:
+      return 0.5 * (gamma * gamma + 1.0);
+    case JumpHeight::above_highest_floor:
+      return 0.5 * excess * excess;
+  }
+  return 0.0;
+}
+
+Value gamma_of_sine(JumpHeight kind, double height) {
+  constexpr double largest = 1e6;
+  double gamma = 1.0;
+  switch (kind) {
+    case JumpHeight::relative_max: {
+      // In s; Newton's steps kept between what is too low and what is not. The height leaps where the ball clears one
+      // more crest: there it ends on the upper side.
+      double low = 0.0, high = largest;
+      if (greatest_gap_on_sine(high).height < height) return no_value(ValueStatus::outside_range);
+      double s = std::min(high, std::max(std::sqrt(std::sqrt(height * (8.0 / 9.0))), std::sqrt(2.0 * height)));
+      for (int step = 0; step < 200 && high > low; ++step) {
+        const GreatestGap at = greatest_gap_on_sine(s);
+        (at.height < height ? low : high) = s;
+        double next = at.slope > 0.0 ? s - (at.height - height) / at.slope : 0.5 * (low + high);
+        if (std::abs(next - s) <= 2e-16 * s) return {std::sqrt(1.0 + s * s)};
+        if (!(next > low && next < high)) next = 0.5 * (low + high);
+        if (!(next > low && next < high)) break;
+        s = next;
+      }
+      gamma = std::sqrt(1.0 + high * high);
+      break;
+    }
+    case JumpHeight::above_launch:
+      gamma = std::sqrt(1.0 + 2.0 * height);
+      break;
+    case JumpHeight::above_mean_floor:
+      if (height < 1.0) return no_value(ValueStatus::outside_range);
+      gamma = std::sqrt(2.0 * height - 1.0);
+      break;
+    case JumpHeight::above_highest_floor:
+      gamma = 1.0 + std::sqrt(2.0 * height);
+      break;
+  }
+  if (gamma > largest) return no_value(ValueStatus::outside_range);
+  return {gamma};
+}
+
 double wrapped(double phase) {
   const double inside = std::fmod(phase, two_pi);
   return inside < 0.0 ? inside + two_pi : inside;
@@ -163,19 +291,19 @@ WaveForm WaveForm::series(std::string name, std::vector<Harmonic> harmonics) {
     wave.status_ = ValueStatus::invalid_argument;
     return wave;
   }
-  const bool pure_sine =
-      wave.harmonics_.size() == 1 && wave.harmonics_[0].order == 1 && wave.harmonics_[0].cosine == 0.0;
-  const double largest = pure_sine
-                             ? std::abs(wave.harmonics_[0].sine)
+  wave.pure_sine_ = wave.harmonics_.size() == 1 && wave.harmonics_[0].order == 1;
+  const double largest = wave.pure_sine_
+                             ? std::hypot(wave.harmonics_[0].sine, wave.harmonics_[0].cosine)
                              : greatest_over_period([&](double phase) { return std::abs(wave.acceleration(phase)); });
   for (Harmonic& harmonic : wave.harmonics_) {
     harmonic.sine /= largest;
     harmonic.cosine /= largest;
     const double k = harmonic.order;
+    wave.highest_order_ = std::max(wave.highest_order_, harmonic.order);
     wave.largest_jerk_ += k * k * k * std::hypot(harmonic.sine, harmonic.cosine);
     wave.largest_snap_ += k * k * k * k * std::hypot(harmonic.sine, harmonic.cosine);
   }
-  wave.highest_ = pure_sine ? 1.0 : greatest_over_period([&](double phase) { return wave.position(phase); });
+  wave.highest_ = wave.pure_sine_ ? 1.0 : greatest_over_period([&](double phase) { return wave.position(phase); });
   return wave;
 }
 
@@ -231,6 +359,27 @@ double WaveForm::jerk(double phase) const {
   return sum;
 }
 
+double WaveForm::deviation(double phase, double t) const {
+  double sum = 0.0;
+  for (const Harmonic& h : harmonics_) {
+    const double sine = std::sin(h.order * phase), cosine = std::cos(h.order * phase);
+    sum += (h.sine * sine + h.cosine * cosine) * cosine_defect(h.order * t) -
+           (h.sine * cosine - h.cosine * sine) * sine_defect(h.order * t);
+  }
+  return sum;
+}
+
+double WaveForm::deviation_rate(double phase, double t) const {
+  double sum = 0.0;
+  for (const Harmonic& h : harmonics_) {
+    const double sine = std::sin(h.order * phase), cosine = std::cos(h.order * phase);
+    const double half = std::sin(0.5 * h.order * t);
+    sum += h.order * ((h.sine * sine + h.cosine * cosine) * sine_defect(h.order * t) -
+                      (h.sine * cosine - h.cosine * sine) * 2.0 * half * half);
+  }
+  return sum;
+}
+
 std::string_view to_string(JumpHeight kind) {
   switch (kind) {
     case JumpHeight::relative_max:
@@ -250,6 +399,7 @@ Value jump_height(JumpHeight kind, double gamma, const WaveForm& wave) {
     return no_value(ValueStatus::invalid_argument);
   }
   if (gamma <= 1.0) return {0.0};
+  if (wave.pure_sine()) return {jump_of_sine(kind, gamma)};
   const double highest_floor = gamma * wave.highest();
   double best = 0.0;
   // Every launch of one period, from phases at which the floor still holds the ball.
@@ -272,6 +422,7 @@ Value gamma_for_jump_height(JumpHeight kind, double height, const WaveForm& wave
   if (!std::isfinite(height) || height < 0.0 || wave.status() != ValueStatus::ok) {
     return no_value(ValueStatus::invalid_argument);
   }
+  if (wave.pure_sine()) return gamma_of_sine(kind, height);
   double low = 1.0;
   double high = 2.0;
   while (jump_height(kind, high, wave).value < height) {

@@ -31,13 +31,18 @@ class WaveForm {
 
   [[nodiscard]] ValueStatus status() const { return status_; }
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] double position(double phase) const;                   // s
-  [[nodiscard]] double velocity(double phase) const;                   // s'
-  [[nodiscard]] double acceleration(double phase) const;               // s''
-  [[nodiscard]] double jerk(double phase) const;                       // s'''
+  [[nodiscard]] double position(double phase) const;      // s
+  [[nodiscard]] double velocity(double phase) const;      // s'
+  [[nodiscard]] double acceleration(double phase) const;  // s''
+  [[nodiscard]] double jerk(double phase) const;          // s'''
+  // s(phase + t) - s - s' t - s'' t^2/2, of full relative accuracy for short times, and its derivative by t.
+  [[nodiscard]] double deviation(double phase, double t) const;
+  [[nodiscard]] double deviation_rate(double phase, double t) const;
   [[nodiscard]] double highest() const { return highest_; }            // max of s over a period
   [[nodiscard]] double largest_jerk() const { return largest_jerk_; }  // a bound on |s'''|
   [[nodiscard]] double largest_snap() const { return largest_snap_; }  // a bound on |s''''|
+  [[nodiscard]] int highest_order() const { return highest_order_; }
+  [[nodiscard]] bool pure_sine() const { return pure_sine_; }  // one harmonic of order 1, of any phase
 
  private:
   WaveForm() = default;
@@ -46,6 +51,8 @@ class WaveForm {
   double highest_ = 0.0;
   double largest_jerk_ = 0.0;
   double largest_snap_ = 0.0;
+  int highest_order_ = 1;
+  bool pure_sine_ = false;
   ValueStatus status_ = ValueStatus::ok;
 };
 

@@ -23,6 +23,36 @@ TEST(JumpHeight, MatchesTheTableOfPhysics) {
   }
 }
 
+// Near Gamma = 1 the jump is far lower than the floor's stroke. In s^2 = Gamma^2 - 1 the greatest gap is
+// 9/8 s^4 (1 - 9 s^2/10 + ...); a wave that is a sine to 1e-14 but goes the general way has to find the same.
+TEST(JumpHeight, KeepsItsDigitsWhereTheBallHardlyLeaves) {
+  for (double excess = 1e-15; excess < 2e-5; excess *= 10) {
+    const double gamma = 1 + excess, s2 = (gamma - 1) * (gamma + 1);
+    EXPECT_NEAR(jump_height(JumpHeight::relative_max, gamma).value / (1.125 * s2 * s2 * (1 - 0.9 * s2)), 1,
+                1e-14 + s2 * s2)
+        << excess;
+    EXPECT_DOUBLE_EQ(jump_height(JumpHeight::above_launch, gamma).value, s2 / 2);
+    EXPECT_DOUBLE_EQ(jump_height(JumpHeight::above_highest_floor, gamma).value, (gamma - 1) * (gamma - 1) / 2);
+    for (const JumpHeight kind : jump_heights) {
+      const double height = jump_height(kind, gamma).value;
+      EXPECT_NEAR(gamma_for_jump_height(kind, height).value, gamma, 4.5e-16) << to_string(kind) << " " << excess;
+    }
+  }
+}
+
+// The closed form of the sine against the search that serves every wave.
+TEST(JumpHeight, OfASineIsWhatEveryWaveIsSearchedFor) {
+  const WaveForm nearly = WaveForm::series("nearly a sine", {{1, 1.0, 0.0}, {2, 1e-15, 0.0}});
+  ASSERT_FALSE(nearly.pure_sine());
+  for (double excess = 1e-6; excess < 40; excess *= 1.1) {
+    for (const JumpHeight kind : jump_heights) {
+      const double sine = jump_height(kind, 1 + excess).value, searched = jump_height(kind, 1 + excess, nearly).value;
+      const double rounding = kind == JumpHeight::above_highest_floor ? 1e-15 / excess : 1e-15;
+      EXPECT_NEAR(searched / sine, 1, 1e-9 + rounding / excess) << to_string(kind) << " " << excess;
+    }
+  }
+}
+
 TEST(JumpHeight, IsNothingWhileTheFloorHoldsTheBall) {
   for (const JumpHeight kind : jump_heights) {
     EXPECT_EQ(jump_height(kind, 0.0).value, 0.0);
