@@ -6,7 +6,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
+#include "sim/random.hpp"
 #include "sim/simulation.hpp"
 #include "sim/statistics.hpp"
 #include "tests/physics/law.hpp"
@@ -83,11 +85,47 @@ TEST(ElasticGas, CollidesAsOftenAsEnskogSays) {
 
 #endif
 
+// a2 of a cooling gas by Boltzmann's equation itself, solved by Monte Carlo [Bird1994] without space: pairs drawn at
+// random collide with a probability as their approach. From 6 to 16 collisions of each, as below.
+double boltzmann_a2(double e) {
+  constexpr std::uint32_t count = 400'000;
+  Random random(5);
+  std::vector<double> vx(count), vz(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Random::Pair v = random.normal_pair();
+    vx[i] = v.first, vz[i] = v.second;
+  }
+  double collided = 0, square = count * 2.0, fastest = 10, sum = 0;
+  int samples = 0;
+  for (double next = 6; next < 16;) {
+    const std::uint32_t i = random.below(count), j = random.below(count);
+    if (i == j) continue;
+    const double angle = 2 * pi * random.uniform(), nx = std::cos(angle), nz = std::sin(angle);
+    const double approach = (vx[i] - vx[j]) * nx + (vz[i] - vz[j]) * nz;
+    if (approach < fastest * random.uniform()) continue;
+    const double kick = (1 + e) / 2 * approach;
+    vx[i] -= kick * nx, vz[i] -= kick * nz, vx[j] += kick * nx, vz[j] += kick * nz;
+    square -= (1 - e * e) / 2 * approach * approach;
+    collided += 2.0 / count;
+    fastest = 10 * std::sqrt(square / 2 / count);  // none of these approaches faster than 10 thermal velocities
+    if (collided < next + 1) continue;
+    next += 1;
+    double v2 = 0, v4 = 0;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const double here = vx[k] * vx[k] + vz[k] * vz[k];
+      v2 += here / count, v4 += here * here / count;
+    }
+    sum += v4 / (2 * v2 * v2) - 1;
+    ++samples;
+  }
+  return sum / samples;
+}
+
 // 1/sqrt(T) grows as (1 - e^2)/4 w (1 + 3 a2/16) t, w the collision frequency at T = 1: from when each disk has
 // collided 6 times (and a2 is what it becomes) until 16. 0.5 % of this rate is 1 % of T. The energy lost by N disks is
 // lost by N - 1 free momenta, which T is counted by. A disk collides as (1 - a2/16) w, so that T falls by (1 + a2/4)
 // (1 - e^2)/2 a collision.
-void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs, double limit = 5e-3) {
+void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs) {
   const double count = rows * rows, free_momenta = (count - 1) / count;
   const double loss = (1 - e * e) / 4, w = collision_frequency(area_fraction, count);
   BlockedMean rate, a2, per_collision;
@@ -113,12 +151,20 @@ void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs, d
   }
   const double expected = loss * w / free_momenta * (1 + 3 * cooling_a2(e) / 16);
   const double expected_fall = -2 * loss / free_momenta * (1 + cooling_a2(e) / 4);
-  std::printf("  e = %.1f, area fraction %.2f, %.0f disks, %d runs\n", e, area_fraction, count, runs);
-  expect_law("cooling: growth of 1/sqrt(T)", rate.mean(), rate.std_error(), expected, limit * expected);
+  std::printf("  e = %.1f, area fraction %.4g, %.0f disks, %d runs\n", e, area_fraction, count, runs);
+  expect_law("cooling: growth of 1/sqrt(T)", rate.mean(), rate.std_error(), expected, 5e-3 * expected);
   EXPECT_LT(2 * rate.std_error(), 5e-3 * expected);
   expect_law("cooling: d ln T a collision of each disk", per_collision.mean(), per_collision.std_error(), expected_fall,
              0.01 * std::abs(expected_fall));
-  expect_law("cooling: a2", a2.mean(), a2.std_error(), cooling_a2(e), 5e-3);
+  const double boltzmann = boltzmann_a2(e);
+  expect_law("cooling: a2, by Boltzmann's equation", a2.mean(), a2.std_error(), boltzmann, 5e-3);
+  // The formula ends its expansion at a2. Where that alone costs it 0.005 it is shown.
+  if (std::abs(cooling_a2(e) - boltzmann) < 5e-3) {
+    expect_law("cooling: a2, by van Noije and Ernst", a2.mean(), a2.std_error(), cooling_a2(e), 5e-3);
+  } else {
+    std::printf("  %-58s %.6g, off Boltzmann's by %.2g\n", "(a2 by van Noije and Ernst)", cooling_a2(e),
+                cooling_a2(e) - boltzmann);
+  }
   EXPECT_LT(2 * a2.std_error(), 5e-3);
 }
 
@@ -142,7 +188,7 @@ void expect_heated(double e, double area_fraction, std::uint32_t rows, int looks
     simulation->snapshot(at);
     a2.add(fourth_cumulant_now(at));
   }
-  std::printf("  e = %.1f, area fraction %.2f, %.0f disks, %d looks\n", e, area_fraction, count, looks);
+  std::printf("  e = %.1f, area fraction %.4g, %.0f disks, %d looks\n", e, area_fraction, count, looks);
   expect_law("white noise: T", temperature.mean(), temperature.std_error(), 1, 0.01);
   EXPECT_LT(2 * temperature.std_error(), 0.01);
   expect_law("white noise: a2", a2.mean(), a2.std_error(), heated_a2(e), 5e-3);
@@ -156,15 +202,12 @@ TEST(HeatedGas, HasTheTemperatureAndTheFourthCumulantOfVanNoijeAndErnst) { expec
 
 #else
 
-// Boltzmann's equation itself, solved by Monte Carlo, has a2 = 0.0330, -0.0261 and -0.0300 for these e: the formula,
-// which ends its expansion at a2, is off by up to 0.006. At e = 0.6 whirls that outlive the heat hold energy back: -1.2
-// % at area fraction 0.02 with 196 disks, -0.8 % at 0.01 with 324, +0.5 +- 0.2 % at 0.0025 with 100; so 1 % is asked
-// there.
-TEST(CoolingGas, CoolsAsHaffSaysForEveryRestitution) {
-  expect_haff(0.6, 0.0025, 10, 1500, 0.01);
-  expect_haff(0.8, 0.02, 14, 4000);
-  expect_haff(0.9, 0.02, 14, 2000);
-}
+// Below the size at which disks cluster, whirls still fade more slowly than the heat and hold energy back, the more so
+// the more free paths fit into the box: at e = 0.6 cooling is 1.2 % slow at area fraction 0.02 with 196 disks. So the
+// box is a third of that there.
+TEST(CoolingGas, CoolsAsHaffSaysAtRestitution06) { expect_haff(0.6, 0.0015, 16, 1000); }
+TEST(CoolingGas, CoolsAsHaffSaysAtRestitution08) { expect_haff(0.8, 0.02, 14, 4000); }
+TEST(CoolingGas, CoolsAsHaffSaysAtRestitution09) { expect_haff(0.9, 0.02, 14, 2000); }
 TEST(HeatedGas, HasItsTemperatureForEveryRestitution) {
   for (const double e : {0.6, 0.8, 0.9}) expect_heated(e, 0.01, 18, 9000);
 }
