@@ -32,9 +32,10 @@ class EventQueue {
     disks_ = disks;
     count_ = static_cast<std::uint32_t>(count);
     beyond_cache_ = count > fits_cache;
-    const double turn = beyond_cache_ ? 1.2 : 2;  // the ring spans as many mean times between two events of a disk
     size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
     ring_.resize(static_cast<std::size_t>(size_));
+    held_.resize(static_cast<std::size_t>(size_));
+    further_.resize(static_cast<std::size_t>(size_));
     grow(256);
     clear(start, events_a_time / events_a_bucket);
   }
@@ -52,16 +53,16 @@ class EventQueue {
       far_.push_back(entry);
     } else {
       const std::size_t index = index_of(static_cast<std::int64_t>(place));
-      if (!beyond_cache_) {
+      if (!beyond_cache_ || held_[index] == entries_a_bucket) {
         put(index, entry);
         return;
       }
-      // The bucket is far from the cache: it is sent for, and written to some
-      // pushes later.
-      __builtin_prefetch(&ring_[index], 1);
+      // The place is far from the cache: it is sent for, and written to some pushes later.
+      Entry* const place_of = &ring_[index].entries[held_[index]++];
+      __builtin_prefetch(place_of, 1);
       const std::size_t turn_of = pushed_++ % most_waiting;
-      if (pushed_ > most_waiting) put(waiting_[turn_of].index, waiting_[turn_of].entry);
-      waiting_[turn_of] = {index, entry};
+      if (pushed_ > most_waiting) *waiting_[turn_of].place = waiting_[turn_of].entry;
+      waiting_[turn_of] = {place_of, entry};
     }
   }
 
@@ -73,12 +74,17 @@ class EventQueue {
     for (;;) {
       if (next_ + looks_ahead >= end_) [[unlikely]] {
         if (!lengthen_run(until)) return false;
-        const Bucket& after = ring_[index_of(current_ + 1)];
-        const char* later = reinterpret_cast<const char*>(&ring_[index_of(current_ + 2)]);
-        for (std::size_t line = 0; line < sizeof(Bucket); line += 64) __builtin_prefetch(later + line);
-        for (std::uint32_t k = 0; k < after.held; ++k) {
-          will_need(static_cast<std::uint32_t>(after.entries[k].pair));
-          will_need(static_cast<std::uint32_t>(after.entries[k].pair >> 32));
+        const std::size_t later = index_of(current_ + 2);
+        for (std::size_t k = 0; k < held_[later]; k += 4) __builtin_prefetch(&ring_[later].entries[k]);
+        coming_ = index_of(current_ + 1);
+        sent_for_ = 0;
+      }
+      // Two of the next bucket at a time: sent for all at once they would wait for each other.
+      if (beyond_cache_) {
+        for (int k = 0; k < 2 && sent_for_ < held_[coming_]; ++k, ++sent_for_) {
+          const std::uint64_t pair = ring_[coming_].entries[sent_for_].pair;
+          will_need(static_cast<std::uint32_t>(pair));
+          will_need(static_cast<std::uint32_t>(pair >> 32));
         }
       }
       const double time = times_[next_];
@@ -107,22 +113,27 @@ class EventQueue {
   }
 
   std::size_t bytes() const {
-    return (ring_.capacity() + full_.capacity()) * sizeof(Bucket) + far_.capacity() * sizeof(Entry) +
+    return ring_.capacity() * (sizeof(Bucket) + 5) + blocks_.capacity() * sizeof(Further) +
+           far_.capacity() * sizeof(Entry) +
            2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
-  static constexpr double events_a_bucket = 8;
-  static constexpr std::uint32_t entries_a_bucket = 15;
+  static constexpr double events_a_bucket = 8,
+                          turn = 1.2;  // the ring spans as many mean times between two events of a disk
+  static constexpr std::uint32_t entries_a_bucket = 16;
 
   struct Entry {
     double time;
     std::uint64_t pair;  // the second disk in the upper half
   };
   struct alignas(64) Bucket {
-    std::uint32_t held, next;  // entries here; where in full_ the earlier ones
-                               // are, 0 for nowhere
     std::array<Entry, entries_a_bucket> entries;
+  };
+  // Entries of a bucket beyond those it has room for, the latest ones first.
+  struct Further {
+    std::uint32_t held, next;  // entries here; where in blocks_ the earlier ones are, 0 for nowhere
+    std::array<Entry, 7> entries;
   };
 
   static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
@@ -145,30 +156,32 @@ class EventQueue {
   }
 
   void put(std::size_t index, const Entry& entry) {
-    Bucket& into = ring_[index];
-    if (into.held == entries_a_bucket) [[unlikely]]
-      make_room(into);
-    into.entries[into.held++] = entry;
+    if (held_[index] < entries_a_bucket) [[likely]] {
+      ring_[index].entries[held_[index]++] = entry;
+    } else {
+      put_further(further_[index], entry);
+    }
+  }
+  [[gnu::noinline]] void put_further(std::uint32_t& first, const Entry& entry) {
+    if (first == 0 || blocks_[first].held == blocks_[first].entries.size()) {
+      std::uint32_t place = free_;
+      if (place != 0) {
+        free_ = blocks_[place].next;
+      } else {
+        place = static_cast<std::uint32_t>(blocks_.size());
+        blocks_.emplace_back();
+      }
+      blocks_[place].held = 0;
+      blocks_[place].next = first;
+      first = place;
+    }
+    Further& block = blocks_[first];
+    block.entries[block.held++] = entry;
   }
   void put_waiting() {
     const std::size_t first = pushed_ > most_waiting ? pushed_ - most_waiting : 0;
-    for (std::size_t k = first; k < pushed_; ++k)
-      put(waiting_[k % most_waiting].index, waiting_[k % most_waiting].entry);
+    for (std::size_t k = first; k < pushed_; ++k) *waiting_[k % most_waiting].place = waiting_[k % most_waiting].entry;
     pushed_ = 0;
-  }
-
-  // Moves a bucket's entries away, behind those moved before.
-  [[gnu::noinline]] void make_room(Bucket& bucket) {
-    std::uint32_t place = free_;
-    if (place != 0) {
-      free_ = full_[place].next;
-    } else {
-      place = static_cast<std::uint32_t>(full_.size());
-      full_.emplace_back();
-    }
-    full_[place] = bucket;
-    bucket.held = 0;
-    bucket.next = place;
   }
 
   void grow(std::size_t size) {
@@ -184,8 +197,9 @@ class EventQueue {
   void clear(double start, double buckets_a_time) {
     now_ = start;
     buckets_a_time_ = std::clamp(buckets_a_time, coarsest, finest);
-    for (Bucket& bucket : ring_) bucket.held = bucket.next = 0;
-    full_.resize(1);
+    std::fill(held_.begin(), held_.end(), std::uint8_t{0});
+    std::fill(further_.begin(), further_.end(), 0u);
+    blocks_.resize(1);
     free_ = 0;
     far_.clear();
     far_limit_ = 256 + 2 * static_cast<std::size_t>(count_);
@@ -193,6 +207,7 @@ class EventQueue {
     current_ = static_cast<std::int64_t>(start * buckets_a_time_) - 1;
     here_ = 0;
     look_far_at_ = current_ + size_;
+    coming_ = sent_for_ = 0;
     next_ = end_ = 0;
     taken_up_ = moved_ = 0;
   }
@@ -248,8 +263,7 @@ class EventQueue {
         }
         look_far();
       }
-      Bucket& bucket = ring_[static_cast<std::size_t>(here_)];
-      if (bucket.held != 0) sort_into_run(collect(bucket));
+      if (held_[static_cast<std::size_t>(here_)] != 0) sort_into_run(collect(static_cast<std::size_t>(here_)));
     } while (end_ == 0);
     return true;
   }
@@ -282,28 +296,29 @@ class EventQueue {
     far_limit_ = std::max(far_limit_, 2 * far_.size());
   }
 
-  // Empties a bucket: what still counts is collected unsorted, and counted.
-  std::size_t collect(Bucket& bucket) {
-    std::size_t count = 0;
-    if (bucket.next != 0) [[unlikely]]
-      count = collect_earlier(bucket.next);
-    count = take_up(bucket, count);
-    bucket.held = bucket.next = 0;
+  // Empties a bucket: what still counts is collected unsorted, in the order in which it came, and counted.
+  std::size_t collect(std::size_t index) {
+    std::size_t count = take_up(ring_[index].entries.data(), held_[index], 0);
+    held_[index] = 0;
+    if (further_[index] != 0) [[unlikely]] {
+      count = collect_further(further_[index], count);
+      further_[index] = 0;
+    }
     taken_up_ += count;
     return count;
   }
-  [[gnu::noinline]] std::size_t collect_earlier(std::uint32_t place) {
-    Bucket& bucket = full_[place];
-    std::size_t count = bucket.next != 0 ? collect_earlier(bucket.next) : 0;
+  [[gnu::noinline]] std::size_t collect_further(std::uint32_t place, std::size_t count) {
+    Further& block = blocks_[place];
+    if (block.next != 0) count = collect_further(block.next, count);
     grow(count + 4 * entries_a_bucket);
-    count = take_up(bucket, count);
-    bucket.next = free_;
+    count = take_up(block.entries.data(), block.held, count);
+    block.next = free_;
     free_ = place;
     return count;
   }
-  std::size_t take_up(const Bucket& bucket, std::size_t count) {
-    for (std::uint32_t k = 0; k < bucket.held; ++k) {
-      const Entry entry = bucket.entries[k];
+  std::size_t take_up(const Entry* entries, std::uint32_t held, std::size_t count) {
+    for (std::uint32_t k = 0; k < held; ++k) {
+      const Entry entry = entries[k];
       unsorted_times_[count] = entry.time;
       unsorted_pairs_[count] = entry.pair;
       count += counts(entry);
@@ -352,7 +367,7 @@ class EventQueue {
   static constexpr std::size_t largest_ranked = 64, most_waiting = 8, looks_ahead = 4;
   static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
-    std::size_t index;
+    Entry* place;
     Entry entry;
   };
   const Disk* disks_ = nullptr;
@@ -360,7 +375,9 @@ class EventQueue {
   double buckets_a_time_ = 1;
   double now_ = 0;  // of the latest event that was popped
   LargeVector<Bucket> ring_;
-  std::vector<Bucket> full_;  // what did not fit; the first place is not used
+  std::vector<std::uint8_t> held_;      // entries in each bucket of the ring
+  std::vector<std::uint32_t> further_;  // where in blocks_ the rest of it is, 0 for nowhere
+  std::vector<Further> blocks_;         // the first is not used
   std::uint32_t free_ = 0;
   std::vector<Entry> far_;
   std::size_t far_limit_ = 0;
@@ -370,6 +387,7 @@ class EventQueue {
   std::int64_t look_far_at_ = 0;
   std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
   bool beyond_cache_ = false;
+  std::size_t coming_ = 0, sent_for_ = 0;      // the next bucket's place, and how many of its disks have been sent for
   std::array<Waiting, most_waiting> waiting_;  // pushed_ of them, the latest ones
   std::size_t pushed_ = 0;
   // The current bucket's events from next_ to end_, in order.
