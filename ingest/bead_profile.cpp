@@ -286,16 +286,22 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
 
 namespace {
 
-// The three shapes of a bead, blurred, at each of the distances given. Where the optical blur is smaller than the
+// flat, sphere, parabola, cone, quartic: see BlurredShapes.
+using Shapes = std::array<double, 5>;
+// Which of them take part in a fit, and last the level outside.
+constexpr std::size_t rim_terms = 6;
+using RimTerms = std::array<bool, rim_terms>;
+
+// The shapes of a bead, blurred, at each of the distances given. Where the optical blur is smaller than the
 // pixel, the pixel's own square window is laid over it (averaged over directions) instead of being counted as a
 // Gaussian.
-std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const std::vector<double>& distance) {
-  std::vector<std::array<double, 3>> shapes(distance.size());
+std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<double>& distance) {
+  std::vector<Shapes> shapes(distance.size());
   constexpr double pixel_variance = 1.0 / 12, gaussian_enough = 0.7;
   if (edge > gaussian_enough) {
     for (std::size_t i = 0; i < distance.size(); ++i) {
       const BlurredShapes one = blurred_disk_shapes(radius, edge, distance[i]);
-      shapes[i] = {one.flat, one.sphere, one.parabola};
+      shapes[i] = {one.flat, one.sphere, one.parabola, one.cone, one.quartic};
     }
     return shapes;
   }
@@ -303,15 +309,15 @@ std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const s
   const double low = std::max(0.0, distance.front() - 0.8), high = distance.back() + 0.8;
   const auto count = static_cast<std::size_t>(std::ceil((high - low) / (optical / 5))) + 2;
   const double step = (high - low) / static_cast<double>(count - 1);
-  std::vector<std::array<double, 3>> table(count);
+  std::vector<Shapes> table(count);
   for (std::size_t k = 0; k < count; ++k) {
     const BlurredShapes one = blurred_disk_shapes(radius, optical, low + static_cast<double>(k) * step);
-    table[k] = {one.flat, one.sphere, one.parabola};
+    table[k] = {one.flat, one.sphere, one.parabola, one.cone, one.quartic};
   }
   static const GaussLegendre rule = gauss_legendre(6);
   constexpr int directions = 4;
   for (std::size_t i = 0; i < distance.size(); ++i) {
-    std::array<double, 3> sum{};
+    Shapes sum{};
     for (int d = 0; d < directions; ++d) {
       const double angle = (d + 0.5) / directions * 0.25 * 3.14159265358979;
       const double x = distance[i] * std::cos(angle), y = distance[i] * std::sin(angle);
@@ -322,7 +328,7 @@ std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const s
           const auto cell = static_cast<std::size_t>(place);
           const double part = place - static_cast<double>(cell);
           const double weight = rule.weight[a] * rule.weight[b] / directions;
-          for (std::size_t k = 0; k < 3; ++k)
+          for (std::size_t k = 0; k < sum.size(); ++k)
             sum[k] += weight * ((1 - part) * table[cell][k] + part * table[cell + 1][k]);
         }
     }
@@ -331,42 +337,55 @@ std::vector<std::array<double, 3>> shapes_at(double radius, double edge, const s
   return shapes;
 }
 
-// Radius and edge by damped least squares; `use` tells which of the three shapes, and the level
-// outside, take part.
-RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<double>& level, double radius_guess,
-                    double edge_guess, std::array<bool, 4> use, double* offset = nullptr) {
+// What is fitted: levels at distances from the centre, and the weight of each.
+struct RimData {
+  std::vector<double> distance, level, weight;
+  double offset_weight = 0;  // of the level outside being 0
+};
+
+// Radius and edge by damped least squares; `use` tells which of the shapes, and the level outside, take part.
+RimFit fit_rim_with(const RimData& data, double radius_guess, double edge_guess, RimTerms use,
+                    double* offset = nullptr) {
   RimFit best;
+  const std::vector<double>&distance = data.distance, &level = data.level;
+  double area_misfit = 0;
+  // Weighted sum of squares with the best sum of shapes.
   const auto misfit_of = [&](double radius, double edge, std::vector<double>& residual) {
     const auto rows = shapes_at(radius, edge, distance);
-    const auto shape = [&](std::size_t i, std::size_t a) { return a < 3 ? rows[i][a] : 1.0; };
-    const std::array<bool, 4>& takes_part = use;
-    std::vector<double> matrix(16, 0.0), right(4, 0.0);
-    for (std::size_t i = 0; i < distance.size(); ++i) {
-      const double weight = distance[i];  // pixels at this distance
-      for (std::size_t a = 0; a < 4; ++a) {
-        if (!takes_part[a]) continue;
-        right[a] += weight * shape(i, a) * level[i];
-        for (std::size_t b = 0; b < 4; ++b)
-          if (takes_part[b]) matrix[a * 4 + b] += weight * shape(i, a) * shape(i, b);
+    const auto shape = [&](std::size_t i, std::size_t a) { return a < 5 ? rows[i][a] : 1.0; };
+    std::vector<double> matrix(rim_terms * rim_terms, 0.0), right(rim_terms, 0.0);
+    for (std::size_t i = 0; i < distance.size(); ++i)
+      for (std::size_t a = 0; a < rim_terms; ++a) {
+        if (!use[a]) continue;
+        right[a] += data.weight[i] * shape(i, a) * level[i];
+        for (std::size_t b = 0; b < rim_terms; ++b)
+          if (use[b]) matrix[a * rim_terms + b] += data.weight[i] * shape(i, a) * shape(i, b);
       }
-    }
-    for (std::size_t a = 0; a < 4; ++a) matrix[a * 5] += takes_part[a] ? 1e-9 * matrix[0] : 1.0;
-    if (!solve_symmetric(matrix, right, 4)) return 1e30;
-    if (offset) *offset = right[3];
+    const double ridge = 1e-9 * matrix[0];
+    for (std::size_t a = 0; a < rim_terms; ++a) matrix[a * (rim_terms + 1)] += use[a] ? ridge : 1.0;
+    if (use[5]) matrix.back() += data.offset_weight;
+    if (!solve_symmetric(matrix, right, rim_terms)) return 1e30;
+    if (offset) *offset = right[5];
     residual.resize(distance.size());
-    double sum = 0, weights = 0;
+    double sum = data.offset_weight * right[5] * right[5], areas = 0;
+    area_misfit = 0;
     for (std::size_t i = 0; i < distance.size(); ++i) {
       double model = 0;
-      for (std::size_t a = 0; a < 4; ++a) model += right[a] * shape(i, a);
-      residual[i] = std::sqrt(distance[i]) * (level[i] - model);
+      for (std::size_t a = 0; a < rim_terms; ++a)
+        if (use[a]) model += right[a] * shape(i, a);
+      const double gap = level[i] - model;
+      residual[i] = std::sqrt(data.weight[i]) * gap;
       sum += residual[i] * residual[i];
-      weights += distance[i];
+      areas += distance[i];
+      area_misfit += distance[i] * gap * gap;
     }
-    return sum / weights;
+    area_misfit = std::sqrt(area_misfit / areas);
+    return sum;
   };
   double radius = radius_guess, edge = std::max(0.3, edge_guess);
   std::vector<double> residual, shifted;
   double misfit = misfit_of(radius, edge, residual);
+  double misfit_by_area = area_misfit;
   double damping = 1e-3;
   for (int round = 0; round < 30; ++round) {
     const double delta = 1e-3;
@@ -384,6 +403,8 @@ RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<doubl
       be -= by_edge * residual[i];
     }
     bool improved = false;
+    const double information = ee > 0 ? rr - re * re / ee : 0;
+    best.std_error_px = information > 0 ? 1 / std::sqrt(information) : 0;
     double moved = 0;
     for (int attempt = 0; attempt < 8 && !improved; ++attempt) {
       const double a = rr * (1 + damping), c = ee * (1 + damping);
@@ -398,6 +419,7 @@ RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<doubl
         radius = new_radius;
         edge = new_edge;
         misfit = new_misfit;
+        misfit_by_area = area_misfit;
         residual = shifted;
         damping = std::max(1e-9, damping * 0.2);
         improved = true;
@@ -407,7 +429,8 @@ RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<doubl
     }
     if (!improved || moved < 3e-5) break;
   }
-  best.misfit = std::sqrt(misfit);
+  best.misfit = misfit_by_area;
+  best.squares = misfit;
   best.good = std::isfinite(radius) && best.misfit < 0.1;
   best.radius_px = radius;
   best.edge_px = edge;
@@ -416,25 +439,35 @@ RimFit fit_rim_with(const std::vector<double>& distance, const std::vector<doubl
 
 }  // namespace
 
-RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
+namespace {
+
+RimData rim_data(const BeadProfile& profile, double radius, double edge) {
+  RimData data;
   const double reach = profile.reach_px();
-  const double low = std::max(0.0, std::min(0.55 * radius_guess_px, radius_guess_px - 2.5 * edge_guess_px));
-  const double spacing = std::clamp(edge_guess_px / 4, 0.08, (reach - low) / 30);
-  std::vector<double> distance, level;
+  const double low = std::max(0.0, std::min(0.55 * radius, radius - 2.5 * edge));
+  const double spacing = std::clamp(edge / 4, 0.08, (reach - low) / 30);
   for (double r = low + 0.5 * spacing; r < reach; r += spacing) {
-    distance.push_back(r);
-    level.push_back(value_at(profile.level, profile.step_px, r));
+    data.distance.push_back(r);
+    data.level.push_back(value_at(profile.level, profile.step_px, r));
   }
-  if (distance.size() < 6) return {};
+  data.weight = data.distance;  // pixels at this distance
+  return data;
+}
+
+}  // namespace
+
+RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px) {
+  RimData data = rim_data(profile, radius_guess_px, edge_guess_px);
+  if (data.distance.size() < 6) return {};
   // The simplest shading that will do: flat, then a sphere's, then both with a parabola.
-  std::array<bool, 4> chosen = {true, false, false, false};
-  RimFit best = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, chosen);
-  for (const std::array<bool, 4>& use :
-       {std::array<bool, 4>{true, true, false, false}, std::array<bool, 4>{true, true, true, false}}) {
+  RimTerms chosen = {true, false, false, false, false, false};
+  RimFit best = fit_rim_with(data, radius_guess_px, edge_guess_px, chosen);
+  for (const RimTerms& use :
+       {RimTerms{true, true, false, false, false, false}, RimTerms{true, true, true, false, false, false}}) {
     // Both shapes together can imitate another radius: they are asked only when nothing simpler comes near.
     const double negligible_misfit = use[2] ? 0.008 : 0.0015, clearly_better = use[2] ? 0.5 : 0.7;
     if (best.good && best.misfit < negligible_misfit) break;
-    const RimFit richer = fit_rim_with(distance, level, radius_guess_px, edge_guess_px, use);
+    const RimFit richer = fit_rim_with(data, radius_guess_px, edge_guess_px, use);
     if (richer.good && (!best.good || richer.misfit < clearly_better * best.misfit)) {
       best = richer;
       chosen = use;
@@ -444,12 +477,104 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
   // too low passes for a larger bead. An offset beyond that is something else: light between the beads, a halo.
   constexpr double largest_offset = 0.006;
   if (best.good) {
-    chosen[3] = true;
+    chosen[5] = true;
     double offset = 0;
-    const RimFit levelled = fit_rim_with(distance, level, best.radius_px, best.edge_px, chosen, &offset);
+    const RimFit levelled = fit_rim_with(data, best.radius_px, best.edge_px, chosen, &offset);
     if (levelled.good && std::abs(offset) < largest_offset && levelled.misfit < best.misfit) best = levelled;
   }
   return best;
+}
+
+RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
+                     double beads, double background_level, double bead_level, double from_px) {
+  RimChoice choice;
+  RimData data = rim_data(profile, radius_px, edge_px);
+  const auto inner = std::lower_bound(data.distance.begin(), data.distance.end(), from_px) - data.distance.begin();
+  for (std::vector<double>* values : {&data.distance, &data.level, &data.weight})
+    values->erase(values->begin(), values->begin() + inner);
+  if (data.distance.size() < 10) return choice;
+  // The profile's own error: pixels at one distance, and what its learning is good to. At a sharp edge square pixels
+  // see every direction differently.
+  constexpr double sharp = 0.6;
+  const double learning = edge_px < sharp ? 3e-3 : 3e-4;
+  const double spacing = data.distance[1] - data.distance[0];
+  for (std::size_t i = 0; i < data.distance.size(); ++i) {
+    const double pixels = std::max(1.0, beads * 2 * 3.14159265358979 * data.distance[i] * knot_px);
+    data.weight[i] = std::min(1.0, spacing / knot_px) / (noise * noise / pixels + learning * learning);
+  }
+  constexpr double likely_offset = 0.002;
+  data.offset_weight = 1 / (likely_offset * likely_offset);
+  struct Trial {
+    RimFit rim;
+    double terms = 0, exponent = 1;
+    bool odd = false;  // neither flat nor an evenly lit ball
+  };
+  std::vector<Trial> trials;
+  const auto try_all = [&](const RimData& levels, double exponent) {
+    constexpr std::array<RimTerms, 8> families = {
+        RimTerms{true, false, false, false, false, true}, RimTerms{true, true, false, false, false, true},
+        RimTerms{true, false, true, false, false, true},  RimTerms{true, false, false, true, false, true},
+        RimTerms{true, false, false, false, true, true},  RimTerms{true, true, true, false, false, true},
+        RimTerms{true, false, true, true, false, true},   RimTerms{true, false, true, false, true, true}};
+    for (const RimTerms& family : families) {
+      // What bends a rim a little passes for a tone curve if the shading is free enough.
+      const bool pair = family[1] + family[2] + family[3] + family[4] > 1;
+      if (pair && exponent != 1) continue;
+      const RimFit rim = fit_rim_with(levels, radius_px, edge_px, family);
+      if (!rim.good) continue;
+      const auto terms = static_cast<double>(std::count(family.begin(), family.end(), true));
+      trials.push_back({rim, terms, exponent, family[2] || family[3] || family[4]});
+    }
+  };
+  try_all(data, 1);
+  // In light, for a camera that encodes for display.
+  constexpr double display_exponent = 0.45;
+  const double brightest = std::max({background_level, bead_level, 1.0});
+  const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
+  const double background = light(background_level), bead = light(bead_level);
+  if (std::abs(bead - background) > 0.05) {
+    RimData in_light = data;
+    for (double& level : in_light.level)
+      level = (light(background_level + (bead_level - background_level) * level) - background) / (bead - background);
+    try_all(in_light, display_exponent);
+  }
+  if (trials.empty()) return choice;
+  // If even the freest shape leaves more than the errors allow, they are larger than thought.
+  const double points = static_cast<double>(data.distance.size()) * std::min(1.0, spacing / knot_px);
+  double least_squares = trials.front().rim.squares;
+  for (const Trial& trial : trials) least_squares = std::min(least_squares, trial.rim.squares);
+  const double scale = std::max(1.0, least_squares / std::max(1.0, points - 5));
+  // Of chi^2: what a term must bring to be believed, and what an odd shape must.
+  constexpr double price_of_term = 6, price_of_oddity = 12;
+  const auto cost = [&](const Trial& trial) {
+    return trial.rim.squares / scale + price_of_term * trial.terms + (trial.odd ? price_of_oddity : 0);
+  };
+  const Trial least = *std::min_element(trials.begin(), trials.end(),
+                                        [&](const Trial& a, const Trial& b) { return cost(a) < cost(b); });
+  choice.rim = least.rim;
+  choice.exponent = least.exponent;
+  constexpr double fair = 5;  // chi^2 a point
+  choice.rim.good = least.rim.squares < fair * points;
+  // Shapes that do as well each have their say; in the error, odd ones as much as any other.
+  double weights = 0, mean = 0;
+  for (const Trial& trial : trials) {
+    if (trial.exponent != choice.exponent) continue;
+    const double weight = std::exp(0.5 * std::max(-60.0, cost(least) - cost(trial)));
+    weights += weight;
+    mean += weight * trial.rim.radius_px;
+  }
+  mean /= weights;
+  double fair_weights = 0, square = 0;
+  for (const Trial& trial : trials) {
+    if (trial.exponent != choice.exponent) continue;
+    const double surplus = cost(trial) - cost(least) - (trial.odd && !least.odd ? price_of_oddity : 0);
+    const double weight = std::exp(-0.5 * std::clamp(surplus, 0.0, 60.0));
+    fair_weights += weight;
+    square += weight * (std::pow(trial.rim.radius_px - mean, 2) + scale * std::pow(trial.rim.std_error_px, 2));
+  }
+  choice.rim.radius_px = mean;
+  choice.rim.std_error_px = std::sqrt(square / fair_weights);
+  return choice;
 }
 
 namespace {
@@ -626,6 +751,7 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
       }
     }
   }
+  rim.inner_px = inner;
   rim.profile.step_px = spacing;
   rim.profile.level.assign(bins, 0.0F);
   rim.profile.fourth_harmonic.assign(bins, 0.0F);

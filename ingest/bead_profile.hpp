@@ -12,7 +12,9 @@ namespace shakebed::ingest {
 struct RimFit {
   bool good = false;
   double radius_px = 0, edge_px = 0;
-  double misfit = 0;  // rms of profile minus fit, contrast units
+  double misfit = 0;        // rms of profile minus fit over the bead's area, contrast units
+  double squares = 0;       // weighted sum of squares
+  double std_error_px = 0;  // of the radius, if the weights are inverse variances
 };
 
 // An evenly bright disk with a Gaussian edge.
@@ -29,6 +31,17 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
 // a sphere's sqrt(1 - rho^2) and a parabola.
 RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px);
 
+// The same once more, with care: the profile's own errors are known from the `noise` of a pixel (contrast units), the
+// number of beads it was learned from and its knots, several shadings are tried (flat; sphere, parabola, cone, quartic
+// and pairs of them), each as recorded and in light if levels were encoded for display (see below), and the radius is
+// the mean of what explains the profile equally well, its error their scatter and each one's own.
+struct RimChoice {
+  RimFit rim;
+  double exponent = 1;
+};
+RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
+                     double beads, double background_level, double bead_level, double from_px = 0);
+
 // The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides; one
 // that encodes for display (exponent 0.45) draws the dark side steep and the bright side long, and puts the edge at
 // another place. Of the two, the one in which the rim of a blurred flat disk fits best; linear when the linear fit
@@ -43,7 +56,8 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
 // The profile averaged over the parts of rims that face open background: nothing within several edge widths, each part
 // measured from its own background to its own bead.
 struct FreeRim {
-  std::size_t sectors = 0;
+  std::size_t sectors = 0;  // sixteen to a bead
+  double inner_px = 0;      // the profile is known from here outwards
   BeadProfile profile;
 };
 FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<const std::vector<ModelDisk>*>& disks,

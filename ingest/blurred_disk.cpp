@@ -94,6 +94,8 @@ BlurredShapes blurred_disk_shapes(double radius_px, double blur_px, double dista
     shapes.flat += weight;
     shapes.sphere += weight * std::sqrt(parabola);
     shapes.parabola += weight * parabola;
+    shapes.cone += weight * (1 - rho);
+    shapes.quartic += weight * parabola * parabola;
   });
   return shapes;
 }

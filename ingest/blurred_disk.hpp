@@ -21,9 +21,9 @@ using RadialContrast = std::function<double(double rho)>;
 // F(d) = integral_0^R c(r/R) r/b^2 exp(-(r^2 + d^2)/2b^2) I_0(r d/b^2) dr, to about 1e-6.
 double blurred_disk_contrast(double radius_px, double blur_px, const RadialContrast& contrast, double distance_px);
 
-// The same for the three shapes 1, sqrt(1 - rho^2), 1 - rho^2 at once (cheaper than three calls).
+// The same for the shapes 1, sqrt(1 - rho^2), 1 - rho^2, 1 - rho, (1 - rho^2)^2 at once (cheaper than five calls).
 struct BlurredShapes {
-  double flat = 0, sphere = 0, parabola = 0;
+  double flat = 0, sphere = 0, parabola = 0, cone = 0, quartic = 0;
 };
 BlurredShapes blurred_disk_shapes(double radius_px, double blur_px, double distance_px);
 

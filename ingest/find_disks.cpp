@@ -46,6 +46,9 @@ double reach_of(double radius, double edge) { return radius + 3.2 * edge + 0.4; 
 // Steps use a gradient widened to about this edge while beads may still be off by half a pixel.
 double softening_for(double edge) { return edge < 0.8 ? std::sqrt(0.8 * 0.8 - edge * edge) : 0.0; }
 
+// Distance of the knots of a profile.
+double knot_for(double radius, double edge) { return std::clamp(0.4 * edge, 0.2, std::max(0.25, radius / 8)); }
+
 std::vector<ModelDisk> disks_at(const std::vector<DiskCandidate>& candidates) {
   std::vector<ModelDisk> disks;
   disks.reserve(candidates.size());
@@ -364,6 +367,16 @@ bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disk
 
 namespace {
 
+// Of a radius told from the rims of `beads` beads under noise `spread` (contrast units), with `doubt` about the
+// shading.
+double radius_error(const FinderCalibration& calibration, double spread, double beads, double doubt) {
+  // The rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per px^2; 0.002 px is what the
+  // model is good to.
+  const double information = beads * 2 * 3.14159265 * calibration.rim_radius_px /
+                             (2 * std::sqrt(3.14159265) * std::max(0.3, calibration.edge_width_px));
+  return std::hypot(spread / std::sqrt(information), 0.002, doubt);
+}
+
 // What remains of the frame, in squares of grey levels, once background and beads are taken out.
 double unexplained_of(const JointFit& fit, const LightField& light) {
   double sum = 0;
@@ -433,6 +446,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   constexpr int least_rounds = 5, most_rounds = 12;
   bool settled = false;
   double last_change = 0;
+  double knot = 0.25;
   for (int round = 0; round < most_rounds; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
@@ -491,7 +505,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     }
     if (options.learn_profile || round < 2) {
       const double reach = std::max(reach_of(radius, edge), round == 0 ? 1.12 * radius + 2 : 0.0);
-      const double knot = std::clamp(round == 0 ? 0.05 * radius : 0.4 * edge, 0.2, std::max(0.25, radius / 8));
+      knot = round == 0 ? std::clamp(0.05 * radius, 0.2, std::max(0.25, radius / 8)) : knot_for(radius, edge);
       const bool sharp = edge < 0.6 && round >= 2;
       const BeadProfile learned =
           learn_profile(fit_pointers, disk_pointers, profile, reach, knot, radius, sharp, round < 2 ? 3 : 1);
@@ -526,43 +540,54 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     return all;
   }
   calibration.radius_px = calibration.rim_radius_px = radius;
-  // Rims that face open background tell the radius where the packed ones cannot: if the camera's tone curve bends, or
-  // if what lies between packed beads is neither bead nor background.
+  // What the whole bed's rims tell; and where nothing explains them (the camera's tone curve bends, or what lies
+  // between packed beads is neither bead nor background) those that face open background.
   double radius_doubt = 0;
-  const RimFit packed = fit_rim(profile, radius, edge);
-  constexpr double poor_misfit = 0.012;
-  if (!options.hold_radius && (!packed.good || packed.misfit > poor_misfit)) {
+  const RimChoice packed =
+      choose_rim(profile, radius, edge, knot, spread, static_cast<double>(total), mean_background(light),
+                 std::max(0.0, mean_background(light) + mean_contrast(light)));
+  const auto take = [&](const RimChoice& choice) {
+    calibration.radius_px = choice.rim.radius_px;
+    calibration.tone_exponent = choice.exponent;
+    radius_doubt = choice.rim.std_error_px;
+  };
+  if (!options.hold_radius && packed.rim.good) {
+    take(packed);
+    calibration.radius_of_all_rims = true;
+  }
+  if (!packed.rim.good) radius_doubt = 0.5 * std::abs(packed.rim.radius_px - radius);  // nothing explains the rim
+  if (!options.hold_radius && !packed.rim.good) {
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
     for (const auto& one : disks) disk_pointers.push_back(&one);
     const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
+      constexpr double poor_misfit = 0.012;
+      const RimChoice open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
+                                        static_cast<double>(free_rim.sectors) / 16, background,
+                                        std::max(0.0, background + contrast), free_rim.inner_px);
       const ToneFit tone =
           fit_tone_exponent(free_rim.profile, background, std::max(0.0, background + contrast), radius, edge);
-      if (tone.chosen.good) {
+      if (open.rim.good) {
+        take(open);
+      } else if (tone.chosen.good && fit_rim(profile, radius, edge).misfit > poor_misfit) {
         calibration.tone_exponent = tone.exponent;
         calibration.radius_px = tone.chosen.radius_px;
-        if (tone.exponent != 1) {
-          radius_doubt = 0.25 * std::abs(tone.chosen.radius_px - tone.linear.radius_px);
-          calibration.warnings.push_back(
-              "Rims fall steeper on their dark side, as in pictures encoded for display: the radius is told in "
-              "light, " +
-              std::to_string(tone.chosen.radius_px) + " px; taken from the recorded levels it would be " +
-              std::to_string(tone.linear.radius_px) + " px.");
-        }
+        if (tone.exponent != 1) radius_doubt += 0.25 * std::abs(tone.chosen.radius_px - tone.linear.radius_px);
       }
     }
   }
+  if (calibration.tone_exponent != 1)
+    calibration.warnings.push_back(
+        "Rims fall steeper on their dark side, as in pictures encoded for display: the radius is told in light, " +
+        std::to_string(calibration.radius_px) + " px; taken from the recorded levels it would be " +
+        std::to_string(radius) + " px.");
   calibration.edge_width_px = edge;
   calibration.profile = profile;
   calibration.light = light;
   calibration.contrast_level = mean_contrast(light);
   calibration.noise_level = spread * std::abs(calibration.contrast_level);
-  // Information on a radius: the rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per
-  // px^2.
-  const double information =
-      static_cast<double>(total) * 2 * 3.14159265 * radius / (2 * std::sqrt(3.14159265) * std::max(0.3, edge));
-  calibration.radius_std_error_px = std::hypot(spread / std::sqrt(information), 0.002, radius_doubt);
+  calibration.radius_std_error_px = radius_error(calibration, spread, static_cast<double>(total), radius_doubt);
   calibration.frames_used = used.size();
   calibration.disks_used = total;
   if (total < 5)
@@ -723,6 +748,15 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     }
     if (put_back) fit_again();
   }
+  if (options.learn_rim) {
+    std::vector<ModelDisk> clear;
+    for (const ModelDisk& disk : disks)
+      if (disk.explained >= least_explained * typical) clear.push_back(disk);
+    result.profile_beads = clear.size();
+    if (!clear.empty())
+      result.profile = learn_profile({&fit}, {&clear}, calibration.profile, calibration.profile.reach_px(),
+                                     knot_for(radius, edge), radius, false, 1);
+  }
   double residual_sum = 0;
   std::size_t residual_count = 0;
   const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;
@@ -778,6 +812,35 @@ FindResult find_disks(const GrayFrame& frame, const FindOptions& options, Finder
   }
   if (calibration_found) *calibration_found = calibrated.calibration;
   return find_disks(frame, calibrated.calibration, options);
+}
+
+void RadiusFromFrames::add(const FindResult& found) {
+  if (found.profile_beads == 0) return;
+  if (sums_.empty()) {
+    step_px_ = found.profile.step_px;
+    sums_.assign(found.profile.level.size(), 0.0);
+  }
+  if (found.profile.level.size() != sums_.size()) return;
+  for (std::size_t k = 0; k < sums_.size(); ++k)
+    sums_[k] += static_cast<double>(found.profile_beads) * static_cast<double>(found.profile.level[k]);
+  beads_ += found.profile_beads;
+  ++frames_;
+}
+
+void RadiusFromFrames::refine(FinderCalibration& calibration) const {
+  if (frames_ < 2 || !calibration.radius_of_all_rims) return;
+  BeadProfile mean;
+  mean.step_px = step_px_;
+  for (const double sum : sums_) mean.level.push_back(static_cast<float>(sum / static_cast<double>(beads_)));
+  const double contrast = calibration.contrast_level, background = mean_background(calibration.light);
+  const double spread = calibration.noise_level / std::max(1e-6, std::abs(contrast));
+  const double beads = static_cast<double>(beads_);
+  const RimChoice choice = choose_rim(mean, calibration.rim_radius_px, calibration.edge_width_px,
+                                      knot_for(calibration.rim_radius_px, calibration.edge_width_px), spread, beads,
+                                      background, std::max(0.0, background + contrast));
+  if (!choice.rim.good || choice.exponent != calibration.tone_exponent) return;
+  calibration.radius_px = choice.rim.radius_px;
+  calibration.radius_std_error_px = radius_error(calibration, spread, beads, choice.rim.std_error_px);
 }
 
 GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const FinderCalibration& calibration) {

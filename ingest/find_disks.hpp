@@ -37,6 +37,7 @@ struct FindOptions {
       20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
   bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge
   bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
+  bool learn_rim = false;         // fill FindResult::profile
 };
 
 // What is common to all frames of a film, learned from its first frames.
@@ -44,12 +45,13 @@ struct FinderCalibration {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   double radius_std_error_px = 0;
-  double rim_radius_px = 0;   // where the recorded profile has its edge: radius_px unless the tone curve moves it
-  double edge_width_px = 0;   // sigma of the blurred edge, the pixel's own 0.29 px included
-  double noise_level = 0;     // sigma of the residuals in grey levels, away from edges
-  double contrast_level = 0;  // bead minus background, grey levels, at the middle of the frame
-  double tone_exponent = 1;   // recorded level = light^exponent, told from the rims; 1 for a linear camera
-  int width = 0, height = 0;  // of the frames it was learned from
+  double rim_radius_px = 0;         // where the recorded profile has its edge: radius_px unless the tone curve moves it
+  double edge_width_px = 0;         // sigma of the blurred edge, the pixel's own 0.29 px included
+  double noise_level = 0;           // sigma of the residuals in grey levels, away from edges
+  double contrast_level = 0;        // bead minus background, grey levels, at the middle of the frame
+  bool radius_of_all_rims = false;  // told from the profile below, the rims of all beads, not from open ones alone
+  double tone_exponent = 1;         // recorded level = light^exponent, told from the rims; 1 for a linear camera
+  int width = 0, height = 0;        // of the frames it was learned from
   BeadProfile profile;
   LightField light;
   std::size_t frames_used = 0;
@@ -62,6 +64,8 @@ struct FindResult {
   std::size_t rejected = 0;      // disks of another size or clarity seen and not reported
   double residual_level = 0;     // rms of frame - model over the beads, grey levels
   std::string why_nothing;       // a sentence when disks is empty
+  BeadProfile profile;           // learned from this frame's beads, if asked for
+  std::size_t profile_beads = 0;
   [[nodiscard]] bool empty() const { return disks.empty(); }
 };
 
@@ -77,6 +81,22 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
 // Finds the disks of one frame of that film. Depends on nothing but its arguments. Throws std::invalid_argument when
 // the frame's pixel count is not width * height.
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options = {});
+
+// The radius from several frames' rims: their profiles averaged. Frames in any order; the result depends on the order
+// only by rounding.
+constexpr std::size_t rim_frames = 10;  // of a film are enough
+class RadiusFromFrames {
+ public:
+  void add(const FindResult& found);  // found with learn_rim
+  // Puts radius and error into the calibration the frames were searched with; leaves it alone when the frames tell
+  // nothing new.
+  void refine(FinderCalibration& calibration) const;
+
+ private:
+  double step_px_ = 0;
+  std::vector<double> sums_;
+  std::size_t beads_ = 0, frames_ = 0;
+};
 
 // Both in one call, for a single photograph.
 FindResult find_disks(const GrayFrame& frame, const FindOptions& options = {},

@@ -325,17 +325,27 @@ std::vector<FinderBenchmarkRow> benchmark_finder(const FinderBenchmarkOptions& o
           Tally result;
           double seconds = calibration_seconds;
           if (calibrated.found) {
-            row.radius_error_px = calibrated.calibration.radius_px - options.radius_px;
             FindOptions find;
             find.joint_fit_sweeps = sweeps;
+            FinderCalibration calibration = calibrated.calibration;
+            RadiusFromFrames radius;
+            std::vector<std::vector<Centre>> all_centres;
             for (std::size_t k = 0; k < frames.size(); ++k) {
               const double frame_start = cpu_seconds();
+              find.learn_rim = sweeps == 20 && k < rim_frames;
               const FindResult found = find_disks(frames[k], calibrated.calibration, find);
+              radius.add(found);
               seconds += cpu_seconds() - frame_start;
               std::vector<Centre> centres;
               for (const FoundDisk& disk : found.disks) centres.push_back({disk.x_px, disk.y_px});
-              tally(centres, truths[k], options.width, options.height, calibrated.calibration.radius_px, result);
+              all_centres.push_back(std::move(centres));
             }
+            const double refine_start = cpu_seconds();
+            radius.refine(calibration);
+            seconds += cpu_seconds() - refine_start;
+            row.radius_error_px = calibration.radius_px - options.radius_px;
+            for (std::size_t k = 0; k < frames.size(); ++k)
+              tally(all_centres[k], truths[k], options.width, options.height, calibration.radius_px, result);
           }
           finish(row, result, seconds, sweeps == 20);
         }

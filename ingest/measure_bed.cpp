@@ -21,6 +21,7 @@ namespace {
 struct FrameFindings {
   FrameReport report;
   std::vector<FoundDisk> disks, second;
+  FindResult rim;                      // of the first frames: their beads' profile
   std::vector<float> coverage_of_row;  // covered px of each row
 };
 
@@ -126,7 +127,11 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
     return findings;
   }
   if (!lens.lens().plain()) frame = lens.corrected(frame);
-  FindResult found = find_disks(frame, finder, options.find);
+  FindOptions find = options.find;
+  find.learn_rim = item.index < rim_frames;
+  FindResult found = find_disks(frame, finder, find);
+  findings.rim.profile = std::move(found.profile);
+  findings.rim.profile_beads = found.profile_beads;
   if (second) {
     findings.second = find_second(frame, found, finder, *second, options.find);
     findings.report.second = findings.second.size();
@@ -478,20 +483,26 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     if (!(top > bins.lowest)) return std::size_t{0};
     return static_cast<std::size_t>(std::clamp(std::ceil((top - bins.lowest) / bins.width - 1e-9), 1.0, 1e5));
   };
+  FinderCalibration refined = finder;
   const auto settle_geometry = [&] {
-    bed.radius_px = finder.radius_px;
-    bed.radius_std_error_px = finder.radius_std_error_px;
+    RadiusFromFrames radius;
+    for (const FrameFindings& frame : held) radius.add(frame.rim);
+    radius.refine(refined);
+    for (FrameFindings& frame : held)
+      for (FoundDisk& disk : frame.disks) disk.radius_px = refined.radius_px;
+    bed.radius_px = refined.radius_px;
+    bed.radius_std_error_px = refined.radius_std_error_px;
     bed.edge_width_px = finder.edge_width_px;
     bed.noise_level = finder.noise_level;
     bed.contrast_level = finder.contrast_level;
     bed.polarity = finder.polarity;
     bed.scale_given = options.scale_m_per_px.has_value();
-    bed.scale_m_per_px = bed.scale_given ? *options.scale_m_per_px : options.bead_diameter_m / (2 * finder.radius_px);
-    bed.scale_relative_std_error = bed.scale_given ? 0 : finder.radius_std_error_px / finder.radius_px;
+    bed.scale_m_per_px = bed.scale_given ? *options.scale_m_per_px : options.bead_diameter_m / (2 * refined.radius_px);
+    bed.scale_relative_std_error = bed.scale_given ? 0 : refined.radius_std_error_px / refined.radius_px;
     diameter_px = options.bead_diameter_m / bed.scale_m_per_px;
-    if (bed.scale_given && std::abs(2 * finder.radius_px / diameter_px - 1) > 0.02)
+    if (bed.scale_given && std::abs(2 * refined.radius_px / diameter_px - 1) > 0.02)
       measurement.warnings.push_back("The scale given makes a bead " + std::to_string(diameter_px) +
-                                     " px wide, but the frames show " + std::to_string(2 * finder.radius_px) + " px.");
+                                     " px wide, but the frames show " + std::to_string(2 * refined.radius_px) + " px.");
     bed.floor_given = options.floor_px.has_value();
     if (bed.floor_given) {
       bed.floor_px = *options.floor_px;
@@ -528,8 +539,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     for (const FrameFindings& frame : held) {
       double low = 1e9, high = -1e9;
       for (const FoundDisk& disk : frame.disks) {
-        low = std::min(low, disk.x_px - finder.radius_px);
-        high = std::max(high, disk.x_px + finder.radius_px);
+        low = std::min(low, disk.x_px - refined.radius_px);
+        high = std::max(high, disk.x_px + refined.radius_px);
       }
       if (frame.disks.empty()) continue;
       leftmost.push_back(low);
@@ -542,7 +553,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       if (!cut) return extreme;
       // Beads go on beyond the frame: only centres a radius inside are counted, so that each of them is seen whole.
       bed.walls_are_frame_sides = true;
-      return left ? frame_side + finder.radius_px : frame_side - finder.radius_px;
+      return left ? frame_side + refined.radius_px : frame_side - refined.radius_px;
     };
     bed.left_wall_px = side(options.left_wall_px, leftmost, frame_left, true);
     bed.right_wall_px = side(options.right_wall_px, rightmost, frame_right, false);
@@ -557,7 +568,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     if (bed.walls_are_frame_sides)
       measurement.warnings.push_back("The bed goes on beyond the frame: the profile is that of the part in view.");
     bins.count = bins_up_to(options.highest.value_or(
-        (bed.floor_px + std::max(0.0, bed.floor_slope * finder.width) + finder.radius_px) / diameter_px + 1));
+        (bed.floor_px + std::max(0.0, bed.floor_slope * finder.width) + refined.radius_px) / diameter_px + 1));
   };
 
   // A frame's disks in heights, its densities.
@@ -598,7 +609,9 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
         if (overlap > 0) area[static_cast<std::size_t>(bin)] += static_cast<double>(rows[row]) * overlap * diameter_px;
       }
     }
-    for (double& value : area) value *= 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
+    // A bead's contrast stands for the area of the radius known by now.
+    const double bead_area = std::pow(refined.radius_px / finder.radius_px, 2);
+    for (double& value : area) value *= bead_area * 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
     covered.push_back(std::move(area));
     through_chord.resize(bins.count, 0.0);
     for (const double height : heights) {
@@ -626,7 +639,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
           lens.plain() ? PixelPlace{disk.x_px, disk.y_px} : lens_map.to_recorded({disk.x_px, disk.y_px});
       measured.x_px = seen_at.x;
       measured.y_px = seen_at.y;
-      measured.radius_px = disk.radius_px;
+      measured.radius_px = species == 1 ? refined.radius_px : disk.radius_px;
       measured.z = (bed.floor_px + bed.floor_slope * disk.x_px - disk.y_px) * cosine / diameter_px;
       measured.x = ((disk.x_px - bed.left_wall_px) * cosine +
                     (disk.y_px - bed.floor_px - bed.floor_slope * disk.x_px) * cosine * bed.floor_slope) /
@@ -643,7 +656,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       const bool in_width = disk.x_px >= bed.left_wall_px && disk.x_px < bed.right_wall_px;
       if (in_width) (species == 1 ? heights : second_heights).push_back(measured.z);
       highest = std::max(highest, measured.z);
-      cut_below += species == 1 && disk.cut && disk.y_px > finder.height - finder.radius_px;
+      cut_below += species == 1 && disk.cut && disk.y_px > finder.height - refined.radius_px;
     };
     for (const FoundDisk& disk : frame.disks) add(disk, 1);
     for (const FoundDisk& disk : frame.second) add(disk, 2);
@@ -704,7 +717,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
           held.push_back(std::move(next->second));
           early.erase(next);
           measurement.most_frames_held = std::max(measurement.most_frames_held, held.size() + early.size());
-          if (options.disk_sink && (geometry_known || held.size() >= options.geometry_frames)) place_held();
+          if (options.disk_sink && (geometry_known || held.size() >= std::max(options.geometry_frames, rim_frames)))
+            place_held();
           ++done;
           if (options.progress) options.progress(done);
         }
@@ -723,6 +737,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   }
   if (failure) std::rethrow_exception(failure);
   place_held();
+  measurement.finder.radius_px = refined.radius_px;
+  measurement.finder.radius_std_error_px = refined.radius_std_error_px;
 
   // Profiles.
   const auto cut_to_bins = [&](std::vector<std::vector<double>>& rows) {
@@ -735,7 +751,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     measurement.second_profile = average_profile(second_densities, bins, options.kernel, bed.scale_relative_std_error);
     for (std::size_t bin = 0; bin < bins.count; ++bin)
       measurement.second_profile->area_fraction[bin] *=
-          std::pow(second->radius_px / finder.radius_px, 2);  // of their own size
+          std::pow(second->radius_px / refined.radius_px, 2);  // of their own size
   }
   measurement.profile = average_profile(densities, bins, options.kernel, bed.scale_relative_std_error);
 

@@ -67,7 +67,7 @@ struct MeasureOptions {
   std::function<void(std::size_t frames_done)> progress;  // called from one thread at a time
   // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
   // that memory hardly grows with the film. Floor and walls, unless given, are then told from the first geometry_frames
-  // frames of the film instead of from all.
+  // frames of the film (rim_frames at least, which tell the radius) instead of from all.
   std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink;
   std::size_t geometry_frames = 100;
 };

@@ -84,7 +84,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 4,
+          .version = 5,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,
