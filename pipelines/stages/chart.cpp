@@ -325,8 +325,12 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
         if (bars) below.error.push_back(data.error[i]);
       }
       const auto n = static_cast<double>(x.size());
-      if (!x.empty()) {
-        Json against{{"curve", curve.name}};
+      Json against{{"curve", curve.name}, {"points", x.size()}};
+      if (x.empty()) {
+        for (const char* key : {"chi2", "p_value", "mean_difference", "rms_difference", "largest_difference"})
+          against[key] = nullptr;
+        found["against"] = std::move(against);
+      } else {
         if (weighted) {
           const int dof = static_cast<int>(x.size());
           against["chi2"] = chi2, against["dof"] = dof;

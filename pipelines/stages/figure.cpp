@@ -155,8 +155,12 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   body +=
       "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
       "pointintervalbox 0\n";
-  // Above the picture, where it hides nothing.
-  body += "set key above vertical maxrows 3 font keyfont spacing 1.2 samplen 2\n";
+  // Above the picture, where it hides nothing, in two columns.
+  const auto entries =
+      std::count_if(drawn.series.begin(), drawn.series.end(), [](const Series& s) { return !s.label.empty(); }) +
+      (picture.band_label.empty() ? 0 : 1);
+  const auto rows = std::max<std::ptrdiff_t>(1, (entries + 1) / 2);
+  body += fmt::format("set key above vertical maxrows {} font keyfont spacing 1.2 samplen 2\n", rows);
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     body += fmt::format(
@@ -165,9 +169,10 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
         object++, number_text(low), number_text(high));
   }
   if (two) {
-    body +=
-        "set multiplot\nset lmargin at screen 0.14\nset rmargin at screen 0.97\nset tmargin at screen 0.84\nset "
-        "bmargin at screen 0.38\nset format x ''\n";
+    body += fmt::format(
+        "set multiplot\nset lmargin at screen 0.14\nset rmargin at screen 0.97\nset tmargin at screen {:.2f}\nset "
+        "bmargin at screen 0.38\nset format x ''\n",
+        0.94 - 0.034 * static_cast<double>(rows));
   } else {
     body += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
   }
@@ -216,7 +221,7 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
   if (!picture.cross_x.empty())
     body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 0.9*scale lw 2 lc rgb '#D55E00' title {}",
                         gnuplot_text(name + ".dat"), gnuplot_text(plain(picture.cross_label)));
-  const double shape = std::clamp((top + 6) / (picture.width + 8), 0.3, 2.0);
+  const double shape = std::clamp((top + 8) / (picture.width + 10), 0.3, 2.0);
   run_gnuplot(directory, name, twice(name, 860, 860 * shape, body + "\n"));
 }
 

@@ -29,6 +29,7 @@ struct Parameter {
 };
 struct Change {  // of a series: pointer → value
   std::vector<std::pair<std::string, Json>> set;
+  std::optional<double> times;  // instead of the parameter's
 };
 struct Collected {
   std::string at;  // "/fit/temperature"
@@ -80,6 +81,8 @@ void Study::describe(Fields& fields) {
                        Json set = Json::object();
                        for (const auto& [pointer, value] : change.set) set[pointer] = value;
                        f.any("set", set, {.help = "JSON pointer into the chain → value"});
+                       f.number("times", change.times,
+                                {.help = "factor of the parameter in this series, instead of its own"});
                        if (!f.decoding()) return;
                        f.require(set.is_object(), "set", "expected an object: pointer → value");
                        change.set.clear();
@@ -144,7 +147,9 @@ Plan Study::plan_of(const Point& point, std::uint64_t seed) const {
     for (const auto& [pointer, value] : series_[point.series].second.set)
       set_pointer(document, pointer, to_node(value));
   }
-  const double value = parameter_.values[point.value] * parameter_.times;
+  const double value =
+      parameter_.values[point.value] *
+      (series_.empty() ? parameter_.times : series_[point.series].second.times.value_or(parameter_.times));
   for (const std::string& pointer : parameter_.set) {
     set_pointer(document, pointer,
                 to_node(parameter_.unit.empty() ? Json(value) : Json(number_text(value) + " " + parameter_.unit)));
@@ -239,6 +244,12 @@ void Study::run(RunContext& context) const {
   }
   if (failure) std::rethrow_exception(failure);
 
+  const auto quoted = [](const std::string& name) {
+    if (name.find_first_of(",\"\n") == std::string::npos) return name;
+    std::string out = "\"";
+    for (const char c : name) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return out + "\"";
+  };
   const auto cell = [](double value) { return std::isfinite(value) ? number_text(value) : std::string(); };
   std::string runs = "series," + parameter_.name + ",replica", table = "series," + parameter_.name;
   for (const auto& [name, ignored] : collect_) {
@@ -251,7 +262,7 @@ void Study::run(RunContext& context) const {
   Json series = Json::object();
   std::size_t missing = 0;
   for (std::size_t i = 0; i < all.size(); i += replicas_) {
-    const std::string where = fmt::format("{},{}", series_name(all[i].series), parameter_.values[all[i].value]);
+    const std::string where = fmt::format("{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value]);
     table += where;
     Json row;
     row[parameter_.name] = parameter_.values[all[i].value];
@@ -294,7 +305,7 @@ void Study::run(RunContext& context) const {
 
 StageRow study_stage(int inner_versions) {
   return {.name = "study",
-          .version = 1 + inner_versions,
+          .version = 2 + inner_versions,
           .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
           .uses_seed = true,
           .result = "study.json",
