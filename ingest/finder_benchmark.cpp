@@ -289,30 +289,39 @@ std::vector<FinderBenchmarkRow> benchmark_finder(const FinderBenchmarkOptions& o
           if (progress) progress(row);
         };
         if (options.with_hough) {
-          FinderBenchmarkRow best = base;
-          best.method = "hough";
-          Tally best_tally;
-          double best_seconds = 0, best_merit = -1;
+          struct Setting {
+            double edge, votes, smooth;
+          } best{};
+          const auto run = [&](const Setting& setting, std::size_t count, Tally& result) {
+            double seconds = 0;
+            for (std::size_t k = 0; k < count; ++k) {
+              const double start = cpu_seconds();
+              const std::vector<Centre> found =
+                  hough(frames[k], options.radius_px, setting.edge, setting.votes, setting.smooth);
+              seconds += cpu_seconds() - start;
+              tally(found, truths[k], options.width, options.height, options.radius_px, result);
+            }
+            return seconds;
+          };
+          constexpr std::size_t tuned_on = 4;  // frames
+          double best_merit = -1;
           for (const double edge : {30.0, 60.0, 120.0, 200.0})
             for (const double votes : {4.0, 6.0, 8.0, 11.0, 15.0})
               for (const double smooth : {0.0, 1.0, 1.5}) {
                 Tally result;
-                const double start = cpu_seconds();
-                std::vector<std::vector<Centre>> found;
-                for (const GrayFrame& frame : frames)
-                  found.push_back(hough(frame, options.radius_px, edge, votes, smooth));
-                const double seconds = cpu_seconds() - start;
-                for (std::size_t k = 0; k < frames.size(); ++k)
-                  tally(found[k], truths[k], options.width, options.height, options.radius_px, result);
+                run({edge, votes, smooth}, std::min(tuned_on, frames.size()), result);
                 const double merit =
                     static_cast<double>(result.hits) - 0.5 * static_cast<double>(result.found - result.hits);
                 if (merit > best_merit) {
                   best_merit = merit;
-                  best_tally = result;
-                  best_seconds = seconds;
+                  best = {edge, votes, smooth};
                 }
               }
-          finish(best, best_tally, best_seconds);
+          FinderBenchmarkRow row = base;
+          row.method = "hough";
+          Tally result;
+          const double seconds = run(best, frames.size(), result);
+          finish(row, result, seconds);
         }
         const double start = cpu_seconds();
         const CalibrationResult calibrated = calibrate_finder({&frames.front()});

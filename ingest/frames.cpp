@@ -513,6 +513,8 @@ FrameSource::FrameSource(FrameSource&&) noexcept = default;
 FrameSource& FrameSource::operator=(FrameSource&&) noexcept = default;
 FrameSource::~FrameSource() = default;
 
+bool FrameSource::is_frame_file(const fs::path& path) { return kind_of(path) != Kind::unknown; }
+
 FrameSource FrameSource::open(const std::vector<std::string>& paths, const FrameSourceOptions& options) {
   auto state = std::make_unique<State>();
   state->options = options;

@@ -70,6 +70,8 @@ class FrameSource {
  public:
   // Throws InputError when nothing matches, a path does not exist, or is of no known kind. Opens no file's contents.
   static FrameSource open(const std::vector<std::string>& paths, const FrameSourceOptions& options = {});
+  // Whether the name's ending is that of a picture or a film: what a folder's other files are told from.
+  static bool is_frame_file(const std::filesystem::path& path);
   // Frames made on demand, e.g. by a renderer: `make(index)` for index 0 .. count - 1, called from several threads.
   static FrameSource from_generator(std::size_t count, std::function<GrayFrame(std::size_t)> make);
   static FrameSource from_frames(std::vector<GrayFrame> frames);

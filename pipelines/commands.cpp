@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 
@@ -311,8 +312,28 @@ int command_fit_images(const Arguments& arguments) {
   if (image.right_wall) extract["right_wall"] = *image.right_wall;
   if (!image.roi.empty()) extract["roi"] = image.roi;
   if (image.polarity) extract["polarity"] = *image.polarity;
-  if (image.frequency && image.frame_rate)
-    extract["frequency"] = *image.frequency, extract["frame_rate"] = *image.frame_rate;
+  if (image.second_diameter) extract["second_diameter"] = *image.second_diameter;
+  if (image.pixel_aspect) extract["pixel_aspect"] = *image.pixel_aspect;
+  if (image.lens) extract["lens"] = *image.lens;
+  if (image.bead_number) extract["bead_number"] = *image.bead_number;
+  if (image.kernel) {
+    const std::size_t colon = image.kernel->find(':');
+    std::string kind = image.kernel->substr(0, colon);
+    std::replace(kind.begin(), kind.end(), '-', '_');
+    extract["kernel"] = kind;
+    if (colon != std::string::npos) {
+      const std::string width = image.kernel->substr(colon + 1);
+      char* end = nullptr;
+      extract["kernel_width"] = std::strtod(width.c_str(), &end);
+      if (width.empty() || *end != 0)
+        throw UsageError(
+            fmt::format("--kernel: expected a kind and its width in D, gaussian:0.5, got {}", *image.kernel));
+    }
+  }
+  if (image.frame_rate) {
+    extract["frame_rate"] = *image.frame_rate;
+    if (image.frequency) extract["frequency"] = *image.frequency;
+  }
   Json fit{{"stage", "fit"}, {"from", "extract"}, {"plateau_density", checked_plateau(image.plateau_density)}};
   if (image.model) fit["model"] = *image.model;
   Json document;

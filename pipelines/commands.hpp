@@ -20,8 +20,10 @@ struct RunArguments {
 struct ImageArguments {
   std::vector<std::string> files;
   std::string diameter;
-  std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity;
-  std::optional<double> plateau_density, floor, left_wall, right_wall;
+  std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity,
+      second_diameter, kernel;
+  std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens;
+  std::optional<std::uint64_t> bead_number;
   std::vector<double> roi;
 };
 struct ProfileArguments {

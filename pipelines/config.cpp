@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
 namespace shakebed::pipelines {
 
@@ -409,7 +410,9 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
           found.push_back(entry.path());
         }
       }
-      std::sort(found.begin(), found.end());
+      std::sort(found.begin(), found.end(), [](const fs::path& a, const fs::path& b) {
+        return strverscmp(a.c_str(), b.c_str()) < 0;  // frame2 before frame10
+      });
     }
     if (found.empty()) {
       complain(item, where,

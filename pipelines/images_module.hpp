@@ -33,7 +33,7 @@ struct RenderOptions {
 };
 
 enum class BeadPolarity { automatic, dark, bright };
-enum class DensityKernel { gaussian, top_hat };
+enum class DensityKernel { gaussian, top_hat, disk_chord };
 
 // Pixels count from the centre of the top-left one, x to the right, y downwards.
 struct ExtractOptions {
@@ -52,10 +52,11 @@ struct ExtractOptions {
   std::optional<double> radius;  // first value [px]
   bool keep_half_hidden = false;
   DensityKernel kernel = DensityKernel::gaussian;
-  double kernel_width = 0.5;                    // sigma or full width [D]
+  double kernel_width = 0.5;                    // sigma, full width or diameter [D]
   double spacing = 0.25;                        // of the profile's heights [D]
   std::optional<double> lowest, highest;        // of the profile [D]
   std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles
+  std::optional<std::uint64_t> bead_number;     // how many beads there are in view, if known
   std::uint64_t stride = 1;                     // every so many frames
   std::uint64_t overlays = 1;                   // frames drawn with what was found
 };

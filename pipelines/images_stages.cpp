@@ -277,6 +277,30 @@ class DisksOnTheWay {
                           quality_[k]);
     return text;
   }
+  // The same as a histogram; its height goes with the logarithm, so that a few odd disks among thousands show.
+  [[nodiscard]] std::string quality_figure() const {
+    constexpr double left = 60, top = 20, wide = 560, high = 200;
+    const double most = std::log1p(static_cast<double>(*std::max_element(quality_.begin(), quality_.end())));
+    const double step = wide / static_cast<double>(quality_.size());
+    std::string bars;
+    for (std::size_t k = 0; k < quality_.size(); ++k) {
+      if (quality_[k] == 0) continue;
+      const double tall = high * std::log1p(static_cast<double>(quality_[k])) / most;
+      bars += fmt::format(
+          "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "
+          "fill=\"#1f6fb4\"><title>{}</title></rect>\n",
+          left + step * static_cast<double>(k), top + high - tall, step - 1, tall, quality_[k]);
+    }
+    return fmt::format(
+               "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 640 270\" width=\"640\" height=\"270\" "
+               "font-family=\"sans-serif\" font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" "
+               "fill=\"none\" stroke=\"#888\"/>\n<text x=\"{0}\" y=\"{4}\">0</text>\n<text x=\"{5}\" y=\"{4}\" "
+               "text-anchor=\"end\">1</text>\n<text x=\"{6}\" y=\"{4}\" text-anchor=\"middle\">quality of the disks: 1 "
+               "is a "
+               "bead like all the others (heights: logarithm of the number)</text>\n",
+               left, top, wide, high, top + high + 25, left + wide, left + wide / 2) +
+           bars + "</svg>\n";
+  }
   // Where the truth is known, how near we came.
   [[nodiscard]] std::optional<Json> truth() const {
     if (real_ == 0 || matched_ == 0) return std::nullopt;
@@ -367,8 +391,9 @@ std::string count_figure(const std::vector<ingest::FrameReport>& frames) {
     return fmt::format("<polyline fill=\"none\" stroke=\"{}\" points=\"{}\"/>\n", colour, points);
   };
   return fmt::format(
-             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"640\" height=\"270\" font-family=\"sans-serif\" "
-             "font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" fill=\"none\" "
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 640 270\" width=\"640\" height=\"270\" "
+             "font-family=\"sans-serif\" font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" "
+             "fill=\"none\" "
              "stroke=\"#888\"/>\n<text x=\"{4}\" y=\"{5}\" text-anchor=\"end\">{6}</text>\n<text x=\"{4}\" y=\"{7}\" "
              "text-anchor=\"end\">0</text>\n<text x=\"{0}\" y=\"{8}\">frame 0 to {9}: disks found (blue), places "
              "rejected (orange)</text>\n",
@@ -433,9 +458,10 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
                                               static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
   }
-  measure.kernel = {
-      options.kernel == DensityKernel::gaussian ? ingest::KernelKind::gaussian : ingest::KernelKind::top_hat,
-      options.kernel_width};
+  measure.kernel = {options.kernel == DensityKernel::gaussian  ? ingest::KernelKind::gaussian
+                    : options.kernel == DensityKernel::top_hat ? ingest::KernelKind::top_hat
+                                                               : ingest::KernelKind::disk_chord,
+                    options.kernel_width};
   measure.bin_width = options.spacing;
   measure.lowest = options.lowest, measure.highest = options.highest;
   measure.shaking_frequency_hz = options.frequency, measure.frame_rate_hz = options.frame_rate;
@@ -458,7 +484,19 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     }
     paths.push_back((rendered->directory / "frames").string());
   } else {
-    for (const auto& path : options.images.paths) paths.push_back(path.string());
+    // What is named is used; of folders and patterns, what is a picture or a film.
+    const auto named = [&](const std::filesystem::path& path) {
+      return std::any_of(options.images.texts.begin(), options.images.texts.end(), [&](const std::string& text) {
+        return std::filesystem::path(text).filename() == path.filename();
+      });
+    };
+    for (const auto& path : options.images.paths)
+      if (named(path) || ingest::FrameSource::is_frame_file(path)) paths.push_back(path.string());
+    if (paths.empty())
+      throw InputError(
+          fmt::format("{}: holds neither a picture nor a film; name files ending in .png, .tif, .jpg, .bmp, "
+                      ".pgm, .mp4, .avi, .mov or .mkv",
+                      options.images.texts.front()));
   }
   ingest::FrameSourceOptions source_options;
   source_options.stride = options.stride;
@@ -488,7 +526,19 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
                                   std::filesystem::path(frame.origin.path).filename().string(), frame.why));
   }
   if (bad > 5) context.warning(fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - 5));
-  const std::string kernel = options.kernel == DensityKernel::gaussian ? "gaussian" : "top_hat";
+  const std::string kernel = options.kernel == DensityKernel::gaussian  ? "gaussian"
+                             : options.kernel == DensityKernel::top_hat ? "top_hat"
+                                                                        : "disk_chord";
+  if (options.frame_rate && !options.frequency)
+    context.warning(
+        "Profiles by phase need the shaking's frequency, which is not told from the film: give frequency "
+        "(--frequency) if the bed is shaken.");
+  if (options.bead_number && std::abs(found.disk_count_mean / static_cast<double>(*options.bead_number) - 1) > 1e-3)
+    context.warning(fmt::format("On average {:.2f} beads were found of the {} there are: {}", found.disk_count_mean,
+                                *options.bead_number,
+                                found.disk_count_mean < static_cast<double>(*options.bead_number)
+                                    ? "some are missed or out of view (count.svg, overlays)"
+                                    : "something else passes for a bead (overlays), or there are more"));
   const double column_number = found.disk_count_mean / bed.width;
   write_profile_csv(
       context.output("profile.csv"),
@@ -546,6 +596,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["frames_used"] = found.profile.samples;
   result["disks_per_frame"] = quantity_json(found.disk_count_mean, "1");
   result["disks_per_frame_scatter"] = found.disk_count_std;
+  if (options.bead_number) result["bead_number"] = *options.bead_number;
   result["diameter"] = quantity_json(options.diameter, "m");
   result["scale"] = quantity_json(bed.scale_m_per_px, "m/px", bed.scale_m_per_px * bed.scale_relative_std_error);
   result["scale_given"] = bed.scale_given;
@@ -598,6 +649,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     write_file(context.output("bed.json"), read_file(rendered->file("bed.json")));
 
   write_file(context.output("quality.csv"), on_the_way.quality_table());
+  write_file(context.output("quality.svg"), on_the_way.quality_figure());
   write_file(context.output("bead.csv"), bead_table(found.finder));
   ingest::write_png(context.output("bead.png"), ingest::bead_picture(found.finder, 8));
   write_file(context.output("count.svg"), count_figure(found.frames));

@@ -416,6 +416,24 @@ class Report {
             "green circles; orange, those cut or half hidden; blue, floor and walls.</figcaption></figure>\n",
             base64(read_file(path)), html(path.stem().string().substr(8)));
       }
+      const auto picture = [&](const fs::path& path, const char* caption) {
+        if (fs::exists(path))
+          out += fmt::format(
+              "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>\n",
+              caption, base64(read_file(path)));
+      };
+      for (const fs::path& path : files) {
+        const std::string name = "residual_" + path.stem().string().substr(8) + ".png";
+        picture(directory(stage) / name,
+                "What beads and light do not explain of that frame: grey where nothing is left.");
+      }
+      picture(directory(stage) / "bead.png", "The bead as learned from the frames.");
+      for (const auto& [name, caption] :
+           {std::pair{"count.svg", "Disks against time: beads do not vanish, so a dip is a miss."},
+            std::pair{"quality.svg", "Quality of the disks found."}})
+        if (const fs::path path = directory(stage) / name; fs::exists(path))
+          out += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n",
+                             inline_svg(path, 900 + (name[0] == 'q')), caption);
       const Json& result = results_.at(stage.id);
       out += "<div class=\"scroll\"><table>\n<tr><th>from the frames</th><th></th></tr>\n";
       for (const char* key : {"frames_used", "disks_per_frame", "scale", "radius", "width", "column_number", "noise",

@@ -117,7 +117,15 @@ int run_program(int argc, char** argv) {
       ->check(CLI::IsMember({"automatic", "dark", "bright"}));
   images->add_option("--frequency", image.frequency, "of the shaking: \"20 Hz\"; with --amplitude also Gamma → T");
   images->add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
-  images->add_option("--frame-rate", image.frame_rate, "of a film: \"500 Hz\"; with --frequency profiles by phase");
+  images->add_option("--frame-rate", image.frame_rate,
+                     "of a film: \"500 Hz\": velocities; with --frequency profiles by phase");
+  images->add_option("--second-diameter", image.second_diameter, "of beads of another size, to be found too");
+  images->add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
+  images->add_option("--lens", image.lens,
+                     "how far the lens moves the corners, in half diagonals, a barrel positive (default: found)");
+  images->add_option("--bead-number", image.bead_number, "how many beads there are in view, to be checked");
+  images->add_option("--kernel", image.kernel,
+                     "density is measured through: gaussian:0.5 (default), top_hat:1, disk_chord:1");
   images->add_option(
       "--initial-height", image.initial_height,
       "height mu of the bed at rest, in D or a length (default: from the beads counted between the walls)");

@@ -45,10 +45,14 @@ class Extract : public Stage {
     fields.number("radius", o.radius,
                   {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
     fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
-    fields.choice("kernel", o.kernel, {{DensityKernel::gaussian, "gaussian"}, {DensityKernel::top_hat, "top_hat"}},
+    fields.choice("kernel", o.kernel,
+                  {{DensityKernel::gaussian, "gaussian"},
+                   {DensityKernel::top_hat, "top_hat"},
+                   {DensityKernel::disk_chord, "disk_chord"}},
                   {.help = "the window through which density is measured"});
     fields.number("kernel_width", o.kernel_width,
-                  {.help = "standard deviation (gaussian) or full width (top_hat) in D", .range = from_to(1e-3, 100)});
+                  {.help = "standard deviation (gaussian), full width (top_hat) or diameter (disk_chord) in D",
+                   .range = from_to(1e-3, 100)});
     fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
     fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
     fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
@@ -56,6 +60,9 @@ class Extract : public Stage {
                     {.help = "of the shaking, for profiles by phase (needs frame_rate)", .range = positive});
     fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
                     {.help = "of the film as recorded; given, velocities are measured", .range = positive});
+    fields.integer("bead_number", o.bead_number,
+                   {.help = "how many beads there are in view, if known: beads missed or seen twice are then told",
+                    .range = at_least(1)});
     fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
     fields.integer("overlays", o.overlays,
                    {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
