@@ -410,7 +410,8 @@ int command_fit_profile(const Arguments& arguments) {
   }
   const fit::FitResult result = fit::fit_profile(profile, options);
   if (result.status == fit::FitStatus::bad_input) throw InputError(fmt::format("{}: {}", p.file, result.message));
-  const Json json = fit_json(result, diameter);
+  Json json = fit_json(result, diameter);
+  if (!table.note.empty()) json["warnings"].push_back(table.note);
   if (arguments.common.out) {
     fs::create_directories(*arguments.common.out);
     write_file_atomically(fs::path(*arguments.common.out) / "fit.json", dump(json));

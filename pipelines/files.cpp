@@ -268,9 +268,30 @@ std::vector<std::string> split_blanks(std::string_view line) {
   }
 }
 
-bool is_any_of(std::string name, std::initializer_list<std::string_view> names) {
+std::string in_small_letters(std::string name) {
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
+}
+
+// The first column called NAME_something, as programs write that keep several windows beside one another; -1 for none.
+std::ptrdiff_t column_of_several(const std::vector<std::string>& header, std::string_view name, std::string& note) {
+  std::ptrdiff_t first = -1;
+  std::string others;
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    if (!in_small_letters(header[i]).starts_with(std::string(name) + "_")) continue;
+    if (first < 0)
+      first = static_cast<std::ptrdiff_t>(i);
+    else
+      others += (others.empty() ? "" : ", ") + header[i];
+  }
+  if (first >= 0 && !others.empty())
+    note = fmt::format("the density is column \"{}\"; {} is not read", header[static_cast<std::size_t>(first)], others);
+  return first;
+}
+
+bool is_any_of(std::string name, std::initializer_list<std::string_view> names) {
+  name = in_small_letters(std::move(name));
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 }  // namespace
@@ -317,6 +338,8 @@ ProfileTable read_profile_csv(const std::filesystem::path& path) {
         else if (is_any_of(header[i], {"samples", "count"}))
           samples = at;
       }
+      if (density < 0 && area < 0) density = column_of_several(header, "phi", profile.note);
+      if (density < 0 && area < 0) area = column_of_several(header, "nu", profile.note);
       if (height < 0 || (density < 0 && area < 0)) {
         throw fail(fmt::format(
             "the header must name at least \"height\" (in D) and \"number_density\" (n D^2), or \"area_fraction\"; "

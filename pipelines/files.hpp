@@ -48,6 +48,7 @@ std::string decompress(std::string_view bytes, const std::string& name);
 // Heights in D, densities n D^2; std_error < 0 is never written, an unknown one is left empty.
 struct ProfileTable {
   std::vector<std::string> comments;  // without the '#'
+  std::string note;                   // which of several densities was read; empty where there was one
   std::vector<double> height;         // bin centres, rising [D]
   std::vector<double> number_density, std_error, area_fraction;
   std::vector<double> samples;  // disk positions that fell into the bin

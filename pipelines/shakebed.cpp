@@ -156,9 +156,9 @@ int run_program(int argc, char** argv) {
                              command_theory);
   TheoryArguments& t = arguments.theory;
   theory->add_option("--plateau-density", t.plateau_density, "phi_0 in 1/D^2 (default 2/sqrt 3)");
-  theory->add_option(
-      "--eos", t.equation,
-      "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, best-of");
+  theory->add_option("--eos", t.equation,
+                     "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, "
+                     "best-of, or all");
   theory->add_option("--diameter", t.diameter, "D, for lengths");
   theory->add_option("--initial-height", t.initial_height,
                      "height mu of the bed at rest: in D, or a length with its unit");

@@ -24,6 +24,15 @@ const fit::EquationOfState& equation_named(const std::string& name) {
 }
 
 Json theory_json(const TheoryQuestion& question) {
+  if (question.equation == "all") {
+    Json rows = Json::array();
+    TheoryQuestion one = question;
+    for (const fit::EquationOfState* row : fit::equations_of_state()) {
+      one.equation = row->name();
+      rows.push_back(theory_json(one));
+    }
+    return rows;
+  }
   const fit::EquationOfState& equation = equation_named(question.equation);
   const fit::ExpansionConstants constants = fit::expansion_constants(equation, question.plateau_density);
   Json out, status = Json::object(), units = Json::object();
@@ -67,6 +76,14 @@ Json theory_json(const TheoryQuestion& question) {
 std::string theory_text(const TheoryQuestion& question) {
   const Json json = theory_json(question);
   std::string out;
+  if (json.is_array()) {
+    TheoryQuestion one = question;
+    for (const Json& row : json) {
+      one.equation = row["equation_of_state"].get<std::string>();
+      out += (out.empty() ? "" : "\n") + one.equation + "\n" + theory_text(one);
+    }
+    return out;
+  }
   for (const auto& [name, unit] : json["units"].items()) {
     const Json& value = json[name];
     const std::string text =

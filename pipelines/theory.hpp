@@ -21,8 +21,8 @@ struct TheoryQuestion {
   std::optional<double> initial_height;                 // mu [D]
   std::optional<double> temperature;                    // T [m g D]
 };
-// The constants, and with an initial height T_c, with a temperature T/T_c and zeta_F. What has no value is null and
-// has its reason under "status".
+// The constants, and with an initial height T_c, with a temperature T/T_c and zeta_F; equation "all": an array of
+// these, one an equation of state. What has no value is null and has its reason under "status".
 Json theory_json(const TheoryQuestion& question);
 std::string theory_text(const TheoryQuestion& question);
 

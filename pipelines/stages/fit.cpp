@@ -167,6 +167,7 @@ void Fit::run(RunContext& context) const {
   const Input* source = context.inputs().empty() ? nullptr : &context.inputs().front();
   const std::filesystem::path path = !profile_.empty() ? profile_.paths.front() : source->file("profile.csv");
   const ProfileTable table = read_profile_csv(path);
+  if (!table.note.empty()) context.warning(table.note);
   for (const Input& input : context.inputs()) {
     if (input.has("bed.json")) {
       const BedDescription bed = BedDescription::read(input.file("bed.json"));

@@ -117,7 +117,7 @@ class Map : public Stage {
 
 StageRow map_stage() {
   return {.name = "map",
-          .version = 1,
+          .version = 2,
           .summary = "maps Gamma to T/T_c by every named reading",
           .accepts = {"fit", "simulate", "extract"},
           .fewest_inputs = 0,
