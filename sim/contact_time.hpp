@@ -56,31 +56,16 @@ inline double time_to_fall(double gap, double vz, double gravity) {
 }
 
 // When a disk may leave its shell: a time that is never later than the true exit. (ox, oz): offset from the shell's
-// centre, inside it; (vx, vz): velocity in the shell's frame; gravity bends the path by at most g t^2 / 2, so the exit
-// lies after the root of |o + v t| + g t^2 / 2 = radius, a convex function whose chords cut the axis before it.
+// centre, inside it; (vx, vz): velocity in the shell's frame. Gravity bends the path by at most g t^2 / 2, so the disk
+// is inside while |o + v t| <= radius - g t^2 / 2, squared: c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0. Without its last term
+// this ends earlier, and has one square root.
 inline double time_to_leave_shell(double ox, double oz, double vx, double vz, double radius, double gravity) {
-  const double speed_squared = vx * vx + vz * vz;
+  const double a = vx * vx + vz * vz + gravity * radius;
+  if (!(a > 0)) return never;
   const double b = ox * vx + oz * vz;
   const double c = std::min(ox * ox + oz * oz - radius * radius, 0.0);
-  double straight = never;
-  if (speed_squared > 0) {
-    const double root = std::sqrt(b * b - speed_squared * c);
-    straight = b > 0 ? -c / (b + root) : (root - b) / speed_squared;
-  }
-  if (!(gravity > 0)) return straight;
-  const auto excess = [&](double t) {
-    const double px = ox + vx * t, pz = oz + vz * t;
-    return std::sqrt(px * px + pz * pz) + 0.5 * gravity * t * t - radius;
-  };
-  double left = 0, excess_left = std::min(excess(0), 0.0);
-  const double right = std::min(straight, std::sqrt(2 * (radius - excess_left) / gravity) * 1.5);
-  const double excess_right = excess(right);
-  if (!(excess_right > 0)) return left;
-  for (int step = 0; step < 3; ++step) {
-    left -= excess_left * (right - left) / (excess_right - excess_left);
-    excess_left = std::min(excess(left), 0.0);
-  }
-  return left;
+  const double root = std::sqrt(b * b - a * c);
+  return b > 0 ? -c / (b + root) : (root - b) / a;
 }
 
 }  // namespace shakebed::sim

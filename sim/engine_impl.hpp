@@ -494,8 +494,9 @@ void Engine<Space, Rule, Sizes>::advance_to(double time) {
     watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
     if (now_ == bath_at_) act_bath();
     if (now_ == synchronise_at_) {
+      const bool arrived = goal == synchronise_at_;  // before the next one is set
       synchronise();
-      if (goal == synchronise_at_ || !(time - base_ > 0)) return;
+      if (arrived || !(time - base_ > 0)) return;
     }
   }
 }
