@@ -394,6 +394,34 @@ TEST(Commands, APoleIsAStatusNotANumber) {
   EXPECT_THAT(json["status"]["mu_0"].get<std::string>(), HasSubstr("pole"));
 }
 
+TEST(Commands, TheoryOfEveryEquationOfState) {
+  ScratchFolder folder;
+  const ProgramResult result =
+      run_shakebed({"theory", "--eos", "all", "--initial-height", "20", "--json"}, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json rows = Json::parse(result.out);
+  ASSERT_EQ(rows.size(), 7U);
+  EXPECT_EQ(rows[0]["equation_of_state"], "enskog");
+  EXPECT_NEAR(rows[0]["mu_0"].get<double>(), 111.311296763, 1e-8);
+  for (const Json& row : rows) EXPECT_EQ(row["mu_0"].is_null(), row["status"].contains("mu_0"));
+}
+
+TEST(Commands, FitProfileSaysWhichOfSeveralDensitiesItRead) {
+  ScratchFolder folder;
+  std::string text = "zeta,phi_bin,nu_bin,phi_window\n";
+  for (double z = 0.5; z < 30; z += 0.5) {
+    const double phi = 0.5 * std::exp(-z / 5);
+    const std::string density = std::to_string(phi);
+    text += std::to_string(z) + "," + density + "," + std::to_string(0.785 * phi) + "," + density + "\n";
+  }
+  shakebed::pipelines::write_file_atomically(folder.path() / "bed.csv", text);
+  const ProgramResult result = run_shakebed({"fit-profile", "bed.csv", "--json"}, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json fit = Json::parse(result.out);
+  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_bin"));
+  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_window is not read"));
+}
+
 TEST(Commands, InitWritesARecipeThatIsGood) {
   ScratchFolder folder;
   ASSERT_EQ(run_shakebed({"init", "mine.json"}, folder.path()).exit_code, 0);

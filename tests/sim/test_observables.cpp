@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <numbers>
 
 #include "sim/archive.hpp"
@@ -266,7 +268,7 @@ TEST(Observers, GoOnFromTheirBytes) {
       in(second.bed, second.order, second.velocities, second.displacement, second.flights);
       EXPECT_TRUE(in.at_end());
       auto cut = saved;
-      cut.resize(cut.size() - 1);
+      cut.pop_back();
       ArchiveReader short_in(cut);
       All third = make();
       EXPECT_THROW(short_in(third.bed, third.order, third.velocities, third.displacement, third.flights),
@@ -279,6 +281,65 @@ TEST(Observers, GoOnFromTheirBytes) {
   EXPECT_EQ(first.bytes(), copy);
   second.flights = first.flights;  // who watched only the whole run
   EXPECT_EQ(second.bytes(), copy);
+}
+
+// A sound run whose ledger and overlap are told otherwise.
+class Spoilt : public Simulation {
+ public:
+  explicit Spoilt(std::unique_ptr<Simulation> sound) : sound_(std::move(sound)), ledger(sound_->energy()) {}
+
+ private:
+  std::unique_ptr<Simulation> sound_;
+
+ public:
+  EnergyLedger ledger;
+  double overlap = 0;
+
+  void advance_to(double time) override { sound_->advance_to(time); }
+  double time() const override { return sound_->time(); }
+  void snapshot(Snapshot& out) const override { sound_->snapshot(out); }
+  DiskProperties properties() const override { return sound_->properties(); }
+  EnergyLedger energy() const override { return ledger; }
+  Counters counters() const override { return sound_->counters(); }
+  double largest_overlap() const override { return overlap; }
+  std::size_t bytes() const override { return sound_->bytes(); }
+  double next_synchronisation() const override { return sound_->next_synchronisation(); }
+  std::vector<std::uint8_t> checkpoint() const override { return sound_->checkpoint(); }
+  void restore(const std::vector<std::uint8_t>& bytes) override { sound_->restore(bytes); }
+  void watch(Watcher* watcher) override { sound_->watch(watcher); }
+  void set_bath_temperature(double temperature) override { sound_->set_bath_temperature(temperature); }
+};
+
+TEST(PrecisionLost, NamesWhatIsWrongAndNothingElse) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{50, 1, 1}};
+  scene.disks.contact = {0.9, 0, 0};
+  scene.box.width = 10;
+  scene.box.sides = HardSides{{0.9, 0, 0}};
+  scene.box.floor = SinusoidalFloor{0.5, 0.5};
+  const auto make = [&] {
+    auto simulation = simulate(scene);
+    simulation->advance_to(20);
+    return simulation;
+  };
+  EXPECT_EQ(precision_lost(*make()), "");
+  Spoilt run(make());
+  EXPECT_EQ(precision_lost(run), "");
+  run.overlap = 0.9e-9;
+  EXPECT_EQ(precision_lost(run), "");
+  run.overlap = 2e-9;
+  EXPECT_NE(precision_lost(run).find("overlap"), std::string::npos);
+  run.overlap = 0;
+  const EnergyLedger sound = run.ledger;
+  run.ledger.kinetic += 1e-4 * (sound.dissipated + sound.initial);
+  EXPECT_NE(precision_lost(run).find("ledger"), std::string::npos);
+  run.ledger = sound;
+  run.ledger.potential = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(precision_lost(run).find("no longer a number"), std::string::npos);
+  run.ledger = sound;
+  run.ledger.kinetic = std::numeric_limits<double>::infinity();
+  EXPECT_NE(precision_lost(run).find("no longer a number"), std::string::npos);
 }
 
 }  // namespace
