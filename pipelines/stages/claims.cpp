@@ -105,6 +105,7 @@ class Claims : public Stage {
           measured = fmt::format("{:.{}f} ± {:.{}f}", value, decimals, error, decimals);
         } else {
           measured = fmt::format("{:.4g}", value);
+          if (!c.pointer.ends_with("/p_value")) measured += " (no error bar)";
         }
         if (!unit.empty() && unit != "1") measured += " " + unit;
       }
@@ -144,7 +145,7 @@ class Claims : public Stage {
 
 StageRow claims_stage() {
   return {.name = "claims",
-          .version = 1,
+          .version = 2,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
           .accepts = {"chart", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
