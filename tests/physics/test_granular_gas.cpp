@@ -158,8 +158,8 @@ void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs) {
              0.01 * std::abs(expected_fall));
   const double boltzmann = boltzmann_a2(e);
   expect_law("cooling: a2, by Boltzmann's equation", a2.mean(), a2.std_error(), boltzmann, 5e-3);
-  // The formula ends its expansion at a2. Where that alone costs it 0.005 it is shown.
-  if (std::abs(cooling_a2(e) - boltzmann) < 5e-3) {
+  // The formula ends its expansion at a2, which at e = 0.6 costs it as much as is asked: there it is shown.
+  if (e > 0.7) {
     expect_law("cooling: a2, by van Noije and Ernst", a2.mean(), a2.std_error(), cooling_a2(e), 5e-3);
   } else {
     std::printf("  %-58s %.6g, off Boltzmann's by %.2g\n", "(a2 by van Noije and Ernst)", cooling_a2(e),
