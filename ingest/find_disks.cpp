@@ -341,6 +341,24 @@ bool settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
   return went_back;
 }
 
+// Share of the ring around a disk, as far as it lies in the frame, in which something is left that no bead explains.
+double unexplained_around(const JointFit& fit, const ModelDisk& disk, double radius, double edge, double noise) {
+  const double from = radius + edge + 0.5, to = std::max(from + 1.5, 1.35 * radius);
+  const float strong = static_cast<float>(std::max(0.3, 3 * noise));
+  std::size_t count = 0, left = 0;
+  for (int row = std::max(0, static_cast<int>(std::ceil(disk.y - to)));
+       row <= std::min(fit.height() - 1, static_cast<int>(std::floor(disk.y + to))); ++row)
+    for (int column = std::max(0, static_cast<int>(std::ceil(disk.x - to)));
+         column <= std::min(fit.width() - 1, static_cast<int>(std::floor(disk.x + to))); ++column) {
+      const double distance = std::hypot(column - disk.x, row - disk.y);
+      if (distance < from || distance > to) continue;
+      ++count;
+      left += fit.residual(column, row) > strong;
+    }
+  return count ? static_cast<double>(left) / static_cast<double>(count) : 0;
+}
+constexpr double most_unexplained_around = 0.12;
+
 // A Newton step of all beads together, then sweeps, at most `sweeps`, for the few that have a longer way to go (cut
 // ones outside the frame) and those they touch. True when nothing moves by more than the tolerance any more.
 bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disks, double tolerance, double bound,
@@ -710,6 +728,20 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   if (!settle(fit, disks, radius) && dropped_last > 0) fit.judge(disks, radius + 1);
   dropped += dropped_last;
 
+  // A dark band at the border, a floor say, can be laid out with cut beads; but a bead has something else around it.
+  const std::size_t before_bands = disks.size();
+  std::vector<ModelDisk> in_bands;
+  for (const ModelDisk& disk : disks) {
+    const bool cut =
+        disk.x < radius || disk.y < radius || disk.x > frame.width - 1 - radius || disk.y > frame.height - 1 - radius;
+    if (cut && unexplained_around(fit, disk, radius, edge, noise) > most_unexplained_around) in_bands.push_back(disk);
+  }
+  for (const ModelDisk& band : in_bands) {
+    fit.subtract(band.x, band.y, -1.0F);
+    std::erase_if(disks, [&](const ModelDisk& disk) { return disk.x == band.x && disk.y == band.y; });
+  }
+  dropped += before_bands - disks.size();
+
   std::vector<double> explained;
   for (const ModelDisk& disk : disks) explained.push_back(disk.explained);
   const double typical = std::max(0.3, median_of(explained));
@@ -728,7 +760,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     taken_out.push_back(disk);
     return true;
   });
-  if (!taken_out.empty() || dropped_last > 0) {
+  if (!taken_out.empty() || dropped_last > 0 || !in_bands.empty()) {
     const std::vector<ModelDisk> before = disks;
     fit_again();
     bool put_back = false;

@@ -1,5 +1,6 @@
 // Inputs that break disk finders: each is drawn or written here, given to the finder with nothing but the diameter, and
 // compared with what is known of it.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -221,6 +222,22 @@ class HardCases {
     camera = camera_of(400, 400);
     camera.jpeg_quality = 60;
     picture("JPEG of quality 60", bed_of(10, 400, 400, 6, 60), camera, 0.1);
+    add("a dark floor in view", 1000, [](HardCaseRow& row) {
+      SyntheticBed bed;
+      bed.left_wall_px = 6, bed.right_wall_px = 393.5, bed.floor_px = 385.7;
+      bed.rows = 6, bed.gas_count = 60, bed.jitter_px = 0.1;
+      GrayFrame frame = render_frame(make_synthetic_bed(bed), camera_of(400, 400));
+      std::fill(frame.pixels.begin() + static_cast<std::ptrdiff_t>(386) * 400, frame.pixels.end(), 90.0F);
+      FrameSource source = FrameSource::from_frames({frame});
+      MeasureOptions options;
+      options.bead_diameter_m = 1e-3;
+      const Measurement measured = measure_bed(source, options);
+      row.error = std::abs(measured.calibration.floor_px - bed.floor_px) / 20;
+      row.error_unit = "D";
+      row.limit = 0.05;
+      row.pass = row.error <= row.limit;
+      row.status = row.pass ? "found" : "wrong";
+    });
     add("bed turned by 3 degrees", 1000, [](HardCaseRow& row) {
       Disks truth = bed_of(10, 500, 400, 7, 60);
       const double angle = 3 * std::numbers::pi / 180;

@@ -158,6 +158,28 @@ TEST(HardCases, JpegArtefacts) {
   EXPECT_LT(score.rms_px, 0.1);
 }
 
+// A dark band at the lower border, 0.7 and 1 D deep, could be laid out with cut beads: no row of them may be seen there
+// (one in a corner is let pass), and the floor is the band's top.
+TEST(HardCases, ADarkFloorIsNoRowOfBeads) {
+  for (const double depth : {14.3, 20.3})
+    for (const float level : {30.0F, 100.0F}) {
+      SyntheticBed bed;
+      bed.left_wall_px = 6, bed.right_wall_px = 393.5, bed.floor_px = 400 - depth;
+      bed.rows = 6, bed.gas_count = 60, bed.jitter_px = 0.1;
+      GrayFrame frame = render_frame(make_synthetic_bed(bed), camera_of(400, 400));
+      std::fill(frame.pixels.begin() + static_cast<std::ptrdiff_t>(std::ceil(bed.floor_px)) * 400, frame.pixels.end(),
+                level);
+      FrameSource source = FrameSource::from_frames({frame});
+      MeasureOptions options;
+      options.bead_diameter_m = 1e-3;
+      const Measurement measured = measure_bed(source, options);
+      EXPECT_NEAR(measured.calibration.floor_px, bed.floor_px, 1) << depth << " " << level;
+      const auto below = std::count_if(measured.disks.begin(), measured.disks.end(),
+                                       [&](const MeasuredDisk& disk) { return disk.y_px > bed.floor_px; });
+      EXPECT_LE(below, 1) << depth << " " << level;
+    }
+}
+
 TEST(HardCases, BedTurnedByThreeDegreesGivesItsTilt) {
   auto truth = bed_of(10, 500, 400, 7, 60);
   const double angle = 3 * std::numbers::pi / 180;
