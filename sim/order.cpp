@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace shakebed::sim {
@@ -70,6 +71,30 @@ class Cells {
   std::int64_t columns_ = 1, rows_ = 1;
   std::vector<std::vector<std::uint32_t>> cells_;
 };
+
+// Of the histogram of heights.
+constexpr double row_bin = 0.02, row_window = 0.06;  // D; standard deviation of the window it is smoothed with
+std::size_t row_bins(double top) {
+  return static_cast<std::size_t>(std::ceil(std::clamp(top, 0.0, OrderObserver::row_reach) / row_bin)) + 1;
+}
+
+std::vector<double> smoothed(const std::vector<double>& histogram) {
+  constexpr int reach = 10;  // bins: more than three standard deviations
+  std::array<double, 2 * reach + 1> weight{};
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k) {
+    const double u = k * row_bin / row_window;
+    sum += weight[static_cast<std::size_t>(k + reach)] = std::exp(-u * u / 2);
+  }
+  const auto n = static_cast<std::ptrdiff_t>(histogram.size());
+  std::vector<double> out(histogram.size());
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(-reach, -i); k <= std::min<std::ptrdiff_t>(reach, n - 1 - i); ++k)
+      out[static_cast<std::size_t>(i + k)] +=
+          weight[static_cast<std::size_t>(k + reach)] / sum * histogram[static_cast<std::size_t>(i)];
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -145,7 +170,11 @@ BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double per
 }
 
 OrderObserver::OrderObserver(const Scene& scene, const DiskProperties& disks, const LayerGrid& layers)
-    : disks_(disks), grid_(layers), layers_(layers.count) {
+    : disks_(disks),
+      grid_(layers),
+      layers_(layers.count),
+      width_(scene.box.width),
+      heights_(row_bins(layers.lowest + layers.thickness * static_cast<double>(layers.count))) {
   if (std::holds_alternative<PeriodicSides>(scene.box.sides)) period_x_ = scene.box.width;
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = top->height;
 }
@@ -165,7 +194,10 @@ void OrderObserver::observe(const Snapshot& at) {
     layer.count += 1;
     layer.psi6 += psi6;
     layer.neighbours += order.neighbours[i];
+    const double bin = std::floor((at.z[i] - at.floor_position) / row_bin);
+    if (bin >= 0 && bin < static_cast<double>(heights_.size())) heights_[static_cast<std::size_t>(bin)] += 1;
   }
+  ++looks_;
   const double share = n > 0 ? 1 / static_cast<double>(n) : 0;
   const double sample[] = {local * share, std::hypot(re, im) * share, neighbours * share,
                            static_cast<double>(order.vacancy_x.size())};
@@ -183,6 +215,44 @@ std::vector<OrderObserver::Layer> OrderObserver::layers() const {
                       layer.neighbours / layer.count, layer.count / total});
   }
   return result;
+}
+
+std::vector<OrderObserver::Row> OrderObserver::rows() const {
+  constexpr double depth = 0.8;  // of a valley, as a part of the peaks on either side
+  const std::vector<double> density = smoothed(heights_);
+  std::vector<Row> rows;
+  std::size_t begin = 0;            // of the row
+  double peak = 0, valley = -1;     // valley: -1 on the way up
+  std::size_t first = 0, last = 0;  // bins as low as the valley
+  for (std::size_t i = 0; i < density.size(); ++i) {
+    const double here = density[i];
+    if (valley < 0) {
+      peak = std::max(peak, here);
+      if (here < depth * peak) valley = here, first = last = i;
+    } else if (here < valley) {
+      valley = here, first = last = i;
+    } else if (here == valley) {
+      last = i;
+    } else if (valley < depth * here && here > peak / 4) {
+      // Up again: the valley lies between two rows. What stays below a fourth of the row before is the surface.
+      const std::size_t end = (first + last) / 2;
+      double disks = 0, height = 0;
+      for (std::size_t k = begin; k < end; ++k) {
+        disks += heights_[k];
+        height += heights_[k] * (static_cast<double>(k) + 0.5) * row_bin;
+      }
+      if (disks > 0) rows.push_back({height / disks, disks / static_cast<double>(looks_)});
+      begin = end, peak = here, valley = -1;
+    }
+  }
+  return rows;
+}
+
+double OrderObserver::bottom_density() const {
+  const std::vector<Row> found = rows();
+  if (found.size() < 3) return std::numeric_limits<double>::quiet_NaN();
+  const double disks = found[0].disks / 2 + found[1].disks + found[2].disks / 2;
+  return disks / (width_ * (found[2].height - found[0].height));
 }
 
 }  // namespace shakebed::sim

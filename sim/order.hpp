@@ -17,7 +17,8 @@ inline constexpr double neighbour_reach = 1.3660254037844386;
 // Of one snapshot; index = disk.
 struct BondOrder {
   std::vector<std::uint8_t> neighbours;
-  std::vector<double> psi6_re, psi6_im;  // psi_6 = mean over neighbours of exp(6 i angle) [HalperinNelson1978]; 0 without any
+  std::vector<double> psi6_re,
+      psi6_im;  // psi_6 = mean over neighbours of exp(6 i angle) [HalperinNelson1978]; 0 without any
   // Sites where a disk of the largest size is missing: at a contact distance from a disk, where no centre is closer
   // than 0.8 of it and at least five are within reach of it. The surface has none: it is seen by four at most.
   std::vector<double> vacancy_x, vacancy_z;
@@ -40,9 +41,20 @@ class OrderObserver {
   };
   std::vector<Layer> layers() const;  // those that held a disk
 
+  // Rows of disks above the (moving) floor, from the lowest up, as far as the valleys of the density between them stay
+  // below 0.8 of its peaks. Not the surface, which has no valley above it; rows above row_reach are not looked for.
+  struct Row {
+    double height, disks;  // mean height of its centres in D; disks in it
+  };
+  static constexpr double row_reach = 256;  // D
+  std::vector<Row> rows() const;
+  // Number density of the bottom of the bed, from its three lowest rows: disks a row over width and distance of rows.
+  // 2/sqrt 3 in close packing. NaN with fewer than three rows.
+  double bottom_density() const;
+
   template <class Archive>
   void visit(Archive& archive) {
-    archive(means_, layers_);
+    archive(means_, layers_, looks_, heights_);
   }
 
  private:
@@ -54,6 +66,9 @@ class OrderObserver {
   LayerGrid grid_;
   BlockedMean means_{4};
   std::vector<LayerSums> layers_;
+  double width_ = 0;
+  std::uint64_t looks_ = 0;
+  std::vector<double> heights_;  // histogram of the centres' heights above the floor, bins of row_bin from 0
 };
 
 }  // namespace shakebed::sim

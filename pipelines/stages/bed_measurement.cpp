@@ -89,6 +89,15 @@ std::string order_text(const sim::OrderObserver& order) {
   return text;
 }
 
+std::string rows_text(const sim::OrderObserver& order) {
+  std::string text =
+      "# rows of disks from the floor up, without the surface; heights above the floor in D\nrow,height,disks\n";
+  int number = 0;
+  for (const sim::OrderObserver::Row& row : order.rows())
+    text += fmt::format("{},{},{}\n", ++number, row.height, row.disks);
+  return text;
+}
+
 std::string velocities_text(const sim::VelocityObserver& velocities) {
   std::string text =
       "# layers of 1 D above the floor's mean, all phases together; temperatures in m g D without the layer's mean "
@@ -263,6 +272,8 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
     plain("psi6_global", order_->psi6_global(), "1");
     plain("neighbours_per_disk", order_->neighbours_per_disk(), "1");
     plain("vacancies", order_->vacancies(), "1");
+    const double bottom = order_->bottom_density();
+    out["bottom_density"] = std::isfinite(bottom) ? quantity_json(bottom, "1/D^2") : Json();
     // Part of the disks that lie in layers whose mean |psi_6| is at least so large: a solid by order, not by density.
     for (const int percent : {70, 80, 90}) {
       double share = 0;
@@ -302,7 +313,10 @@ void BedMeasurement::write(RunContext& context, bool frames) const {
     write_profile(context, "profile_frames.csv", frames_.density(false),
                   "the floor's mean position, at the moments of the frames only");
   write_file(context.output("layers.csv"), layers_text(bed_));
-  if (order_) write_file(context.output("order.csv"), order_text(*order_));
+  if (order_) {
+    write_file(context.output("order.csv"), order_text(*order_));
+    write_file(context.output("rows.csv"), rows_text(*order_));
+  }
   if (plan_.observe.velocities) {
     write_file(context.output("velocities.csv"), velocities_text(*lab_));
     write_file(context.output("velocity_histogram.csv"), histogram_text(*lab_));

@@ -758,7 +758,7 @@ void Simulate::run(RunContext& context) const {
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 9,
+          .version = 10,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,

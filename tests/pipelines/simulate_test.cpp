@@ -55,6 +55,7 @@ TEST_F(SimulateStage, MeasuresWhatItIsAskedFor) {
     EXPECT_TRUE(json[key]["value"].is_number() && json[key]["std_error"].is_number()) << key;
   }
   EXPECT_EQ(header("order.csv"), "height,psi6,neighbours,share");
+  EXPECT_EQ(header("rows.csv"), "row,height,disks");
   EXPECT_THAT(header("velocities.csv"), HasSubstr("a2"));
   EXPECT_EQ(header("velocity_histogram.csv"), "velocity,density_x,density_z,maxwellian");
   EXPECT_EQ(header("displacement.csv"), "lag,msd_x,std_error_x,msd_z,std_error_z,origins");

@@ -113,6 +113,34 @@ TEST(BondOrder, OfAPerfectCrystalIsOne) {
   EXPECT_EQ(order.vacancies().value, 0);
 }
 
+TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
+  // 9 rows of 12, each row but the last has a valley above it.
+  Lattice crystal = lattice(12, 10);
+  for (double& z : crystal.at.z) z += 0.5;
+  OrderObserver order(crystal.scene, crystal.disks, {0, 1, 20});
+  for (int look = 0; look < 3; ++look) {
+    crystal.at.floor_position = 0.1 * look;  // heights count from the moving floor
+    for (double& z : crystal.at.z) z += look > 0 ? 0.1 : 0;
+    order.observe(crystal.at);
+  }
+  const auto rows = order.rows();
+  ASSERT_EQ(rows.size(), 9u);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    EXPECT_NEAR(rows[k].disks, 12, 1e-12) << k;
+    EXPECT_NEAR(rows[k].height, 0.5 + static_cast<double>(k) * 1.02 * root3 / 2, 0.011) << k;
+  }
+  EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 0.012);
+}
+
+TEST(Rows, OfAGasThereAreNone) {
+  Lattice gas = lattice(40, 40);
+  for (std::size_t i = 0; i < gas.at.z.size(); ++i) gas.at.z[i] = 0.025 * static_cast<double>(i);  // evenly up to 40 D
+  OrderObserver order(gas.scene, gas.disks, {0, 1, 60});
+  order.observe(gas.at);
+  EXPECT_TRUE(order.rows().empty());
+  EXPECT_TRUE(std::isnan(order.bottom_density()));
+}
+
 TEST(BondOrder, CountsEmptySitesOnce) {
   const Lattice crystal = lattice(12, 10, {30, 66, 95});  // apart from each other
   const BondOrder order = bond_order(crystal.at, crystal.disks, crystal.scene.box.width,
