@@ -30,6 +30,49 @@ TEST(StraightLine, NeedsTwoPlacesAndErrors) {
   EXPECT_FALSE(fit_straight_line(std::vector<double>{1, 2}, std::vector<double>{1, 2}, std::vector<double>{1, 0}).ok);
 }
 
+// y = 0.3 + 2 x^1.7 exactly, every point 0.01 uncertain: chi2 is 0 there. The error of the exponent against the linear
+// propagation, by hand for two unknowns (no offset): with y = A x^n, d = A x^n ln x, p = x^n,
+// var(n) = sum p^2 / (sum d^2 sum p^2 - (sum d p)^2) sigma^2.
+TEST(PowerLaw, FindsItsExponentAndError) {
+  const std::vector<double> x{0.2, 0.5, 0.8, 1.1, 1.5}, error(5, 0.01);
+  std::vector<double> y, without;
+  double dd = 0, pp = 0, dp = 0;
+  for (const double u : x) {
+    const double p = std::pow(u, 1.7), d = 2 * p * std::log(u);
+    y.push_back(0.3 + 2 * p), without.push_back(2 * p);
+    dd += d * d, pp += p * p, dp += d * p;
+  }
+  const PowerLaw law = fit_power_law(x, y, error, true);
+  ASSERT_TRUE(law.ok);
+  EXPECT_NEAR(law.exponent, 1.7, 1e-6);
+  EXPECT_NEAR(law.offset, 0.3, 1e-6);
+  EXPECT_NEAR(law.amplitude, 2, 1e-6);
+  EXPECT_NEAR(law.chi2, 0, 1e-6);
+  EXPECT_EQ(law.dof, 2);
+  const PowerLaw plain = fit_power_law(x, without, error, false);
+  ASSERT_TRUE(plain.ok);
+  EXPECT_NEAR(plain.exponent, 1.7, 1e-6);
+  EXPECT_NEAR(plain.exponent_error, 0.01 * std::sqrt(pp / (dd * pp - dp * dp)), 1e-5);
+}
+
+TEST(PowerLaw, SaysWhenThereIsNone) {
+  const std::vector<double> x{1, 2, 3, 4}, error(4, 0.1);
+  EXPECT_FALSE(fit_power_law(x, std::vector<double>{1, 1, 1, 1}, error, true).ok);   // any exponent
+  EXPECT_FALSE(fit_power_law(x, std::vector<double>{4, 3, 2, 1}, error, false).ok);  // it falls: below 0.1
+  EXPECT_FALSE(fit_power_law(std::vector<double>{0, 1, 2, 3}, x, error, true).ok);   // no power of 0
+  EXPECT_FALSE(fit_given_power(std::vector<double>{1}, std::vector<double>{1}, std::vector<double>{1}, 2, true).ok);
+}
+
+// A given power by hand: y = A x^2 through (1, 1) and (2, 5), equal errors: A = (1 + 20)/17.
+TEST(PowerLaw, OfAGivenPowerIsDoneByHand) {
+  const PowerLaw law =
+      fit_given_power(std::vector<double>{1, 2}, std::vector<double>{1, 5}, std::vector<double>{0.5, 0.5}, 2, false);
+  ASSERT_TRUE(law.ok);
+  EXPECT_NEAR(law.amplitude, 21.0 / 17, 1e-14);
+  EXPECT_EQ(law.dof, 1);
+  EXPECT_NEAR(law.chi2, 4 * (std::pow(4.0 / 17, 2) + std::pow(1.0 / 17, 2)), 1e-13);
+}
+
 // chi2 of two degrees of freedom: exp(-chi2/2).
 TEST(ChanceOfChi2, IsExponentialForTwoDegrees) {
   EXPECT_NEAR(chance_of_chi2(3, 2), std::exp(-1.5), 1e-14);
