@@ -27,7 +27,7 @@ struct PointsOptions {
   int color = -1;
   double times = 1, plus = 0, x_times = 1, x_plus = 0;
   std::optional<double> x_least, x_most;  // of those drawn and used
-  bool line_fit = false;
+  bool line_fit = false, power_fit = false;
   std::optional<double> fit_least, fit_most;
   std::uint32_t pool = 1;
   std::string against;         // name of a curve
@@ -154,6 +154,27 @@ std::vector<double> pooled(const std::vector<double>& errors, std::size_t pool) 
   return out;
 }
 
+// Offset + amplitude x^exponent with the exponent fitted, and with 1 and 2 given.
+Json power_json(const std::vector<double>& x, const std::vector<double>& y, const std::vector<double>& error) {
+  Json out;
+  const auto described = [](const fit::PowerLaw& law) {
+    return Json{{"amplitude", law.amplitude},
+                {"offset", law.offset},
+                {"chi2", law.chi2},
+                {"dof", law.dof},
+                {"p_value", law.p_value}};
+  };
+  const fit::PowerLaw law = error.empty() ? fit::PowerLaw{} : fit::fit_power_law(x, y, error, true);
+  out["status"] = law.ok ? "ok" : "needs four points with x > 0 and errors, and an exponent between 0.1 and 6";
+  out["exponent"] = law.ok ? quantity_json(law.exponent, "1", law.exponent_error) : Json();
+  if (law.ok) out["law"] = described(law);
+  for (const int exponent : {1, 2}) {
+    const fit::PowerLaw given = error.empty() ? fit::PowerLaw{} : fit::fit_given_power(x, y, error, exponent, true);
+    out["given"][std::to_string(exponent)] = given.ok ? described(given) : Json();
+  }
+  return out;
+}
+
 class Chart : public Stage {
  public:
   void describe(Fields& fields) override;
@@ -193,6 +214,8 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.number("x_least", p.x_least, {.help = "points with a smaller x are left out"});
   fields.number("x_most", p.x_most, {.help = "points with a larger x are left out"});
   fields.boolean("line_fit", p.line_fit, {.help = "fit a straight line, weighted by the errors"});
+  fields.boolean("power_fit", p.power_fit,
+                 {.help = "fit offset + amplitude x^exponent, and the same with exponents 1 and 2 given"});
   fields.number("fit_least", p.fit_least, {.help = "smallest x that fits and comparisons use"});
   fields.number("fit_most", p.fit_most, {.help = "largest x that fits and comparisons use"});
   fields.integer("pool", p.pool,
@@ -309,14 +332,16 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
         }
       }
     }
+    if (options.power_fit) found["power"] = power_json(x, y, weighted ? error : std::vector<double>{});
     if (!options.against.empty()) {
       const CurveOptions& curve = *std::find_if(chart.curves.begin(), chart.curves.end(),
                                                 [&](const CurveOptions& c) { return c.name == options.against; });
       Series below{options.label, style_of(options.look), own, {}, {}, {}};
-      double chi2 = 0, sum = 0, squares = 0, largest = 0;
+      double chi2 = 0, sum = 0, squares = 0, propagated = 0, largest = 0;
       for (std::size_t i = 0; i < x.size(); ++i) {
         const double difference = y[i] - value_at(curve, x[i]);
         if (weighted) chi2 += std::pow(difference / error[i], 2);
+        propagated += std::pow(difference * error[i], 2);
         sum += difference, squares += difference * difference, largest = std::max(largest, std::abs(difference));
       }
       for (std::size_t i = 0; i < data.x.size(); ++i) {
@@ -340,7 +365,11 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
         against["mean_difference"] =
             x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
                          : quantity_json(mean, "1");
-        against["rms_difference"] = std::sqrt(squares / n);
+        // d rms = sum d_i delta_i/(n rms); rms is never less than the errors make it.
+        const double rms = std::sqrt(squares / n);
+        against["rms_difference"] = data.has_errors && rms > 0
+                                        ? quantity_json(rms, "1", std::sqrt(propagated) / (n * rms))
+                                        : quantity_json(rms, "1");
         against["largest_difference"] = largest;
         found["against"] = std::move(against);
       }
@@ -422,7 +451,7 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 1,
+          .version = 2,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,

@@ -2,7 +2,8 @@
 // levels crossed, and residuals below; and snapshots of disks coloured by their order.
 //
 // Files: NAME.svg, NAME.pdf, NAME.dat, NAME.gp for each chart and snapshot; chart.json with what was computed:
-// /NAME/POINTS/{slope, intercept, chi2, dof, p_value}, .../against/{chi2, dof, p_value, mean_difference}, .../crossings.
+// /NAME/POINTS/{slope, intercept, chi2, dof, p_value}, .../against/{chi2, dof, p_value, mean_difference},
+// .../crossings.
 #pragma once
 
 #include "pipelines/stages.hpp"

@@ -39,6 +39,55 @@ struct Collected {
 struct Number {
   double value = NAN, std_error = NAN;
 };
+// A CSV of the chain, averaged over the replicas row by row.
+struct Tabulated {
+  std::string at;   // "/bed/velocities.csv"
+  std::string key;  // the column that says which rows are the same
+};
+// Of one run: key → cell by cell of its row.
+struct Rows {
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;
+};
+Rows read_rows(const fs::path& path) {
+  Rows out;
+  const std::string text = read_file(path);
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    begin = end + 1;
+    if (line.empty() || line.front() == '#') continue;
+    if (out.header.empty())
+      out.header = split_csv_line(line);
+    else
+      out.rows.push_back(split_csv_line(line));
+  }
+  return out;
+}
+// Mean and its standard error from the spread; of one value, its own error.
+struct Mean {
+  double n = 0, mean = NAN, error = NAN;
+  explicit Mean(const std::vector<Number>& numbers) {
+    double sum = 0, squares = 0;
+    for (const Number& number : numbers) {
+      if (!std::isfinite(number.value)) continue;
+      n += 1, sum += number.value, error = number.std_error;
+    }
+    if (n == 0) return;
+    mean = sum / n;
+    if (n == 1) return;
+    for (const Number& number : numbers) {
+      if (std::isfinite(number.value)) squares += std::pow(number.value - mean, 2);
+    }
+    error = std::sqrt(squares / (n - 1) / n);
+  }
+};
+double number_of(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return !text.empty() && *end == '\0' ? value : NAN;
+}
 
 class Study : public Stage {
  public:
@@ -53,12 +102,15 @@ class Study : public Stage {
   std::vector<Point> points() const;
   Plan plan_of(const Point& point, std::uint64_t seed) const;
   std::vector<Number> numbers(const Plan& plan, const fs::path& folder) const;
+  Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
+  void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
   std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
 
   Json chain_;
   Parameter parameter_;
   std::vector<std::pair<std::string, Change>> series_;
   std::vector<std::pair<std::string, Collected>> collect_;
+  std::vector<std::pair<std::string, Tabulated>> tables_;
   std::uint32_t replicas_ = 1;
 };
 
@@ -97,6 +149,13 @@ void Study::describe(Fields& fields) {
                           f.number("plus", c.plus, {.help = "added after the factor"});
                         },
                         {.help = "name of a column → where its number is", .required = true});
+  fields.map<Tabulated>(
+      "tables", tables_,
+      [](Fields& f, Tabulated& t) {
+        f.text("at", t.at, {.help = "/<stage id>/<file>.csv", .required = true});
+        f.text("key", t.key, {.help = "column by which rows of replicas are matched", .required = true});
+      },
+      {.help = "name of a CSV of this stage → the chain's file whose rows are averaged over the replicas in it"});
   fields.integer("replicas", replicas_,
                  {.help = "runs at every point, each with seeds of its own", .range = from_to(1, 1000)});
   if (!fields.decoding() || fields.problem_count() > 0) return;
@@ -117,6 +176,14 @@ void Study::describe(Fields& fields) {
           if (tokens.size() < 2 || plan.find(tokens.front()) == nullptr)
             fields.problem("/collect/" + escape_pointer_token(name) + "/at",
                            "\"" + collected.at + "\" leads to no stage of the chain", "Write /<stage id>/<number>");
+        }
+        for (const auto& [name, table] : tables_) {
+          const auto tokens = split_pointer(table.at);
+          if (tokens.size() != 2 || plan.find(tokens.front()) == nullptr)
+            fields.problem("/tables/" + escape_pointer_token(name) + "/at",
+                           "\"" + table.at + "\" leads to no file of the chain", "Write /<stage id>/<file>.csv");
+          if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
+            fields.problem("/tables/" + escape_pointer_token(name), "\"" + name + "\" cannot be the name of its file");
         }
       } catch (const ConfigError& error) {
         for (const Problem& problem : error.problems())
@@ -193,9 +260,92 @@ std::vector<Number> Study::numbers(const Plan& plan, const fs::path& folder) con
   return out;
 }
 
+namespace {
+std::string quoted(const std::string& name) {
+  if (name.find_first_of(",\"\n") == std::string::npos) return name;
+  std::string out = "\"";
+  for (const char c : name) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+std::string cell(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
+}  // namespace
+
+// Runs the chain at one point: {"numbers": [[value, error], ...], "tables": [{"header", "rows"}, ...]}.
+Json Study::run_once(RunContext& context, const Point& point, const fs::path& folder) const {
+  const Plan plan = plan_of(point, context.seed());
+  RunOptions options;
+  options.out = folder;
+  options.jobs = 1;
+  fs::create_directories(folder);
+  remove_leftovers(folder);
+  RunOutcome outcome;
+  outcome.out = folder;
+  run_stages(plan, options, nullptr, outcome);
+  if (outcome.code == exit_interrupted) throw Interrupted();
+  if (outcome.code != exit_ok && outcome.code != exit_check_failed)
+    throw StageError(fmt::format("{}, {} = {}, replica {}: {}", series_name(point.series), parameter_.name,
+                                 parameter_.values[point.value], point.replica, outcome.error));
+  Json found{{"numbers", Json::array()}, {"tables", Json::array()}};
+  for (const Number& n : numbers(plan, folder)) found["numbers"].push_back(Json::array({n.value, n.std_error}));
+  for (const auto& [name, table] : tables_) {
+    const auto tokens = split_pointer(table.at);
+    const Rows rows = read_rows(folder / tokens[0] / tokens[1]);
+    if (std::find(rows.header.begin(), rows.header.end(), table.key) == rows.header.end())
+      throw InputError(fmt::format("tables/{}: {} has no column \"{}\"", name, table.at, table.key));
+    found["tables"].push_back(Json{{"header", rows.header}, {"rows", rows.rows}});
+  }
+  return found;
+}
+
+// NAME.csv: series, parameter, key, then mean and error of every other column, and how many runs had the row.
+void Study::write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const {
+  for (std::size_t k = 0; k < tables_.size(); ++k) {
+    const auto& [name, table] = tables_[k];
+    std::string text =
+        fmt::format("# {} of the chain, means over the runs that have the row; errors from their spread\n", table.at);
+    std::vector<std::string> header;
+    for (std::size_t i = 0; i < all.size(); i += replicas_) {
+      std::map<double, std::vector<std::vector<Number>>> columns;  // key → column → runs
+      for (std::size_t r = i; r < i + replicas_; ++r) {
+        const Json& one = kept[r]["tables"][k];
+        if (header.empty()) {
+          header = one["header"].get<std::vector<std::string>>();
+          text += fmt::format("series,{},{}", parameter_.name, table.key);
+          for (const std::string& column : header) {
+            if (column != table.key) text += fmt::format(",{0},{0}_error", column);
+          }
+          text += ",runs\n";
+        }
+        const auto place =
+            static_cast<std::size_t>(std::find(header.begin(), header.end(), table.key) - header.begin());
+        for (const Json& row : one["rows"]) {
+          const auto cells = row.get<std::vector<std::string>>();
+          const double key = place < cells.size() ? number_of(cells[place]) : NAN;
+          if (!std::isfinite(key)) continue;
+          auto& of_key = columns[key];
+          of_key.resize(header.size());
+          for (std::size_t c = 0; c < cells.size() && c < header.size(); ++c)
+            of_key[c].push_back({number_of(cells[c]), NAN});
+        }
+      }
+      for (const auto& [key, values] : columns) {
+        text += fmt::format("{},{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value], cell(key));
+        for (std::size_t c = 0; c < header.size(); ++c) {
+          if (header[c] == table.key) continue;
+          const Mean mean(values[c]);
+          text += "," + cell(mean.mean) + "," + cell(mean.error);
+        }
+        text += fmt::format(",{}\n", values.front().size());
+      }
+    }
+    write_file(context.output(name + ".csv"), text);
+  }
+}
+
 void Study::run(RunContext& context) const {
   const std::vector<Point> all = points();
   std::vector<std::vector<Number>> found(all.size());
+  std::vector<Json> kept(all.size());
   const fs::path scratch = context.scratch();
   std::atomic<std::size_t> next{0}, done{0};
   std::mutex guard;
@@ -204,27 +354,13 @@ void Study::run(RunContext& context) const {
     for (std::size_t i = next++; i < all.size(); i = next++) {
       try {
         context.check_interrupted();
-        const fs::path kept = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
-        if (!fs::exists(kept)) {
-          const Plan plan = plan_of(all[i], context.seed());
-          RunOptions options;
-          options.out = folder;
-          options.jobs = 1;
-          fs::create_directories(folder);
-          remove_leftovers(folder);
-          RunOutcome outcome;
-          outcome.out = folder;
-          run_stages(plan, options, nullptr, outcome);
-          if (outcome.code == exit_interrupted) throw Interrupted();
-          if (outcome.code != exit_ok && outcome.code != exit_check_failed)
-            throw StageError(fmt::format("{}, {} = {}, replica {}: {}", series_name(all[i].series), parameter_.name,
-                                         parameter_.values[all[i].value], all[i].replica, outcome.error));
-          Json rows = Json::array();
-          for (const Number& n : numbers(plan, folder)) rows.push_back(Json::array({n.value, n.std_error}));
-          write_file_atomically(kept, dump(rows));
+        const fs::path file = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
+        if (!fs::exists(file)) {
+          write_file_atomically(file, dump(run_once(context, all[i], folder)));
           fs::remove_all(folder);
         }
-        for (const Json& pair : read_json(kept)) {
+        kept[i] = read_json(file);
+        for (const Json& pair : kept[i]["numbers"]) {
           const auto number = [](const Json& j) { return j.is_number() ? j.get<double>() : NAN; };
           found[i].push_back({number(pair[0]), number(pair[1])});
         }
@@ -244,13 +380,6 @@ void Study::run(RunContext& context) const {
   }
   if (failure) std::rethrow_exception(failure);
 
-  const auto quoted = [](const std::string& name) {
-    if (name.find_first_of(",\"\n") == std::string::npos) return name;
-    std::string out = "\"";
-    for (const char c : name) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return out + "\"";
-  };
-  const auto cell = [](double value) { return std::isfinite(value) ? number_text(value) : std::string(); };
   std::string runs = "series," + parameter_.name + ",replica", table = "series," + parameter_.name;
   for (const auto& [name, ignored] : collect_) {
     runs += "," + name;
@@ -267,17 +396,10 @@ void Study::run(RunContext& context) const {
     Json row;
     row[parameter_.name] = parameter_.values[all[i].value];
     for (std::size_t c = 0; c < collect_.size(); ++c) {
-      double n = 0, sum = 0, squares = 0, own = NAN;
-      for (std::size_t r = i; r < i + replicas_; ++r) {
-        const Number& number = found[r][c];
-        if (!std::isfinite(number.value)) continue;
-        n += 1, sum += number.value, own = number.std_error;
-      }
-      for (std::size_t r = i; r < i + replicas_; ++r) {
-        if (std::isfinite(found[r][c].value)) squares += std::pow(found[r][c].value - sum / n, 2);
-      }
+      std::vector<Number> values;
+      for (std::size_t r = i; r < i + replicas_; ++r) values.push_back(found[r][c]);
+      const auto [n, mean, error] = Mean(values);
       missing += replicas_ - static_cast<std::size_t>(n);
-      const double mean = n > 0 ? sum / n : NAN, error = n > 1 ? std::sqrt(squares / (n - 1) / n) : own;
       table += "," + cell(mean) + "," + cell(error);
       Json quantity{{"value", std::isfinite(mean) ? Json(mean) : Json()}};
       if (std::isfinite(error)) quantity["std_error"] = error;
@@ -297,6 +419,7 @@ void Study::run(RunContext& context) const {
                                 all.size() * collect_.size()));
   write_file(context.output("table.csv"), notes + table);
   write_file(context.output("replicas.csv"), runs);
+  write_tables(context, all, kept);
   write_file(context.output("study.json"),
              dump(Json{{"replicas", replicas_}, {"runs", all.size()}, {"series", std::move(series)}}));
 }
@@ -305,7 +428,7 @@ void Study::run(RunContext& context) const {
 
 StageRow study_stage(int inner_versions) {
   return {.name = "study",
-          .version = 2 + inner_versions,
+          .version = 3 + inner_versions,
           .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
           .uses_seed = true,
           .result = "study.json",
