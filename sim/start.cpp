@@ -56,6 +56,7 @@ Room room_of(const Scene& scene) {
 // nothing touches. A row that exactly fills the width of a hard box would collide without end at the first instant.
 std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
   const double d = room.diameter;
+  constexpr double margin = 1e-9;  // the lowest row does not quite touch the floor, nor the highest the lid
   const double usable = room.periodic_x ? room.width : room.width - d;  // for centres
   std::uint32_t a_row = start.disks_a_row;
   std::uint32_t rows = 0;
@@ -70,7 +71,7 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
     rows = (room.count + a_row - 1) / std::max(a_row, 1u);
   } else {
     // Fill the box evenly: the number a row for which the cells come out closest to regular hexagons.
-    const double height = room.periodic_z ? room.height : room.height - d - room.floor;
+    const double height = room.periodic_z ? room.height : room.height - d * (1 + margin) - room.floor;
     if (a_row == 0) {
       const double side = std::sqrt(usable * height / room.count * 2 / std::numbers::sqrt3);
       a_row = std::max(1u, static_cast<std::uint32_t>(std::round(usable / side)));
@@ -84,7 +85,7 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
   const double touching = d * d * (1 + 1e-6) - a * a / 4;  // squared distance of rows that just do not touch
   double row_height = std::sqrt(std::max(touching, 0.0));
   if (!std::isinf(room.height)) {
-    const double height = room.periodic_z ? room.height : room.height - d - room.floor;
+    const double height = room.periodic_z ? room.height : room.height - d * (1 + margin) - room.floor;
     const double even = room.periodic_z ? height / rows : (rows > 1 ? height / (rows - 1) : height);
     if (even * even < d * d - a * a / 4) no_room(room);
     row_height = even;
@@ -94,7 +95,7 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
   for (std::uint32_t k = 0; k < room.count; ++k) {
     const std::uint32_t row = k / a_row, place = k % a_row;
     const double x0 = room.periodic_x ? 0.25 * a : d / 2;
-    const double z0 = room.periodic_z ? row_height / 2 : room.floor + d / 2 * (1 + 1e-9);
+    const double z0 = room.periodic_z ? row_height / 2 : room.floor + d / 2 * (1 + margin);
     points.push_back({x0 + (place + 0.5 * (row % 2)) * a, z0 + row * row_height});
   }
   return points;
