@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <set>
+#include <string>
+#include <typeinfo>
 
 #include "sim/overlap.hpp"
 #include "sim/simulation.hpp"
@@ -43,6 +47,11 @@ TEST(SceneCheck, RefusesWhatCannotBe) {
   s.box.sides = PeriodicSides{};
   s.box.top = PeriodicTop{30};
   EXPECT_EQ(first_problem(s), "/box/height");
+  s = bed(300, 30);
+  s.gravity = Weightless{};
+  s.box.sides = PeriodicSides{};
+  s.box.top = PeriodicTop{30};
+  EXPECT_EQ(first_problem(s), "/floor/motion");
   s = bed(300, 30);
   s.bath = WhiteNoiseBath{1, 0.1, true};
   s.disks.contact.restitution = 1;
@@ -98,6 +107,72 @@ TEST(Start, IsTheSameForTheSameSeedAndAnotherForAnother) {
   EXPECT_EQ(a[7].x, b[7].x);
   EXPECT_EQ(a[7].vz, b[7].vz);
   EXPECT_NE(a[7].x, c[7].x);
+}
+
+// Every choice with every other: what cannot be is refused with a sentence, all else runs, keeps its ledger and lets
+// nothing overlap. Only what is hot makes an engine of its own: 4 spaces x 3 rules x 2 sizes.
+TEST(EveryChoice, RunsWithEveryOtherOnAtMost24Engines) {
+  std::set<std::string> engines;
+  int ran = 0, refused = 0;
+  const std::vector<double> wave{0, 0.3, 0, -0.3, 0.1};
+  const std::array<Gravity, 2> gravities{Weightless{}, UniformGravity{}};
+  const std::array<Sides, 2> sides{HardSides{{0.95, 0, 0}}, PeriodicSides{}};
+  const std::array<Top, 3> tops{OpenTop{}, Lid{12, {}}, PeriodicTop{12}};
+  const std::array<Floor, 3> floors{StillFloor{}, SinusoidalFloor{0.4, 0.5}, TabulatedFloor{2, wave}};
+  const std::array<Bath, 5> baths{NoBath{}, LangevinBath{1, 0.5, 0.25}, AndersenBath{1, 0.5},
+                                  WhiteNoiseBath{0.5, 0.25, true}, ThermalFloor{1}};
+  const std::array<Start, 3> starts{HexagonalStart{}, RandomStart{},
+                                    PlacedStart{{{2, 2, 1, 0, 0, 0}, {4, 2, -1, 0.5, 0.2, 0}, {6, 5, 0, 1, 0, 0}}}};
+  struct Contact {
+    Surface surface;
+    double inertia_ratio, duration;
+  };
+  const std::array<Contact, 5> contacts{Contact{{1, 0, 0}, 0.5, 0}, Contact{{0.9, 0, 0}, 0.5, 0},
+                                        Contact{{0.9, 0, 0}, 0.5, 1e-3}, Contact{{0.9, 0.2, 0.4}, 0.5, 0},
+                                        Contact{{0.9, 0.2, 0.4}, 0.4, 1e-3}};
+  for (const Gravity& gravity : gravities)
+    for (const Sides& side : sides)
+      for (const Top& top : tops)
+        for (const Floor& floor : floors)
+          for (const Bath& bath : baths)
+            for (const Start& start : starts)
+              for (const Contact& contact : contacts)
+                for (const bool two : {false, true}) {
+                  Scene s;
+                  s.gravity = gravity;
+                  s.disks.species = {{10, 1, 1}};
+                  if (two) s.disks.species.push_back({4, 0.6, 0.3});
+                  s.disks.contact = contact.surface;
+                  s.disks.inertia_ratio = contact.inertia_ratio;
+                  s.disks.contact_duration = contact.duration;
+                  // As the contact: only where nothing else dissipates is the elastic engine meant.
+                  s.box = {8, side, top, floor, contact.surface};
+                  if (auto* hard = std::get_if<HardSides>(&s.box.sides)) hard->surface = contact.surface;
+                  s.bath = bath;
+                  s.start = start;
+                  const auto problems = check(s);
+                  if (!problems.empty()) {
+                    EXPECT_FALSE(problems[0].what.empty());
+                    EXPECT_THROW(simulate(s), std::invalid_argument);
+                    ++refused;
+                    continue;
+                  }
+                  const auto simulation = simulate(s);
+                  simulation->advance_to(1.5);
+                  simulation->advance_to(3);
+                  ++ran;
+                  const Simulation& engine = *simulation;
+                  engines.insert(typeid(engine).name());
+                  const EnergyLedger e = simulation->energy();
+                  ASSERT_LE(std::abs(e.imbalance()), 1e-11 * (std::abs(e.initial) + std::abs(e.kinetic) + e.dissipated +
+                                                              std::abs(e.floor_work) + std::abs(e.bath_work)))
+                      << ran;
+                  ASSERT_LE(simulation->largest_overlap(), 1e-12) << ran;
+                }
+  std::printf("  %d combinations ran on %zu engines, %d were refused\n", ran, engines.size(), refused);
+  EXPECT_EQ(engines.size(), 24u);
+  EXPECT_GT(ran, 1000);
+  EXPECT_GT(refused, 100);
 }
 
 }  // namespace
