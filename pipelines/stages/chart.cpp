@@ -17,7 +17,7 @@
 namespace shakebed::pipelines {
 namespace {
 
-enum class Look { points, line, dashed, dotted };
+enum class Look { points, line, dashed, dotted, none };
 
 struct PointsOptions {
   std::string name, from, file = "table.csv", label;
@@ -58,8 +58,11 @@ Series::Style style_of(Look look) {
          : look == Look::dashed ? Series::Style::dashed
                                 : Series::Style::dotted;
 }
-const std::vector<Choice<Look>> looks{
-    {Look::points, "points"}, {Look::line, "line"}, {Look::dashed, "dashed"}, {Look::dotted, "dotted"}};
+const std::vector<Choice<Look>> looks{{Look::points, "points"},
+                                      {Look::line, "line"},
+                                      {Look::dashed, "dashed"},
+                                      {Look::dotted, "dotted"},
+                                      {Look::none, "none"}};
 
 double value_at(const CurveOptions& curve, double x) {
   double y = 0;
@@ -134,7 +137,9 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
     const auto spread = data.has_errors ? number_in(cell(error)) : std::nullopt;
     rows.push_back({place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0});
   }
-  if (!any) throw InputError(fmt::format("{}: no row is one of \"{}\"", path.string(), options.name));
+  // What is only counted may be nothing: no prediction in range, say.
+  if (!any && options.look != Look::none)
+    throw InputError(fmt::format("{}: no row is one of \"{}\"", path.string(), options.name));
   std::stable_sort(rows.begin(), rows.end(), [](const Row& l, const Row& r) { return l.x < r.x; });
   for (const Row& row : rows) data.x.push_back(row.x), data.y.push_back(row.y), data.error.push_back(row.error);
   return data;
@@ -152,6 +157,18 @@ std::vector<double> pooled(const std::vector<double>& errors, std::size_t pool) 
     out.push_back(std::sqrt(squares / static_cast<double>(span)));
   }
   return out;
+}
+
+// Root mean square of ln(y/curve); none where a sign forbids it. 0.69: wrong by a factor of two.
+std::optional<double> rms_log_ratio(const CurveOptions& curve, const std::vector<double>& x,
+                                    const std::vector<double>& y) {
+  double squares = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double ratio = y[i] / value_at(curve, x[i]);
+    if (!(ratio > 0) || !std::isfinite(ratio)) return std::nullopt;
+    squares += std::pow(std::log(ratio), 2);
+  }
+  return std::sqrt(squares / static_cast<double>(x.size()));
 }
 
 // Offset + amplitude x^exponent with the exponent fitted, and with 1 and 2 given.
@@ -205,7 +222,7 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.text("x", p.x, {.help = "column", .required = true});
   fields.text("y", p.y, {.help = "column", .required = true});
   fields.text("error", p.error, {.help = "column of the errors of y; left out, y_error or std_error; \"none\""});
-  fields.choice("look", p.look, looks, {.help = "how it is drawn"});
+  fields.choice("look", p.look, looks, {.help = "how it is drawn; none: only its numbers are found"});
   fields.integer("color", p.color, {.help = "of the palette, 0 to 6; left out, one after the other"});
   fields.number("times", p.times, {.help = "factor of y"});
   fields.number("plus", p.plus, {.help = "added to y after the factor"});
@@ -234,6 +251,7 @@ void describe_points(Fields& fields, PointsOptions& p) {
   } else {
     fields.problem("/where", "expected an object: column → text");
   }
+  fields.require(!p.residuals || p.look != Look::none, "residuals", "what is not drawn has no residuals to draw");
   fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals from what? \"against\" names no curve");
 }
 
@@ -302,10 +320,12 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
   for (const PointsOptions& options : chart.points) {
     Data data = read_data(input_named(context, options.from).file(options.file), options);
     if (data.has_errors) data.error = pooled(data.error, options.pool);
-    const int own = options.color >= 0 ? options.color : color++;
+    const bool drawn = options.look != Look::none;
+    const int own = options.color >= 0 ? options.color : drawn ? color++ : 0;
     const bool bars = data.has_errors && options.look == Look::points;
-    picture.series.push_back(
-        {options.label, style_of(options.look), own, data.x, data.y, bars ? data.error : std::vector<double>{}});
+    if (drawn)
+      picture.series.push_back(
+          {options.label, style_of(options.look), own, data.x, data.y, bars ? data.error : std::vector<double>{}});
     Json found = Json::object();
     found["points"] = data.x.size();
     // What fits and comparisons use.
@@ -371,6 +391,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
                                         ? quantity_json(rms, "1", std::sqrt(propagated) / (n * rms))
                                         : quantity_json(rms, "1");
         against["largest_difference"] = largest;
+        if (const std::optional<double> ratio = rms_log_ratio(curve, x, y)) against["rms_log_ratio"] = *ratio;
         found["against"] = std::move(against);
       }
       if (options.residuals && !below.x.empty()) {
@@ -451,7 +472,7 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 2,
+          .version = 3,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,

@@ -45,6 +45,12 @@ std::string plain(std::string_view text) {
 
 namespace {
 
+// Characters of UTF-8.
+std::size_t letters(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
 // Both pictures from one script: it is drawn twice, and what differs (size, font, file) comes first. The PDF is as wide
 // as one column of a journal, 86 mm, with text that reads there.
 std::string twice(const std::string& name, double width, double height, const std::string& body) {
@@ -84,7 +90,7 @@ void run_gnuplot(const std::filesystem::path& directory, const std::string& name
 
 // The series as "plot" elements, their data at `index` and after in NAME.dat.
 std::string plot_elements(const std::vector<Series>& all, const std::string& name, std::size_t index, bool titles) {
-  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4};  // filled circle, square, triangle, diamond, ...; open ones
+  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8, 12, 10};  // filled circle, square, ...; then open ones
   std::size_t point = 0;
   std::string script;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -102,7 +108,8 @@ std::string plot_elements(const std::vector<Series>& all, const std::string& nam
     script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), index + i);
     switch (series.style) {
       case Series::Style::points:
-        script += fmt::format("1:2 with points pt {} ps 0.55*scale lc rgb '{}'", points[shape % points.size()], color);
+        script +=
+            fmt::format("1:2 with points pt {} ps 0.55*scale lw 1.4 lc rgb '{}'", points[shape % points.size()], color);
         break;
       case Series::Style::line:
         script += fmt::format("1:2 with lines lw 2 lc rgb '{}'", color);
@@ -155,12 +162,16 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   body +=
       "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
       "pointintervalbox 0\n";
-  // Above the picture, where it hides nothing, in two columns.
-  const auto entries =
-      std::count_if(drawn.series.begin(), drawn.series.end(), [](const Series& s) { return !s.label.empty(); }) +
-      (picture.band_label.empty() ? 0 : 1);
-  const auto rows = std::max<std::ptrdiff_t>(1, (entries + 1) / 2);
-  body += fmt::format("set key above vertical maxrows {} font keyfont spacing 1.2 samplen 2\n", rows);
+  // Above the picture, where it hides nothing: in three columns if the labels are short enough for that.
+  std::size_t entries = picture.band_label.empty() ? 0 : 1, longest = letters(picture.band_label);
+  for (const Series& series : drawn.series) {
+    entries += !series.label.empty();
+    longest = std::max(longest, letters(series.label));
+  }
+  const std::size_t columns = entries > 4 && longest <= 27 ? 3 : 2;
+  const std::size_t rows = std::max<std::size_t>(1, (entries + columns - 1) / columns);
+  body += fmt::format("set key above vertical maxrows {} Left reverse font keyfont spacing 1.2 samplen 1.5 width {}\n",
+                      rows, columns == 3 ? -3 : 0);
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     body += fmt::format(
@@ -172,7 +183,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
     body += fmt::format(
         "set multiplot\nset lmargin at screen 0.14\nset rmargin at screen 0.97\nset tmargin at screen {:.2f}\nset "
         "bmargin at screen 0.38\nset format x ''\n",
-        0.94 - 0.034 * static_cast<double>(rows));
+        1 - (14 + 25 * static_cast<double>(rows)) / (640 + 24 * static_cast<double>(rows)));
   } else {
     body += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
   }
@@ -192,7 +203,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
     if (!picture.x_low || !picture.x_high) body += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
     body += "plot " + plot_elements(drawn.lower, name, drawn.series.size(), false) + "\nunset multiplot\n";
   }
-  run_gnuplot(directory, name, twice(name, 860, two ? 720 : 560, body));
+  run_gnuplot(directory, name, twice(name, 860, (two ? 640 : 480) + 24 * static_cast<double>(rows), body));
 }
 
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
@@ -460,7 +471,7 @@ void Figure::run(RunContext& context) const {
 
 StageRow figure_stage() {
   return {.name = "figure",
-          .version = 2,
+          .version = 3,
           .summary = "draws profiles, fits and published curves",
           .accepts = {"extract", "simulate", "fit"},
           .fewest_inputs = 1,
