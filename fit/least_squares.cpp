@@ -72,6 +72,7 @@ class Solver {
     for (int round = 0; round < rounds; ++round) {
       threshold_ = options_.robust ? options_.robust_threshold * std::max(scale, 1e-300) : 0.0;
       solution.converged = descend(solution);
+      if (solution.converged) polish(solution);
       const double next = residual_scale(residual_);
       if (std::abs(next - scale) <= 1e-6 * scale) break;
       scale = next;
@@ -204,6 +205,45 @@ class Solver {
       }
     }
     return false;
+  }
+
+  // Near the minimum chi2 no longer tells two points apart, by rounding, where its gradient still does: Gauss-Newton
+  // steps, each of which must halve what the next one promises.
+  void polish(Solution& solution) {
+    const auto columns = static_cast<Eigen::Index>(free_.size());
+    if (columns == 0) return;
+    Matrix a;
+    Vector g;
+    normal_equations(a, g);
+    Vector step = a.ldlt().solve(-g);
+    double promise = -g.dot(step);
+    for (int i = 0; i < 3; ++i) {
+      if (!step.allFinite() || !(promise > 0.0 && promise < 1e-6 * solution.objective)) return;
+      FitModel::Parameters trial = solution.parameters;
+      for (Eigen::Index c = 0; c < columns; ++c) {
+        const std::size_t parameter = free_[static_cast<std::size_t>(c)];
+        trial[parameter] = coordinates_.moved(parameter, trial[parameter], step[c]);
+      }
+      const FitModel::Parameters unbounded = trial;
+      clamp(trial);
+      if (trial != unbounded || trial == solution.parameters) return;
+      const Vector old_residual = residual_;
+      const Matrix old_jacobian = jacobian_;
+      double next = promise;
+      if (evaluate(trial, residual_, jacobian_)) {
+        normal_equations(a, g);
+        step = a.ldlt().solve(-g);
+        next = -g.dot(step);
+      }
+      if (!(next < 0.25 * promise)) {
+        residual_ = old_residual;
+        jacobian_ = old_jacobian;
+        return;
+      }
+      promise = next;
+      solution.parameters = trial;
+      solution.objective = objective(residual_);
+    }
   }
 
   void finish(Solution& solution) {
