@@ -59,13 +59,43 @@ void BlockedCovariance::add(std::span<const double> sample) {
   block_length_ *= 2;
 }
 
-std::size_t BlockedCovariance::independent_blocks() const {
-  const std::size_t joined = std::max<std::size_t>(1, blocks_.size() / 128);
-  return blocks_.size() / joined;
+namespace {
+
+// 1 + 2 sum of the correlations of a series, summed to five times itself [Sokal1997].
+double inefficiency(std::vector<double> series) {
+  double mean = 0, variance = 0;
+  for (const double x : series) mean += x / static_cast<double>(series.size());
+  for (double& x : series) x -= mean, variance += x * x;
+  double sum = 1;
+  for (std::size_t lag = 1; lag < series.size() / 4 && variance > 0; ++lag) {
+    double correlation = 0;
+    for (std::size_t b = 0; b + lag < series.size(); ++b) correlation += series[b] * series[b + lag];
+    sum += 2 * correlation / variance;
+    if (static_cast<double>(lag) >= 5 * sum) break;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::size_t BlockedCovariance::joined() const {
+  const std::size_t usual = std::max<std::size_t>(1, blocks_.size() / 128);
+  if (blocks_.size() < 16) return usual;
+  std::vector<double> sum(blocks_.size()), moment(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (std::size_t i = 0; i < size_; ++i) {
+      sum[b] += blocks_[b][i];
+      moment[b] += static_cast<double>(i) * blocks_[b][i];
+    }
+  }
+  const double memory = std::max(inefficiency(std::move(sum)), inefficiency(std::move(moment)));
+  if (memory < 1.2) return usual;
+  const auto asked = static_cast<std::size_t>(std::ceil(4 * std::min(memory, static_cast<double>(blocks_.size()))));
+  return std::max(usual, std::min(asked, blocks_.size() / 8));
 }
 
 std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t last) const {
-  const std::size_t joined = std::max<std::size_t>(1, blocks_.size() / 128), count = blocks_.size() / joined;
+  const std::size_t joined = this->joined(), count = blocks_.size() / joined;
   const std::size_t n = last - first;
   std::vector<double> covariance(n * n, 0.0), mean(n, 0.0);
   if (count < 2) return covariance;

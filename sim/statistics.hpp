@@ -53,10 +53,11 @@ class BlockedCovariance {
   explicit BlockedCovariance(std::size_t size = 1) : size_(size) {}
   void add(std::span<const double> sample);  // of `size` values
   std::size_t blocks() const { return blocks_.size(); }
-  // Of the means of the quantities first to last-1, row by row. Blocks are joined until about 128 are left, so that
-  // neighbouring ones are as good as independent. Zeros with fewer than 2 blocks.
+  // Of the means of the quantities first to last-1, row by row. Blocks are joined until about 128 are left, or fewer
+  // where they remember longer: until one is four times as long as the correlations of the quantities' sum and of their
+  // first moment (sum of i x_i) last, but 8 are left. Zeros with fewer than 2 blocks.
   std::vector<double> of_means(std::size_t first, std::size_t last) const;
-  std::size_t independent_blocks() const;  // that of_means() rests on
+  std::size_t independent_blocks() const { return blocks_.size() / joined(); }  // that of_means() rests on
 
   template <class Archive>
   void visit(Archive& archive) {
@@ -64,6 +65,8 @@ class BlockedCovariance {
   }
 
  private:
+  std::size_t joined() const;
+
   std::size_t size_;
   std::size_t block_length_ = 1, in_block_ = 0;
   std::vector<double> sum_;

@@ -18,18 +18,14 @@ ObserveOptions ObserveOptions::from(const std::vector<std::string>& wanted) {
   return {has("order"), has("velocities"), has("displacement"), has("pressure"), has("phases")};
 }
 
-namespace {
-
-// The rows from the lowest to the highest that holds anything.
-struct Rows {
-  std::size_t first, last;
-};
 Rows filled_rows(const sim::Profile& profile) {
   Rows rows{0, profile.height.size()};
   while (rows.first < rows.last && profile.number_density[rows.first] < 1e-12) ++rows.first;
   while (rows.last > rows.first && profile.number_density[rows.last - 1] < 1e-12) --rows.last;
   return rows;
 }
+
+namespace {
 
 ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
                       const std::vector<std::string>& comments) {
@@ -47,15 +43,15 @@ ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
   return table;
 }
 
-// Of the lab profile: height_i,height_j,covariance for j >= i, only what is not 0.
-std::string covariance_text(const sim::BedObserver& observer) {
-  const sim::Profile profile = observer.density(false);
+// Of the lab profile: height_i,height_j,covariance for j >= i, only what is not 0. `covariance` is that of its filled
+// rows.
+std::string covariance_text(const sim::Profile& profile, const std::vector<double>& covariance,
+                            std::size_t independent_blocks) {
   const Rows rows = filled_rows(profile);
-  const std::vector<double> covariance = observer.density_covariance(rows.first, rows.last);
   const std::size_t n = rows.last - rows.first;
   std::string text = fmt::format(
       "# covariance of number_density in profile.csv\n# independent_blocks: {}\nheight_i,height_j,covariance\n",
-      observer.covariance_blocks());
+      independent_blocks);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = i; j < n; ++j) {
       if (covariance[i * n + j] != 0)
@@ -299,15 +295,19 @@ void BedMeasurement::write_profile(RunContext& context, const char* file, const 
   write_profile_csv(context.output(file), table_of(density, width_, plan_.grid.spacing, comments));
 }
 
-void BedMeasurement::write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor) const {
+void BedMeasurement::write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor,
+                                     const std::vector<double>& covariance, std::size_t independent_blocks) const {
   write_profile(context, "profile.csv", lab, "the floor's mean position");
   write_profile(context, "profile_floor_frame.csv", floor, "the moving floor");
-  std::filesystem::remove(context.output("covariance.csv"));
+  write_file(context.output("covariance.csv"), covariance_text(lab, covariance, independent_blocks));
 }
 
 void BedMeasurement::write(RunContext& context, bool frames) const {
   write_profile(context, "profile.csv", bed_.density(false), "the floor's mean position");
-  write_file(context.output("covariance.csv"), covariance_text(bed_));
+  const sim::Profile lab = bed_.density(false);
+  const Rows rows = filled_rows(lab);
+  write_file(context.output("covariance.csv"),
+             covariance_text(lab, bed_.density_covariance(rows.first, rows.last), bed_.covariance_blocks()));
   write_profile(context, "profile_floor_frame.csv", bed_.density(true), "the moving floor");
   if (frames)
     write_profile(context, "profile_frames.csv", frames_.density(false),

@@ -34,6 +34,12 @@ struct MeasurementPlan {
   ObserveOptions observe;
 };
 
+// The rows of a profile from the lowest to the highest that holds anything: first to last - 1.
+struct Rows {
+  std::size_t first, last;
+};
+Rows filled_rows(const sim::Profile& profile);
+
 class BedMeasurement {
  public:
   BedMeasurement(const sim::Scene& scene, const sim::DiskProperties& disks, const MeasurementPlan& plan);
@@ -51,9 +57,10 @@ class BedMeasurement {
   void results(const SceneOptions& options, const sim::Scene& scene, Json& out) const;
   // profile.csv, covariance.csv, layers.csv ... below the stage's output.
   void write(RunContext& context, bool frames) const;
-  // profile.csv and profile_floor_frame.csv of other densities on the same heights, in place of this bed's own, without
-  // a covariance.
-  void write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor) const;
+  // profile.csv and profile_floor_frame.csv of other densities on the same heights, in place of this bed's own, and
+  // covariance.csv, of the filled rows of `lab`.
+  void write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor,
+                       const std::vector<double>& covariance, std::size_t independent_blocks) const;
   std::uint64_t above_profile() const { return above_; }
 
   template <class Archive>

@@ -694,6 +694,30 @@ sim::Profile joined_density(const std::vector<const BedMeasurement*>& measuremen
   return out;
 }
 
+// Of the filled rows of the mean of the replicas' densities: what each shows of it by itself, together, and where the
+// replicas differ by more than that (beds are not all built alike), so much more of it.
+std::vector<double> joined_covariance(const std::vector<const BedMeasurement*>& measurements,
+                                      const sim::Profile& joined, std::size_t& independent_blocks) {
+  const Rows rows = filled_rows(joined);
+  const std::size_t n = rows.last - rows.first;
+  const auto replicas = static_cast<double>(measurements.size());
+  std::vector<double> covariance(n * n, 0.0);
+  independent_blocks = 0;
+  for (const BedMeasurement* m : measurements) {
+    const std::vector<double> own = m->bed().density_covariance(rows.first, rows.last);
+    for (std::size_t i = 0; i < n * n; ++i) covariance[i] += own[i] / (replicas * replicas);
+    independent_blocks += m->bed().covariance_blocks();
+  }
+  double seen = 0, own = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    seen += joined.std_error[rows.first + i] * joined.std_error[rows.first + i];
+    own += covariance[i * n + i];
+  }
+  if (seen > own && own > 0)
+    for (double& value : covariance) value *= seen / own;
+  return covariance;
+}
+
 void Simulate::run(RunContext& context) const {
   std::vector<std::unique_ptr<Run>> runs(replicas_);
   if (replicas_ == 1) {
@@ -739,7 +763,10 @@ void Simulate::run(RunContext& context) const {
     collisions += static_cast<double>(one->counters().collisions());
   }
   if (replicas_ > 1) {
-    measurements[0]->write_densities(context, joined_density(measurements, false), joined_density(measurements, true));
+    const sim::Profile lab = joined_density(measurements, false);
+    std::size_t blocks = 0;
+    const std::vector<double> covariance = joined_covariance(measurements, lab, blocks);
+    measurements[0]->write_densities(context, lab, joined_density(measurements, true), covariance, blocks);
     write_file(context.output("replicas.csv"), replicas_text(results));
   }
   Json out = replicas_ > 1 ? joined(results) : results[0];
@@ -758,7 +785,7 @@ void Simulate::run(RunContext& context) const {
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 10,
+          .version = 11,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,

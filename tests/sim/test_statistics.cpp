@@ -73,6 +73,31 @@ TEST(BlockedCovariance, KnowsTheCovarianceOfCorrelatedMeans) {
   EXPECT_NEAR(yy, of_x + of_noise, 0.08 * (of_x + of_noise));
 }
 
+// Of a series as short as 15 of its memories, too: blocks that only make 128 of it would miss four fifths of it.
+TEST(BlockedCovariance, KnowsThatOfAShortSeriesWithALongMemory) {
+  Random random(45);
+  const double r = 9.0 / 11.0;  // a memory of 10 samples
+  const int n = 150, runs = 400;
+  double xx = 0, blocks = 0;
+  for (int run = 0; run < runs; ++run) {
+    BlockedCovariance covariance(2);
+    double x = random.normal_pair().first;
+    for (int i = 0; i < n; ++i) {
+      const Random::Pair draw = random.normal_pair();
+      x = r * x + std::sqrt(1 - r * r) * draw.first;
+      const double sample[2] = {draw.second, x};
+      covariance.add(sample);
+    }
+    xx += covariance.of_means(1, 2)[0] / runs;
+    blocks += static_cast<double>(covariance.independent_blocks()) / runs;
+  }
+  const double truth = (1 + r) / (1 - r) / n;
+  std::printf("  variance of the mean %.4f of the true one, from %.1f blocks\n", xx / truth, blocks);
+  EXPECT_GT(xx, 0.7 * truth);
+  EXPECT_LT(xx, 1.1 * truth);
+  EXPECT_LT(blocks, 30);
+}
+
 // Whatever the kernel, the area under the density is the number of disks over the width.
 TEST(Density, HasTheDisksUnderIt) {
   const ProfileGrid grid{-2, 0.05, 400};
