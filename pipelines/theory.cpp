@@ -195,6 +195,8 @@ std::string audit_text() {
   for (const fit::AuditRow& row : fit::audit()) {
     out += fmt::format("{} [{}]\n  printed:    {}\n  recomputed: {}\n", row.quantity, fit::to_string(row.status),
                        row.printed_text, row.recomputed_text);
+    if (row.is_numeric && row.difference != 0)
+      out += fmt::format("  difference: {:+.7g} ({:+.3g} %)\n", row.difference, 100 * row.relative_difference);
     if (!row.explanation.empty()) out += fmt::format("  {}\n", row.explanation);
   }
   return out;
@@ -307,7 +309,8 @@ Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
     why = result.message.empty() ? std::string(fit::to_string(result.status)) : result.message;
   } else if (misfit > tolerable_misfit) {
     why = fmt::format("inside the window the model misses the data by {:.1f} % of the greatest density", 100 * misfit);
-  } else if (result.critical_status == fit::ValueStatus::ok && result.reduced_temperature.value > 1) {
+  } else if (result.model != "simulation" && result.critical_status == fit::ValueStatus::ok &&
+             result.reduced_temperature.value > 1) {
     why = fmt::format(
         "T/T_c = {:.2f} is above 1: by this model there is no solid, and the fitted rectangle means nothing",
         result.reduced_temperature.value);

@@ -6,15 +6,19 @@
 #include <charconv>
 #include <cmath>
 
+#include "fit/expansion.hpp"
 #include "fit/fit_profile.hpp"
+#include "fit/simulated_profiles.hpp"
 #include "pipelines/bed.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/theory.hpp"
+#include "pipelines/trajectory.hpp"
+#include "sim/observables.hpp"
 
 namespace shakebed::pipelines {
 namespace {
 
-enum class ErrorSource { diagonal, covariance };
+enum class ErrorSource { automatic, diagonal, covariance };
 enum class KernelChoice { measured, none, gaussian, top_hat, disk_chord };
 
 struct WindowChoice {
@@ -29,6 +33,8 @@ struct KernelOptions {
   double width = 0.5;
 };
 
+const std::string simulation = "simulation";
+
 class Fit : public Stage {
  public:
   void describe(Fields& fields) override {
@@ -36,9 +42,12 @@ class Fit : public Stage {
         "profile", profile_,
         {.help = "a profile of your own (CSV with height and number_density); left out, that of the stage in \"from\"",
          .example = "\"profile.csv\""});
-    fields.text("model", options_.model,
-                {.help = "enskog-rectangle, hydrostatic:<equation of state>, fermi or rectangle",
-                 .example = "\"enskog-rectangle\""});
+    fields.text(
+        "model", options_.model,
+        {.help = "enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle, or simulation: the profile "
+                 "of the first stage in \"from\" (or of \"profile\") is matched against those of all other "
+                 "simulate stages there, at their known temperatures",
+         .example = "\"enskog-rectangle\""});
     fields.number(
         "plateau_density", options_.plateau_density,
         {.help = "density phi_0 of the solid in 1/D^2: 2/sqrt(3) in equilibrium, 1.10 for the published experiment",
@@ -87,12 +96,30 @@ class Fit : public Stage {
           f.require(!w.low || !w.high || *w.low < *w.high, "low", "the window ends below where it begins");
         },
         {.help = "which part of the profile is fitted"});
-    fields.choice("errors", errors_, {{ErrorSource::diagonal, "diagonal"}, {ErrorSource::covariance, "covariance"}},
-                  {.help = "covariance: use the covariance between heights that extract measured"});
+    fields.choice(
+        "errors", errors_,
+        {{ErrorSource::automatic, "automatic"},
+         {ErrorSource::diagonal, "diagonal"},
+         {ErrorSource::covariance, "covariance"}},
+        {.help = "covariance: that between heights, which simulate and extract measure; diagonal: the profile's "
+                 "standard errors, as if heights were independent (for a measured profile these are too "
+                 "small); automatic: covariance where there is one"});
     fields.boolean("robust", options_.robust, {.help = "Huber's loss: outliers count linearly"});
     fields.boolean("sweep", options_.sweep, {.help = "also T against window"});
     fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
+    fields.integer("bootstrap", bootstrap_,
+                   {.help = "resamples over blocks of frames, for the error of T that frames show by themselves: of an "
+                            "extract stage, or of a simulate stage that kept its frames; 0: none",
+                    .range = from_to(0, 100'000)});
     if (!fields.decoding()) return;
+    fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
+                   "there are no frames to resample: no extract or simulate stage in \"from\"");
+    fields.require(bootstrap_ == 0 || options_.model != simulation, "bootstrap",
+                   "the model simulation has its own errors, from the library's repeats");
+    fields.require(options_.model != simulation || fields.has_upstream("simulate"), "model",
+                   "the model simulation needs simulate stages in \"from\" as its library");
+    fields.require(options_.model == simulation || fields.upstream().size() <= 2, "from",
+                   "only the model simulation reads more than two stages");
     const bool upstream = !fields.upstream().empty();
     fields.require(!temperature_measured_ || fields.has_upstream("simulate"), "temperature_measured",
                    "no simulate stage in \"from\" has measured a temperature");
@@ -103,8 +130,8 @@ class Fit : public Stage {
     fields.require(profile_.paths.size() <= 1, "profile",
                    fmt::format("names {} files, one profile is fitted at a time", profile_.paths.size()));
     const std::string& model = options_.model;
-    bool known = model == "enskog-rectangle" || model == "fermi" || model == "rectangle";
-    std::vector<std::string> names{"enskog-rectangle", "fermi", "rectangle"};
+    bool known = model == "enskog-rectangle" || model == "fermi" || model == "rectangle" || model == simulation;
+    std::vector<std::string> names{"enskog-rectangle", "fermi", "rectangle", simulation};
     for (const fit::EquationOfState* row : fit::equations_of_state()) {
       names.push_back("hydrostatic:" + std::string(row->name()));
       known = known || names.back() == model;
@@ -123,14 +150,20 @@ class Fit : public Stage {
   std::optional<double> diameter_;
   KernelOptions kernel_;
   WindowChoice window_;
-  ErrorSource errors_ = ErrorSource::diagonal;
+  ErrorSource errors_ = ErrorSource::automatic;
   bool temperature_measured_ = false;
+  std::uint32_t bootstrap_ = 0;
 };
 
-// Covariance between the heights of a profile, from covariance.csv.
-std::vector<double> read_covariance(const std::filesystem::path& path, const std::vector<double>& heights) {
+// Covariance between the heights of a profile, from covariance.csv, and how many independent samples are behind it.
+// Heights that are not in the file keep their own variance.
+void read_covariance(const Input& source, fit::Profile& profile) {
+  const std::filesystem::path path = source.file("covariance.csv");
+  const std::vector<double>& heights = profile.height;
   const std::size_t n = heights.size();
-  std::vector<double> covariance(n * n, 0.0);
+  profile.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < profile.std_error.size(); ++i)
+    profile.covariance[i * n + i] = profile.std_error[i] * profile.std_error[i];
   const std::string text = read_file(path);
   const auto index_of = [&](double height) -> std::optional<std::size_t> {
     const auto at = std::lower_bound(heights.begin(), heights.end(), height - 1e-9);
@@ -142,15 +175,23 @@ std::vector<double> read_covariance(const std::filesystem::path& path, const std
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string_view line = std::string_view(text).substr(begin, end - begin);
     begin = end + 1;
+    constexpr std::string_view blocks = "# independent_blocks: ";
+    if (line.starts_with(blocks))
+      profile.covariance_samples = std::atoi(std::string(line.substr(blocks.size())).c_str());
     if (line.empty() || line.front() == '#' || line.front() == 'h') continue;
     const auto cells = split_csv_line(line);
     if (cells.size() != 3) throw InputError(path.string() + ": expected height_i,height_j,covariance");
     const auto i = index_of(std::strtod(cells[0].c_str(), nullptr)),
                j = index_of(std::strtod(cells[1].c_str(), nullptr));
     if (!i || !j) continue;
-    covariance[*i * n + *j] = covariance[*j * n + *i] = std::strtod(cells[2].c_str(), nullptr);
+    const double value = std::strtod(cells[2].c_str(), nullptr);
+    profile.covariance[*i * n + *j] = profile.covariance[*j * n + *i] = value;
   }
-  return covariance;
+  if (const Json found = source.result(); source.stage == "extract" && found.contains("profile")) {
+    const double frames = found["profile"].value("frames", 0.0),
+                 together = found["profile"].value("correlation_frames", 1.0);
+    profile.covariance_samples = static_cast<int>(frames / std::max(1.0, together));
+  }
 }
 
 std::optional<double> number_in(const std::string& text) {
@@ -158,6 +199,187 @@ std::optional<double> number_in(const std::string& text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+fit::Profile profile_of(const ProfileTable& table) {
+  fit::Profile profile;
+  profile.height = table.height;
+  profile.number_density = table.number_density;
+  // Errors where every bin has one; a bin without samples has an error of 0, which says nothing about it.
+  double smallest = 0;
+  for (const double error : table.std_error) {
+    if (!(error >= 0)) return profile;
+    if (error > 0) smallest = smallest == 0 ? error : std::min(smallest, error);
+  }
+  if (smallest > 0)
+    for (const double error : table.std_error) profile.std_error.push_back(error > 0 ? error : smallest);
+  return profile;
+}
+
+// A bed of the library: its temperature is that of its reservoir, or else its kinetic one.
+struct LibraryBed {
+  std::string id;
+  fit::SimulatedProfile profile;
+  std::string kernel;
+};
+LibraryBed library_bed(const Input& input) {
+  const ProfileTable table = read_profile_csv(input.file("profile.csv"));
+  LibraryBed bed{input.id, {0, profile_of(table), 0}, table.comment("kernel") + " " + table.comment("kernel_width")};
+  bed.profile.temperature = BedDescription::read(input.file("bed.json")).bath_temperature;
+  if (!(bed.profile.temperature > 0)) {
+    const Json observed = input.result();
+    const Json *x = find_pointer(observed, "/temperature_x/value"), *z = find_pointer(observed, "/temperature_z/value");
+    if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
+      throw InputError(input.id + ": this bed has no temperature, so it is no use in a library");
+    bed.profile.temperature = (x->get<double>() + z->get<double>()) / 2;
+  }
+  return bed;
+}
+
+// The simulation as the model, in the form of every other fit.
+struct Matched {
+  fit::FitResult fit;
+  Json library = Json::array();
+  double interpolation_error = 0;
+  std::optional<double> scatter;  // relative, of the library's own beds matched against one another
+};
+Matched match(const fit::Profile& measured, const std::vector<LibraryBed>& beds, const WindowChoice& window,
+              const fit::FitOptions& options) {
+  Matched out;
+  std::vector<fit::SimulatedProfile> library;
+  for (const LibraryBed& bed : beds) {
+    library.push_back(bed.profile);
+    out.library.push_back(Json{{"stage", bed.id}, {"temperature", quantity_json(bed.profile.temperature, "m g D")}});
+  }
+  fit::MatchOptions how;
+  if (window.low) how.low = *window.low;
+  if (window.high) how.high = *window.high;
+  const fit::MatchResult found = fit::match_simulated(measured, library, how);
+  fit::FitResult& fit = out.fit;
+  fit.status = found.status, fit.message = found.message, fit.model = simulation;
+  fit.temperature = found.temperature, fit.temperature_interval = found.interval;
+  fit.warnings = found.warnings;
+  fit.chi2 = found.chi2, fit.dof = found.dof, fit.chi2_per_dof = found.chi2_per_dof, fit.bins = found.bins;
+  out.interpolation_error = found.interpolation_error;
+  const auto tests = fit::test_library(library, how);
+  if (const fit::Value scatter = fit::library_scatter(tests, found.temperature.value);
+      found.status == fit::FitStatus::ok && scatter.ok()) {
+    out.scatter = scatter.value;
+    fit.temperature.std_error = std::max(fit.temperature.std_error, scatter.value * found.temperature.value);
+  }
+  if (!found.height.empty()) fit.window_low = found.height.front(), fit.window_high = found.height.back();
+  fit.window_rule = "every bin from " + number_text(how.low) + " D up";
+  fit.plateau_density = {options.plateau_density, 0, true};
+  if (options.column_number) {
+    fit.column_number = {*options.column_number, 0, true};
+    const fit::Value critical =
+        fit::critical_temperature(fit::enskog(), {*options.column_number, options.plateau_density});
+    fit.critical_status = critical.status;
+    if (critical.ok()) {
+      fit.critical_temperature = {critical.value, 0, true};
+      fit.reduced_temperature = {fit.temperature.value / critical.value, fit.temperature.std_error / critical.value};
+    }
+  }
+  // With T known the tail says where the solid ends.
+  if (found.status == fit::FitStatus::ok) {
+    fit::FitOptions tail = options;
+    tail.model = "enskog-rectangle";
+    tail.window = {};
+    tail.window.below_density = 0.6;
+    tail.interval = tail.sweep = tail.compare = false;
+    tail.curve_points = 0;
+    const auto at = [&](double temperature) {
+      tail.fixed_temperature = temperature;
+      return fit::fit_profile(measured, tail);
+    };
+    const fit::FitResult best = at(fit.temperature.value),
+                         warmer = at(fit.temperature.value + fit.temperature.std_error);
+    if (best.ok() && warmer.ok()) {
+      fit.shift = best.shift, fit.solid_height = best.solid_height;
+      fit.shift.std_error = std::hypot(best.shift.std_error, warmer.shift.value - best.shift.value);
+      fit.solid_height.std_error =
+          std::hypot(best.solid_height.std_error, warmer.solid_height.value - best.solid_height.value);
+      fit.solid_height_by_sum_rule = best.solid_height_by_sum_rule;
+    }
+    fit.area = best.area;
+  }
+  for (std::size_t i = 0; i < measured.height.size(); ++i) {
+    fit::Residual r{measured.height[i], measured.number_density[i],
+                    measured.std_error.empty() ? 0 : measured.std_error[i], 0, false};
+    for (std::size_t k = 0; k < found.height.size(); ++k) {
+      if (found.height[k] == r.height) r.model = found.density[k], r.used = true;
+    }
+    if (r.used) fit.curve.push_back({r.height, r.model, r.model});
+    fit.residuals.push_back(r);
+  }
+  return out;
+}
+
+// The profile of each frame by itself, in the order of time: from disks.csv or from a trajectory.
+fit::ProfileFrames frames_of(const Input& source, const ProfileTable& table, const fit::Kernel& kernel) {
+  if (kernel.kind != fit::KernelKind::gaussian && kernel.kind != fit::KernelKind::top_hat)
+    throw InputError("\"bootstrap\": profiles of single frames are counted with a gaussian or a top_hat kernel only");
+  const sim::Kernel counted{
+      kernel.kind == fit::KernelKind::gaussian ? sim::KernelKind::gaussian : sim::KernelKind::top_hat, kernel.width};
+  if (table.size() < 3) throw InputError("\"bootstrap\": the profile has fewer than three heights");
+  const double spacing = (table.height.back() - table.height.front()) / static_cast<double>(table.size() - 1);
+  const sim::ProfileGrid grid{table.height.front(), spacing, table.size()};
+  fit::ProfileFrames frames;
+  frames.height = table.height;
+  std::vector<double> density(table.size());
+  const auto add = [&](const std::vector<double>& z, double width) {
+    std::fill(density.begin(), density.end(), 0.0);
+    sim::add_density(grid, counted, width, z, 0.0, density);
+    frames.number_density.insert(frames.number_density.end(), density.begin(), density.end());
+  };
+  if (source.stage == "simulate") {
+    const std::string name = source.has("trajectory.extxyz") ? "trajectory.extxyz" : "trajectory.extxyz.zst";
+    if (!source.has(name))
+      throw InputError("\"bootstrap\": " + source.id + " kept no frames; give it \"frames\": {\"count\": ...}");
+    TrajectoryReader reader(source.file(name));
+    TrajectoryFrame frame;
+    while (reader.read(frame)) add(frame.z, frame.width);
+    return frames;
+  }
+  const Json extracted = source.result();
+  const Json* width = find_pointer(extracted, "/width/value");
+  if (width == nullptr || !width->is_number()) throw InputError("\"bootstrap\": the frames do not tell their width");
+  const std::filesystem::path path = source.file("disks.csv");
+  const std::string text = read_file(path);
+  std::vector<double> z;
+  std::string current;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    begin = end + 1;
+    if (line.empty() || line.front() == '#' || line.front() == 'f') continue;
+    const auto cells = split_csv_line(line);
+    if (cells.size() < 6) throw InputError(path.string() + ": expected frame,x_px,y_px,radius_px,x,z,quality");
+    if (cells[0] != current) {
+      if (!current.empty()) add(z, width->get<double>());
+      z.clear();
+      current = cells[0];
+    }
+    z.push_back(std::strtod(cells[5].c_str(), nullptr));
+  }
+  if (!current.empty()) add(z, width->get<double>());
+  return frames;
+}
+
+Json bootstrap_json(const fit::BootstrapResult& result, std::uint32_t resamples) {
+  Json out{{"status", fit::to_string(result.status)},
+           {"resamples", resamples},
+           {"succeeded", result.succeeded},
+           {"frames_a_block", result.block}};
+  if (!result.message.empty()) out["message"] = result.message;
+  if (result.status != fit::FitStatus::ok) return out;
+  out["temperature"] = quantity_json(result.temperature.value, "m g D", result.temperature.std_error);
+  out["shift"] = quantity_json(result.shift.value, "D", result.shift.std_error);
+  out["temperature_interval"] = Json{{"low", result.temperature_interval.low},
+                                     {"high", result.temperature_interval.high},
+                                     {"confidence", result.temperature_interval.confidence}};
+  return out;
 }
 
 void Fit::run(RunContext& context) const {
@@ -189,31 +411,14 @@ void Fit::run(RunContext& context) const {
       throw InputError("the simulated bed has no kinetic temperature at which T could be held");
     options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
   }
-  fit::Profile profile;
-  profile.height = table.height;
-  profile.number_density = table.number_density;
-  // Errors where every bin has one; a bin without samples has an error of 0, which says nothing about it.
-  bool has_errors = true;
-  double smallest = 0;
-  for (const double error : table.std_error) {
-    has_errors = has_errors && error >= 0;
-    if (error > 0) smallest = smallest == 0 ? error : std::min(smallest, error);
-  }
-  if (has_errors && smallest > 0) {
-    for (const double error : table.std_error) profile.std_error.push_back(error > 0 ? error : smallest);
-  } else {
+  fit::Profile profile = profile_of(table);
+  if (profile.std_error.empty())
     context.warning("the profile has no standard errors: those of the fit follow from the scatter about it");
-  }
-  if (errors_ == ErrorSource::covariance) {
-    if (source == nullptr || !source->has("covariance.csv"))
-      throw InputError("\"errors\": \"covariance\" needs the profile of an extract stage");
-    profile.covariance = read_covariance(source->file("covariance.csv"), profile.height);
-    if (const Json extracted = source->result(); extracted.contains("profile")) {
-      const double frames = extracted["profile"].value("frames", 0.0),
-                   together = extracted["profile"].value("correlation_frames", 1.0);
-      profile.covariance_samples = static_cast<int>(frames / std::max(1.0, together));
-    }
-  }
+  const bool has_covariance = source != nullptr && profile_.empty() && source->has("covariance.csv");
+  if (errors_ == ErrorSource::covariance && !has_covariance)
+    throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
+  if (errors_ != ErrorSource::diagonal && has_covariance && options.model != simulation)
+    read_covariance(*source, profile);
   switch (kernel_.kind) {
     case KernelChoice::none:
       options.kernel = {fit::KernelKind::none, 0};
@@ -247,11 +452,43 @@ void Fit::run(RunContext& context) const {
   options.window.lowest_significance = window_.lowest_significance;
 
   context.progress(0.1, "fitting");
-  const fit::FitResult result = fit::fit_profile(profile, options);
+  Matched matched;
+  fit::FitResult result;
+  if (options.model == simulation) {
+    std::vector<LibraryBed> beds;
+    const std::string kernel = table.comment("kernel") + " " + table.comment("kernel_width");
+    for (const Input& input : context.inputs()) {
+      if (input.stage != "simulate" || (profile_.empty() && &input == source)) continue;
+      beds.push_back(library_bed(input));
+      if (beds.back().kernel != kernel)
+        throw InputError(
+            fmt::format("{}: its profile went through the kernel \"{}\", the measured one through \"{}\"; "
+                        "the simulation is a model only through the same",
+                        input.id, beds.back().kernel, kernel));
+    }
+    matched = match(profile, beds, window_, options);
+    result = std::move(matched.fit);
+    result.kernel = options.kernel;
+  } else {
+    result = fit::fit_profile(profile, options);
+  }
   if (result.status == fit::FitStatus::bad_input)
     throw InputError(fmt::format("{}: {}", path.string(), result.message));
   for (const std::string& warning : result.warnings) context.warning(warning);
-  const Json json = fit_json(result, diameter);
+  Json json = fit_json(result, diameter);
+  if (options.model == simulation) {
+    json["library"] = std::move(matched.library);
+    json["interpolation_error"] = quantity_json(matched.interpolation_error, "m g D");
+    json["library_scatter"] = matched.scatter ? Json(*matched.scatter) : Json();
+  }
+  if (bootstrap_ > 0) {
+    context.progress(0.3, "resampling");
+    fit::BootstrapOptions how;
+    how.resamples = static_cast<int>(bootstrap_);
+    const fit::BootstrapResult found = fit::bootstrap_fit(frames_of(*source, table, options.kernel), options, how);
+    if (found.status != fit::FitStatus::ok) context.warning("bootstrap: " + found.message);
+    json["bootstrap"] = bootstrap_json(found, bootstrap_);
+  }
   if (!json["describes_data"].get<bool>()) {
     context.warning(
         fmt::format("{} does not describe this profile: {}", result.model, json["why_not"].get<std::string>()));
@@ -283,11 +520,11 @@ void Fit::run(RunContext& context) const {
 
 StageRow fit_stage() {
   return {.name = "fit",
-          .version = 2,
+          .version = 3,
           .summary = "fits temperature and solid height to a density profile",
           .accepts = {"extract", "simulate"},
           .fewest_inputs = 0,
-          .most_inputs = 2,
+          .most_inputs = 64,
           .result = "fit.json",
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Fit>(); }};
 }

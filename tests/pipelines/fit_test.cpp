@@ -1,0 +1,143 @@
+// The fit stage where it reads more than a profile: a library of simulated beds as the model, frames for a bootstrap.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "pipelines/json.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using shakebed::pipelines::Json;
+using testing::HasSubstr;
+
+// A bed of mu = 10.1 that an Andersen bath holds at a part of T_c; 118 elastic disks, T_c = 0.10496 m g D.
+constexpr double critical = 0.104959;
+std::string bed(const std::string& id, double reduced, int seed, const std::string& more = "") {
+  const std::string t = std::to_string(reduced * critical);
+  return R"({ "stage": "simulate", "id": ")" + id + R"(", "seed": )" + std::to_string(seed) +
+         R"(, "units": "reduced", "disks": { "count": 118 }, "box": { "width": 10.1, "sides": "periodic" },
+             "bath": { "kind": "andersen", "temperature": )" +
+         t + R"(, "rate": 0.3 }, "start_temperature": )" + t + R"(, "settle": 60, "measure": 150 )" + more + " },\n";
+}
+const std::string frames = R"(, "frames": { "count": 150 })";
+
+class FitStage : public testing::Test {
+ protected:
+  ProgramResult run(const std::string& stages) {
+    write_text(folder_ / "r.json", R"({ "name": "t", "stages": [ )" + stages + " ] }");
+    return run_shakebed({"run", "r.json", "--out", "o"}, folder_.path());
+  }
+  Json fit() { return Json::parse(read_text(folder_ / "o/fit/fit.json")); }
+  ScratchFolder folder_;
+};
+
+TEST_F(FitStage, MatchesAProfileAgainstSimulatedBeds) {
+  std::string stages, ids;
+  int seed = 100;
+  for (const double reduced : {0.35, 0.5, 0.7, 0.95}) {
+    for (const char* repeat : {"a", "b"}) {
+      const std::string id = "bed" + std::to_string(seed) + repeat;
+      stages += bed(id, reduced, ++seed);
+      ids += ", \"" + id + "\"";
+    }
+  }
+  const ProgramResult result = run(stages + bed("measured", 0.6, 1) + R"({ "stage": "fit", "from": ["measured")" + ids +
+                                   R"(], "model": "simulation", "base": 0.066987 })");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = fit();
+  EXPECT_EQ(json["status"], "ok");
+  const double t = json["temperature"]["value"], error = json["temperature"]["std_error"];
+  EXPECT_NEAR(t, 0.6 * critical, 0.05 * 0.6 * critical);
+  EXPECT_NEAR(t, 0.6 * critical, 4 * error);
+  EXPECT_LT(error, 0.05 * t);
+  EXPECT_EQ(json["library"].size(), 8u);
+  EXPECT_GT(json["interpolation_error"]["value"].get<double>(), 0);
+  EXPECT_TRUE(json["library_scatter"].is_number());
+  EXPECT_NEAR(json["solid_height"]["value"].get<double>(), 0.4 * 10.118, 0.03 * 10.118 + 3 * 0.06 * 10.118 * error / t);
+  EXPECT_THAT(read_text(folder_ / "o/fit/residuals.csv"), HasSubstr("height,number_density,std_error,model,used"));
+}
+
+TEST_F(FitStage, SaysWhatALibraryLacks) {
+  const std::string measured = bed("measured", 0.6, 1);
+  // All warmer than the measurement.
+  ProgramResult result = run(bed("a", 0.9, 2) + bed("b", 1.1, 3) + bed("c", 1.4, 4) + measured +
+                             R"({ "stage": "fit", "from": ["measured", "a", "b", "c"], "model": "simulation" })");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(fit()["status"], "unresolved temperature");
+  // Another kernel.
+  result = run(bed("a", 0.5, 2) + bed("b", 0.7, 3, R"(, "profile": { "kernel": { "kind": "top_hat", "width": 1 } })") +
+               measured + R"({ "stage": "fit", "from": ["measured", "a", "b"], "model": "simulation" })");
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("b: its profile went through the kernel \"top-hat 1\""));
+  // No library, and one where there is no use for it.
+  write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.1\n");
+  result = run(R"({ "stage": "fit", "profile": "p.csv", "model": "simulation" })");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("needs simulate stages"));
+  result =
+      run(bed("a", 0.5, 2) + bed("b", 0.7, 3) + measured + R"({ "stage": "fit", "from": ["measured", "a", "b"] })");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("only the model simulation reads more than two stages"));
+}
+
+// 40 beds at 20 T_c, fluid everywhere, each measured for a time in which it forgets itself some fifteen times. What the
+// fits state is what the temperatures scatter by (40 beds tell a standard deviation to 11 %; the blocks behind each
+// error, a dozen, to 20 %), and of 40 intervals of 95 % at least 33 hold the truth (fewer: 0.3 % of cases).
+TEST_F(FitStage, StatesErrorsThatMeanWhatTheySay) {
+  constexpr int beds = 40;
+  std::string stages;
+  for (int k = 0; k < beds; ++k) {
+    const std::string id = std::to_string(k);
+    stages += bed("bed" + id, 20, k + 1) + R"({ "stage": "fit", "id": "fit)" + id + R"(", "from": "bed)" + id +
+              R"(", "sweep": false, "compare": false, "window": { "low": 8 } })" + (k + 1 < beds ? "," : "");
+  }
+  const ProgramResult result = run(stages);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  double sum = 0, squares = 0, stated = 0;
+  int held = 0;
+  for (int k = 0; k < beds; ++k) {
+    const Json json = Json::parse(read_text(folder_ / ("o/fit" + std::to_string(k)) / "fit.json"));
+    ASSERT_EQ(json["status"], "ok");
+    const double t = json["temperature"]["value"].get<double>() / (20 * critical),
+                 error = json["temperature"]["std_error"].get<double>() / (20 * critical);
+    sum += t, squares += t * t, stated += error * error;
+    const Json& interval = json["temperature_interval"];
+    held += interval["low"].get<double>() <= 20 * critical && 20 * critical <= interval["high"].get<double>();
+  }
+  const double mean = sum / beds, spread = std::sqrt((squares / beds - mean * mean) * beds / (beds - 1));
+  std::printf(
+      "  T over the bath's %.4f +- %.4f; one bed scatters by %.4f and states %.4f; %d of %d intervals hold it\n", mean,
+      spread / std::sqrt(beds), spread, std::sqrt(stated / beds), held, beds);
+  EXPECT_GT(std::sqrt(stated / beds), 0.6 * spread);
+  EXPECT_LT(std::sqrt(stated / beds), 1.6 * spread);
+  EXPECT_GE(held, 33);
+  EXPECT_NEAR(mean, 1, 4 * spread / std::sqrt(beds));
+}
+
+TEST_F(FitStage, ResamplesFrames) {
+  const std::string fit_stage = R"({ "stage": "fit", "from": "measured", "bootstrap": 100,
+      "sweep": false, "compare": false, "window": { "low": 5 } })";
+  ASSERT_EQ(run(bed("measured", 20, 1, frames) + fit_stage).exit_code, 0);
+  const Json json = fit(), resampled = json["bootstrap"];
+  EXPECT_EQ(resampled["status"], "ok");
+  EXPECT_EQ(resampled["resamples"], 100);
+  EXPECT_EQ(resampled["succeeded"], 100);
+  const double own = json["temperature"]["std_error"], by_frames = resampled["temperature"]["std_error"],
+               difference =
+                   resampled["temperature"]["value"].get<double>() - json["temperature"]["value"].get<double>();
+  EXPECT_GT(by_frames, own / 3);
+  EXPECT_LT(by_frames, 3 * own);
+  EXPECT_LT(std::abs(difference), 3 * by_frames);
+  EXPECT_LT(resampled["temperature_interval"]["low"], resampled["temperature"]["value"]);
+  EXPECT_GT(resampled["temperature_interval"]["high"], resampled["temperature"]["value"]);
+  // Without frames there is nothing to resample.
+  const ProgramResult result = run(bed("measured", 20, 1) + fit_stage);
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("kept no frames"));
+}
+
+}  // namespace
