@@ -180,8 +180,8 @@ void expect_enskog_profile(double reduced, double from, double length) {
   expect_law("phi over Enskog's, worst layer", 1 + worst, worst_error, 1, 0.01);
 }
 
-TEST(Hydrostatics, FluidBedHasEnskogsProfileAt15CriticalTemperatures) { expect_enskog_profile(15, 8, 8000); }
-TEST(Hydrostatics, FluidBedHasEnskogsProfileAt40CriticalTemperatures) { expect_enskog_profile(40, 5, 8000); }
+TEST(Hydrostatics, FluidBedHasEnskogsProfileAt15CriticalTemperatures) { expect_enskog_profile(15, 8, 16000); }
+TEST(Hydrostatics, FluidBedHasEnskogsProfileAt40CriticalTemperatures) { expect_enskog_profile(40, 5, 16000); }
 
 #endif
 
