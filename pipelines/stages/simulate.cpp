@@ -362,7 +362,7 @@ class Simulate::Run {
     }
     run_to(times_.moment(moments), "measuring");
     measurement_->end(*simulation_);
-    require_soundness();
+    require_precision(*simulation_, sound_, folder_ / "checkpoint");
     cpu_ += thread_cpu_seconds() - cpu_start;
   }
 
@@ -534,7 +534,7 @@ class Simulate::Run {
       const bool keep_due = simulation_->time() >= keep_at_;
       if ((save_due || keep_due) && synchronisation <= goal) {
         simulation_->advance_to(synchronisation);
-        require_soundness();
+        require_precision(*simulation_, sound_, folder_ / "checkpoint");
         sound_ = state();
         keep_at_ = simulation_->time() + end / 16;
         if (save_due) save();
@@ -546,21 +546,8 @@ class Simulate::Run {
   }
 
   void save() {
-    const std::string_view bytes(reinterpret_cast<const char*>(sound_.data()), sound_.size());
-    write_file_atomically(folder_ / "checkpoint", fast_hash(bytes) + std::string(bytes));
+    write_checkpoint(folder_ / "checkpoint", sound_);
     last_saved_ = std::chrono::steady_clock::now();
-  }
-
-  // A run that has lost its precision stops; what was sound stays in the checkpoint.
-  void require_soundness() {
-    const std::string trouble = sim::precision_lost(*simulation_);
-    if (trouble.empty()) return;
-    if (!sound_.empty()) save();
-    throw StageError(fmt::format(
-        "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
-        simulation_->time(), simulation_->counters().collisions(), trouble,
-        sound_.empty() ? std::string("there is no earlier sound state")
-                       : "its last sound state is kept in " + (folder_ / "checkpoint").string()));
   }
 
   void anneal() {
@@ -782,6 +769,23 @@ void Simulate::run(RunContext& context) const {
 }
 
 }  // namespace
+
+void write_checkpoint(const fs::path& path, const std::vector<std::uint8_t>& state) {
+  const std::string_view bytes(reinterpret_cast<const char*>(state.data()), state.size());
+  write_file_atomically(path, fast_hash(bytes) + std::string(bytes));
+}
+
+void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
+                       const fs::path& checkpoint) {
+  const std::string trouble = sim::precision_lost(simulation);
+  if (trouble.empty()) return;
+  if (!last_sound.empty()) write_checkpoint(checkpoint, last_sound);
+  throw StageError(fmt::format(
+      "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
+      simulation.time(), simulation.counters().collisions(), trouble,
+      last_sound.empty() ? std::string("there is no earlier sound state")
+                         : "its last sound state is kept in " + checkpoint.string()));
+}
 
 StageRow simulate_stage() {
   return {.name = "simulate",

@@ -18,10 +18,23 @@
 //   phases        phases.csv, phases_floor_frame.csv: density, mean velocities, temperatures by phase and height
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
 #include "pipelines/stages.hpp"
+#include "sim/simulation.hpp"
 
 namespace shakebed::pipelines {
 
 StageRow simulate_stage();
+
+// What a run is gone on from after a kill: a state behind its hash.
+void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
+
+// Where the simulation has lost its precision (sim/observables.hpp): writes the last sound state, if there is one, and
+// throws StageError, which says what is wrong, when, and where that state is.
+void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
+                       const std::filesystem::path& checkpoint);
 
 }  // namespace shakebed::pipelines

@@ -8,7 +8,9 @@
 #include <numbers>
 
 #include "pipelines/json.hpp"
+#include "pipelines/stages/simulate.hpp"
 #include "tests/pipelines/program.hpp"
+#include "tests/sim/spoilt_simulation.hpp"
 
 namespace {
 
@@ -171,6 +173,56 @@ TEST_F(SimulateStage, RefusesWhatCannotBeAsked) {
   const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder_.path());
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("the box is periodic upwards"));
+}
+
+// A run that loses precision never goes on quietly: it stops, says what, when and after how much, and leaves its last
+// sound state in the form in which a killed run finds it again.
+TEST(SimulatePrecision, LostStopsTheRunWithItsLastSoundState) {
+  using namespace shakebed;
+  const auto make = [] {
+    sim::Scene scene;
+    scene.gravity = sim::UniformGravity{};
+    scene.disks.species = {{50, 1, 1}};
+    scene.disks.contact = {0.9, 0, 0};
+    scene.box.width = 10;
+    scene.box.sides = sim::PeriodicSides{};
+    scene.box.floor = sim::SinusoidalFloor{0.5, 0.5};
+    return sim::simulate(scene);
+  };
+  auto run = make();
+  run->advance_to(run->next_synchronisation());
+  const std::vector<std::uint8_t> sound = run->checkpoint();
+  run->advance_to(20);
+  ScratchFolder folder;
+  const fs::path kept = folder / "checkpoint";
+  sim::Spoilt spoilt(std::move(run));
+  EXPECT_NO_THROW(pipelines::require_precision(spoilt, sound, kept));
+  EXPECT_FALSE(fs::exists(kept));
+  spoilt.overlap = 1e-3;
+  try {
+    pipelines::require_precision(spoilt, sound, kept);
+    FAIL() << "a run with an overlap of 1e-3 D goes on";
+  } catch (const pipelines::StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("at time 20 "));
+    EXPECT_THAT(error.what(), HasSubstr(std::to_string(spoilt.counters().collisions()) + " collisions"));
+    EXPECT_THAT(error.what(), HasSubstr("two disks overlap by 0.001 D"));
+    EXPECT_THAT(error.what(), HasSubstr("kept in " + kept.string()));
+  }
+  const std::string text = read_text(kept);
+  ASSERT_GT(text.size(), sound.size());
+  EXPECT_EQ(text.substr(text.size() - sound.size()), std::string(sound.begin(), sound.end()));
+  // From that state it goes on as it had come.
+  auto again = make();
+  again->restore({text.end() - static_cast<std::ptrdiff_t>(sound.size()), text.end()});
+  again->advance_to(20);
+  EXPECT_EQ(again->counters().collisions(), spoilt.counters().collisions());
+  try {
+    pipelines::require_precision(spoilt, {}, folder / "none");
+    FAIL();
+  } catch (const pipelines::StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("there is no earlier sound state"));
+  }
+  EXPECT_FALSE(fs::exists(folder / "none"));
 }
 
 }  // namespace
