@@ -106,6 +106,41 @@ void room_benchmark(const Effort& effort, StageResult& result) {
   if (!exponents.rows.empty()) result.tables.push_back(std::move(exponents));
 }
 
+// Knobs turned one at a time: error against time, the default marked.
+void trade_offs(const Effort& effort, StageResult& result) {
+  effort.step("fit: iterations, size of the table, bins");
+  const auto rows = fit::benchmark_fit_trade_offs(effort.quick ? 0.3 : 3);
+  struct Knob {
+    std::string name, title, note, cost_label, error_label;
+  };
+  const Knob knobs[] = {{"iterations", "Error of T against time, by the fit's iterations",
+                         "error: of T, relative, against the converged fit's; cost: a fit of 100 bins",
+                         "CPU seconds a fit", "relative error of T"},
+                        {"table size", "Error of the inverse of f against time, by the size of its table",
+                         "error: relative, the worst over the table's range; cost: a value", "CPU seconds a value",
+                         "relative error, worst"},
+                        {"bins", "Statistical error of T against time, by the number of bins",
+                         "error: the standard error of T, relative, for one and the same measurement; cost: a fit",
+                         "CPU seconds a fit", "relative standard error of T"}};
+  for (const Knob& knob : knobs) {
+    Table table{knob.title, knob.note, {"setting", knob.name, "us", "error", "default"}, {}};
+    std::string name = "fit-by-" + knob.name;
+    std::replace(name.begin(), name.end(), ' ', '-');
+    Figure figure{name, knob.title, knob.cost_label, knob.error_label, {}};
+    for (const fit::FitTradeOff& row : rows) {
+      if (row.knob != knob.name) continue;
+      table.rows.push_back({row.setting, row.value, 1e-3 * row.nanoseconds, row.error, row.standard ? "yes" : ""});
+      if (figure.curves.empty() || figure.curves.back().label != row.setting)
+        figure.curves.push_back({row.setting, {}, {}});
+      Curve& curve = figure.curves.back();
+      if (row.standard) curve.standard = curve.cost.size();
+      curve.cost.push_back(1e-9 * row.nanoseconds), curve.error.push_back(std::max(row.error, 1e-17));
+    }
+    result.tables.push_back(std::move(table));
+    result.figures.push_back(std::move(figure));
+  }
+}
+
 // The Cramer-Rao bound of T, T and shift free: from the derivatives of the model in the window that was used.
 double bound_of_temperature(const fit::FitOptions& options, const fit::Profile& data, double shift, double low,
                             double high) {
@@ -306,6 +341,7 @@ StageResult bench_fit(const Effort& effort) {
   result.name = "fit", result.title = "fit: equations of state and fits of profiles";
   result.cpu_seconds = cpu_seconds_of([&] {
     room_benchmark(effort, result);
+    trade_offs(effort, result);
     statistics(effort, result);
     hard_cases(effort, result);
   });
