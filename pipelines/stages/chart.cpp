@@ -215,7 +215,7 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.text("name", p.name, {.help = "its name in chart.json", .required = true});
   fields.text("from", p.from, {.help = "id of the stage whose table it is; may be left out when there is one"});
   fields.text("file", p.file, {.help = "a CSV in that stage's folder"});
-  fields.text("label", p.label, {.help = "in the key; none: not in the key"});
+  fields.text("label", p.label, {.help = "in the key, with T_c and D^2 as on the axes; none: not in the key"});
   Json where = Json::object();
   for (const auto& [name, value] : p.where) where[name] = value;
   fields.any("where", where, {.help = "only rows with: column → text"});
@@ -324,8 +324,8 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
     const int own = options.color >= 0 ? options.color : drawn ? color++ : 0;
     const bool bars = data.has_errors && options.look == Look::points;
     if (drawn)
-      picture.series.push_back(
-          {options.label, style_of(options.look), own, data.x, data.y, bars ? data.error : std::vector<double>{}});
+      picture.series.push_back({options.label, style_of(options.look), own, data.x, data.y,
+                                bars ? data.error : std::vector<double>{}, true});
     Json found = Json::object();
     found["points"] = data.x.size();
     // What fits and comparisons use.
@@ -421,7 +421,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
   }
   for (const CurveOptions& curve : chart.curves) {
     if (curve.label.empty()) continue;
-    Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}};
+    Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}, true};
     for (int i = 0; i <= 200; ++i) {
       const double x = curve.from + (curve.to - curve.from) * i / 200;
       series.x.push_back(x), series.y.push_back(value_at(curve, x));
@@ -472,7 +472,7 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 3,
+          .version = 4,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,

@@ -51,6 +51,23 @@ std::size_t letters(std::string_view text) {
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
 }
 
+// Distance of tics, 1, 2 or 5 times a power of ten, so that at most six stand on a short axis.
+double tic_distance(const std::vector<Series>& all) {
+  double low = INFINITY, high = -INFINITY;
+  for (const Series& series : all) {
+    for (std::size_t i = 0; i < series.y.size(); ++i) {
+      const double error = i < series.error.size() ? series.error[i] : 0;
+      low = std::min(low, series.y[i] - error), high = std::max(high, series.y[i] + error);
+    }
+  }
+  if (!(high > low)) return 0;
+  const double least = (high - low) / 4, power = std::pow(10, std::floor(std::log10(least)));
+  for (const double step : {1.0, 2.0, 5.0}) {
+    if (step * power >= least) return step * power;
+  }
+  return 10 * power;
+}
+
 // Both pictures from one script: it is drawn twice, and what differs (size, font, file) comes first. The PDF is as wide
 // as one column of a journal, 86 mm, with text that reads there.
 std::string twice(const std::string& name, double width, double height, const std::string& body) {
@@ -121,7 +138,8 @@ std::string plot_elements(const std::vector<Series>& all, const std::string& nam
         script += fmt::format("1:2 with lines lw 1.6 dashtype 3 lc rgb '{}'", color);
         break;
     }
-    script += titles ? fmt::format(" title {}", gnuplot_text(plain(series.label))) : std::string(" notitle");
+    script += titles ? fmt::format(" title {}", gnuplot_text(series.markup ? series.label : plain(series.label)))
+                     : std::string(" notitle");
   }
   return script;
 }
@@ -171,7 +189,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   const std::size_t columns = entries > 4 && longest <= 27 ? 3 : 2;
   const std::size_t rows = std::max<std::size_t>(1, (entries + columns - 1) / columns);
   body += fmt::format("set key above vertical maxrows {} Left reverse font keyfont spacing 1.2 samplen 1.5 width {}\n",
-                      rows, columns == 3 ? -3 : 0);
+                      rows, columns == 3 && longest > 18 ? -3 : 0);
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     body += fmt::format(
@@ -199,6 +217,8 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
         "xlabel {}\nset ylabel {}\nset yrange [*:*]\nunset logscale y\nset xzeroaxis lc rgb "
         "'#404040' lw 1\n",
         gnuplot_text(picture.x_label), gnuplot_text(picture.lower_label));
+    if (const double distance = tic_distance(drawn.lower); distance > 0)
+      body += "set ytics " + number_text(distance) + "\n";
     // The two share their x: where the upper one found it by itself, the lower one takes it over.
     if (!picture.x_low || !picture.x_high) body += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
     body += "plot " + plot_elements(drawn.lower, name, drawn.series.size(), false) + "\nunset multiplot\n";
@@ -230,7 +250,7 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
   body +=
       fmt::format("plot {} index 0 using 1:2:3:4 with circles lc palette lw 0.5 notitle", gnuplot_text(name + ".dat"));
   if (!picture.cross_x.empty())
-    body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 0.9*scale lw 2 lc rgb '#D55E00' title {}",
+    body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 1.3*scale lw 3 lc rgb '#D55E00' title {}",
                         gnuplot_text(name + ".dat"), gnuplot_text(plain(picture.cross_label)));
   const double shape = std::clamp((top + 8) / (picture.width + 10), 0.3, 2.0);
   run_gnuplot(directory, name, twice(name, 860, 860 * shape, body + "\n"));
