@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "ingest/blurred_disk.hpp"
 #include "ingest/smooth_field.hpp"
+#include "ingest/solid_borders.hpp"
 
 namespace shakebed::ingest {
 
@@ -17,7 +19,8 @@ std::array<double, 4> cubic_b_splines(double t) {
   return {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6};
 }
 
-double value_at(const std::vector<float>& samples, double step, double r) {
+template <class Number>
+double value_at(const std::vector<Number>& samples, double step, double r) {
   const double place = r / step;
   const auto cell = static_cast<std::size_t>(place);
   if (cell + 1 >= samples.size()) return 0;
@@ -130,6 +133,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
           const float place = place1[static_cast<std::size_t>(k)];
           const auto cell = static_cast<std::size_t>(static_cast<int>(place));
           const double part = static_cast<double>(place - static_cast<float>(static_cast<int>(place)));
+          if (unseen(line[k])) continue;
           const double e = static_cast<double>(line[k]);
           pixel_count[cell] += 1 - part;
           pixel_count[cell + 1] += part;
@@ -139,7 +143,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
         if (!fourth_harmonic) continue;
         for (int k = 0; k < count; ++k) {
           const double r = static_cast<double>(place1[static_cast<std::size_t>(k)]) * fine;
-          if (r <= ring_low || r >= ring_high) continue;
+          if (r <= ring_low || r >= ring_high || unseen(line[k])) continue;
           const double dx = left + k - bead.x, squared = r * r;
           const double a2 = dx * dx, b2 = dy * dy;
           const double cosine = (a2 * a2 - 6 * a2 * b2 + b2 * b2) / (squared * squared);
@@ -178,6 +182,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
               std::min(fit.width() - 1, static_cast<int>(std::floor(std::min(one.x + half1, other.x + half2))));
           const int count = right_column - left + 1;
           if (count <= 0) continue;
+          const float* line = fit.residual_row(row) + left;
           distances(left, count, one.x, dy1, inverse_pair_bin, place1);
           distances(left, count, other.x, dy2, inverse_pair_bin, place2);
           for (int k = 0; k < count; ++k) {
@@ -185,7 +190,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
                                        static_cast<std::size_t>(static_cast<int>(place1[static_cast<std::size_t>(k)])));
             const auto bin2 = std::min(pair_bins - 1,
                                        static_cast<std::size_t>(static_cast<int>(place2[static_cast<std::size_t>(k)])));
-            pair_count[bin1 * pair_bins + bin2] += 1;
+            pair_count[bin1 * pair_bins + bin2] += unseen(line[k]) ? 0.0F : 1.0F;
           }
         }
       }
@@ -258,6 +263,7 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
   for (std::size_t i = 0; i < free_count; ++i) change[i] += present[i];
 
   BeadProfile learned;
+  learned.asymmetry = current.asymmetry;
   learned.step_px = std::min(current.step_px, knot / 8);
   const std::size_t count = static_cast<std::size_t>(std::ceil(reach_px / learned.step_px)) + 1;
   learned.level.resize(count);
@@ -486,7 +492,7 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
 }
 
 RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
-                     double beads, double background_level, double bead_level, double from_px) {
+                     double beads, double background_level, double bead_level, double from_px, bool linear_only) {
   RimChoice choice;
   RimData data = rim_data(profile, radius_px, edge_px);
   const auto inner = std::lower_bound(data.distance.begin(), data.distance.end(), from_px) - data.distance.begin();
@@ -532,7 +538,7 @@ RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_p
   const double brightest = std::max({background_level, bead_level, 1.0});
   const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
   const double background = light(background_level), bead = light(bead_level);
-  if (std::abs(bead - background) > 0.05) {
+  if (!linear_only && std::abs(bead - background) > 0.05) {
     RimData in_light = data;
     for (double& level : in_light.level)
       level = (light(background_level + (bead_level - background_level) * level) - background) / (bead - background);
@@ -545,9 +551,10 @@ RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_p
   for (const Trial& trial : trials) least_squares = std::min(least_squares, trial.rim.squares);
   const double scale = std::max(1.0, least_squares / std::max(1.0, points - 5));
   // Of chi^2: what a term must bring to be believed, and what an odd shape must.
-  constexpr double price_of_term = 6, price_of_oddity = 12;
+  constexpr double price_of_term = 6, price_of_oddity = 12, price_of_curve = 12;
   const auto cost = [&](const Trial& trial) {
-    return trial.rim.squares / scale + price_of_term * trial.terms + (trial.odd ? price_of_oddity : 0);
+    return trial.rim.squares / scale + price_of_term * trial.terms + (trial.odd ? price_of_oddity : 0) +
+           (trial.exponent != 1 ? price_of_curve : 0);
   };
   const Trial least = *std::min_element(trials.begin(), trials.end(),
                                         [&](const Trial& a, const Trial& b) { return cost(a) < cost(b); });
@@ -661,6 +668,198 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
   return fit;
 }
 
+std::shared_ptr<const BeadAsymmetry> learn_asymmetry(const std::vector<const JointFit*>& fits,
+                                                     const std::vector<const std::vector<ModelDisk>*>& disks,
+                                                     const BeadProfile& current, double radius_px, double noise,
+                                                     int row_step) {
+  constexpr double ring = 0.4;  // px
+  constexpr std::size_t orders = BeadAsymmetry::orders;
+  const double reach = current.reach_px();
+  const auto rings = static_cast<std::size_t>(std::ceil(reach / ring)) + 1;
+  std::vector<std::array<double, orders>> cosine_sum(rings), sine_sum(rings), weight(rings);
+  for (std::size_t k = 0; k < rings; ++k) {
+    cosine_sum[k].fill(0);
+    sine_sum[k].fill(0);
+    weight[k].fill(0);
+  }
+  constexpr float no_bead = 1;  // dirt, something in front
+  for (std::size_t f = 0; f < fits.size(); ++f)
+    for (const ModelDisk& bead : *disks[f]) {
+      const int top = std::max(0, static_cast<int>(std::ceil(bead.y - reach)));
+      const int bottom = std::min(fits[f]->height() - 1, static_cast<int>(std::floor(bead.y + reach)));
+      for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
+        const double dy = row - bead.y, half = std::sqrt(std::max(0.0, reach * reach - dy * dy));
+        const int left = std::max(0, static_cast<int>(std::ceil(bead.x - half)));
+        const int right = std::min(fits[f]->width() - 1, static_cast<int>(std::floor(bead.x + half)));
+        const float* line = fits[f]->residual_row(row);
+        for (int column = left; column <= right; ++column) {
+          if (std::abs(line[column]) > no_bead) continue;
+          const double dx = column - bead.x, r = std::sqrt(dx * dx + dy * dy);
+          if (r < 1e-6) continue;
+          const double place = r / ring, e = static_cast<double>(line[column]), cosine = dx / r, sine = dy / r;
+          const auto k = std::min(rings - 2, static_cast<std::size_t>(place));
+          const double outer = place - static_cast<double>(k);
+          double c = cosine, s = sine;
+          for (std::size_t m = 0; m < orders; ++m) {
+            cosine_sum[k][m] += (1 - outer) * e * c;
+            cosine_sum[k + 1][m] += outer * e * c;
+            sine_sum[k][m] += (1 - outer) * e * s;
+            sine_sum[k + 1][m] += outer * e * s;
+            weight[k][m] += 0.5 * (1 - outer);
+            weight[k + 1][m] += 0.5 * outer;
+            const double next = c * cosine - s * sine;
+            s = s * cosine + c * sine;
+            c = next;
+          }
+        }
+      }
+    }
+  // Pixels that two beads share are told to both: a little less than all of it.
+  constexpr double share = 0.7;
+  BeadAsymmetry::Harmonics harmonics;
+  harmonics.step_px = ring;
+  double chance = 0, area = 0;  // what noise alone would give
+  for (std::size_t m = 0; m < orders; ++m) {
+    auto &cosine = harmonics.cosine[m], &sine = harmonics.sine[m];
+    cosine.assign(rings + 1, 0.0);
+    sine.assign(rings + 1, 0.0);
+    for (std::size_t k = 0; k < rings; ++k) {
+      const double r = static_cast<double>(k) * ring;
+      // A shape of m periods a turn is nothing near the middle.
+      const double allowed = std::clamp(2 * r / static_cast<double>(m + 1) - 0.5, 0.0, 1.0);
+      double c = 0, s = 0;
+      if (current.asymmetry) {
+        c = value_at(current.asymmetry->harmonics().cosine[m], ring, r);
+        s = value_at(current.asymmetry->harmonics().sine[m], ring, r);
+      }
+      if (weight[k][m] > 0) {
+        c += share * cosine_sum[k][m] / weight[k][m];
+        s += share * sine_sum[k][m] / weight[k][m];
+        if (r <= radius_px) chance += r * share * share * noise * noise / weight[k][m];
+      }
+      cosine[k] = allowed * c;
+      sine[k] = allowed * s;
+      if (m == 0 && r <= radius_px) area += r;
+    }
+  }
+  auto learned = std::make_shared<const BeadAsymmetry>(std::move(harmonics));
+  if (current.asymmetry) return learned;
+  // Rims that are no circles (pixels wider than high) differ along and across, but not from side to side.
+  constexpr double least = 0.015;  // contrast units
+  const double one_sided = learned->one_sidedness(radius_px);
+  return one_sided * one_sided > least * least + 4 * chance / std::max(1e-9, area) ? learned : nullptr;
+}
+
+BeadProfile recentred(const BeadProfile& profile, double by_x, double by_y) {
+  constexpr std::size_t directions = 48;
+  std::array<double, directions> cosine, sine;
+  for (std::size_t d = 0; d < directions; ++d) {
+    cosine[d] = std::cos(2 * std::numbers::pi * static_cast<double>(d) / directions);
+    sine[d] = std::sin(2 * std::numbers::pi * static_cast<double>(d) / directions);
+  }
+  const auto level_at = [&](double r, std::size_t d) {
+    const double x = r * cosine[d] + by_x, y = r * sine[d] + by_y;
+    return value_at(profile.level, profile.step_px, std::hypot(x, y)) + profile.asymmetry->at(x, y);
+  };
+  BeadProfile moved = profile;
+  for (std::size_t k = 0; k + 1 < profile.level.size(); ++k) {
+    double sum = 0;
+    for (std::size_t d = 0; d < directions; ++d) sum += level_at(static_cast<double>(k) * profile.step_px, d);
+    moved.level[k] = static_cast<float>(sum / directions);
+  }
+  BeadAsymmetry::Harmonics harmonics = profile.asymmetry->harmonics();
+  for (std::size_t k = 0; k < harmonics.cosine.front().size(); ++k) {
+    const double r = static_cast<double>(k) * harmonics.step_px;
+    std::array<double, directions> level;
+    for (std::size_t d = 0; d < directions; ++d) level[d] = r < profile.reach_px() ? level_at(r, d) : 0.0;
+    for (std::size_t m = 0; m < BeadAsymmetry::orders; ++m) {
+      double c = 0, s = 0;
+      for (std::size_t d = 0; d < directions; ++d) {
+        const std::size_t turned = (m + 1) * d % directions;
+        c += level[d] * cosine[turned];
+        s += level[d] * sine[turned];
+      }
+      harmonics.cosine[m][k] = k ? 2 * c / directions : 0;
+      harmonics.sine[m][k] = k ? 2 * s / directions : 0;
+    }
+  }
+  moved.asymmetry = std::make_shared<const BeadAsymmetry>(std::move(harmonics));
+  return moved;
+}
+
+Outline outline_of(const BeadProfile& profile, double radius_px, double edge_px) {
+  constexpr std::size_t directions = 32, shapes = 3;
+  // Shapes of a disk, and by how much they may be moved along a radius.
+  const double most = std::min(0.3 * radius_px, 3.0 + edge_px), fine = 0.05;
+  const double low = 0.5 * radius_px, high = profile.reach_px();
+  const auto count = static_cast<std::size_t>((high - low + 2 * most) / fine) + 2;
+  std::vector<std::array<double, shapes>> table(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const BlurredShapes one =
+        blurred_disk_shapes(radius_px, edge_px, std::max(0.0, low - most + static_cast<double>(k) * fine));
+    table[k] = {one.flat, one.sphere, one.cone};
+  }
+  const double spacing = std::max(0.1, edge_px / 4);
+  std::vector<double> matrix(9, 0.0), right(3, 0.0);
+  double all_weight = 0;
+  for (std::size_t d = 0; d < directions; ++d) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(d) / directions;
+    const double cosine = std::cos(angle), sine = std::sin(angle);
+    std::vector<double> distance, level;
+    for (double r = low; r < high; r += spacing) {
+      distance.push_back(r);
+      level.push_back(value_at(profile.level, profile.step_px, r) + profile.asymmetry->at(r * cosine, r * sine));
+    }
+    const auto misfit = [&](double shift) {
+      std::vector<double> normal(shapes * shapes, 0.0), value(shapes, 0.0);
+      double square = 0;
+      for (std::size_t i = 0; i < distance.size(); ++i) {
+        const double place = (distance[i] - shift - low + most) / fine;
+        const auto cell = std::min(count - 2, static_cast<std::size_t>(std::max(0.0, place)));
+        const double part = std::clamp(place - static_cast<double>(cell), 0.0, 1.0);
+        std::array<double, shapes> shape{};
+        for (std::size_t a = 0; a < shapes; ++a) shape[a] = (1 - part) * table[cell][a] + part * table[cell + 1][a];
+        square += level[i] * level[i];
+        for (std::size_t a = 0; a < shapes; ++a) {
+          value[a] += shape[a] * level[i];
+          for (std::size_t b = 0; b < shapes; ++b) normal[a * shapes + b] += shape[a] * shape[b];
+        }
+      }
+      const std::vector<double> wanted = value;
+      for (std::size_t a = 0; a < shapes; ++a) normal[a * shapes + a] += 1e-4 * normal[0];
+      if (!solve_symmetric(normal, value, shapes)) return square;
+      for (std::size_t a = 0; a < shapes; ++a) square -= value[a] * wanted[a];
+      return square;
+    };
+    // Coarse, then by parabolas.
+    double best = 0, least = 1e30, step = std::max(0.1, 0.4 * edge_px);
+    for (double shift = -most; shift <= most; shift += step)
+      if (const double here = misfit(shift); here < least) least = here, best = shift;
+    double bend = 0;
+    for (int round = 0; round < 4; ++round) {
+      const double before = misfit(best - step), here = misfit(best), after = misfit(best + step);
+      bend = (before - 2 * here + after) / (step * step);
+      if (bend > 0) best += std::clamp(0.5 * step * (before - after) / (before - 2 * here + after), -step, step);
+      step = std::max(0.02, 0.5 * step);
+    }
+    if (!(bend > 0) || std::abs(best) > most) continue;
+    const std::array<double, 3> row = {1, cosine, sine};
+    all_weight += bend;
+    for (std::size_t a = 0; a < 3; ++a) {
+      right[a] += bend * row[a] * best;
+      for (std::size_t b = 0; b < 3; ++b) matrix[a * 3 + b] += bend * row[a] * row[b];
+    }
+  }
+  Outline outline;
+  for (std::size_t a = 0; a < 3; ++a) matrix[a * 4] += 1e-3 * all_weight;  // a rim seen on one side only
+  if (!(all_weight > 0) || !solve_symmetric(matrix, right, 3)) return outline;
+  outline.good = true;
+  outline.radius_px = radius_px + right[0];
+  outline.x_px = right[1];
+  outline.y_px = right[2];
+  return outline;
+}
+
 FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<const std::vector<ModelDisk>*>& disks,
                        double radius_px, double edge_px) {
   constexpr int sectors = 16;
@@ -735,7 +934,7 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
         outside /= outside_count;
         inside /= inside_count;
         const double scatter = std::sqrt(std::max(0.0, square / outside_count - outside * outside));
-        if (std::abs(outside) > 0.2 || scatter > 0.2 || inside - outside < 0.4) continue;
+        if (std::abs(outside) > 0.2 || scatter > 0.2 || inside - outside < 0.4 || inside > 10) continue;
         ++rim.sectors;
         for (const Sample& sample : sector) {
           const double level = static_cast<double>(sample.level) - outside;

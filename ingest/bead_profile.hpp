@@ -1,12 +1,33 @@
 #pragma once
 // The bead's own profile, learned from frames once its centres are roughly known.
 
+#include <memory>
 #include <vector>
 
 #include "ingest/calibration.hpp"
 #include "ingest/joint_fit.hpp"
 
 namespace shakebed::ingest {
+
+// What the residuals of all beads have in common beyond the radial profile: the asymmetry of `current` with that added;
+// none when `current` has none and there is no more than noise (contrast units) and small flaws of the model would
+// give. Only every `row_step`-th row of pixels is used.
+std::shared_ptr<const BeadAsymmetry> learn_asymmetry(const std::vector<const JointFit*>& fits,
+                                                     const std::vector<const std::vector<ModelDisk>*>& disks,
+                                                     const BeadProfile& current, double radius_px, double noise,
+                                                     int row_step);
+
+// The same bead seen from a point (by_x, by_y) px beside its centre. `profile` has an asymmetry.
+BeadProfile recentred(const BeadProfile& profile, double by_x, double by_y);
+
+// The circle on which a bead ends, whatever its shading: edges along 32 radii, each of a blurred disk whose light is
+// even, falls like a sphere's and grows with the distance, in shares of its own. `profile` has an asymmetry.
+struct Outline {
+  bool good = false;
+  double x_px = 0, y_px = 0;  // its middle, from the profile's centre
+  double radius_px = 0;
+};
+Outline outline_of(const BeadProfile& profile, double radius_px, double edge_px);
 
 // The rim of a profile: radius and edge width of the disk that, blurred by a Gaussian, draws it.
 struct RimFit {
@@ -34,13 +55,15 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
 // The same once more, with care: the profile's own errors are known from the `noise` of a pixel (contrast units), the
 // number of beads it was learned from and its knots, several shadings are tried (flat; sphere, parabola, cone, quartic
 // and pairs of them), each as recorded and in light if levels were encoded for display (see below), and the radius is
-// the mean of what explains the profile equally well, its error their scatter and each one's own.
+// the mean of what explains the profile equally well, its error their scatter and each one's own. `linear_only`: as
+// recorded.
 struct RimChoice {
   RimFit rim;
   double exponent = 1;
 };
 RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
-                     double beads, double background_level, double bead_level, double from_px = 0);
+                     double beads, double background_level, double bead_level, double from_px = 0,
+                     bool linear_only = false);
 
 // The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides; one
 // that encodes for display (exponent 0.45) draws the dark side steep and the bright side long, and puts the edge at

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "ingest/frames.hpp"
+#include "ingest/solid_borders.hpp"
 
 namespace shakebed::ingest {
 
@@ -57,6 +58,12 @@ Gradient sobel(const GrayFrame& frame) {
     for (std::size_t k = 1; k + 1 < width; ++k) {
       to_x[k] = 0.125F * (a[k + 1] - a[k - 1] + 2 * (b[k + 1] - b[k - 1]) + c[k + 1] - c[k - 1]);
       to_y[k] = 0.125F * (c[k - 1] - a[k - 1] + 2 * (c[k] - a[k]) + c[k + 1] - a[k + 1]);
+    }
+    for (std::size_t k = 1; k + 1 < width; ++k) {  // next to what is unseen there is no telling
+      constexpr float steepest = 0.01F * brightest_seen;
+      const bool seen = std::abs(to_x[k]) < steepest && std::abs(to_y[k]) < steepest;
+      to_x[k] = seen ? to_x[k] : 0.0F;
+      to_y[k] = seen ? to_y[k] : 0.0F;
     }
   }
   return gradient;
@@ -117,9 +124,11 @@ GrayFrame busiest_window(const GrayFrame& frame, int side) {
     for (int column = 0; column < columns; ++column) {
       double sum = 0;
       for (int y = row * block; y + 1 < (row + 1) * block; y += 2)
-        for (int x = column * block; x + 1 < (column + 1) * block; ++x)
-          sum += static_cast<double>(std::abs(frame.at(x + 1, y) - frame.at(x, y)) +
-                                     std::abs(frame.at(x, y + 1) - frame.at(x, y)));
+        for (int x = column * block; x + 1 < (column + 1) * block; ++x) {
+          const float change =
+              std::abs(frame.at(x + 1, y) - frame.at(x, y)) + std::abs(frame.at(x, y + 1) - frame.at(x, y));
+          sum += unseen(change) ? 0.0 : static_cast<double>(change);
+        }
       at(column + 1, row + 1) = sum + at(column, row + 1) + at(column + 1, row) - at(column, row);
     }
   const int wide = std::min(columns, side / block), high = std::min(rows, side / block);

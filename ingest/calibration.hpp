@@ -1,9 +1,11 @@
 #pragma once
 // What the finder learns from the frames before it looks for disks: polarity, radius, edge and the bead's own profile.
 
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "ingest/bead_asymmetry.hpp"
 #include "ingest/frames.hpp"
 
 namespace shakebed::ingest {
@@ -15,8 +17,9 @@ enum class Polarity { automatic, dark_beads, bright_beads };
 // themselves at sharp edges. Sampled at r = 0, step_px, 2 step_px, ...
 struct BeadProfile {
   double step_px = 0;
-  std::vector<float> level;            // p(r)
-  std::vector<float> fourth_harmonic;  // p4(r)
+  std::vector<float> level;                        // p(r)
+  std::vector<float> fourth_harmonic;              // p4(r)
+  std::shared_ptr<const BeadAsymmetry> asymmetry;  // none for beads that look the same from all sides
   [[nodiscard]] double reach_px() const {
     return level.empty() ? 0.0 : step_px * static_cast<double>(level.size() - 1);
   }

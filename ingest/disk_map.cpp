@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 #include <unordered_map>
 
+#include "ingest/solid_borders.hpp"
+
 namespace shakebed::ingest {
 
 int map_reduction(double radius_px) { return std::max(1, static_cast<int>(radius_px / 4.5)); }
@@ -93,7 +95,7 @@ std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, d
     float* square = squares.data() + (level - levels.data());
     float sum = 0, sum_of_squares = 0;
     for (int column = 0; column < small.width; ++column) {
-      const float value = std::min(1.6F, std::max(-0.6F, from[column]));
+      const float value = unseen(from[column]) ? 0.0F : std::min(1.6F, std::max(-0.6F, from[column]));
       sum += value;
       sum_of_squares += value * value;
       level[column + 1] = sum;
@@ -170,7 +172,8 @@ std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int f
   for (int row = 0; row < small.height; ++row) {
     const float* from = small.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(small.width);
     float* to = frame.ptr<float>(row + margin) + margin;
-    for (int column = 0; column < small.width; ++column) to[column] = std::min(1.6F, std::max(-0.6F, from[column]));
+    for (int column = 0; column < small.width; ++column)
+      to[column] = unseen(from[column]) ? 0.0F : std::min(1.6F, std::max(-0.6F, from[column]));
   }
   // The bead as the reduced frame shows it, centred on pixel (0, 0) of the periodic field.
   const auto level_at = [&](double r) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "ingest/disk_map.hpp"
 #include "ingest/joint_fit.hpp"
 #include "ingest/smooth_field.hpp"
+#include "ingest/solid_borders.hpp"
 
 namespace shakebed::ingest {
 
@@ -191,7 +193,7 @@ double residual_spread(const JointFit& fit) {
   const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(total) / 20000)));
   for (int row = 0; row < fit.height(); row += step)
     for (int column = (row / step) % 2; column < fit.width(); column += step)
-      sizes.push_back(std::abs(fit.residual(column, row)));
+      if (!unseen(fit.residual(column, row))) sizes.push_back(std::abs(fit.residual(column, row)));
   if (sizes.empty()) return 0;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
@@ -216,7 +218,8 @@ double noise_of(const GrayFrame& flat) {
   const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(flat.pixels.size()) / 20000)));
   for (int row = 0; row < flat.height; row += step)
     for (int column = 1; column + 1 < flat.width; column += step)
-      sizes.push_back(std::abs(flat.at(column - 1, row) - 2 * flat.at(column, row) + flat.at(column + 1, row)));
+      if (!unseen(flat.at(column - 1, row) + flat.at(column, row) + flat.at(column + 1, row)))
+        sizes.push_back(std::abs(flat.at(column - 1, row) - 2 * flat.at(column, row) + flat.at(column + 1, row)));
   if (sizes.empty()) return 0;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
@@ -232,9 +235,18 @@ GrayFrame map_frame(const GrayFrame& flat, double radius, double noise) {
   return smoothed(reduced(flat, factor));
 }
 
+// Those in an unseen part are none.
+std::vector<DiskCandidate> seen_ones(const GrayFrame& flat, std::vector<DiskCandidate> candidates) {
+  std::erase_if(candidates, [&](const DiskCandidate& candidate) {
+    const int column = static_cast<int>(std::lround(candidate.x)), row = static_cast<int>(std::lround(candidate.y));
+    return column >= 0 && row >= 0 && column < flat.width && row < flat.height && unseen(flat.at(column, row));
+  });
+  return candidates;
+}
+
 std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double noise, double score) {
-  return find_candidates(map_frame(flat, radius, noise), map_reduction(radius), radius, score,
-                         2 * radius * least_separation);
+  return seen_ones(flat, find_candidates(map_frame(flat, radius, noise), map_reduction(radius), radius, score,
+                                         2 * radius * least_separation));
 }
 
 // Beyond this edge width, in radii, touching beads run into one another so much that the ideal disk's map no longer
@@ -246,8 +258,8 @@ std::vector<DiskCandidate> candidates_by(const BeadProfile& profile, const GrayF
                                          double noise, double score) {
   if (edge < strong_blur * radius) return candidates_in(flat, radius, noise, score);
   const int factor = map_reduction(radius);
-  return find_matched_candidates(reduced(flat, factor), factor, profile, radius, noise, score,
-                                 2 * radius * least_separation);
+  return seen_ones(flat, find_matched_candidates(reduced(flat, factor), factor, profile, radius, noise, score,
+                                                 2 * radius * least_separation));
 }
 
 // Beads that leave much more unexplained than the others are taken out; then all beads that show in the residual are
@@ -351,7 +363,7 @@ double unexplained_around(const JointFit& fit, const ModelDisk& disk, double rad
     for (int column = std::max(0, static_cast<int>(std::ceil(disk.x - to)));
          column <= std::min(fit.width() - 1, static_cast<int>(std::floor(disk.x + to))); ++column) {
       const double distance = std::hypot(column - disk.x, row - disk.y);
-      if (distance < from || distance > to) continue;
+      if (distance < from || distance > to || unseen(fit.residual(column, row))) continue;
       ++count;
       left += fit.residual(column, row) > strong;
     }
@@ -404,6 +416,7 @@ double unexplained_of(const JointFit& fit, const LightField& light) {
     float part = 0;
     for (int column = 0; column < fit.width(); ++column) {
       const auto node = static_cast<std::size_t>(std::min(light.columns - 1.0, column / light.spacing_px + 0.5));
+      if (unseen(line[column])) continue;
       const float level = line[column] * light.contrast[node_row * static_cast<std::size_t>(light.columns) + node];
       part += level * level;
     }
@@ -412,8 +425,52 @@ double unexplained_of(const JointFit& fit, const LightField& light) {
   return sum;
 }
 
+// How far inside a border its blurred edge reaches.
+double border_margin(double edge) { return 0.5 + 2 * edge; }
+
+// Whether an even area has the level of the background there.
+bool is_background(const SolidBorder& border, const LightField& light, const GrayFrame& frame) {
+  constexpr double same = 0.15;  // contrast units
+  const double place = 0.5 * (border.from + border.to), depth = 0.5 * (border.depth_px + border.slope * place);
+  const double x = border.side == FrameSide::left    ? depth
+                   : border.side == FrameSide::right ? frame.width - 1 - depth
+                                                     : place;
+  const double y = border.side == FrameSide::top      ? depth
+                   : border.side == FrameSide::bottom ? frame.height - 1 - depth
+                                                      : place;
+  const auto node = [&](double at, int nodes) {
+    return static_cast<std::size_t>(std::clamp(at / light.spacing_px + 0.5, 0.0, nodes - 1.0));
+  };
+  const std::size_t at = node(y, light.rows) * static_cast<std::size_t>(light.columns) + node(x, light.columns);
+  return std::abs(border.level - static_cast<double>(light.background[at])) <
+         same * std::abs(static_cast<double>(light.contrast[at]));
+}
+
+// Takes out what has the level of the background already at first sight.
+void drop_plain_background(std::vector<SolidBorder>& borders, const GrayFrame& frame, Polarity polarity) {
+  if (borders.empty()) return;
+  const GrayFrame open = without_borders(frame, borders, 0);
+  std::vector<float> levels;
+  const std::size_t step = std::max<std::size_t>(1, open.pixels.size() / 40000);
+  for (std::size_t k = 0; k < open.pixels.size(); k += step)
+    if (!unseen(open.pixels[k])) levels.push_back(open.pixels[k]);
+  if (levels.empty()) return;
+  std::sort(levels.begin(), levels.end());
+  const auto level_of = [&](double part) {
+    return static_cast<double>(levels[static_cast<std::size_t>(part * static_cast<double>(levels.size() - 1))]);
+  };
+  constexpr double outermost = 0.05, same = 0.25;
+  const bool dark = polarity != Polarity::bright_beads;
+  const double background = level_of(dark ? 1 - outermost : outermost),
+               bead = level_of(dark ? outermost : 1 - outermost);
+  std::erase_if(borders, [&](const SolidBorder& border) {
+    return std::abs(border.level - background) < same * std::abs(background - bead);
+  });
+}
+
 struct Learned {
   CalibrationResult result;
+  bool one_sided = false;  // light from one side was allowed for
   double unexplained = 0;  // of the first frame, grey levels squared
   bool complete = false;   // hardly more than its noise
   bool astray = false;     // the radius went as far from the estimate as it may
@@ -421,7 +478,7 @@ struct Learned {
 
 // Learns all there is to learn, starting from a radius and a polarity.
 Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                   const RadiusEstimate& estimate) {
+                   const RadiusEstimate& estimate, bool allow_one_sided = true) {
   Learned all;
   CalibrationResult& result = all.result;
   FinderCalibration& calibration = result.calibration;
@@ -434,7 +491,23 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   std::vector<const GrayFrame*> used;
   for (const GrayFrame* frame : frames)
     if (frame->width == calibration.width && frame->height == calibration.height) used.push_back(frame);
-  LightField light = estimate_light(*used.front(), radius, calibration.polarity);
+  // What is even and ends in a straight line at the border is floor, wall or lid, unless it is background.
+  constexpr double usual_edge = 0.75;
+  std::vector<std::vector<SolidBorder>> borders;
+  std::vector<GrayFrame> seen;
+  for (const GrayFrame* frame : used) {
+    borders.push_back(find_solid_borders(*frame));
+    drop_plain_background(borders.back(), *frame, calibration.polarity);
+    seen.push_back(without_borders(*frame, borders.back(), -border_margin(usual_edge)));
+  }
+  LightField light = estimate_light(seen.front(), radius, calibration.polarity);
+  for (std::size_t f = 0; f < used.size(); ++f) {
+    std::erase_if(borders[f], [&](const SolidBorder& border) { return is_background(border, light, *used[f]); });
+    complete_corners(borders[f], *used[f]);
+    seen[f] = without_borders(*used[f], borders[f], border_margin(usual_edge));
+    used[f] = &seen[f];
+    calibration.solid_borders = calibration.solid_borders || !borders[f].empty();
+  }
   BeadProfile profile = ideal_profile(radius, edge, reach_of(radius, edge));
 
   std::vector<GrayFrame> flats(used.size());
@@ -465,7 +538,8 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   bool settled = false;
   double last_change = 0;
   double knot = 0.25;
-  for (int round = 0; round < most_rounds; ++round) {
+  double moved_by = 0;  // px, by the outline
+  for (int round = 0;; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
     std::size_t total = 0;
@@ -513,7 +587,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
                        " px were suspected, but no bead and no light make up the frame";
       return all;
     }
-    if (round + 1 == most_rounds || (round + 1 >= least_rounds && settled)) break;
+    if (round + 1 == (profile.asymmetry ? 2 : 1) * most_rounds || (round + 1 >= least_rounds && settled)) break;
 
     std::vector<const JointFit*> fit_pointers;
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
@@ -537,6 +611,27 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
       }
       profile = options.learn_profile ? learned : ideal_profile(radius, edge, reach_of(radius, edge));
     }
+    moved_by = 0;
+    if (allow_one_sided && options.learn_profile && round >= 1 && (round <= 2 || profile.asymmetry)) {
+      // Light from one side: the lit side pulls at the centres of radial beads. The outline tells where they are.
+      const ProfileTable latest(profile, radius, edge, 0);
+      for (std::size_t f = 0; f < used.size(); ++f) {
+        fits[f]->set_table(&latest);
+        fits[f]->reset(flats[f], disks[f]);
+      }
+      profile.asymmetry =
+          learn_asymmetry(fit_pointers, disk_pointers, profile, radius, spread, profile.asymmetry ? 1 : 2);
+      if (profile.asymmetry)
+        if (const Outline outline = outline_of(profile, radius, edge); outline.good) {
+          moved_by = std::hypot(outline.x_px, outline.y_px);
+          profile = recentred(profile, outline.x_px, outline.y_px);
+          for (auto& one : disks)
+            for (ModelDisk& disk : one) {
+              disk.x += outline.x_px;
+              disk.y += outline.y_px;
+            }
+        }
+    }
     if (round >= 1) {
       std::vector<TileSums> tiles;
       const ProfileTable latest(profile, radius, edge, 0);
@@ -546,7 +641,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
         add_tile_sums(flats[f], *fits[f], spread, tiles);
       }
       const double change = refine_light(light, tiles, calibration.width, calibration.height);
-      settled = change < std::max(3e-4, 0.02 * spread) || change > 0.7 * last_change;
+      settled = (change < std::max(3e-4, 0.02 * spread) || change > 0.7 * last_change) && moved_by < 0.01;
       last_change = change;
     }
   }
@@ -581,9 +676,16 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
       constexpr double poor_misfit = 0.012;
-      const RimChoice open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
-                                        static_cast<double>(free_rim.sectors) / 16, background,
-                                        std::max(0.0, background + contrast), free_rim.inner_px);
+      RimChoice open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
+                                  static_cast<double>(free_rim.sectors) / 16, background,
+                                  std::max(0.0, background + contrast), free_rim.inner_px);
+      if (open.rim.good && open.exponent != 1 && packed.exponent == 1) {  // a tone curve is every rim's
+        const double curved = open.rim.radius_px;
+        open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
+                          static_cast<double>(free_rim.sectors) / 16, background, std::max(0.0, background + contrast),
+                          free_rim.inner_px, true);
+        open.rim.std_error_px = std::hypot(open.rim.std_error_px, 0.25 * (curved - open.rim.radius_px));
+      }
       const ToneFit tone =
           fit_tone_exponent(free_rim.profile, background, std::max(0.0, background + contrast), radius, edge);
       if (open.rim.good) {
@@ -612,12 +714,21 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     calibration.warnings.push_back("Only " + std::to_string(total) +
                                    " disks to learn the bead from: its radius is uncertain.");
   all.unexplained = unexplained_of(*fits.front(), light);
+  all.one_sided = profile.asymmetry != nullptr;
   all.complete = spread < 1.5 * noise_of(flats.front()) + 0.03;
   result.found = true;
   return all;
 }
 
 }  // namespace
+
+GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration) {
+  if (!calibration.solid_borders) return frame;
+  std::vector<SolidBorder> borders = find_solid_borders(frame);
+  std::erase_if(borders, [&](const SolidBorder& border) { return is_background(border, calibration.light, frame); });
+  complete_corners(borders, frame);
+  return without_borders(frame, borders, border_margin(calibration.edge_width_px));
+}
 
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   CalibrationResult result;
@@ -628,8 +739,9 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   for (const GrayFrame* frame : frames) require_consistent(*frame);
   // A first radius and the polarity.
   RadiusEstimate estimate;
+  const auto open_part = [](const GrayFrame& frame) { return without_borders(frame, find_solid_borders(frame), 0); };
   if (options.radius_px && *options.radius_px > 0) {
-    estimate = estimate_radius(*frames.front(), options.polarity, std::max(1.0, 0.8 * *options.radius_px),
+    estimate = estimate_radius(open_part(*frames.front()), options.polarity, std::max(1.0, 0.8 * *options.radius_px),
                                1.25 * *options.radius_px);
     if (!estimate.found && options.polarity != Polarity::automatic) {
       estimate.found = true;
@@ -639,7 +751,7 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     estimate.packed_radius_px = 0;
   } else {
     for (const GrayFrame* frame : frames) {
-      estimate = estimate_radius(*frame, options.polarity);
+      estimate = estimate_radius(open_part(*frame), options.polarity);
       if (estimate.found) break;
     }
   }
@@ -650,6 +762,14 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   const auto learn = [&](RadiusEstimate from) {
     constexpr int most_starts = 3;
     Learned best = learn_from(frames, options, from);
+    if ((best.one_sided && !best.complete) || (!best.result.found && !best.result.why_not.empty())) {
+      // Shadows beside the beads, say, are not the beads' own light.
+      Learned plain = learn_from(frames, options, from, false);
+      const bool more =
+          plain.result.calibration.disks_used > 1.05 * static_cast<double>(best.result.calibration.disks_used);
+      if (plain.result.found && (!best.result.found || more || plain.unexplained < best.unexplained))
+        best = std::move(plain);
+    }
     for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
       from.radius_px = best.result.calibration.rim_radius_px;
       Learned again = learn_from(frames, options, from);
@@ -661,19 +781,27 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   if (!(estimate.packed_radius_px > 0)) return learn(estimate).result;
   // It may as well be a packed bed seen from its voids. The likelier is tried first; unless it explains the frame
   // nearly down to its noise, so is the other. What was not seen at first is believed only when it does.
+  // A packed bed fills a good part of what is in view.
+  const auto fills = [&](const Learned& learned) {
+    constexpr double fair_part = 0.25;
+    const FinderCalibration& found = learned.result.calibration;
+    const double disks =
+        static_cast<double>(found.disks_used) / static_cast<double>(std::max<std::size_t>(1, found.frames_used));
+    return disks * std::numbers::pi * found.radius_px * found.radius_px > fair_part * found.width * found.height;
+  };
   RadiusEstimate packed = estimate;
   packed.radius_px = estimate.packed_radius_px;
   packed.polarity = estimate.packed_polarity;
   if (estimate.packed_likely) {
     Learned as_packed = learn(packed);
-    if (as_packed.result.found && as_packed.complete) return as_packed.result;
+    if (as_packed.result.found && as_packed.complete && fills(as_packed)) return as_packed.result;
     return learn(estimate).result;
   }
   Learned as_seen = learn(estimate);
   if (as_seen.result.found && as_seen.complete) return as_seen.result;
   Learned as_packed = learn(packed);
   const bool better = !as_seen.result.found || as_packed.unexplained < as_seen.unexplained;
-  return as_packed.result.found && as_packed.complete && better ? as_packed.result : as_seen.result;
+  return as_packed.result.found && as_packed.complete && fills(as_packed) && better ? as_packed.result : as_seen.result;
 }
 
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
@@ -686,7 +814,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     return result;
   }
   const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
-  const GrayFrame flat = flatten(frame, calibration.light);
+  const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light);
   const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, std::abs(calibration.contrast_level)));
   std::vector<ModelDisk> disks = disks_at(candidates_by(calibration.profile, flat, radius, edge, noise, least_score));
   const double contrast = std::abs(calibration.contrast_level);
@@ -879,13 +1007,14 @@ GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const 
   require_consistent(frame);
   if (frame.width != calibration.width || frame.height != calibration.height)
     throw std::invalid_argument("residual_frame: the frame has not the size of the film's frames");
-  const GrayFrame flat = flatten(frame, calibration.light);
+  const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light);
   const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
   JointFit fit(flat);
   fit.set_table(&table);
   for (const FoundDisk& disk : found.disks) fit.subtract(disk.x_px, disk.y_px, 1.0F);
   GrayFrame residual = fit.residual_image();
-  for (float& level : residual.pixels) level *= static_cast<float>(calibration.contrast_level);
+  for (float& level : residual.pixels)
+    level = unseen(level) ? 0.0F : level * static_cast<float>(calibration.contrast_level);
   return residual;
 }
 

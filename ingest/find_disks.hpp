@@ -51,6 +51,7 @@ struct FinderCalibration {
   double contrast_level = 0;        // bead minus background, grey levels, at the middle of the frame
   bool radius_of_all_rims = false;  // told from the profile below, the rims of all beads, not from open ones alone
   double tone_exponent = 1;         // recorded level = light^exponent, told from the rims; 1 for a linear camera
+  bool solid_borders = false;       // floor, walls or lid are in view; each frame is searched without them
   int width = 0, height = 0;        // of the frames it was learned from
   BeadProfile profile;
   LightField light;
@@ -77,6 +78,9 @@ struct CalibrationResult {
   std::string why_not;
 };
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+
+// The frame with floor, walls and lid unseen (see solid_borders.hpp).
+GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration);
 
 // Finds the disks of one frame of that film. Depends on nothing but its arguments. Throws std::invalid_argument when
 // the frame's pixel count is not width * height.

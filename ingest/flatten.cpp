@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "ingest/smooth_field.hpp"
+#include "ingest/solid_borders.hpp"
 
 namespace shakebed::ingest {
 
@@ -173,23 +174,30 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
   const GrayFrame small = radius_px < 2.5 ? frame : box3(reduced(frame, factor));
   const int block = std::max(8, static_cast<int>(std::lround(7 * radius_px / factor)));
   std::vector<BlockValue> upper, lower;
+  const auto add_block = [&](int top, int left, int bottom, int right, std::size_t fewest) {
+    if ((bottom - top) * (right - left) * 3 < block * block && !(upper.empty())) return;
+    std::vector<float> levels;
+    for (int row = top; row < bottom; ++row)
+      for (int column = left; column < right; ++column)
+        if (!unseen(small.at(column, row))) levels.push_back(small.at(column, row));
+    if (levels.size() < std::max<std::size_t>(1, fewest)) return;
+    const auto pick = [&](double part) {
+      const auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(levels.size() - 1));
+      std::nth_element(levels.begin(), levels.begin() + place, levels.end());
+      return static_cast<double>(levels[static_cast<std::size_t>(place)]);
+    };
+    const double u = 2 * (0.5 * (left + right)) / small.width - 1, v = 2 * (0.5 * (top + bottom)) / small.height - 1;
+    const double median = pick(0.5);
+    upper.push_back({u, v, pick(0.97), median, false});
+    lower.push_back({u, v, pick(0.03), median, false});
+  };
   for (int top = 0; top < small.height; top += block)
     for (int left = 0; left < small.width; left += block) {
       const int bottom = std::min(small.height, top + block), right = std::min(small.width, left + block);
-      if ((bottom - top) * (right - left) * 3 < block * block && !(upper.empty())) continue;
-      std::vector<float> levels;
-      for (int row = top; row < bottom; ++row)
-        for (int column = left; column < right; ++column) levels.push_back(small.at(column, row));
-      const auto pick = [&](double part) {
-        const auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(levels.size() - 1));
-        std::nth_element(levels.begin(), levels.begin() + place, levels.end());
-        return static_cast<double>(levels[static_cast<std::size_t>(place)]);
-      };
-      const double u = 2 * (0.5 * (left + right)) / small.width - 1, v = 2 * (0.5 * (top + bottom)) / small.height - 1;
-      const double median = pick(0.5);
-      upper.push_back({u, v, pick(0.97), median, false});
-      lower.push_back({u, v, pick(0.03), median, false});
+      add_block(top, left, bottom, right, static_cast<std::size_t>((bottom - top) * (right - left) / 3));
     }
+  if (upper.empty()) add_block(0, 0, small.height, small.width, 1);  // hardly anything in view
+  if (upper.empty()) throw std::invalid_argument("estimate_light: nothing of the frame is to be seen");
   // The beads' envelope is told by the blocks that hold beads: those with a fair share of the largest contrast.
   std::vector<double> spans;
   for (std::size_t k = 0; k < upper.size(); ++k) spans.push_back(upper[k].value - lower[k].value);
@@ -296,7 +304,8 @@ GrayFrame flatten(const GrayFrame& frame, const LightField& light) {
     }
     const float* from = frame.pixels.data() + static_cast<std::size_t>(row) * width;
     float* to = flat.pixels.data() + static_cast<std::size_t>(row) * width;
-    for (std::size_t x = 0; x < width; ++x) to[x] = (from[x] - background_line[x]) / inverse_line[x];
+    for (std::size_t x = 0; x < width; ++x)
+      to[x] = unseen(from[x]) ? unseen_level : (from[x] - background_line[x]) / inverse_line[x];
   }
   return flat;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "ingest/solid_borders.hpp"
 #include "ingest/vector_lanes.hpp"
 
 namespace shakebed::ingest {
@@ -22,6 +23,7 @@ double interpolate(const std::vector<float>& samples, double step, double r) {
 
 ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px) {
   reach_ = profile.reach_px();
+  asymmetry_ = profile.asymmetry;
   const double resolution = std::clamp(0.05 * edge_px, 0.01, 0.06);
   const double step = 2 * radius_px * resolution;
   inverse_step_ = static_cast<float>(1 / step);
@@ -171,12 +173,13 @@ void JointFit::subtract(double x, double y, float sign) {
       load(line + k, present);
       store(present - sign * value, line + k);
     }
+    if (table.asymmetry_) table.asymmetry_->add_to_row(line, left, count, x, dy, -sign);
   }
 }
 
 void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
   const ProfileTable& table = *table_;
-  if (table.fourth_ || std::abs(new_x - old_x) > 2 || std::abs(new_y - old_y) > 2) {
+  if (table.fourth_ || table.asymmetry_ || std::abs(new_x - old_x) > 2 || std::abs(new_y - old_y) > 2) {
     subtract(old_x, old_y, -1.0F);
     subtract(new_x, new_y, 1.0F);
     return;
@@ -247,6 +250,8 @@ JointFit::Descent JointFit::descent_of(ModelDisk& disk, float bound) const {
       Floats d, e;
       gather(rise, cell, d);
       load(line + k, e);
+      const Floats nothing = {};
+      d = e < brightest_seen ? d : nothing;
       e = e < bound ? e : bound;
       e = e > -bound ? e : -bound;
       const Floats d_dx = d * dx;
@@ -433,7 +438,7 @@ void JointFit::judge(std::vector<ModelDisk>& disks, double radius) const {
         Floats own, e;
         gather(table.level_.data(), cell, own);
         load(line + k, e);
-        const Ints inside = lane_indices < count - k;
+        const Ints inside = (lane_indices < count - k) & (e < brightest_seen);
         const Floats nothing = {};
         own = inside ? own : nothing;
         e = inside ? e : nothing;
@@ -473,8 +478,10 @@ double JointFit::strong_pixels(float level) const {
     const float* a = residual_row(row);
     const float* b = residual_row(row + 1);
     int strong = 0;
-    for (int column = 0; column + 1 < width_; column += 2)
-      strong += a[column] + a[column + 1] + b[column] + b[column + 1] > 4 * level;
+    for (int column = 0; column + 1 < width_; column += 2) {
+      const float sum = a[column] + a[column + 1] + b[column] + b[column + 1];
+      strong += sum > 4 * level && sum < brightest_seen;
+    }
     count += static_cast<std::size_t>(strong);
   }
   return 4.0 * static_cast<double>(count);

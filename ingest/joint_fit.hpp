@@ -48,6 +48,7 @@ class ProfileTable {
   float inverse_step_ = 0;
   int last_ = 0;
   std::vector<float> level_, rise_, soft_rise_;
+  std::shared_ptr<const BeadAsymmetry> asymmetry_;
   bool fourth_ = false;
   std::vector<float> fourth_level_, fourth_rise_;  // p4(r)/r^4
 };

@@ -12,6 +12,7 @@
 
 #include "ingest/atomic_file.hpp"
 #include "ingest/smooth_field.hpp"
+#include "ingest/solid_borders.hpp"
 
 namespace shakebed::ingest {
 
@@ -73,7 +74,11 @@ std::vector<double> contrast_by_row(const FinderCalibration& finder) {
   for (std::size_t k = 1; k < below.size(); ++k) {
     const double y = (static_cast<double>(k) - 0.5 - static_cast<double>(half)) * row_step_px;
     double row = 0;
-    for (double x = 0.5 * row_step_px; x < reach; x += row_step_px) row += 2 * level_at(std::hypot(x, y));
+    for (double x = 0.5 * row_step_px; x < reach; x += row_step_px) {
+      row += 2 * level_at(std::hypot(x, y));
+      if (finder.profile.asymmetry)  // y_px grows downwards
+        row += finder.profile.asymmetry->at(x, -y) + finder.profile.asymmetry->at(-x, -y);
+    }
     below[k] = below[k - 1] + row;
   }
   const double all = below.back();
@@ -149,7 +154,7 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
     findings.report.why = found.why_nothing;
   }
   if (options.profile_from_coverage) {
-    const GrayFrame flat = flatten(frame, finder.light);
+    const GrayFrame flat = flatten(seen_part(frame, finder), finder.light);
     int left = 0, right = frame.width;
     if (options.left_wall_px)
       left = std::clamp(static_cast<int>(std::lround(*options.left_wall_px + 0.5)), 0, frame.width);
@@ -159,7 +164,8 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
     for (int row = 0; row < frame.height; ++row) {
       double sum = 0;
       const float* line = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width);
-      for (int column = left; column < right; ++column) sum += static_cast<double>(line[column]);
+      for (int column = left; column < right; ++column)
+        sum += unseen(line[column]) ? 0.0 : static_cast<double>(line[column]);
       findings.coverage_of_row[static_cast<std::size_t>(row)] = static_cast<float>(sum / per_area);
     }
   }

@@ -70,6 +70,7 @@ GrayFrame bead_picture(const FinderCalibration& calibration, int magnification) 
       if (cell < profile.level.size()) {
         const double cosine = r > 0 ? std::cos(4 * std::atan2(y, x)) : 0;
         level = profile.level[cell] + profile.fourth_harmonic[cell] * static_cast<float>(cosine);
+        if (profile.asymmetry) level += static_cast<float>(profile.asymmetry->at(x, y));
       }
       picture.pixels.push_back(background + static_cast<float>(calibration.contrast_level) * level);
     }

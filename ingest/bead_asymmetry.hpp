@@ -1,0 +1,39 @@
+#pragma once
+// What a bead lit from one side adds to its radial profile: lit and dark side, a highlight beside the middle.
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace shakebed::ingest {
+
+// a(r, theta) = sum over m = 1 .. 6 of c_m(r) cos(m theta) + s_m(r) sin(m theta), in units of the bead's contrast,
+// theta from x towards y. Fixed once made; any number of beads can be drawn with it.
+class BeadAsymmetry {
+ public:
+  static constexpr int orders = 6;
+  struct Harmonics {
+    double step_px = 0;
+    std::array<std::vector<double>, orders> cosine, sine;  // m - 1; at r = 0, step_px, ...; 0 beyond
+  };
+  explicit BeadAsymmetry(Harmonics harmonics);
+  [[nodiscard]] const Harmonics& harmonics() const { return harmonics_; }
+  [[nodiscard]] double at(double dx, double dy) const;
+  // Rms over the disk of that radius of what differs from one side to the opposite one (odd m).
+  [[nodiscard]] double one_sidedness(double radius_px) const;
+
+  // Adds `sign` times the asymmetry of a bead at x_px to `count` pixels of one row from column `left` on; `dy_px` is
+  // the row less the bead's y.
+  void add_to_row(float* row, int left, int count, double x_px, double dy_px, float sign) const;
+
+ private:
+  Harmonics harmonics_;
+  double reach_ = 0;
+  // Sampled `finer_` times as fine as pixels, columns of one phase beside one another: row j, phase p, place k hold the
+  // value at dx = k - side_ - p/finer_, dy = j/finer_ - side_.
+  int finer_ = 4, side_ = 0;
+  std::vector<float> samples_;
+  [[nodiscard]] const float* line(int j, int phase) const;
+};
+
+}  // namespace shakebed::ingest
