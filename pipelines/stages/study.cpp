@@ -169,6 +169,9 @@ void Study::describe(Fields& fields) {
       try {
         const Plan plan = plan_of({k, v, 0}, 1);
         for (const PlannedStage& stage : plan.stages) {
+          for (const char* name : {"chart", "claims", "study"})  // their versions are not part of a study's
+            if (stage.row->name == name)
+              fields.problem("/stages", fmt::format("a chain holds no {} stage", name), "Put it after the study");
           if (!stage.input_files.empty()) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
         }
         for (const auto& [name, collected] : collect_) {
@@ -428,7 +431,7 @@ void Study::run(RunContext& context) const {
 
 StageRow study_stage(int inner_versions) {
   return {.name = "study",
-          .version = 3 + inner_versions,
+          .version = 100 + inner_versions,
           .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
           .uses_seed = true,
           .result = "study.json",
