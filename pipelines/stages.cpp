@@ -5,6 +5,7 @@
 #include "pipelines/stages/chart.hpp"
 #include "pipelines/stages/check.hpp"
 #include "pipelines/stages/claims.hpp"
+#include "pipelines/stages/critical.hpp"
 #include "pipelines/stages/extract.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "pipelines/stages/fit.hpp"
@@ -18,8 +19,9 @@ namespace shakebed::pipelines {
 
 const std::vector<StageRow>& stage_table() {
   static const std::vector<StageRow> table = [] {
-    std::vector<StageRow> rows = {simulate_stage(), infer_stage(),  render_stage(), extract_stage(), fit_stage(),
-                                  map_stage(),      figure_stage(), chart_stage(),  claims_stage(),  check_stage()};
+    std::vector<StageRow> rows = {simulate_stage(), infer_stage(),  render_stage(),   extract_stage(),
+                                  fit_stage(),      map_stage(),    critical_stage(), figure_stage(),
+                                  chart_stage(),    claims_stage(), check_stage()};
     int versions = 0;  // of what a study's chain may hold
     for (const StageRow& row : rows) {
       if (row.name != "chart" && row.name != "claims") versions += row.version;

@@ -104,8 +104,9 @@ class Claims : public Stage {
           const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9);
           measured = fmt::format("{:.{}f} ± {:.{}f}", value, decimals, error, decimals);
         } else {
-          measured = fmt::format("{:.4g}", value);
-          if (!c.pointer.ends_with("/p_value")) measured += " (no error bar)";
+          const bool chance = c.pointer.ends_with("/p_value");
+          measured = chance && value < 1e-10 ? "below 1e-10" : fmt::format("{:.4g}", value);
+          if (!chance) measured += " (no error bar)";
         }
         if (!unit.empty() && unit != "1") measured += " " + unit;
       }
@@ -147,7 +148,7 @@ StageRow claims_stage() {
   return {.name = "claims",
           .version = 2,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
-          .accepts = {"chart", "study", "simulate", "fit", "map", "extract"},
+          .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "claims.json",

@@ -1,9 +1,16 @@
 #include "pipelines/stages/map.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+
+#include <charconv>
+
+#include "fit/empirical_map.hpp"
 #include "pipelines/bed.hpp"
 #include "pipelines/files.hpp"
+#include "pipelines/stages/study_table.hpp"
 #include "pipelines/theory.hpp"
 
 namespace shakebed::pipelines {
@@ -28,6 +35,24 @@ class Map : public Stage {
     fields.number("restitution", restitution_,
                   {.help = "of the single ball; 0: one flight of a dead ball", .range = from_to(0, 0.99)});
     fields.text("equation", equation_, {.help = "equation of state"});
+    fields.input_files("table", table_,
+                       {.help = "simulated beds of known temperature, as a study writes them (table.csv): T is "
+                                "interpolated among them, beside the theory; left out, that of the study in \"from\"",
+                        .example = "\"table.csv\""});
+    fields.object<TableColumns>(
+        "columns", columns_,
+        [](Fields& f, TableColumns& c) {
+          f.text("temperature", c.temperature, {.help = "column that is T, in m g D"});
+          f.texts(
+              "axes", c.axes,
+              {.help = "what the table is over: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
+                       "among gamma, frequency (Hz), restitution and friction (of the beads), initial_height"});
+        },
+        {.help = "how the table is read"});
+    fields.number("bead_restitution", bead_restitution_,
+                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
+    fields.number("bead_friction", bead_friction_,
+                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
     if (!fields.decoding()) return;
     if (fit::find_equation_of_state(equation_) == nullptr) {
       try {
@@ -35,6 +60,15 @@ class Map : public Stage {
       } catch (const UsageError& error) {
         fields.problem("/equation", error.what());
       }
+    }
+    fields.require(table_.paths.size() <= 1, "table", "one table is read at a time");
+    const std::vector<std::string> known{"gamma", "frequency", "restitution", "friction", "initial_height"};
+    for (const std::string& axis : columns_.axes) {
+      const std::string nearest = nearest_name(axis, known);
+      fields.require(std::find(known.begin(), known.end(), axis) != known.end(), "columns/axes",
+                     fmt::format("there is no axis \"{}\"", axis),
+                     nearest.empty() ? fmt::format("There are {}", fmt::join(known, ", "))
+                                     : fmt::format("Did you mean \"{}\"?", nearest));
     }
     if (!fields.has_upstream("simulate")) {
       for (const std::string key : {"gamma", "frequency", "diameter", "initial_height"}) {
@@ -61,8 +95,11 @@ class Map : public Stage {
       question.measured_temperature = number("/temperature/value");
       question.measured_std_error = number("/temperature/std_error");
     }
-    if (const Input* simulated = context.find_input("simulate")) {
-      const BedDescription bed = BedDescription::read(simulated->file("bed.json"));
+    std::optional<double> bead_restitution = bead_restitution_, bead_friction = bead_friction_;
+    if (const Input* source = context.find_input("simulate")) {
+      const BedDescription bed = BedDescription::read(source->file("bed.json"));
+      if (!bead_restitution) bead_restitution = bed.restitution;
+      if (!bead_friction) bead_friction = bed.friction;
       if (bed.reduced && !(diameter_ && frequency_))
         throw InputError("the bed is in reduced units: give diameter and frequency here");
       question.gamma = bed.gamma();
@@ -85,7 +122,11 @@ class Map : public Stage {
     if (initial_height_) question.initial_height = *initial_height_;
     if (!(question.gamma > 0) || !(question.frequency > 0))
       throw InputError("the floor of this bed does not shake: there is no Gamma to map");
-    const Json json = map_json(question);
+    Json json = map_json(question);
+    if (const Input* study = context.find_input("study"); study != nullptr || !table_.empty()) {
+      const StudyTable table = read_study_table(table_.empty() ? study->file("table.csv") : table_.paths.front());
+      json["simulated"] = simulated(context, table, question, bead_restitution, bead_friction, json);
+    }
     write_file(context.output("map.json"), dump(json));
     std::string csv = "name,jump_height,expansion,constants,jump,rise,reduced_temperature,in_range\n";
     std::size_t in_range = 0;
@@ -108,6 +149,83 @@ class Map : public Stage {
   }
 
  private:
+  struct TableColumns {
+    std::string temperature = "T";
+    std::vector<std::string> axes{"gamma"};
+  };
+
+  // "restitution=0.9 friction=0.2": the number behind `name`.
+  static std::optional<double> in_series(const std::string& series, const std::string& name) {
+    for (std::size_t at = series.find(name + "="); at != std::string::npos; at = series.find(name + "=", at + 1)) {
+      if (at > 0 && series[at - 1] != ' ' && series[at - 1] != ',') continue;
+      double value = 0;
+      const char *begin = series.data() + at + name.size() + 1, *last = series.data() + series.size();
+      const auto [end, error] = std::from_chars(begin, last, value);
+      if (error == std::errc() && (end == last || *end == ' ' || *end == ',')) return value;
+    }
+    return std::nullopt;
+  }
+
+  // T of simulated beds, interpolated at the question.
+  Json simulated(RunContext& context, const StudyTable& table, const MapQuestion& question,
+                 std::optional<double> bead_restitution, std::optional<double> bead_friction, const Json& map) const {
+    std::vector<fit::MapAxis> axes;
+    std::vector<double> here;
+    Json asked = Json::object();
+    for (const std::string& axis : columns_.axes) {
+      axes.push_back({axis, false});
+      const std::optional<double> value = axis == "gamma"         ? std::optional(question.gamma)
+                                          : axis == "frequency"   ? std::optional(question.frequency)
+                                          : axis == "restitution" ? bead_restitution
+                                          : axis == "friction"    ? bead_friction
+                                                                  : std::optional(question.initial_height);
+      if (!value)
+        throw InputError(
+            fmt::format("the table is over {} of the beads, which no bed in \"from\" tells: give bead_{}", axis, axis));
+      here.push_back(*value);
+      asked[axis] = *value;
+    }
+    std::vector<fit::MapPoint> points;
+    for (std::size_t r = 0; r < table.rows.size(); ++r) {
+      const auto t = table.number(r, table.column(columns_.temperature));
+      if (!t || !(*t > 0)) continue;
+      fit::MapPoint point{{}, *t, table.error(r, columns_.temperature).value_or(0)};
+      for (const std::string& axis : columns_.axes) {
+        const auto value = table.has(axis) ? table.number(r, table.column(axis)) : in_series(table.series(r), axis);
+        if (!value)
+          throw InputError(fmt::format("{}: row {} has no {}: neither a column nor in its series \"{}\"", table.file,
+                                       r + 1, axis, table.series(r)));
+        point.position.push_back(*value);
+      }
+      points.push_back(std::move(point));
+    }
+    const std::size_t number = points.size();
+    const fit::EmpiricalMap beds(std::move(axes), std::move(points));
+    const fit::EmpiricalMap::Prediction found = beds.at(here);
+    Json out{{"status", fit::to_string(found.status)}, {"beds", number}, {"at", std::move(asked)}};
+    if (!beds.message().empty()) out["message"] = beds.message();
+    if (found.status != fit::FitStatus::ok) {
+      context.warning(fmt::format("the table of simulated beds gives no temperature: {}",
+                                  beds.message().empty() ? fit::to_string(found.status) : beds.message()));
+      return out;
+    }
+    out["inside"] = found.inside;
+    out["interpolation_error"] = beds.interpolation_error();
+    const auto put = [&](const char* key, double factor, const char* unit) {
+      out[key] = quantity_json(found.temperature.value * factor, unit, found.temperature.std_error * factor);
+    };
+    put("temperature", 1, "m g D");
+    put("temperature_over_mg", question.diameter, "m");
+    if (const Json* critical = find_pointer(map, "/critical_temperature/value"); critical != nullptr)
+      put("reduced_temperature", 1 / critical->get<double>(), "1");
+    if (!found.inside)
+      context.warning("the bed lies outside the table of simulated beds: its temperature there is an extrapolation");
+    return out;
+  }
+
+  InputFiles table_;
+  TableColumns columns_;
+  std::optional<double> bead_restitution_, bead_friction_;
   std::optional<double> gamma_, frequency_, diameter_, gravity_, initial_height_, plateau_density_;
   double restitution_ = 0;
   std::string equation_ = "enskog";
@@ -117,11 +235,11 @@ class Map : public Stage {
 
 StageRow map_stage() {
   return {.name = "map",
-          .version = 2,
+          .version = 3,
           .summary = "maps Gamma to T/T_c by every named reading",
-          .accepts = {"fit", "simulate", "extract"},
+          .accepts = {"fit", "simulate", "extract", "study"},
           .fewest_inputs = 0,
-          .most_inputs = 3,
+          .most_inputs = 4,
           .result = "map.json",
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Map>(); }};
 }

@@ -1,0 +1,103 @@
+#include "pipelines/stages/critical.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "fit/critical_temperature.hpp"
+#include "pipelines/files.hpp"
+#include "pipelines/stages/study_table.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+class Critical : public Stage {
+ public:
+  void describe(Fields& fields) override {
+    fields.text("temperature", temperature_, {.help = "column of the study that is the temperature, in any unit"});
+    fields.text("unit", unit_, {.help = "its unit, to be told"});
+    fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; \"\": none"});
+    fields.numbers("densities", densities_, {.help = "T_c is where the bottom falls below these"});
+    fields.text("order", order_, {.help = "column of the bond order psi_6; \"\": none"});
+    fields.numbers("orders", orders_, {.help = "T_c' is where the crystal's bond order falls below these"});
+    if (!fields.decoding()) return;
+    fields.require(!density_.empty() || !order_.empty(), "density", "neither a density nor an order is looked at");
+    for (const double d : densities_)
+      fields.require(d > 0 && d <= fit::close_packing_density * (1 + 1e-12), "densities",
+                     fmt::format("a threshold lies between 0 and close packing, 1.1547, not {}", d));
+    for (const double p : orders_)
+      fields.require(p > 0 && p < 1, "orders", fmt::format("a threshold of psi_6 lies between 0 and 1, not {}", p));
+  }
+
+  void run(RunContext& context) const override {
+    const StudyTable table = read_study_table(context.input("study").file("table.csv"));
+    std::vector<std::string> series;
+    for (std::size_t r = 0; r < table.rows.size(); ++r) {
+      const std::string name = table.series(r);
+      if (std::find(series.begin(), series.end(), name) == series.end()) series.push_back(name);
+    }
+    std::string csv = "series,quantity,threshold,temperature,std_error,status\n";
+    Json out;
+    std::size_t found = 0, asked = 0;
+    const auto look = [&](const char* name, const std::string& column, const std::vector<double>& thresholds) {
+      if (column.empty()) return;
+      Json& quantity = out[name];
+      quantity["column"] = column;
+      for (const std::string& one : series) {
+        Json rows = Json::array();
+        for (const fit::ThresholdCrossing& c : fit::threshold_temperatures(points_of(table, one, column), thresholds)) {
+          const bool ok = c.status == fit::ValueStatus::ok;
+          ++asked, found += ok;
+          Json row{{"threshold", c.threshold}, {"status", fit::to_string(c.status)}};
+          row["temperature"] = ok ? c.temperature.std_error > 0
+                                        ? quantity_json(c.temperature.value, unit_, c.temperature.std_error)
+                                        : quantity_json(c.temperature.value, unit_)
+                                  : Json();
+          rows.push_back(std::move(row));
+          csv += fmt::format(
+              "\"{}\",{},{},{},{},{}\n", one, name, c.threshold, ok ? number_text(c.temperature.value) : "",
+              ok && c.temperature.std_error > 0 ? number_text(c.temperature.std_error) : "", fit::to_string(c.status));
+        }
+        quantity["series"][one.empty() ? "all" : one] = std::move(rows);
+      }
+    };
+    look("T_c", density_, densities_);
+    look("T_c_prime", order_, orders_);
+    if (found < asked)
+      context.warning(
+          fmt::format("{} of {} thresholds are not crossed within the study's temperatures", asked - found, asked));
+    write_file(context.output("critical.json"), dump(out));
+    write_file(context.output("critical.csv"), csv);
+  }
+
+ private:
+  std::vector<fit::TemperaturePoint> points_of(const StudyTable& table, const std::string& series,
+                                               const std::string& column) const {
+    const std::size_t x = table.column(temperature_), y = table.column(column);
+    std::vector<fit::TemperaturePoint> points;
+    for (std::size_t r = 0; r < table.rows.size(); ++r) {
+      if (table.series(r) != series) continue;
+      const auto t = table.number(r, x), value = table.number(r, y);
+      if (t && value) points.push_back({*t, *value, table.error(r, column).value_or(0)});
+    }
+    return points;
+  }
+
+  std::string temperature_ = "T", unit_ = "T_c", density_ = "bottom_density", order_ = "psi6";
+  std::vector<double> densities_{1.10, 1.11, 1.12, 1.13, 1.14, 1.15, 1.154}, orders_{0.95, 0.9, 0.85, 0.8, 0.7};
+};
+
+}  // namespace
+
+StageRow critical_stage() {
+  return {.name = "critical",
+          .version = 1,
+          .summary = "measures T_c and T_c' from a study over temperature, against the threshold",
+          .accepts = {"study"},
+          .fewest_inputs = 1,
+          .most_inputs = 1,
+          .result = "critical.json",
+          .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Critical>(); }};
+}
+
+}  // namespace shakebed::pipelines
