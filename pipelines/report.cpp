@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "pipelines/animation.hpp"
@@ -48,6 +49,37 @@ a { color: var(--accent); } ul.files { margin: 8px 0; padding-left: 1.2em; colum
 )css";
 
 std::string html(std::string_view text) { return escape_markup(text); }
+
+// Text that people write: T_c, ζ_F, a_2 with a subscript, T^2, D^-2 with a superscript; names like above_launch as they
+// stand.
+std::string prose(std::string_view text) {
+  const std::string plain = html(text);
+  const auto letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
+  const auto alphanumeric = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  const auto greek = [](char c) { return (static_cast<unsigned char>(c) & 0x80) != 0; };
+  std::string out;
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    std::size_t end = i + 1;
+    const char c = plain[i];
+    if (c == '_' && i > 0 &&
+        (greek(plain[i - 1]) || (letter(plain[i - 1]) && (i == 1 || !alphanumeric(plain[i - 2]))))) {
+      while (end < plain.size() && alphanumeric(plain[end])) ++end;
+      if (end > i + 1 && (end == plain.size() || plain[end] != '_')) {
+        out += "<sub>" + plain.substr(i + 1, end - i - 1) + "</sub>";
+        i = end - 1;
+        continue;
+      }
+    } else if (c == '^' && i > 0 && (greek(plain[i - 1]) || alphanumeric(plain[i - 1]))) {
+      if (end < plain.size() && plain[end] == '-') ++end;
+      while (end < plain.size() && alphanumeric(plain[end])) ++end;
+      out += "<sup>" + plain.substr(i + 1, end - i - 1) + "</sup>";
+      i = end - 1;
+      continue;
+    }
+    out += c;
+  }
+  return out;
+}
 
 void replace_all(std::string& text, std::string_view what, std::string_view with) {
   for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += with.size())
@@ -147,7 +179,7 @@ class Report {
     const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
     std::string out = page_head(title);
     out += verdict_line();
-    for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
+    for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
       out += fmt::format("<p>{}</p>\n", html(plan_.description));
     out += banners() + warnings() + claims() + figures() + published() + checks() + bed_in_motion() + overlays() +
@@ -250,15 +282,24 @@ class Report {
       for (const fs::directory_entry& entry : fs::directory_iterator(directory(stage), error)) {
         if (entry.path().extension() == ".svg") files.push_back(entry.path());
       }
-      std::sort(files.begin(), files.end());
+      // In the order of the recipe where there is one, else by name.
+      const Json result = results_.contains(stage.id) ? results_.at(stage.id) : Json::object();
+      const auto place = [&](const fs::path& path) {
+        const auto found = result.is_object() ? result.find(path.stem().string()) : result.end();
+        return std::pair(std::distance(result.begin(), found), path);
+      };
+      std::sort(files.begin(), files.end(), [&](const auto& a, const auto& b) { return place(a) < place(b); });
       for (const fs::path& path : files) {
         const std::string name = path.stem().string();
+        const Json* own = find_pointer(result, "/" + escape_pointer_token(name) + "/caption");
         const std::string caption =
-            name == "profile" ? "Density against height. Error bars: one standard error, correlated frames allowed for."
+            own != nullptr && own->is_string() ? own->get<std::string>()
+            : name == "profile"
+                ? "Density against height. Error bars: one standard error, correlated frames allowed for."
             : name == "windows" ? "The fitted temperature against the lower edge of the window it is fitted in."
                                 : words(name);
         out += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", inline_svg(path, ++svg_count_),
-                           html(caption));
+                           prose(caption));
       }
     }
     return out.empty() ? "" : "<h2>Figures</h2>\n" + out;
@@ -292,14 +333,17 @@ class Report {
         const std::string verdict = row.value("verdict", "");
         const auto aside = [&](const char* key) {
           const std::string text = row.value(key, "");
-          return text.empty() ? "" : fmt::format("<br><span class=\"soft\">{}</span>", html(text));
+          return text.empty() ? "" : fmt::format("<br><span class=\"soft\">{}</span>", prose(text));
         };
         out += fmt::format(
             "<tr><td>{}{}</td><td>{}</td><td class=\"number\">{}</td><td><span class=\"{}\">{}</span>{}</td><td>{}</td>"
             "</tr>\n",
-            html(row.value("claim", "")), aside("measured_as"), html(row.value("claimed", "")),
-            html(row.value("measured", "")), verdict == "holds" || verdict == "agrees within errors" ? "good" : "bad",
-            html(verdict), aside("note"), html(row.value("place", "")));
+            prose(row.value("claim", "")), aside("measured_as"), html(row.value("claimed", "")),
+            html(row.value("measured", "")),
+            verdict == "holds" || verdict == "agrees within errors" ? "good"
+            : verdict == "not measured"                             ? "soft"
+                                                                    : "bad",
+            html(verdict), aside("note"), prose(row.value("place", "")));
       }
       out += "</table></div>\n<p class=\"soft\">" + html(results_.at(stage.id).value("verdict_is", "")) + ".</p>\n";
     }
@@ -622,7 +666,7 @@ std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<st
   constexpr std::size_t most_rows = 500;
   const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
   std::string out = page_head(title);
-  for (const std::string& paragraph : plan.report.text) out += fmt::format("<p>{}</p>\n", html(paragraph));
+  for (const std::string& paragraph : plan.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
   if (!problems.empty()) {
     out += "<div class=\"warnings\"><strong>Points that failed</strong><ul>\n";
     for (const std::string& problem : problems) out += fmt::format("<li>{}</li>\n", html(problem));

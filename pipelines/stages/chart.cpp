@@ -42,14 +42,14 @@ struct CurveOptions {
   int color = 0;
 };
 struct ChartOptions {
-  std::string name, x_label, y_label, residual_label;
+  std::string name, caption, x_label, y_label, residual_label;
   std::optional<double> x_low, x_high, y_low, y_high;
   bool logarithmic_x = false, logarithmic_y = false;
   std::vector<PointsOptions> points;
   std::vector<CurveOptions> curves;
 };
 struct SnapshotOptions {
-  std::string name, from;
+  std::string name, from, caption;
 };
 
 Series::Style style_of(Look look) {
@@ -260,6 +260,7 @@ void Chart::describe(Fields& fields) {
       "charts", charts_,
       [](Fields& f, ChartOptions& chart) {
         f.text("name", chart.name, {.help = "of its files", .required = true});
+        f.text("caption", chart.caption, {.help = "below it in the report"});
         f.text("x_label", chart.x_label, {.help = "with the unit", .required = true});
         f.text("y_label", chart.y_label, {.help = "with the unit", .required = true});
         f.text("residual_label", chart.residual_label, {.help = "of the panel of residuals"});
@@ -299,6 +300,7 @@ void Chart::describe(Fields& fields) {
                                   f.text("name", s.name, {.help = "of its files", .required = true});
                                   f.text("from", s.from,
                                          {.help = "id of the simulate stage whose last state it is", .required = true});
+                                  f.text("caption", s.caption, {.help = "below it in the report"});
                                 },
                                 {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
   if (fields.decoding())
@@ -316,6 +318,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
                   .logarithmic_x = chart.logarithmic_x,
                   .logarithmic_y = chart.logarithmic_y};
   Json out = Json::object();
+  if (!chart.caption.empty()) out["caption"] = chart.caption;
   int color = 1;
   for (const PointsOptions& options : chart.points) {
     Data data = read_data(input_named(context, options.from).file(options.file), options);
@@ -458,7 +461,9 @@ Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) 
     crystal += picture.color.back() >= 0.8;
   }
   draw_disks(picture, context.output_directory(), options.name);
-  return Json{{"disks", frame.size()}, {"empty_sites", order.vacancy_x.size()}, {"disks_with_psi6_above_0.8", crystal}};
+  Json out{{"disks", frame.size()}, {"empty_sites", order.vacancy_x.size()}, {"disks_with_psi6_above_0.8", crystal}};
+  if (!options.caption.empty()) out["caption"] = options.caption;
+  return out;
 }
 
 void Chart::run(RunContext& context) const {
@@ -472,7 +477,7 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 4,
+          .version = 5,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,

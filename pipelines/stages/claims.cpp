@@ -148,7 +148,7 @@ StageRow claims_stage() {
   return {.name = "claims",
           .version = 2,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
-          .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
+          .accepts = {"chart", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "claims.json",
