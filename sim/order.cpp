@@ -174,7 +174,7 @@ OrderObserver::OrderObserver(const Scene& scene, const DiskProperties& disks, co
       grid_(layers),
       layers_(layers.count),
       width_(scene.box.width),
-      heights_(row_bins(layers.lowest + layers.thickness * static_cast<double>(layers.count))) {
+      bins_(row_bins(layers.lowest + layers.thickness * static_cast<double>(layers.count))) {
   if (std::holds_alternative<PeriodicSides>(scene.box.sides)) period_x_ = scene.box.width;
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = top->height;
 }
@@ -194,8 +194,11 @@ void OrderObserver::observe(const Snapshot& at) {
     layer.count += 1;
     layer.psi6 += psi6;
     layer.neighbours += order.neighbours[i];
-    const double bin = std::floor((at.z[i] - at.floor_position) / row_bin);
-    if (bin >= 0 && bin < static_cast<double>(heights_.size())) heights_[static_cast<std::size_t>(bin)] += 1;
+    const double height = at.z[i] - at.floor_position, bin = std::floor(height / row_bin);
+    if (bin >= 0 && bin < static_cast<double>(bins_.size())) {
+      bins_[static_cast<std::size_t>(bin)].disks += 1;
+      bins_[static_cast<std::size_t>(bin)].heights += height;
+    }
   }
   ++looks_;
   const double share = n > 0 ? 1 / static_cast<double>(n) : 0;
@@ -219,7 +222,9 @@ std::vector<OrderObserver::Layer> OrderObserver::layers() const {
 
 std::vector<OrderObserver::Row> OrderObserver::rows() const {
   constexpr double depth = 0.8;  // of a valley, as a part of the peaks on either side
-  const std::vector<double> density = smoothed(heights_);
+  std::vector<double> histogram;
+  for (const Bin& bin : bins_) histogram.push_back(bin.disks);
+  const std::vector<double> density = smoothed(histogram);
   std::vector<Row> rows;
   std::size_t begin = 0;            // of the row
   double peak = 0, valley = -1;     // valley: -1 on the way up
@@ -238,8 +243,8 @@ std::vector<OrderObserver::Row> OrderObserver::rows() const {
       const std::size_t end = (first + last) / 2;
       double disks = 0, height = 0;
       for (std::size_t k = begin; k < end; ++k) {
-        disks += heights_[k];
-        height += heights_[k] * (static_cast<double>(k) + 0.5) * row_bin;
+        disks += bins_[k].disks;
+        height += bins_[k].heights;
       }
       if (disks > 0) rows.push_back({height / disks, disks / static_cast<double>(looks_)});
       begin = end, peak = here, valley = -1;

@@ -54,7 +54,7 @@ class OrderObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(means_, layers_, looks_, heights_);
+    archive(means_, layers_, looks_, bins_);
   }
 
  private:
@@ -68,7 +68,10 @@ class OrderObserver {
   std::vector<LayerSums> layers_;
   double width_ = 0;
   std::uint64_t looks_ = 0;
-  std::vector<double> heights_;  // histogram of the centres' heights above the floor, bins of row_bin from 0
+  struct Bin {
+    double disks = 0, heights = 0;  // sum of their heights: a cold row is far narrower than a bin
+  };
+  std::vector<Bin> bins_;  // of the centres' heights above the floor, row_bin each from 0
 };
 
 }  // namespace shakebed::sim

@@ -128,9 +128,9 @@ TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
   ASSERT_EQ(rows.size(), 9u);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     EXPECT_NEAR(rows[k].disks, 12, 1e-12) << k;
-    EXPECT_NEAR(rows[k].height, 0.5 + static_cast<double>(k) * 1.02 * root3 / 2, 0.011) << k;
+    EXPECT_NEAR(rows[k].height, 0.5 + static_cast<double>(k) * 1.02 * root3 / 2, 1e-12) << k;
   }
-  EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 0.012);
+  EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 1e-12);
 }
 
 TEST(Rows, OfAGasThereAreNone) {
