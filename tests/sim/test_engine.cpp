@@ -119,6 +119,55 @@ TEST(Engine, LetsNothingOverlapAndNothingOut) {
   }
 }
 
+// A small periodic box of few disks: shells that fitted the density would reach two images of one neighbour, only the
+// nearest of which is looked at.
+TEST(Engine, KeepsTheImagesOfANeighbourApart) {
+  for (const double width : {5.0, 6.3, 9.0, 14.0}) {
+    for (const std::uint32_t disks : {2u, 4u, 9u}) {
+      Scene scene;
+      scene.gravity = Weightless{};
+      scene.disks.species = {{disks, 1, 1}};
+      scene.box.width = width;
+      scene.box.sides = PeriodicSides{};
+      scene.box.top = PeriodicTop{width};
+      scene.start = RandomStart{};
+      scene.start_temperature = 1;
+      scene.seed = disks;
+      ASSERT_TRUE(check(scene).empty());
+      const auto sim = simulate(scene);
+      for (int i = 1; i <= 1000; ++i) {
+        sim->advance_to(0.37 * i);
+        ASSERT_LE(sim->largest_overlap(), 1e-12) << disks << " disks, " << width << " D wide, look " << i;
+      }
+      EXPECT_GT(sim->counters().disk_collisions, 10u);
+    }
+  }
+}
+
+// A gas so thin that disks fly a hundred times their size between collisions: its pressure, and what it
+// costs.
+TEST(Engine, FollowsAThinGasWithLargeShells) {
+  Scene scene;
+  scene.gravity = Weightless{};
+  scene.disks.species = {{400, 1, 1}};
+  scene.box.width = 400;
+  scene.box.sides = PeriodicSides{};
+  scene.box.top = PeriodicTop{400};
+  scene.start = RandomStart{};
+  scene.start_temperature = 1;
+  const auto sim = simulate(scene);
+  for (int i = 1; i <= 50; ++i) {
+    sim->advance_to(200.0 * i);
+    ASSERT_LE(sim->largest_overlap(), 1e-12);
+  }
+  const Counters counters = sim->counters();
+  const double collisions = static_cast<double>(counters.disk_collisions);
+  // Z - 1 = 2 phi to first order, that is 0.00393, with phi^2 terms below 2e-5; five standard errors.
+  const double z_less_one = counters.virial / (2 * sim->energy().kinetic * sim->time());
+  EXPECT_NEAR(z_less_one / (2 * 400 * std::numbers::pi / 4 / (400.0 * 400.0)), 1, 5 / std::sqrt(collisions) + 0.005);
+  EXPECT_LT(static_cast<double>(counters.shell_exits), 60 * collisions);
+}
+
 // Rows whose disks touch exactly: contacts of equal times, many of them at one instant, each of which must have its
 // turn.
 TEST(Engine, KeepsALatticeOfTouchingDisksApart) {
