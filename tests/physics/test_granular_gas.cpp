@@ -86,39 +86,51 @@ TEST(ElasticGas, CollidesAsOftenAsEnskogSays) {
 #endif
 
 // a2 of a cooling gas by Boltzmann's equation itself, solved by Monte Carlo [Bird1994] without space: pairs drawn at
-// random collide with a probability as their approach. From 6 to 16 collisions of each, as below.
-double boltzmann_a2(double e) {
-  constexpr std::uint32_t count = 400'000;
-  Random random(5);
-  std::vector<double> vx(count), vz(count);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const Random::Pair v = random.normal_pair();
-    vx[i] = v.first, vz[i] = v.second;
-  }
-  double collided = 0, square = count * 2.0, fastest = 10, sum = 0;
-  int samples = 0;
-  for (double next = 6; next < 16;) {
-    const std::uint32_t i = random.below(count), j = random.below(count);
-    if (i == j) continue;
-    const double angle = 2 * pi * random.uniform(), nx = std::cos(angle), nz = std::sin(angle);
-    const double approach = (vx[i] - vx[j]) * nx + (vz[i] - vz[j]) * nz;
-    if (approach < fastest * random.uniform()) continue;
-    const double kick = (1 + e) / 2 * approach;
-    vx[i] -= kick * nx, vz[i] -= kick * nz, vx[j] += kick * nx, vz[j] += kick * nz;
-    square -= (1 - e * e) / 2 * approach * approach;
-    collided += 2.0 / count;
-    fastest = 10 * std::sqrt(square / 2 / count);  // none of these approaches faster than 10 thermal velocities
-    if (collided < next + 1) continue;
-    next += 1;
-    double v2 = 0, v4 = 0;
-    for (std::uint32_t k = 0; k < count; ++k) {
-      const double here = vx[k] * vx[k] + vz[k] * vz[k];
-      v2 += here / count, v4 += here * here / count;
+// random collide with a probability as their approach. From 6 to 16 collisions of each, as below. 24 gases of 1e5:
+// 0.0328(4), -0.0262(4), -0.0299(2) at e = 0.6, 0.8, 0.9, where van Noije and Ernst's expansion, which ends at a2
+// itself [BrilliantovPoeschel2006], has 0.0387, -0.0219, -0.0269. A gas of 256 has 0.0314(7) at 0.6: its size does
+// nothing.
+Measured boltzmann_a2(double e) {
+  constexpr std::uint32_t count = 100'000;
+#ifdef SHAKEBED_LONG_TESTS
+  constexpr int gases = 16;
+#else
+  constexpr int gases = 5;
+#endif
+  BlockedMean a2;
+  for (int gas = 0; gas < gases; ++gas) {
+    Random random(static_cast<std::uint64_t>(gas) + 5);
+    std::vector<double> vx(count), vz(count);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const Random::Pair v = random.normal_pair();
+      vx[i] = v.first, vz[i] = v.second;
     }
-    sum += v4 / (2 * v2 * v2) - 1;
-    ++samples;
+    double collided = 0, square = count * 2.0, fastest = 8, sum = 0;
+    int samples = 0;
+    for (double next = 6; next < 16;) {
+      const std::uint32_t i = random.below(count), j = random.below(count);
+      if (i == j) continue;
+      const double angle = 2 * pi * random.uniform(), nx = std::cos(angle), nz = std::sin(angle);
+      const double approach = (vx[i] - vx[j]) * nx + (vz[i] - vz[j]) * nz;
+      if (approach < fastest * random.uniform()) continue;
+      const double kick = (1 + e) / 2 * approach;
+      vx[i] -= kick * nx, vz[i] -= kick * nz, vx[j] += kick * nx, vz[j] += kick * nz;
+      square -= (1 - e * e) / 2 * approach * approach;
+      collided += 2.0 / count;
+      fastest = 8 * std::sqrt(square / 2 / count);  // one pair in 1e7 approaches faster than 8 thermal velocities
+      if (collided < next + 1) continue;
+      next += 1;
+      double v2 = 0, v4 = 0;
+      for (std::uint32_t k = 0; k < count; ++k) {
+        const double here = vx[k] * vx[k] + vz[k] * vz[k];
+        v2 += here / count, v4 += here * here / count;
+      }
+      sum += v4 / (2 * v2 * v2) - 1;
+      ++samples;
+    }
+    a2.add(sum / samples);
   }
-  return sum / samples;
+  return {a2.mean(), a2.std_error()};
 }
 
 // 1/sqrt(T) grows as (1 - e^2)/4 w (1 + 3 a2/16) t, w the collision frequency at T = 1: from when each disk has
@@ -156,14 +168,15 @@ void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs) {
   EXPECT_LT(2 * rate.std_error(), 5e-3 * expected);
   expect_law("cooling: d ln T a collision of each disk", per_collision.mean(), per_collision.std_error(), expected_fall,
              0.01 * std::abs(expected_fall));
-  const double boltzmann = boltzmann_a2(e);
-  expect_law("cooling: a2, by Boltzmann's equation", a2.mean(), a2.std_error(), boltzmann, 5e-3);
-  // The formula ends its expansion at a2, which at e = 0.6 costs it as much as is asked: there it is shown.
+  const Measured boltzmann = boltzmann_a2(e);
+  expect_law("cooling: a2, by Boltzmann's equation", a2.mean(), std::hypot(a2.std_error(), boltzmann.std_error),
+             boltzmann.value, 5e-3);
+  // The formula ends its expansion at a2, which at e = 0.6 costs it 0.006, more than is asked: there it is shown.
   if (e > 0.7) {
     expect_law("cooling: a2, by van Noije and Ernst", a2.mean(), a2.std_error(), cooling_a2(e), 5e-3);
   } else {
     std::printf("  %-58s %.6g, off Boltzmann's by %.2g\n", "(a2 by van Noije and Ernst)", cooling_a2(e),
-                cooling_a2(e) - boltzmann);
+                cooling_a2(e) - boltzmann.value);
   }
   EXPECT_LT(2 * a2.std_error(), 5e-3);
 }
