@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include <charconv>
+#include <set>
 
 #include "fit/empirical_map.hpp"
 #include "pipelines/bed.hpp"
@@ -200,6 +201,14 @@ class Map : public Stage {
       points.push_back(std::move(point));
     }
     const std::size_t number = points.size();
+    for (std::size_t a = 0; a < here.size(); ++a) {
+      std::set<double> levels;
+      for (const fit::MapPoint& point : points) levels.insert(point.position[a]);
+      if (levels.size() < 3 && !levels.contains(here[a]))
+        context.warning(
+            fmt::format("the table has {} values of {}: how T bends between them is not in the interpolation's error",
+                        levels.size(), columns_.axes[a]));
+    }
     const fit::EmpiricalMap beds(std::move(axes), std::move(points));
     const fit::EmpiricalMap::Prediction found = beds.at(here);
     Json out{{"status", fit::to_string(found.status)}, {"beds", number}, {"at", std::move(asked)}};
