@@ -82,7 +82,7 @@ int run_program(int argc, char** argv) {
   reproduce->add_option(
       "figure", arguments.recipe,
       "clement-rajchenbach (the default; also named quinn-hong-fig3), quinn-hong-fig1, quinn-hong-fig2, "
-      "quinn-hong-eq6, quinn-hong-beyond, all");
+      "quinn-hong-eq6, quinn-hong-beyond, quinn-hong-tc, temperature-map, all");
   add_preset(*reproduce, arguments.run);
   add_run(*reproduce, arguments.run);
 
