@@ -162,7 +162,8 @@ struct Spacing {
 };
 struct Candidate {
   double radius = 0, sign = 1, explained = 0, support = 0;
-  Spacing spacing;  // of its centres, px of the frame
+  std::size_t count = 0;  // of its circles
+  Spacing spacing;        // of their centres, px of the frame
 };
 
 // Median distance from a place to its second nearest neighbour (of the three in a honeycomb the one in the middle), and
@@ -329,6 +330,7 @@ void vote(const GrayFrame& frame, double scale, double from_radius, double to_ra
                             sign,
                             explained / chosen_weight,
                             support_sum / support_weight,
+                            centres.size(),
                             {spacing.median * scale, spacing.scatter * scale}});
     }
   }
@@ -358,7 +360,14 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
     scale *= 2;
   }
   const Candidate* best = nullptr;
-  const auto merit = [](const Candidate& c) { return c.explained * c.support * c.support; };
+  // A few large circles whose rims are seen in part are something else: the outline of the whole bed, say.
+  const double large = 0.2 * std::min(frame.width, frame.height);
+  const auto merit = [&](const Candidate& c) {
+    constexpr std::size_t few = 5;
+    constexpr double well_supported = 0.85, doubted = 0.01;
+    const double trust = c.count < few && c.radius > large && c.support < well_supported ? doubted : 1.0;
+    return trust * c.explained * c.support * c.support;
+  };
   const auto allowed = [&](const Candidate& c) {
     return polarity == Polarity::automatic || (c.sign > 0) == (polarity == Polarity::dark_beads);
   };
@@ -376,12 +385,27 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
     }
     if (beads) best = beads;
   }
-  constexpr double least_merit = 0.02;  // of all edges in the frame; white noise reaches 0.002
-  if (!best || merit(*best) < least_merit) {
+  {
+    constexpr double faintest = 0.004, another = 1.15;
+    constexpr std::size_t most = 4;
+    std::vector<Candidate> ranked = candidates;
+    std::sort(ranked.begin(), ranked.end(),
+              [&](const Candidate& a, const Candidate& b) { return merit(a) > merit(b); });
+    for (const Candidate& candidate : ranked) {
+      const Polarity its = candidate.sign > 0 ? Polarity::dark_beads : Polarity::bright_beads;
+      const auto near = [&](double radius) {
+        return std::max(radius / candidate.radius, candidate.radius / radius) < another;
+      };
+      const bool known = std::any_of(estimate.others.begin(), estimate.others.end(),
+                                     [&](const auto& other) { return other.polarity == its && near(other.radius_px); });
+      if (merit(candidate) < faintest || known || !allowed(candidate) || estimate.others.size() >= most) continue;
+      estimate.others.push_back({candidate.radius, its});
+    }
+  }
+  if (!best) {
     estimate.why_not = "no circle of any radius: no rim in the frame points to a common centre";
     return estimate;
   }
-  estimate.found = true;
   estimate.radius_px = best->radius;
   estimate.polarity = best->sign > 0 ? Polarity::dark_beads : Polarity::bright_beads;
   estimate.score = best->explained * best->support;
@@ -405,6 +429,14 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
       estimate.packed_likely = voids->spacing.scatter < regular * voids->spacing.median;
     }
   }
+  constexpr double least_merit = 0.02;  // of all edges in the frame; white noise reaches 0.002
+  if (merit(*best) < least_merit) {
+    if (estimate.packed_radius_px > 0)
+      estimate.others.insert(estimate.others.begin(), {estimate.packed_radius_px, estimate.packed_polarity});
+    estimate.why_not = "no circle of any radius: no rim in the frame points to a common centre";
+    return estimate;
+  }
+  estimate.found = true;
   return estimate;
 }
 

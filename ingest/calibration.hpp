@@ -36,7 +36,13 @@ struct RadiusEstimate {
   double packed_radius_px = 0;
   Polarity packed_polarity = Polarity::automatic;
   bool packed_likely = false;  // the voids are evenly spaced
-  std::string why_not;         // when not found: a sentence
+  // What else circles were seen of, likeliest first, should the above explain little; also when nothing was found.
+  struct Other {
+    double radius_px = 0;
+    Polarity polarity = Polarity::automatic;
+  };
+  std::vector<Other> others;
+  std::string why_not;  // when not found: a sentence
 };
 
 // Radius and polarity by gradient voting over all radii from `smallest_radius_px` to `largest_radius_px` (0: a third of

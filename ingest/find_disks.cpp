@@ -253,10 +253,24 @@ std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, d
 // tells them from the voids between them; the learned profile's does.
 constexpr double strong_blur = 0.14;
 
+// A bead that hardly differs from the background over much of its area, of glass say, is nothing like an ideal disk.
+bool hollow(const BeadProfile& profile, double radius) {
+  constexpr double well_filled = 0.5;
+  double sum = 0, area = 0, most = 0;
+  for (std::size_t k = 0; k < profile.level.size(); ++k) {
+    const double r = static_cast<double>(k) * profile.step_px;
+    if (r > radius) break;
+    sum += r * static_cast<double>(profile.level[k]);
+    area += r;
+    most = std::max(most, static_cast<double>(profile.level[k]));
+  }
+  return sum < well_filled * most * area;
+}
+
 // Candidates once the bead's profile is known.
 std::vector<DiskCandidate> candidates_by(const BeadProfile& profile, const GrayFrame& flat, double radius, double edge,
                                          double noise, double score) {
-  if (edge < strong_blur * radius) return candidates_in(flat, radius, noise, score);
+  if (edge < strong_blur * radius && !hollow(profile, radius)) return candidates_in(flat, radius, noise, score);
   const int factor = map_reduction(radius);
   return seen_ones(flat, find_matched_candidates(reduced(flat, factor), factor, profile, radius, noise, score,
                                                  2 * radius * least_separation));
@@ -470,6 +484,7 @@ void drop_plain_background(std::vector<SolidBorder>& borders, const GrayFrame& f
 
 struct Learned {
   CalibrationResult result;
+  double typical = 0;      // share of the contrast that a good bead explains
   bool one_sided = false;  // light from one side was allowed for
   double unexplained = 0;  // of the first frame, grey levels squared
   bool complete = false;   // hardly more than its noise
@@ -652,6 +667,13 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
         "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but none is filled like a bead";
     return all;
   }
+  // What is left should be the frame's noise. Where much more is left than that, the frame shows something else.
+  constexpr double most_left = 0.2;  // contrast units
+  if (const double noise = noise_of(flats.front()); spread * spread > noise * noise + most_left * most_left) {
+    result.why_not = "no disks seen: " + std::to_string(total) + " circles of " + std::to_string(radius) +
+                     " px were suspected, but they do not make up the frame";
+    return all;
+  }
   calibration.radius_px = calibration.rim_radius_px = radius;
   // What the whole bed's rims tell; and where nothing explains them (the camera's tone curve bends, or what lies
   // between packed beads is neither bead nor background) those that face open background.
@@ -714,6 +736,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     calibration.warnings.push_back("Only " + std::to_string(total) +
                                    " disks to learn the bead from: its radius is uncertain.");
   all.unexplained = unexplained_of(*fits.front(), light);
+  all.typical = typical_explained;
   all.one_sided = profile.asymmetry != nullptr;
   all.complete = spread < 1.5 * noise_of(flats.front()) + 0.03;
   result.found = true;
@@ -755,30 +778,55 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
       if (estimate.found) break;
     }
   }
-  if (!estimate.found) {
+  if (!estimate.found && estimate.others.empty()) {
     result.why_not = "no disks seen: " + estimate.why_not;
     return result;
   }
-  const auto learn = [&](RadiusEstimate from) {
+  const auto learn_from_here = [&](RadiusEstimate from, bool allow_one_sided) {
     constexpr int most_starts = 3;
-    Learned best = learn_from(frames, options, from);
-    if ((best.one_sided && !best.complete) || (!best.result.found && !best.result.why_not.empty())) {
-      // Shadows beside the beads, say, are not the beads' own light.
-      Learned plain = learn_from(frames, options, from, false);
-      const bool more =
-          plain.result.calibration.disks_used > 1.05 * static_cast<double>(best.result.calibration.disks_used);
-      if (plain.result.found && (!best.result.found || more || plain.unexplained < best.unexplained))
-        best = std::move(plain);
-    }
+    Learned best = learn_from(frames, options, from, allow_one_sided);
     for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
       from.radius_px = best.result.calibration.rim_radius_px;
-      Learned again = learn_from(frames, options, from);
+      Learned again = learn_from(frames, options, from, allow_one_sided);
       if (!again.result.found || !again.complete || again.unexplained > 1.02 * best.unexplained) break;
       best = std::move(again);
     }
     return best;
   };
-  if (!(estimate.packed_radius_px > 0)) return learn(estimate).result;
+  const auto learn = [&](const RadiusEstimate& from) {
+    Learned best = learn_from_here(from, true);
+    if (!best.one_sided || (best.complete && !best.astray)) return best;
+    // Shadows beside the beads, say, are not the beads' own light.
+    Learned plain = learn_from_here(from, false);
+    return plain.result.found ? plain : best;
+  };
+  // What explains the frame little gives way to what explains it better: the bright middle of a glass bead to the
+  // whole of it, say.
+  const auto or_another = [&](Learned best) {
+    // Of what was not seen at first, many beads must be seen clearly.
+    constexpr double clearly_less = 0.5, well_explained = 0.75;
+    constexpr std::size_t fewest = 20;
+    const bool seen = best.result.found;
+    if (options.radius_px || (best.result.found && best.complete)) return best.result;
+    for (const auto& other : estimate.others) {
+      RadiusEstimate from;
+      from.found = true;
+      from.radius_px = other.radius_px;
+      from.polarity = other.polarity;
+      Learned another = learn(from);
+      if (!another.result.found || another.typical < well_explained || another.result.calibration.disks_used < fewest)
+        continue;
+      if (seen ? another.unexplained < clearly_less * best.unexplained : another.complete) best = std::move(another);
+      if (best.result.found && best.complete) break;
+    }
+    return best.result;
+  };
+  if (!estimate.found) {
+    Learned nothing;
+    nothing.result.why_not = "no disks seen: " + estimate.why_not;
+    return or_another(std::move(nothing));
+  }
+  if (!(estimate.packed_radius_px > 0)) return or_another(learn(estimate));
   // It may as well be a packed bed seen from its voids. The likelier is tried first; unless it explains the frame
   // nearly down to its noise, so is the other. What was not seen at first is believed only when it does.
   // A packed bed fills a good part of what is in view.
@@ -795,13 +843,14 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
   if (estimate.packed_likely) {
     Learned as_packed = learn(packed);
     if (as_packed.result.found && as_packed.complete && fills(as_packed)) return as_packed.result;
-    return learn(estimate).result;
+    return or_another(learn(estimate));
   }
   Learned as_seen = learn(estimate);
   if (as_seen.result.found && as_seen.complete) return as_seen.result;
   Learned as_packed = learn(packed);
   const bool better = !as_seen.result.found || as_packed.unexplained < as_seen.unexplained;
-  return as_packed.result.found && as_packed.complete && fills(as_packed) && better ? as_packed.result : as_seen.result;
+  return as_packed.result.found && as_packed.complete && fills(as_packed) && better ? as_packed.result
+                                                                                    : or_another(std::move(as_seen));
 }
 
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

@@ -155,7 +155,7 @@ void growth(const Effort& effort, StageResult& result) {
       [](int frames) { return photographs(12, 8, frames); },
       [](int frames, const RecipeRun&) { return static_cast<double>(frames); });
   measure(
-      effort.quick ? std::vector<int>{24, 48, 96} : std::vector<int>{24, 80, 240, 800}, "pixels",
+      effort.quick ? std::vector<int>{24, 48, 96} : std::vector<int>{24, 60, 120, 240}, "pixels",
       [](int width) { return photographs(width, width, 1); },
       [](int, const RecipeRun& run) {
         return run.number("render", "render.json", "/width/value") *

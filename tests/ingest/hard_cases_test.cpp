@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <tuple>
+#include <vector>
 
 #include "ingest/find_disks.hpp"
 #include "ingest/measure_bed.hpp"
@@ -178,6 +180,61 @@ TEST(HardCases, ADarkFloorIsNoRowOfBeads) {
                                        [&](const MeasuredDisk& disk) { return disk.y_px > bed.floor_px; });
       EXPECT_LE(below, 1) << depth << " " << level;
     }
+}
+
+// A frame around the bed: floor and walls of any level from darker than the beads to brighter than the background,
+// thin or thick, with background outside or none.
+TEST(HardCases, AFrameAroundTheBedHidesNoBeadAndIsNone) {
+  for (const auto& [level, thick, outside] :
+       {std::tuple{10.0F, 7, true}, {60.0F, 20, true}, {60.0F, 60, false}, {130.0F, 20, true}, {245.0F, 30, false}}) {
+    SyntheticBed bed;
+    bed.left_wall_px = 80.5, bed.right_wall_px = 419.5, bed.floor_px = 419.5;
+    bed.rows = 6, bed.gas_count = 60, bed.gas_height_px = 100, bed.jitter_px = 0.1;
+    std::vector<RenderedDisk> truth = make_synthetic_bed(bed);
+    GrayFrame frame = render_frame(truth, camera_of(500, 500));
+    for (int row = 0; row < 500; ++row)
+      for (int column = 0; column < 500; ++column) {
+        const bool in = column > 80 && column < 420 && row < 420;
+        const bool near = column > 80 - thick && column < 420 + thick && row < 420 + thick;
+        if (!in && (near || !outside))
+          frame.pixels[static_cast<std::size_t>(row * 500 + column)] =
+              level + 1.5F * static_cast<float>(row * 7 % 3 - 1);
+      }
+    const test::Score score = test::score(find_disks(frame).disks, truth, 500, 500);
+    EXPECT_EQ(score.recall(), 1.0) << level << " " << thick;
+    EXPECT_EQ(score.precision(), 1.0) << level << " " << thick;
+    EXPECT_LT(score.rms_px, 0.1) << level << " " << thick;
+  }
+}
+
+// Spheres lit from the upper left, the far side at a third of the light; what the eye takes for the middle of a bead is
+// a sixth of a radius off.
+TEST(HardCases, BeadsLitFromOneSideAreWhereTheirOutlineIs) {
+  const std::vector<RenderedDisk> truth = bed_of(10, 400, 400, 6, 60);
+  GrayFrame frame;
+  frame.width = frame.height = 400;
+  RandomStream random(5);
+  constexpr int finer = 3;
+  for (int row = 0; row < 400; ++row)
+    for (int column = 0; column < 400; ++column) {
+      double sum = 0;
+      for (int k = 0; k < finer * finer; ++k) {
+        const double x = column - 0.5 + (k % finer + 0.5) / finer, y = row - 0.5 + (k / finer + 0.5) / finer;
+        double level = 25;
+        for (const RenderedDisk& disk : truth) {
+          const double dx = (x - disk.x_px) / 10, dy = (y - disk.y_px) / 10, squared = dx * dx + dy * dy;
+          if (squared < 1) level = 60 + 140 * std::max(0.0, 0.8 * std::sqrt(1 - squared) - 0.36 * dx - 0.48 * dy);
+        }
+        sum += level;
+      }
+      frame.pixels.push_back(static_cast<float>(sum / (finer * finer) + 6 * (random.uniform() - 0.5)));
+    }
+  const FindResult result = find_disks(frame);
+  const test::Score score = test::score(result.disks, truth, 400, 400);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+  EXPECT_LT(score.rms_px, 0.1);
+  EXPECT_NEAR(result.disks.front().radius_px, 10, 0.15);
 }
 
 TEST(HardCases, BedTurnedByThreeDegreesGivesItsTilt) {
