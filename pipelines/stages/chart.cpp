@@ -477,7 +477,7 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 5,
+          .version = 6,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,

@@ -68,20 +68,34 @@ double tic_distance(const std::vector<Series>& all) {
   return 10 * power;
 }
 
-// Both pictures from one script: it is drawn twice, and what differs (size, font, file) comes first. The PDF is as wide
-// as one column of a journal, 86 mm, with text that reads there.
-std::string twice(const std::string& name, double width, double height, const std::string& body) {
+// Both pictures from one script: it is drawn twice, and what differs (size, font, place, file) comes first. The PDF is
+// as wide as one column of a journal, 86 mm, with text of 7 points that reads there (gnuplot's pdfcairo draws a font
+// of 10.5 so large).
+struct Sheet {
+  double height;         // of the SVG in pixels, 860 wide; of the PDF in points, 243.8 wide
+  std::string settings;  // gnuplot variables the body reads
+};
+constexpr double svg_width = 860, pdf_width = 8.6 / 2.54 * 72;
+std::string twice(const std::string& name, const Sheet& svg, const Sheet& pdf, const std::string& body) {
   std::string script = "set encoding utf8\n";
   script += fmt::format(
       "set terminal svg size {:.0f},{:.0f} enhanced font 'Helvetica,16' background '#ffffff' linewidth 1.4\nset output "
       "{}\nscale = 1.0\nkeyfont = ',14'\n",
-      width, height, gnuplot_text(name + ".svg"));
-  script += body + "unset output\n\nreset\nset encoding utf8\n";
+      svg_width, svg.height, gnuplot_text(name + ".svg"));
+  script += svg.settings + body + "unset output\n\nreset\nset encoding utf8\n";
   script += fmt::format(
-      "set terminal pdfcairo size 8.6cm,{:.2f}cm enhanced font 'Helvetica,7' background '#ffffff' linewidth "
-      "0.6\nset output {}\nscale = 0.6\nkeyfont = ',6'\n",
-      8.6 * height / width, gnuplot_text(name + ".pdf"));
-  return script + body + "unset output\n";
+      "set terminal pdfcairo size 8.6cm,{:.2f}cm enhanced font 'Helvetica,10.5' background '#ffffff' linewidth "
+      "0.6\nset output {}\nscale = 0.6\nkeyfont = ',9'\n",
+      pdf.height / 72 * 2.54, gnuplot_text(name + ".pdf"));
+  return script + pdf.settings + body + "unset output\n";
+}
+
+// Where a picture's key and panels are. `row`: height of a line of the key, in the sheet's unit.
+Sheet picture_sheet(std::size_t entries, std::size_t columns, int key_width, double plots, double row, double left) {
+  const auto rows = static_cast<double>(std::max<std::size_t>(1, (entries + columns - 1) / columns));
+  const double height = plots + row * rows;
+  return {height, fmt::format("key_rows = {}\nkey_width = {}\npanel_top = {:.3f}\npanel_left = {}\n", rows, key_width,
+                              1 - (0.022 * plots + 1.04 * row * rows) / height, left)};
 }
 
 void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script) {
@@ -180,16 +194,16 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   body +=
       "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
       "pointintervalbox 0\n";
-  // Above the picture, where it hides nothing: in three columns if the labels are short enough for that.
+  // Above the picture, where it hides nothing, in as many columns as the labels allow.
   std::size_t entries = picture.band_label.empty() ? 0 : 1, longest = letters(picture.band_label);
   for (const Series& series : drawn.series) {
     entries += !series.label.empty();
     longest = std::max(longest, letters(series.label));
   }
-  const std::size_t columns = entries > 4 && longest <= 27 ? 3 : 2;
-  const std::size_t rows = std::max<std::size_t>(1, (entries + columns - 1) / columns);
-  body += fmt::format("set key above vertical maxrows {} Left reverse font keyfont spacing 1.2 samplen 1.5 width {}\n",
-                      rows, columns == 3 && longest > 18 ? -3 : 0);
+  const bool many = entries > 4;
+  const std::size_t svg_columns = many && longest <= 27 ? 3 : 2;
+  const std::size_t pdf_columns = many && longest <= 14 ? 3 : longest <= 26 ? 2 : 1;
+  body += "set key above vertical maxrows key_rows Left reverse font keyfont spacing 1.2 samplen 1.5 width key_width\n";
   int object = 1;
   for (const auto& [low, high] : picture.bands) {
     body += fmt::format(
@@ -198,10 +212,9 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
         object++, number_text(low), number_text(high));
   }
   if (two) {
-    body += fmt::format(
-        "set multiplot\nset lmargin at screen 0.14\nset rmargin at screen 0.97\nset tmargin at screen {:.2f}\nset "
-        "bmargin at screen 0.38\nset format x ''\n",
-        1 - (14 + 25 * static_cast<double>(rows)) / (640 + 24 * static_cast<double>(rows)));
+    body +=
+        "set multiplot\nset lmargin at screen panel_left\nset rmargin at screen 0.97\nset tmargin at screen "
+        "panel_top\nset bmargin at screen 0.38\nset format x ''\n";
   } else {
     body += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
   }
@@ -213,7 +226,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   body += plot_elements(drawn.series, name, 0, true) + "\n";
   if (two) {
     body += fmt::format(
-        "set tmargin at screen 0.35\nset bmargin at screen 0.12\nunset key\nunset title\nset format x '% h'\nset "
+        "set tmargin at screen 0.35\nset bmargin at screen 0.13\nunset key\nunset title\nset format x '% h'\nset "
         "xlabel {}\nset ylabel {}\nset yrange [*:*]\nunset logscale y\nset xzeroaxis lc rgb "
         "'#404040' lw 1\n",
         gnuplot_text(picture.x_label), gnuplot_text(picture.lower_label));
@@ -223,7 +236,10 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
     if (!picture.x_low || !picture.x_high) body += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
     body += "plot " + plot_elements(drawn.lower, name, drawn.series.size(), false) + "\nunset multiplot\n";
   }
-  run_gnuplot(directory, name, twice(name, 860, (two ? 640 : 480) + 24 * static_cast<double>(rows), body));
+  const Sheet svg =
+      picture_sheet(entries, svg_columns, svg_columns == 3 && longest > 18 ? -3 : 0, two ? 640 : 480, 24, 0.14);
+  const Sheet pdf = picture_sheet(entries, pdf_columns, 0, two ? 200 : 150, 9.2, 0.17);
+  run_gnuplot(directory, name, twice(name, svg, pdf, body));
 }
 
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
@@ -253,7 +269,7 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
     body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 1.3*scale lw 3 lc rgb '#D55E00' title {}",
                         gnuplot_text(name + ".dat"), gnuplot_text(plain(picture.cross_label)));
   const double shape = std::clamp((top + 8) / (picture.width + 10), 0.3, 2.0);
-  run_gnuplot(directory, name, twice(name, 860, 860 * shape, body + "\n"));
+  run_gnuplot(directory, name, twice(name, {svg_width * shape, ""}, {pdf_width * shape, ""}, body + "\n"));
 }
 
 namespace {
@@ -491,7 +507,7 @@ void Figure::run(RunContext& context) const {
 
 StageRow figure_stage() {
   return {.name = "figure",
-          .version = 3,
+          .version = 4,
           .summary = "draws profiles, fits and published curves",
           .accepts = {"extract", "simulate", "fit"},
           .fewest_inputs = 1,
