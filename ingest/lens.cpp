@@ -54,6 +54,30 @@ GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
                                 t * (0.5F + t * (2 - 1.5F * t)), t * t * (-0.5F + 0.5F * t)};
   };
   const std::size_t stride = static_cast<std::size_t>(recorded_width_);
+  if (lens_.radial == 0) {  // rows stay rows
+    struct Part {
+      std::array<std::size_t, 4> from;
+      std::array<float, 4> weight;
+    };
+    std::vector<Part> parts(static_cast<std::size_t>(width_));
+    for (int column = 0; column < width_; ++column) {
+      Part& part = parts[static_cast<std::size_t>(column)];
+      const double x = std::clamp(to_recorded({static_cast<double>(column), middle_y_}).x, 0.0, recorded_width_ - 1.0);
+      const int left = static_cast<int>(x);
+      part.weight = weights(static_cast<float>(x - left));
+      for (int i = 0; i < 4; ++i)
+        part.from[static_cast<std::size_t>(i)] =
+            static_cast<std::size_t>(std::clamp(left + i - 1, 0, recorded_width_ - 1));
+    }
+    for (int row = 0; row < height_; ++row) {
+      const float* line = recorded.pixels.data() + static_cast<std::size_t>(row) * stride;
+      float* to = frame.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
+      for (const Part& part : parts)
+        *to++ = part.weight[0] * line[part.from[0]] + part.weight[1] * line[part.from[1]] +
+                part.weight[2] * line[part.from[2]] + part.weight[3] * line[part.from[3]];
+    }
+    return frame;
+  }
   for (int row = 0; row < height_; ++row) {
     float* to = frame.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
     for (int column = 0; column < width_; ++column) {

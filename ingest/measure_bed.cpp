@@ -176,6 +176,8 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
 // Straight line y = a + b x through the bottoms of the lowest disks, by Huber's weights.
 struct Line {
   double offset = 0, slope = 0;
+  double slope_std_error = 0;
+  std::pair<double, double> middle;  // of the points
 };
 Line robust_line(const std::vector<std::pair<double, double>>& points) {
   Line line;
@@ -202,6 +204,12 @@ Line robust_line(const std::vector<std::pair<double, double>>& points) {
     if (!(determinant > 1e-9 * w * wxx)) break;
     line.slope = (w * wxy - wx * wy) / determinant;
     line.offset = (wy - line.slope * wx) / w;
+    double square = 0;
+    for (const auto& [x, y] : points)
+      square += std::min(std::pow(y - line.offset - line.slope * x, 2), 36 * spread * spread);
+    const double variance = std::max(spread * spread, square / (static_cast<double>(points.size()) - 2));
+    line.slope_std_error = std::sqrt(variance * w / determinant);
+    line.middle = {wx / w, wy / w};
   }
   return line;
 }
@@ -235,7 +243,15 @@ Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, in
   std::vector<std::pair<double, double>> low;
   for (const auto& point : points)
     if (point.second > typical - 0.6 * diameter_px) low.push_back(point);
-  return robust_line(low);
+  Line line = robust_line(low);
+  // Some ten columns of a bed that flies do not lie on a line: a tilt is believed beyond its error only (1 in 200 for
+  // Student's t of 8 degrees of freedom).
+  constexpr double believed = 4;
+  if (std::abs(line.slope) < believed * line.slope_std_error) {
+    line.slope = 0;
+    line.offset = line.middle.second;
+  }
+  return line;
 }
 
 // The floor's motion, y = middle - rise sin(2 pi turns) - rise_late cos(2 pi turns), from what no bead ever passes.
@@ -517,6 +533,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       const Line floor = find_floor(held, diameter_px, finder.width);
       bed.floor_px = floor.offset;
       bed.floor_slope = options.floor_slope.value_or(floor.slope);
+      if (!options.floor_slope) bed.floor_tilt_std_error_degrees = floor.slope_std_error * 180 / std::numbers::pi;
       if (options.floor_slope) {  // keep the line through the middle of the frame
         bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
       }
@@ -837,8 +854,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     measurement.warnings.push_back("Beads are cut by the lower border of the frame: the floor is not in view.");
   if (std::abs(bed.floor_tilt_degrees) > 0.5) {
     char text[160];
-    std::snprintf(text, sizeof text, "The floor is tilted by %.2f degrees; heights are measured across it.",
-                  bed.floor_tilt_degrees);
+    std::snprintf(text, sizeof text, "The floor is tilted by %.2f +- %.2f degrees; heights are measured across it.",
+                  bed.floor_tilt_degrees, bed.floor_tilt_std_error_degrees);
     measurement.warnings.emplace_back(text);
   }
   return measurement;

@@ -85,9 +85,10 @@ struct BedCalibration {
   double noise_level = 0;     // grey levels
   double contrast_level = 0;  // grey levels
   Polarity polarity = Polarity::automatic;
-  double floor_px = 0;     // at x_px = 0; its mean position when it moves
-  double floor_slope = 0;  // px down per px right
-  double floor_tilt_degrees = 0;
+  double floor_px = 0;                      // at x_px = 0; its mean position when it moves
+  double floor_slope = 0;                   // px down per px right
+  double floor_tilt_degrees = 0;            // 0 unless beyond its error
+  double floor_tilt_std_error_degrees = 0;  // 0 when given
   // The floor moves in the frame as floor_px - floor_amplitude_px sin(2 pi (t f + floor_phase)), t from the first
   // frame, upwards positive. Fitted when shaking frequency and frame rate are given and the floor is not; 0 when it
   // rests.

@@ -609,7 +609,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["polarity"] = bed.polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
   result["floor"] = quantity_json(bed.floor_px, "px");
   result["floor_given"] = bed.floor_given;
-  result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg");
+  result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
   result["left_wall"] = quantity_json(bed.left_wall_px, "px");
   result["right_wall"] = quantity_json(bed.right_wall_px, "px");
   result["walls_given"] = bed.walls_given;
