@@ -153,7 +153,7 @@ std::string page_head(const std::string& title) {
       "'unsafe-inline'; img-src data:\">\n"
       "<meta name=\"generator\" content=\"shakebed {}\">\n<link rel=\"icon\" "
       "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
-      program_version(), html(title), style, html(title));
+      program_version(), html(title), style, prose(title));
 }
 
 namespace {
@@ -340,9 +340,9 @@ class Report {
             "</tr>\n",
             prose(row.value("claim", "")), aside("measured_as"), html(row.value("claimed", "")),
             html(row.value("measured", "")),
-            verdict == "holds" || verdict == "agrees within errors" ? "good"
-            : verdict == "not measured"                             ? "soft"
-                                                                    : "bad",
+            verdict == "holds"           ? "good"
+            : verdict == "does not hold" ? "bad"
+                                         : "soft",
             html(verdict), aside("note"), prose(row.value("place", "")));
       }
       out += "</table></div>\n<p class=\"soft\">" + html(results_.at(stage.id).value("verdict_is", "")) + ".</p>\n";

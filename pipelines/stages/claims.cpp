@@ -16,13 +16,13 @@ struct Claim {
 };
 
 // The interval of 95 % against what is claimed. A claim of a number to some tolerance is an interval too.
-enum class Verdict { holds, within_errors, fails, open };
+enum class Verdict { holds, open, fails, missing };
 std::string_view name_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::holds:
       return "holds";
-    case Verdict::within_errors:
-      return "agrees within errors";
+    case Verdict::open:
+      return "open";
     case Verdict::fails:
       return "does not hold";
     default:
@@ -90,10 +90,10 @@ class Claims : public Stage {
       const double low = c.value ? *c.value - c.tolerance : c.least.value_or(-INFINITY),
                    high = c.value ? *c.value + c.tolerance : c.most.value_or(INFINITY);
       const double reach = 1.96 * error;
-      const Verdict verdict = !std::isfinite(value)                           ? Verdict::open
+      const Verdict verdict = !std::isfinite(value)                           ? Verdict::missing
                               : value - reach >= low && value + reach <= high ? Verdict::holds
                               : value + reach < low || value - reach > high   ? Verdict::fails
-                                                                              : Verdict::within_errors;
+                                                                              : Verdict::open;
       std::string claimed = c.value ? fmt::format("{:g}", *c.value) : "";
       if (c.value && c.tolerance > 0) claimed += fmt::format(" ± {:g}", c.tolerance);
       if (c.least) claimed += fmt::format("at least {:g}", *c.least);
@@ -132,7 +132,7 @@ class Claims : public Stage {
     write_file(context.output("claims.json"),
                dump(Json{{"verdict_is",
                           "the interval of 95 % of the measured number (1.96 standard errors) lies within "
-                          "what is claimed (holds), outside of it (does not hold), or in both"},
+                          "what is claimed (holds), outside of it (does not hold), or in both (open)"},
                          {"claims", std::move(rows)}}));
     write_file(context.output("claims.csv"), csv);
     write_file(context.output("claims.md"), table);
@@ -146,9 +146,9 @@ class Claims : public Stage {
 
 StageRow claims_stage() {
   return {.name = "claims",
-          .version = 2,
+          .version = 3,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
-          .accepts = {"chart", "study", "simulate", "fit", "map", "extract"},
+          .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "claims.json",
