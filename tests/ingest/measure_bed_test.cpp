@@ -288,6 +288,27 @@ TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {
   EXPECT_TRUE(told);
 }
 
+// Few beads near the floor, none of them at rest: their lowest places lie on no line, and no tilt follows.
+TEST(MeasureBed, ATiltWithinItsErrorIsNone) {
+  std::vector<GrayFrame> frames;
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    SyntheticBed bed;
+    bed.left_wall_px = 6, bed.right_wall_px = 250, bed.floor_px = 290;
+    bed.radius_px = 8, bed.rows = 0, bed.gas_count = 60, bed.gas_height_px = 120, bed.seed = k + 1;
+    Camera camera;
+    camera.width = 256, camera.height = 300;
+    camera.blur_px = 0.8, camera.read_noise = 3;
+    frames.push_back(render_frame(make_synthetic_bed(bed), camera));
+  }
+  FrameSource source = FrameSource::from_frames(frames);
+  MeasureOptions options;
+  options.bead_diameter_m = 3e-3;
+  const Measurement found = measure_bed(source, options);
+  EXPECT_EQ(found.calibration.floor_tilt_degrees, 0);
+  EXPECT_GT(found.calibration.floor_tilt_std_error_degrees, 0.05);
+  for (const std::string& warning : found.warnings) EXPECT_EQ(warning.find("tilted"), std::string::npos) << warning;
+}
+
 TEST(MeasureBed, ASecondSpeciesIsRejectedUnlessAskedFor) {
   SyntheticBed bed;
   bed.left_wall_px = 12;
