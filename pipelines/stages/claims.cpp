@@ -56,7 +56,7 @@ class Claims : public Stage {
 
   void run(RunContext& context) const override {
     Json rows = Json::array();
-    std::string csv = "claim,claimed,measured,std_error,verdict,place\n",
+    std::string csv = "claim,measured_as,claimed,measured,std_error,verdict,place\n",
                 table = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
     const auto cell = [](const std::string& text) {
       std::string out;
@@ -122,7 +122,7 @@ class Claims : public Stage {
         for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
         return "\"" + text + "\"";
       };
-      csv += fmt::format("{},{},{},{},{},{}\n", quoted(c.claim), quoted(claimed),
+      csv += fmt::format("{},{},{},{},{},{},{}\n", quoted(c.claim), quoted(c.measured_as), quoted(claimed),
                          std::isfinite(value) ? number_text(value) : "", error > 0 ? number_text(error) : "",
                          name_of(verdict), quoted(c.place));
       table += fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
@@ -146,7 +146,7 @@ class Claims : public Stage {
 
 StageRow claims_stage() {
   return {.name = "claims",
-          .version = 3,
+          .version = 4,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
           .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
