@@ -37,6 +37,8 @@ class LensMap {
   [[nodiscard]] GrayFrame corrected(const GrayFrame& recorded) const;
 
  private:
+  [[nodiscard]] double shrink(double q) const;
+
   Lens lens_;
   int recorded_width_, recorded_height_, width_, height_;
   double margin_x_ = 0, margin_y_ = 0;

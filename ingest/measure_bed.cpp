@@ -406,12 +406,13 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     if (!left.known) break;
     // Below a few thousandths it may as well be streaks or shading, and does no harm.
     constexpr double worth_it = 0.004, settled = 3e-4, most = 0.25;
-    const double least = lens.plain() ? worth_it : settled;
-    const auto clear = [&](double value, double std_error) { return std::abs(value) > std::max(least, 5 * std_error); };
+    const auto clear = [&](double value, double std_error, bool in_use) {
+      return std::abs(value) > std::max(in_use ? settled : worth_it, 5 * std_error);
+    };
     Lens better = lens;
-    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error))
+    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error, lens.pixel_aspect != 1))
       better.pixel_aspect = std::clamp(lens.pixel_aspect * left.lens.pixel_aspect, 1 - most, 1 + most);
-    if (!options.lens_radial && clear(left.lens.radial, left.radial_std_error))
+    if (!options.lens_radial && clear(left.lens.radial, left.radial_std_error, lens.radial != 0))
       better.radial = std::clamp(lens.radial + left.lens.radial, -most, most);
     if (better.pixel_aspect == lens.pixel_aspect && better.radial == lens.radial) break;
     const Lens before = lens;
