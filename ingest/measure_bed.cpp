@@ -427,6 +427,10 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       break;
     }
     calibrated = std::move(again);
+    // What a small correction leaves is its square and a share of its own: less than what would be worth it.
+    constexpr double small = 0.01;
+    if (std::abs(lens.pixel_aspect / before.pixel_aspect - 1) < small && std::abs(lens.radial - before.radial) < small)
+      break;
   }
   if (options.second_diameter_m) {
     const double expected = calibrated.calibration.radius_px * *options.second_diameter_m / options.bead_diameter_m;
