@@ -34,7 +34,7 @@ void integrate_over_disk(double radius, double blur, double distance, const Use&
   const double low = std::max(0.0, distance - 7 * blur), high = std::min(radius, distance + 7 * blur);
   if (high <= low) return;
   const double v_low = std::sqrt(radius - high), v_high = std::sqrt(radius - low);
-  constexpr int pieces = 2;
+  constexpr int pieces = 3;
   const double inverse_square = 1 / (blur * blur);
   for (int piece = 0; piece < pieces; ++piece) {
     const double from = v_low + (v_high - v_low) * piece / pieces;

@@ -359,6 +359,7 @@ TEST(MeasureBed, ASecondSpeciesIsRejectedUnlessAskedFor) {
   options.second_diameter_m = 1.2e-3;
   const Measurement none = measure_bed(source, options);
   EXPECT_FALSE(none.second_finder);
+  ASSERT_FALSE(none.warnings.empty());
   EXPECT_NE(none.warnings.front().find("second diameter"), std::string::npos);
 }
 
