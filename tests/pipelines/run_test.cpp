@@ -188,6 +188,13 @@ TEST_F(Presets, AMistypedNameIsToldWhichThereAre) {
   EXPECT_EQ(run({"reproduce", "all", "--preset", "no-such", "--out", "o"}).exit_code, 2);
 }
 
+TEST_F(Presets, EveryFigureThatShipsHasAQuickOneAndAFullOne) {
+  for (const char* preset : {"quick", "full"}) {
+    const ProgramResult plan = run({"reproduce", "all", "--preset", preset, "--out", "o", "--dry-run"});
+    EXPECT_EQ(plan.exit_code, 0) << preset << ": " << plan.err;
+  }
+}
+
 TEST_F(Presets, AMistakeInOneIsShownAtItsPlaceWithoutRunningIt) {
   presets("{ \"quick\": {\n\"/stages/bed/disks/diameter\": \"3 Hz\" } }");
   const ProgramResult wrong = run({"validate", "r.json"});
