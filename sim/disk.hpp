@@ -7,6 +7,7 @@
 namespace shakebed::sim {
 
 inline constexpr double never = std::numeric_limits<double>::infinity();
+inline constexpr double skin_unit = 1.0 / 128;
 
 // What a disk meets next. A partner >= 0 is another disk's number; the rest are these.
 enum Partner : std::int32_t {
@@ -36,7 +37,7 @@ struct alignas(64) Disk {
   std::int32_t partner;      // with whom: a disk's number or one of Partner
   std::uint16_t neighbours;  // how many disks its neighbour list holds
   std::uint8_t near;         // which walls its shell can reach, bits of Near
-  std::uint8_t skin;         // radius of its shell, in units of Engine::skin_unit_
+  std::uint8_t skin;         // radius of its shell, in units of skin_unit
   float shell_x, shell_z;    // centre of its shell
 };
 static_assert(sizeof(Disk) == 64);

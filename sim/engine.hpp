@@ -125,7 +125,6 @@ class Engine final : public Simulation {
 
   // --- synchronisation
   void synchronise();
-  double density_round_disks(double height) const;
   void begin_interval();
   void renumber();
   template <class Self, class Visit>
@@ -172,7 +171,6 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  double skin_unit_ = 1.0 / 128;  // of Disk::skin
   bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;

@@ -209,7 +209,7 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, c
   const double dt = next.time - now_;
   const double ox = motion.x - static_cast<double>(disk.shell_x), oz = motion.z - static_cast<double>(disk.shell_z);
   // Gravity bends the path away from its chord by at most g dt^2 / 8.
-  const double skin = disk.skin * skin_unit_;
+  const double skin = disk.skin * skin_unit;
   double limit = skin;
   double ez = oz + motion.vz * dt;
   if constexpr (Space::falls) {
@@ -313,7 +313,7 @@ FloatLanes Engine<Space, Rule, Sizes>::skins_and_radii(WordLanes ids) const {
   if constexpr (!Sizes::equal) {
     for (int k = 0; k < 8; ++k) radii[k] = static_cast<float>(sizes_.radius(static_cast<std::uint32_t>(ids[k])));
   }
-  return __builtin_convertvector(skins, FloatLanes) * all_floats(static_cast<float>(skin_unit_)) + radii;
+  return __builtin_convertvector(skins, FloatLanes) * all_floats(static_cast<float>(skin_unit)) + radii;
 }
 
 // The largest shell with which i would have no more than eight neighbours,
@@ -333,13 +333,13 @@ void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
     }
     skin = std::max(skin, static_cast<float>(smallest_skin_));
   }
-  disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit_));
+  disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit));
 }
 
 // Fills found_ with those of nearby_ that i's shell reaches.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
-  const auto skin = static_cast<float>(disks_[i].skin * skin_unit_);
+  const auto skin = static_cast<float>(disks_[i].skin * skin_unit);
   found_.clear();
   for (std::size_t k = 0; k < nearby_count_; ++k) {
     if (reached_by_[k] < skin) found_.push_back(nearby_[k]);
@@ -351,7 +351,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::mark_near_walls(std::uint32_t i) {
   if constexpr (Space::has_walls) {
     Disk& disk = disks_[i];
-    const double reach = sizes_.radius(i) + disk.skin * skin_unit_ + shell_slack;
+    const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
     unsigned near = 0;
     if (hard_sides_ && disk.shell_x < reach) near |= near_left_wall;
     if (hard_sides_ && disk.shell_x > width_ - reach) near |= near_right_wall;
@@ -854,29 +854,6 @@ void Engine<Space, Rule, Sizes>::renumber() {
   }
 }
 
-// Disks an area, as the disks themselves find it: the mean over disks of how many others share their square of about 16
-// D. At least that of a single pair in the box.
-template <class Space, class Rule, class Sizes>
-double Engine<Space, Rule, Sizes>::density_round_disks(double height) const {
-  const double side = 16;
-  const auto columns = static_cast<std::size_t>(std::max(1.0, width_ / side)),
-             rows = static_cast<std::size_t>(std::max(1.0, height / side));
-  std::vector<std::uint32_t> disks(columns * rows);
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    double x = disks_[i].x, z = disks_[i].z;
-    if constexpr (Space::wraps_x) x = period_x_.wrapped(x);
-    if constexpr (Space::wraps_z) z = period_z_.wrapped(z);
-    const auto place = [](double value, double length, std::size_t places) {
-      return static_cast<std::size_t>(
-          std::clamp(value / length * static_cast<double>(places), 0.0, static_cast<double>(places - 1)));
-    };
-    ++disks[place(z, height, rows) * columns + place(x, width_, columns)];
-  }
-  double pairs = 0;
-  for (const std::uint32_t n : disks) pairs += static_cast<double>(n) * (n - 1.0);
-  return std::max(pairs, 2.0) / count_ / (width_ * height / static_cast<double>(columns * rows));
-}
-
 // From positions, velocities, spins and clocks at now_ = 0 alone.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
@@ -890,27 +867,23 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average. Where there is no
-  // gravity the density is that which disks have round them, so that a gas has shells as large as its free paths and
-  // its clusters do not pay for them; a bed has a gas above it, where larger ones save work.
-  const double density = Space::falls ? count_ / (width_ * height) : density_round_disks(height);
-  largest_skin_ =
-      std::clamp(0.5 * (std::sqrt(8.3 / (std::numbers::pi * density)) - 1), 0.25, Space::falls ? 1.5 : 24.0);
+  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average; a bed under gravity
+  // has a gas above it, where larger ones save work.
+  const double density = count_ / (width_ * height);
+  largest_skin_ = std::clamp(0.5 * (std::sqrt(8.3 / (std::numbers::pi * density)) - 1), 0.25, 1.5);
   if constexpr (Space::falls) largest_skin_ = std::max(largest_skin_, 0.5);
   // Two disks that stay in their shells must not come near a second image of each other.
   if constexpr (Space::wraps_x) {
     if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact) / 4);
   }
   if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact) / 4);
-  skin_unit_ = 1.0 / 128;
-  while (255 * skin_unit_ < largest_skin_) skin_unit_ *= 2;
   // Distances of shells' centres are taken in single precision.
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
   shells_.reset(disks_.data(), count_, largest_contact + 2 * largest_skin_ + shell_slack_, width_, height);
   for (std::uint32_t i = 0; i < count_; ++i) {
     centre_shell(i);
-    disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit_);
+    disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
     shells_.file(i);
   }
   for (std::uint32_t i = 0; i < count_; ++i) {

@@ -144,30 +144,6 @@ TEST(Engine, KeepsTheImagesOfANeighbourApart) {
   }
 }
 
-// A gas so thin that disks fly a hundred times their size between collisions: its pressure, and what it
-// costs.
-TEST(Engine, FollowsAThinGasWithLargeShells) {
-  Scene scene;
-  scene.gravity = Weightless{};
-  scene.disks.species = {{400, 1, 1}};
-  scene.box.width = 400;
-  scene.box.sides = PeriodicSides{};
-  scene.box.top = PeriodicTop{400};
-  scene.start = RandomStart{};
-  scene.start_temperature = 1;
-  const auto sim = simulate(scene);
-  for (int i = 1; i <= 50; ++i) {
-    sim->advance_to(200.0 * i);
-    ASSERT_LE(sim->largest_overlap(), 1e-12);
-  }
-  const Counters counters = sim->counters();
-  const double collisions = static_cast<double>(counters.disk_collisions);
-  // Z - 1 = 2 phi to first order, that is 0.00393, with phi^2 terms below 2e-5; five standard errors.
-  const double z_less_one = counters.virial / (2 * sim->energy().kinetic * sim->time());
-  EXPECT_NEAR(z_less_one / (2 * 400 * std::numbers::pi / 4 / (400.0 * 400.0)), 1, 5 / std::sqrt(collisions) + 0.005);
-  EXPECT_LT(static_cast<double>(counters.shell_exits), 60 * collisions);
-}
-
 // Rows whose disks touch exactly: contacts of equal times, many of them at one instant, each of which must have its
 // turn.
 TEST(Engine, KeepsALatticeOfTouchingDisksApart) {
