@@ -504,9 +504,10 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
       if (std::find(arrows[i].begin(), arrows[i].end(), target) != arrows[i].end()) {
         problem(*node, where, fmt::format("names \"{}\" twice", node->text));
       } else if (std::find(row.accepts.begin(), row.accepts.end(), kind) == row.accepts.end()) {
-        problem(*node, where,
-                fmt::format("\"{}\" is a stage of kind {}, and {} does not read its results", node->text, kind, row.name),
-                row.accepts.empty() ? "" : fmt::format("It reads those of {}", fmt::join(row.accepts, ", ")));
+        problem(
+            *node, where,
+            fmt::format("\"{}\" is a stage of kind {}, and {} does not read its results", node->text, kind, row.name),
+            row.accepts.empty() ? "" : fmt::format("It reads those of {}", fmt::join(row.accepts, ", ")));
       } else {
         arrows[i].push_back(target);
       }
