@@ -17,6 +17,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/errors.hpp"
 #include "pipelines/json.hpp"
 #include "pipelines/sha256_block.hpp"
@@ -65,12 +66,6 @@ class MappedFile {
   void* data_ = nullptr;
   std::size_t size_ = 0;
 };
-
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
-}
 
 }  // namespace
 
@@ -228,30 +223,6 @@ std::string profile_text(const ProfileTable& profile) {
 
 void write_profile_csv(const std::filesystem::path& path, const ProfileTable& profile) {
   write_file(path, profile_text(profile));
-}
-
-std::vector<std::string> split_csv_line(std::string_view line, char separator) {
-  std::vector<std::string> cells(1);
-  bool quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (quoted) {
-      if (c == '"' && i + 1 < line.size() && line[i + 1] == '"')
-        cells.back() += '"', ++i;
-      else if (c == '"')
-        quoted = false;
-      else
-        cells.back() += c;
-    } else if (c == '"') {
-      quoted = true;
-    } else if (c == separator) {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
-    }
-  }
-  for (std::string& cell : cells) cell = trimmed(cell);
-  return cells;
 }
 
 namespace {

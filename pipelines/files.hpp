@@ -63,7 +63,4 @@ void write_profile_csv(const std::filesystem::path& path, const ProfileTable& pr
 // are optional, a missing area_fraction is pi/4 phi. Rows are sorted by height. Throws InputError naming the line.
 ProfileTable read_profile_csv(const std::filesystem::path& path);
 
-// One line of a CSV, as text. Quotes are understood.
-std::vector<std::string> split_csv_line(std::string_view line, char separator = ',');
-
 }  // namespace shakebed::pipelines

@@ -18,6 +18,7 @@
 #include "ingest/synthetic_frames.hpp"
 #include "ingest/velocities.hpp"
 #include "pipelines/bed.hpp"
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/images_module.hpp"
 #include "pipelines/trajectory.hpp"

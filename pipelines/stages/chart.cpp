@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <complex>
 
 #include "fit/straight_line.hpp"
 #include "pipelines/bed.hpp"
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "pipelines/trajectory.hpp"
@@ -70,21 +70,12 @@ double value_at(const CurveOptions& curve, double x) {
   return y;
 }
 
-std::optional<double> number_in(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    return std::nullopt;
-  return value;
-}
-
 // Rows of a table that fulfil `where`, with x rising.
 struct Data {
   std::vector<double> x, y, error;
   bool has_errors = true;
 };
 Data read_data(const std::filesystem::path& path, const PointsOptions& options) {
-  const std::string text = read_file(path);
   std::vector<std::string> header;
   struct Row {
     double x, y, error;
@@ -92,25 +83,10 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
   std::vector<Row> rows;
   Data data;
   bool any = false;
-  const auto column = [&](const std::string& name) {
-    const auto found = std::find(header.begin(), header.end(), name);
-    if (found == header.end()) {
-      const std::string nearest = nearest_name(name, header);
-      throw InputError(fmt::format("{}: has no column \"{}\"; {}", path.string(), name,
-                                   nearest.empty() ? fmt::format("there are {}", fmt::join(header, ", "))
-                                                   : fmt::format("did you mean \"{}\"?", nearest)));
-    }
-    return static_cast<std::size_t>(found - header.begin());
-  };
+  const auto column = [&](const std::string& name) { return csv_column(header, name, path.string()); };
   std::size_t x = 0, y = 0, error = 0;
   std::vector<std::size_t> conditions;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (line.empty() || line.front() == '#') continue;
-    const auto cells = split_csv_line(line);
+  each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t) {
     if (header.empty()) {
       header = cells;
       x = column(options.x), y = column(options.y);
@@ -122,7 +98,7 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
       data.has_errors = !of_error.empty() && of_error != "none";
       if (data.has_errors) error = column(of_error);
       for (const auto& [name, ignored] : options.where) conditions.push_back(column(name));
-      continue;
+      return;
     }
     const auto cell = [&](std::size_t k) { return k < cells.size() ? cells[k] : std::string(); };
     bool wanted = true;
@@ -130,13 +106,13 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
       wanted = wanted && cell(conditions[k]) == options.where[k].second;
     any = any || wanted;
     const auto at = number_in(cell(x)), value = number_in(cell(y));
-    if (!wanted || !at || !value) continue;
+    if (!wanted || !at || !value) return;
     const double place = options.x_plus + options.x_times * *at;
-    if (options.x_least && place < *options.x_least) continue;
-    if (options.x_most && place > *options.x_most) continue;
+    if (options.x_least && place < *options.x_least) return;
+    if (options.x_most && place > *options.x_most) return;
     const auto spread = data.has_errors ? number_in(cell(error)) : std::nullopt;
     rows.push_back({place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0});
-  }
+  });
   // What is only counted may be nothing: no prediction in range, say.
   if (!any && options.look != Look::none)
     throw InputError(fmt::format("{}: no row is one of \"{}\"", path.string(), options.name));

@@ -8,6 +8,7 @@
 
 #include "fit/hydrostatic_profile.hpp"
 #include "pipelines/bed.hpp"
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/process.hpp"
 
@@ -301,30 +302,22 @@ Curve curve_of(const ProfileTable& table) {
 // Two columns of one of our own CSV files.
 Curve read_columns(const std::filesystem::path& path, const std::string& x, const std::string& y,
                    const std::string& error = "") {
-  const std::string text = read_file(path);
   Curve curve;
   std::vector<std::string> header;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (line.empty() || line.front() == '#') continue;
-    const auto cells = split_csv_line(line);
+  each_csv_line(read_file(path), [&](std::vector<std::string> cells, std::size_t line) {
     if (header.empty()) {
-      header = cells;
-      continue;
+      header = std::move(cells);
+      return;
     }
     const auto number = [&](const std::string& name) {
-      const auto found = std::find(header.begin(), header.end(), name);
-      const auto index = static_cast<std::size_t>(found - header.begin());
-      if (found == header.end() || index >= cells.size())
-        throw InputError(fmt::format("{}: has no column \"{}\"", path.string(), name));
+      const std::size_t index = csv_column(header, name, path.string());
+      if (index >= cells.size())
+        throw InputError(fmt::format("{}:{}: has no cell in column \"{}\"", path.string(), line, name));
       return std::strtod(cells[index].c_str(), nullptr);
     };
     curve.x.push_back(number(x)), curve.y.push_back(number(y));
     if (!error.empty()) curve.error.push_back(number(error));
-  }
+  });
   return curve;
 }
 

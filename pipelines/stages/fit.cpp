@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "fit/expansion.hpp"
 #include "fit/fit_profile.hpp"
 #include "fit/simulated_profiles.hpp"
 #include "pipelines/bed.hpp"
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/theory.hpp"
 #include "pipelines/trajectory.hpp"
@@ -170,35 +170,23 @@ void read_covariance(const Input& source, fit::Profile& profile) {
     if (at == heights.end() || std::abs(*at - height) > 1e-9) return std::nullopt;
     return static_cast<std::size_t>(at - heights.begin());
   };
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    constexpr std::string_view blocks = "# independent_blocks: ";
-    if (line.starts_with(blocks))
-      profile.covariance_samples = std::atoi(std::string(line.substr(blocks.size())).c_str());
-    if (line.empty() || line.front() == '#' || line.front() == 'h') continue;
-    const auto cells = split_csv_line(line);
+  constexpr std::string_view blocks = "# independent_blocks: ";
+  if (const std::size_t at = text.find(blocks); at != std::string::npos)
+    profile.covariance_samples = std::atoi(text.c_str() + at + blocks.size());
+  each_csv_line(text, [&](const std::vector<std::string>& cells, std::size_t) {
+    if (cells[0] == "height_i") return;
     if (cells.size() != 3) throw InputError(path.string() + ": expected height_i,height_j,covariance");
     const auto i = index_of(std::strtod(cells[0].c_str(), nullptr)),
                j = index_of(std::strtod(cells[1].c_str(), nullptr));
-    if (!i || !j) continue;
+    if (!i || !j) return;
     const double value = std::strtod(cells[2].c_str(), nullptr);
     profile.covariance[*i * n + *j] = profile.covariance[*j * n + *i] = value;
-  }
+  });
   if (const Json found = source.result(); source.stage == "extract" && found.contains("profile")) {
     const double frames = found["profile"].value("frames", 0.0),
                  together = found["profile"].value("correlation_frames", 1.0);
     profile.covariance_samples = static_cast<int>(frames / std::max(1.0, together));
   }
-}
-
-std::optional<double> number_in(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
 }
 
 fit::Profile profile_of(const ProfileTable& table) {
@@ -345,16 +333,10 @@ fit::ProfileFrames frames_of(const Input& source, const ProfileTable& table, con
   const Json* width = find_pointer(extracted, "/width/value");
   if (width == nullptr || !width->is_number()) throw InputError("\"bootstrap\": the frames do not tell their width");
   const std::filesystem::path path = source.file("disks.csv");
-  const std::string text = read_file(path);
   std::vector<double> z;
   std::string current;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (line.empty() || line.front() == '#' || line.front() == 'f') continue;
-    const auto cells = split_csv_line(line);
+  each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t) {
+    if (cells[0] == "frame") return;
     if (cells.size() < 6) throw InputError(path.string() + ": expected frame,x_px,y_px,radius_px,x,z,quality");
     if (cells[0] != current) {
       if (!current.empty()) add(z, width->get<double>());
@@ -362,7 +344,7 @@ fit::ProfileFrames frames_of(const Input& source, const ProfileTable& table, con
       current = cells[0];
     }
     z.push_back(std::strtod(cells[5].c_str(), nullptr));
-  }
+  });
   if (!current.empty()) add(z, width->get<double>());
   return frames;
 }

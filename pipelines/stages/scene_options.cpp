@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <numbers>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/trajectory.hpp"
 
@@ -59,18 +60,9 @@ sim::Surface to_sim(const SurfaceOptions& s) { return {s.restitution, s.friction
 FloorTable read_floor_table(const std::filesystem::path& path) {
   FloorTable table;
   std::vector<double> times;
-  const std::string text = read_file(path);
   std::size_t time_column = std::string::npos, height_column = std::string::npos;
-  int line_number = 0;
   bool header = false;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    std::string line = text.substr(begin, end - begin);
-    begin = end + 1;
-    ++line_number;
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.empty() || line[0] == '#') continue;
-    const std::vector<std::string> cells = split_csv_line(line);
+  each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t line_number) {
     const auto fail = [&](const std::string& what) {
       throw InputError(fmt::format("{}:{}: {}", path.string(), line_number, what));
     };
@@ -81,7 +73,7 @@ FloorTable read_floor_table(const std::filesystem::path& path) {
         if (cells[k] == "height") height_column = k;
       }
       if (height_column == std::string::npos) fail("expected a header with the columns time,height or height");
-      continue;
+      return;
     }
     const auto number = [&](std::size_t column) {
       if (column >= cells.size()) fail(fmt::format("expected {} columns, found {}", column + 1, cells.size()));
@@ -100,7 +92,7 @@ FloorTable read_floor_table(const std::filesystem::path& path) {
       if (n >= 3 && std::abs((times[n - 1] - times[0]) / static_cast<double>(n - 1) / step - 1) > 1e-3)
         fail("the times are not equally spaced");
     }
-  }
+  });
   if (table.heights.size() < 4)
     throw InputError(fmt::format("{}: a period of the floor needs at least 4 positions, found {}", path.string(),
                                  table.heights.size()));

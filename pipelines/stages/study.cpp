@@ -10,6 +10,7 @@
 #include <mutex>
 #include <thread>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/plan.hpp"
 #include "pipelines/replica_seed.hpp"
@@ -51,18 +52,12 @@ struct Rows {
 };
 Rows read_rows(const fs::path& path) {
   Rows out;
-  const std::string text = read_file(path);
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (line.empty() || line.front() == '#') continue;
+  each_csv_line(read_file(path), [&](std::vector<std::string> cells, std::size_t) {
     if (out.header.empty())
-      out.header = split_csv_line(line);
+      out.header = std::move(cells);
     else
-      out.rows.push_back(split_csv_line(line));
-  }
+      out.rows.push_back(std::move(cells));
+  });
   return out;
 }
 // Mean and its standard error from the spread; of one value, its own error.
@@ -83,11 +78,6 @@ struct Mean {
     error = std::sqrt(squares / (n - 1) / n);
   }
 };
-double number_of(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  return !text.empty() && *end == '\0' ? value : NAN;
-}
 
 class Study : public Stage {
  public:
@@ -323,12 +313,12 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
             static_cast<std::size_t>(std::find(header.begin(), header.end(), table.key) - header.begin());
         for (const Json& row : one["rows"]) {
           const auto cells = row.get<std::vector<std::string>>();
-          const double key = place < cells.size() ? number_of(cells[place]) : NAN;
+          const double key = place < cells.size() ? number_in(cells[place]).value_or(NAN) : NAN;
           if (!std::isfinite(key)) continue;
           auto& of_key = columns[key];
           of_key.resize(header.size());
           for (std::size_t c = 0; c < cells.size() && c < header.size(); ++c)
-            of_key[c].push_back({number_of(cells[c]), NAN});
+            of_key[c].push_back({number_in(cells[c]).value_or(NAN), NAN});
         }
       }
       for (const auto& [key, values] : columns) {

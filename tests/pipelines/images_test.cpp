@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/json.hpp"
 #include "tests/pipelines/program.hpp"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/json.hpp"
 #include "tests/pipelines/program.hpp"

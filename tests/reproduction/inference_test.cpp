@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "pipelines/csv.hpp"
 #include "pipelines/files.hpp"
 #include "pipelines/json.hpp"
 #include "tests/pipelines/program.hpp"
