@@ -209,20 +209,12 @@ TEST(Finder, ResidualOfAFoundFrameIsItsNoise) {
 }
 
 TEST(RealFrames, BlackBeadsAllFoundNoneFalseScaleFromTheDiameter) {
-  const auto folder = test::real_images() / "beadtracking";
-  if (test::real_images().empty() || !std::filesystem::exists(folder / "truth.csv"))
-    GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
+  const auto folder = test::flume_frames();
+  if (folder.empty()) GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
   std::vector<std::vector<RenderedDisk>> truth;
-  std::ifstream in(folder / "truth.csv");
-  std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    std::stringstream fields(line);
-    std::vector<std::string> field;
-    for (std::string one; std::getline(fields, one, ',');) field.push_back(one);
-    const auto frame = static_cast<std::size_t>(std::stoul(field[1]));
-    if (truth.size() <= frame) truth.resize(frame + 1);
-    if (field[3] == "black") truth[frame].push_back({std::stod(field[4]), std::stod(field[5]), 14.6, 0, 0});
+  for (const test::FlumeBead& bead : test::flume_truth()) {
+    if (truth.size() <= bead.frame) truth.resize(bead.frame + 1);
+    if (bead.black) truth[bead.frame].push_back({bead.x_px, bead.y_px, 14.6, 0, 0});
   }
   FrameSource source = FrameSource::open({folder.string() + "/*.tif"});
   const std::clock_t start = std::clock();

@@ -380,9 +380,8 @@ TEST(MeasureBed, TablesAndOverlayAreWritten) {
 // (motion_state 0, told from the second frame on); they creep, and the camera shakes. Without the motion all have in
 // common and a straight one of its own, a bead's places scatter by what they repeat to.
 TEST(RealFrames, BeadsAtRestRepeatToAFewThousandthsOfAPixel) {
-  const auto folder = test::real_images() / "beadtracking";
-  if (test::real_images().empty() || !std::filesystem::exists(folder / "truth.csv"))
-    GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
+  const auto folder = test::flume_frames();
+  if (folder.empty()) GTEST_SKIP() << "the real images are not here (set SHAKEBED_IMAGES to their folder)";
   MeasureOptions options;
   options.bead_diameter_m = 6e-3;
   FrameSource source = FrameSource::open({folder.string() + "/*.tif"});
@@ -395,21 +394,14 @@ TEST(RealFrames, BeadsAtRestRepeatToAFewThousandthsOfAPixel) {
     std::array<double, frames> x{}, y{};
   };
   std::map<std::string, Track> tracks;
-  std::ifstream in(folder / "truth.csv");
-  std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    std::stringstream fields(line);
-    std::vector<std::string> field;
-    for (std::string one; std::getline(fields, one, ',');) field.push_back(one);
-    ASSERT_GE(field.size(), 8U);
-    const std::size_t frame = std::stoul(field[1]);
-    const double x = std::stod(field[4]), y = std::stod(field[5]);
-    if (field[3] != "black" || frame >= frames || (frame > 0 && field[7] != "0")) continue;
+  for (const test::FlumeBead& bead : test::flume_truth()) {
+    const std::size_t frame = bead.frame;
+    const double x = bead.x_px, y = bead.y_px;
+    if (!bead.black || frame >= frames || (frame > 0 && !bead.at_rest)) continue;
     if (x < radius || x > width - 1 - radius || y > lowest_truth) continue;
     for (const MeasuredDisk& disk : measured.disks) {
       if (disk.frame != frame || std::hypot(disk.x_px - x, disk.y_px - y) > 4) continue;
-      Track& track = tracks[field[2]];
+      Track& track = tracks[bead.bead];
       track.x[frame] = disk.x_px;
       track.y[frame] = disk.y_px;
       ++track.seen;

@@ -5,7 +5,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <string>
+#include <vector>
 
 namespace shakebed::ingest::test {
 
@@ -36,6 +39,36 @@ inline std::filesystem::path real_images() {
   if (const char* given = std::getenv("SHAKEBED_IMAGES")) return given;
   const std::filesystem::path beside = std::filesystem::path(SHAKEBED_SOURCE_DIR) / ".." / "shared" / "images";
   return std::filesystem::exists(beside) ? beside : std::filesystem::path();
+}
+
+// The folder of the flume's eight frames with black beads of 6 mm; empty when absent.
+inline std::filesystem::path flume_frames() {
+  const std::filesystem::path images = real_images();
+  if (images.empty() || !std::filesystem::exists(images / "beadtracking" / "truth.csv")) return {};
+  return images / "beadtracking";
+}
+
+// One bead of one of the flume's frames, as its experimenters tell it. The truth stops at y = 305 px.
+struct FlumeBead {
+  std::size_t frame = 0;
+  std::string bead;
+  bool black = false;
+  bool at_rest = false;  // told from the second frame on
+  double x_px = 0, y_px = 0;
+};
+inline std::vector<FlumeBead> flume_truth() {
+  std::ifstream in(flume_frames() / "truth.csv");
+  std::vector<FlumeBead> truth;
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::stringstream fields(line);
+    std::vector<std::string> field;
+    for (std::string one; std::getline(fields, one, ',');) field.push_back(one);
+    truth.push_back({std::stoul(field.at(1)), field.at(2), field.at(3) == "black", field.at(7) == "0",
+                     std::stod(field.at(4)), std::stod(field.at(5))});
+  }
+  return truth;
 }
 
 }  // namespace shakebed::ingest::test
