@@ -42,6 +42,11 @@ if(SHAKEBED_SANITIZE)
   target_link_options(shakebed_options INTERFACE "-fsanitize=${SHAKEBED_SANITIZE}")
 endif()
 
+if(SHAKEBED_COVERAGE)  # counts of executed lines, g++ alone: tests/robustness/coverage reads them
+  target_compile_options(shakebed_options INTERFACE --coverage -fprofile-abs-path)
+  target_link_options(shakebed_options INTERFACE --coverage)
+endif()
+
 # shakebed_test(NAME sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given.
 function(shakebed_test name)
