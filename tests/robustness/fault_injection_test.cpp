@@ -173,6 +173,42 @@ TEST_F(Faults, SmallDiskIsFull) {
   EXPECT_GE(failed, 4);
 }
 
+TEST_F(Faults, FolderThatMayOnlyBeRead) {
+  const auto run_read_only = [&](const fs::path& folder, const char* name) {
+    const Shim shim;
+    const Variable fault("SHAKEBED_FAULT_READONLY", folder.string());
+    return run_shakebed({"run", name, "--out", "o"}, folder_.path());
+  };
+  const auto files = [&] {
+    std::set<std::pair<std::string, std::string>> found;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "o"))
+      if (entry.is_regular_file()) found.emplace(entry.path().string(), read_text(entry.path()));
+    return found;
+  };
+  const auto expect_said = [](const ProgramResult& result) {
+    EXPECT_EQ(result.exit_code, 5);
+    EXPECT_NE(result.err.find("Read-only file system"), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find("terminate called"), std::string::npos) << result.err;
+  };
+  // Where OUT is to be made.
+  expect_said(run_read_only(folder_.path(), "r.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "o"));
+  // OUT with finished stages: another seed would make all of them again.
+  ASSERT_EQ(run().exit_code, 0);
+  const auto before = files();
+  std::string other = recipe();
+  const std::string seed = "\"seed\": 7";
+  other.replace(other.find(seed), seed.size(), "\"seed\": 8");
+  write_text(folder_ / "other.json", other);
+  expect_said(run_read_only(folder_ / "o", "other.json"));
+  EXPECT_EQ(files(), before);
+  // One stage's folder alone.
+  expect_said(run_read_only(folder_ / "o" / "bed", "other.json"));
+  EXPECT_EQ(read_text(folder_ / "o/bed/profile.csv"), read_text(folder_ / "expected/bed/profile.csv"));
+  EXPECT_EQ(run_shakebed({"verify", "o"}, folder_.path()).exit_code, 0);
+  expect_goes_on();
+}
+
 TEST_F(Faults, StdoutIsFull) {
   for (const char* arguments :
        {"theory --json", "audit", "map --gamma 4 --frequency 20 --diameter 3e-3 --initial-height 10", "schema"}) {
@@ -325,10 +361,8 @@ TEST_F(Faults, SignalsAtAnyMoment) {
         << "signal " << signal << ": " << code;
     EXPECT_LT(seconds, 60) << "did not stop";
     stopped += code != 0;
-    if (i % 6 == 5) {
-      expect_goes_on();
-      fs::remove_all(folder_ / "o");
-    }
+    if (i % 6 == 5) expect_goes_on();
+    if (i % 6 == 5 || code == 0) fs::remove_all(folder_ / "o");  // else the next one would find all of it done
   }
   EXPECT_GT(stopped, 6) << "the signals came too late";
 }
