@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "ingest/blurred_disk.hpp"
+#include "ingest/nearby.hpp"
 #include "ingest/smooth_field.hpp"
 #include "ingest/solid_borders.hpp"
 
@@ -161,40 +162,33 @@ BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
       }
     }
     // Pairs whose reaches overlap: their splines meet in the same pixels.
-    std::vector<std::size_t> order(beads.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return beads[a].y < beads[b].y; });
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const ModelDisk& one = beads[order[i]];
-      for (std::size_t j = i + 1; j < order.size(); ++j) {
-        const ModelDisk& other = beads[order[j]];
-        const double apart_x = other.x - one.x, apart_y = other.y - one.y;
-        if (apart_y > 2 * reach_px) break;
-        if (apart_x * apart_x + apart_y * apart_y > 4 * reach_squared) continue;
-        const int top = std::max(0, static_cast<int>(std::ceil(other.y - reach_px)));
-        const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(one.y + reach_px)));
-        for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
-          const double dy1 = row - one.y, dy2 = row - other.y;
-          const double half1 = std::sqrt(std::max(0.0, reach_squared - dy1 * dy1));
-          const double half2 = std::sqrt(std::max(0.0, reach_squared - dy2 * dy2));
-          const int left = std::max(0, static_cast<int>(std::ceil(std::max(one.x - half1, other.x - half2))));
-          const int right_column =
-              std::min(fit.width() - 1, static_cast<int>(std::floor(std::min(one.x + half1, other.x + half2))));
-          const int count = right_column - left + 1;
-          if (count <= 0) continue;
-          const float* line = fit.residual_row(row) + left;
-          distances(left, count, one.x, dy1, inverse_pair_bin, place1);
-          distances(left, count, other.x, dy2, inverse_pair_bin, place2);
-          for (int k = 0; k < count; ++k) {
-            const auto bin1 = std::min(pair_bins - 1,
-                                       static_cast<std::size_t>(static_cast<int>(place1[static_cast<std::size_t>(k)])));
-            const auto bin2 = std::min(pair_bins - 1,
-                                       static_cast<std::size_t>(static_cast<int>(place2[static_cast<std::size_t>(k)])));
-            pair_count[bin1 * pair_bins + bin2] += unseen(line[k]) ? 0.0F : 1.0F;
-          }
+    const Nearby near(beads.size(), 2 * reach_px, [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
+    near.pairs([&](std::size_t i, std::size_t j) {
+      const ModelDisk &one = beads[i], &other = beads[j];
+      const int top = std::max(0, static_cast<int>(std::ceil(other.y - reach_px)));
+      const int bottom = std::min(fit.height() - 1, static_cast<int>(std::floor(one.y + reach_px)));
+      for (int row = first_row(top, row_step); row <= bottom; row += row_step) {
+        const double dy1 = row - one.y, dy2 = row - other.y;
+        const double half1 = std::sqrt(std::max(0.0, reach_squared - dy1 * dy1));
+        const double half2 = std::sqrt(std::max(0.0, reach_squared - dy2 * dy2));
+        const int left = std::max(0, static_cast<int>(std::ceil(std::max(one.x - half1, other.x - half2))));
+        const int right_column =
+            std::min(fit.width() - 1, static_cast<int>(std::floor(std::min(one.x + half1, other.x + half2))));
+        const int count = right_column - left + 1;
+        if (count <= 0) continue;
+        const float* line = fit.residual_row(row) + left;
+        distances(left, count, one.x, dy1, inverse_pair_bin, place1);
+        distances(left, count, other.x, dy2, inverse_pair_bin, place2);
+        for (int k = 0; k < count; ++k) {
+          const auto bin1 =
+              std::min(pair_bins - 1, static_cast<std::size_t>(static_cast<int>(place1[static_cast<std::size_t>(k)])));
+          const auto bin2 =
+              std::min(pair_bins - 1, static_cast<std::size_t>(static_cast<int>(place2[static_cast<std::size_t>(k)])));
+          pair_count[bin1 * pair_bins + bin2] += unseen(line[k]) ? 0.0F : 1.0F;
         }
       }
-    }
+      return false;
+    });
   }
   struct Cell {
     std::array<std::size_t, 4> slots;
@@ -879,18 +873,17 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
     std::vector<ModelDisk> beads = *disks[f];
     std::sort(beads.begin(), beads.end(), [](const ModelDisk& a, const ModelDisk& b) { return a.y < b.y; });
     const double far = open_to + radius_px + 3 * edge_px;
-    std::size_t first = 0;
+    const Nearby near(beads.size(), far, [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
     for (std::size_t i = 0; i < beads.size(); ++i) {
       const ModelDisk& bead = beads[i];
-      while (beads[first].y < bead.y - far) ++first;
       if (bead.x < open_to || bead.y < open_to || bead.x > flat.width - 1 - open_to ||
           bead.y > flat.height - 1 - open_to)
         continue;
       std::array<bool, sectors> open;
       open.fill(true);
-      for (std::size_t j = first; j < beads.size() && beads[j].y <= bead.y + far; ++j) {
+      near.any_near(bead.x, bead.y, [&](std::size_t j) {
+        if (j == i) return false;
         const double dx = beads[j].x - bead.x, dy = beads[j].y - bead.y;
-        if (j == i || dx * dx + dy * dy > far * far) continue;
         const double distance = std::sqrt(dx * dx + dy * dy);
         const double half =
             std::asin(std::min(1.0, (radius_px + 3 * edge_px + 1) / distance)) + 2 * 3.14159265358979 / sectors / 2;
@@ -900,7 +893,8 @@ FreeRim learn_free_rim(const std::vector<GrayFrame>& flats, const std::vector<co
           if (std::abs(std::remainder(direction - middle, 2 * 3.14159265358979)) < half)
             open[static_cast<std::size_t>(s)] = false;
         }
-      }
+        return false;
+      });
       if (std::none_of(open.begin(), open.end(), [](bool free) { return free; })) continue;
       std::array<std::vector<Sample>, sectors> samples;
       const int top = static_cast<int>(std::ceil(bead.y - open_to)),

@@ -11,6 +11,7 @@
 #include "ingest/bead_profile.hpp"
 #include "ingest/disk_map.hpp"
 #include "ingest/joint_fit.hpp"
+#include "ingest/nearby.hpp"
 #include "ingest/smooth_field.hpp"
 #include "ingest/solid_borders.hpp"
 
@@ -67,27 +68,22 @@ std::vector<ModelDisk> disks_at(const std::vector<DiskCandidate>& candidates) {
   return disks;
 }
 
+Nearby nearby(const std::vector<ModelDisk>& disks, double distance) {
+  return {disks.size(), distance, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); }};
+}
+
 // Takes out beads that explain nothing and the worse of two in one place, as judged; puts their share back into the
 // residual.
 std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least) {
   std::vector<std::uint8_t> drop(disks.size(), 0);
   for (std::size_t i = 0; i < disks.size(); ++i) drop[i] = disks[i].explained < least;
-  std::vector<std::size_t> order(disks.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return disks[a].y < disks[b].y; });
-  const double near = 2 * radius * least_separation;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (drop[order[i]]) continue;
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const ModelDisk &one = disks[order[i]], &other = disks[order[j]];
-      const double dx = other.x - one.x, dy = other.y - one.y;
-      if (dy > near) break;
-      if (drop[order[j]] || dx * dx + dy * dy > near * near) continue;
-      const bool first_worse = one.explained < other.explained;
-      drop[first_worse ? order[i] : order[j]] = 1;
-      if (first_worse) break;
-    }
-  }
+  nearby(disks, 2 * radius * least_separation).pairs([&](std::size_t one, std::size_t other) {
+    if (drop[one]) return true;
+    if (drop[other]) return false;
+    const bool first_worse = disks[one].explained < disks[other].explained;
+    drop[first_worse ? one : other] = 1;
+    return first_worse;
+  });
   std::vector<ModelDisk> kept;
   kept.reserve(disks.size());
   for (std::size_t i = 0; i < disks.size(); ++i) {
@@ -184,6 +180,112 @@ double refine_light(LightField& light, const std::vector<TileSums>& tiles, int w
       largest = std::max({largest, std::abs(beta), std::abs(gamma - 1)});
     }
   return largest;
+}
+
+// Where no bead is near there is open background: its levels, a tile each.
+constexpr std::size_t fewest_open_tiles = 6;
+std::vector<TileSums> open_background(const GrayFrame& flat, const std::vector<ModelDisk>& disks, double clear_px) {
+  const std::size_t width = static_cast<std::size_t>(flat.width);
+  std::vector<std::uint8_t> near(flat.pixels.size(), 0);
+  for (const ModelDisk& disk : disks) {
+    const int top = std::max(0, static_cast<int>(std::ceil(disk.y - clear_px)));
+    const int bottom = std::min(flat.height - 1, static_cast<int>(std::floor(disk.y + clear_px)));
+    for (int row = top; row <= bottom; ++row) {
+      const double half = std::sqrt(std::max(0.0, clear_px * clear_px - (row - disk.y) * (row - disk.y)));
+      const int left = std::max(0, static_cast<int>(std::ceil(disk.x - half)));
+      const int right = std::min(flat.width - 1, static_cast<int>(std::floor(disk.x + half)));
+      for (int column = left; column <= right; ++column)
+        near[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] = 1;
+    }
+  }
+  constexpr int side = 32;
+  constexpr std::size_t fewest_pixels = 40;
+  std::vector<TileSums> tiles;
+  std::vector<float> levels;
+  for (int top = 0; top < flat.height; top += side)
+    for (int left = 0; left < flat.width; left += side) {
+      const int bottom = std::min(flat.height, top + side), right = std::min(flat.width, left + side);
+      levels.clear();
+      double u = 0, v = 0;
+      for (int row = top; row < bottom; ++row)
+        for (int column = left; column < right; ++column) {
+          const std::size_t at = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
+          if (near[at] || unseen(flat.pixels[at])) continue;
+          levels.push_back(flat.pixels[at]);
+          u += column, v += row;
+        }
+      if (levels.size() < fewest_pixels) continue;
+      const auto middle = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() / 2);
+      std::nth_element(levels.begin(), middle, levels.end());
+      TileSums tile;
+      tile.u = 2 * (u / static_cast<double>(levels.size()) + 0.5) / flat.width - 1;
+      tile.v = 2 * (v / static_cast<double>(levels.size()) + 0.5) / flat.height - 1;
+      tile.flat = static_cast<double>(*middle);
+      tiles.push_back(tile);
+    }
+  return tiles;
+}
+
+double field_at(const LightField& light, const std::vector<float>& field, double x, double y) {
+  const double across = std::clamp(x / light.spacing_px, 0.0, light.columns - 1.001),
+               down = std::clamp(y / light.spacing_px, 0.0, light.rows - 1.001);
+  const auto column = static_cast<std::size_t>(across), row = static_cast<std::size_t>(down);
+  const double right = across - static_cast<double>(column), lower = down - static_cast<double>(row);
+  const std::size_t at = row * static_cast<std::size_t>(light.columns) + column,
+                    below = at + static_cast<std::size_t>(light.columns);
+  return (1 - lower) * ((1 - right) * static_cast<double>(field[at]) + right * static_cast<double>(field[at + 1])) +
+         lower * ((1 - right) * static_cast<double>(field[below]) + right * static_cast<double>(field[below + 1]));
+}
+
+constexpr double well_beyond_background = -0.05;  // contrast units
+
+// A packed bed shows little background, and the voids between its beads, blurred, pass for it. If what open background
+// there is tells of one well beyond that behind the beads, the light is set right; beads keep their level. Whether it
+// was so.
+bool correct_background(LightField& light, const GrayFrame& flat, const std::vector<TileSums>& open,
+                        const std::vector<ModelDisk>& disks) {
+  if (open.size() < fewest_open_tiles || disks.empty()) return false;
+  constexpr int order = 2;
+  const std::size_t terms = polynomial_terms(order);
+  std::vector<double> matrix(terms * terms, 0.0), fit(terms, 0.0), basis(terms), levels;
+  const auto x_of = [&](const TileSums& tile) { return 0.5 * (tile.u + 1) * flat.width - 0.5; };
+  const auto y_of = [&](const TileSums& tile) { return 0.5 * (tile.v + 1) * flat.height - 0.5; };
+  for (const TileSums& tile : open)
+    levels.push_back(field_at(light, light.background, x_of(tile), y_of(tile)) +
+                     tile.flat * field_at(light, light.contrast, x_of(tile), y_of(tile)));
+  const double middle = median_of(levels);
+  const auto [lowest, highest] = std::minmax_element(levels.begin(), levels.end());
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    polynomial_values(open[k].u, open[k].v, order, basis.data());
+    for (std::size_t a = 0; a < terms; ++a) {
+      fit[a] += basis[a] * (levels[k] - middle);
+      for (std::size_t b = 0; b < terms; ++b) matrix[a * terms + b] += basis[a] * basis[b];
+    }
+  }
+  for (std::size_t a = 0; a < terms; ++a)  // what open parts do not tell is even
+    matrix[a * terms + a] += (a ? 1e-2 : 1e-9) * static_cast<double>(open.size());
+  if (!solve_symmetric(matrix, fit, terms)) return false;
+  const auto background_at = [&](double x, double y) {
+    polynomial_values(std::clamp((2 * x + 1) / flat.width - 1, -1.0, 1.05),
+                      std::clamp((2 * y + 1) / flat.height - 1, -1.0, 1.05), order, basis.data());
+    double level = middle;
+    for (std::size_t a = 0; a < terms; ++a) level += fit[a] * basis[a];
+    return std::clamp(level, *lowest, *highest);
+  };
+  double beyond = 0;
+  for (const ModelDisk& disk : disks)
+    beyond += (background_at(disk.x, disk.y) - field_at(light, light.background, disk.x, disk.y)) /
+              field_at(light, light.contrast, disk.x, disk.y) / static_cast<double>(disks.size());
+  if (beyond > well_beyond_background) return false;
+  for (int row = 0; row < light.rows; ++row)
+    for (int column = 0; column < light.columns; ++column) {
+      const std::size_t at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
+      const auto level = static_cast<float>(background_at(column * light.spacing_px, row * light.spacing_px));
+      light.contrast[at] += light.background[at] - level;
+      light.background[at] = level;
+    }
+  return true;
 }
 
 // Typical size of the residual, robust against what is no bead at all.
@@ -305,29 +407,31 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
   }
   std::vector<ModelDisk> fresh = disks_at(candidates_in(fit.residual_image(), radius, noise, clear_score));
   const double near = 2 * radius * least_separation;
-  const auto taken = [&](const std::vector<ModelDisk>& among, const ModelDisk& disk, double distance) {
-    for (const ModelDisk& other : among) {
-      const double dx = other.x - disk.x, dy = other.y - disk.y;
-      if (dx * dx + dy * dy < distance * distance) return true;
-    }
-    return false;
-  };
+  const Nearby near_kept = nearby(kept, near), near_suspects = nearby(suspects, near);
   std::vector<ModelDisk> added;
   for (ModelDisk& disk : fresh) {
-    if (taken(kept, disk, near)) continue;
+    if (near_kept.any_near(disk.x, disk.y)) continue;
     double nearest = near;
-    for (const ModelDisk& suspect : suspects) {
+    near_suspects.any_near(disk.x, disk.y, [&](std::size_t i) {
+      const ModelDisk& suspect = suspects[i];
       const double distance = std::hypot(suspect.x - disk.x, suspect.y - disk.y);
-      if (distance >= nearest) continue;
+      if (distance >= nearest) return false;
       nearest = distance;
       disk.former_x = suspect.x;
       disk.former_y = suspect.y;
       disk.former_unexplained = 1 - suspect.explained;
-    }
+      return false;
+    });
     added.push_back(disk);
   }
-  for (const ModelDisk& disk : suspects)
-    if (!taken(added, disk, near)) added.push_back(disk);
+  const Nearby near_fresh = nearby(added, near);
+  std::vector<std::uint8_t> back(suspects.size(), 0);
+  for (std::size_t i = 0; i < suspects.size(); ++i) {
+    const ModelDisk& disk = suspects[i];
+    back[i] = !near_fresh.any_near(disk.x, disk.y) &&
+              !near_suspects.any_near(disk.x, disk.y, [&](std::size_t other) { return other < i && back[other]; });
+    if (back[i]) added.push_back(disk);
+  }
   for (ModelDisk& disk : added) {
     disk.quiet_sweeps = 0;
     fit.subtract(disk.x, disk.y, 1.0F);
@@ -397,11 +501,15 @@ bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disk
     disks[i].quiet_sweeps = 2;
     if (disks[i].last_step >= longest_step) far.push_back(i);
   }
-  if (50 * far.size() <= disks.size())
-    for (const std::size_t i : far)
-      for (ModelDisk& disk : disks)
-        if (std::hypot(disk.x - disks[i].x, disk.y - disks[i].y) < 2 * fit.reach()) disk.quiet_sweeps = 0;
   const bool few = 50 * far.size() <= disks.size() && !far.empty();
+  if (few) {
+    const Nearby near = nearby(disks, 2 * fit.reach());
+    for (const std::size_t i : far)
+      near.any_near(disks[i].x, disks[i].y, [&](std::size_t other) {
+        disks[other].quiet_sweeps = 0;
+        return false;
+      });
+  }
   for (int sweep = 0; few && sweep < sweeps; ++sweep)
     if (fit.sweep(disks, longest_step, tolerance, bound) < tolerance) break;
   return false;
@@ -442,9 +550,8 @@ double unexplained_of(const JointFit& fit, const LightField& light) {
 // How far inside a border its blurred edge reaches.
 double border_margin(double edge) { return 0.5 + 2 * edge; }
 
-// Whether an even area has the level of the background there.
-bool is_background(const SolidBorder& border, const LightField& light, const GrayFrame& frame) {
-  constexpr double same = 0.15;  // contrast units
+// The level of an even area in contrast units: 0 is the background there, 1 the beads.
+double level_in(const LightField& light, const SolidBorder& border, const GrayFrame& frame) {
   const double place = 0.5 * (border.from + border.to), depth = 0.5 * (border.depth_px + border.slope * place);
   const double x = border.side == FrameSide::left    ? depth
                    : border.side == FrameSide::right ? frame.width - 1 - depth
@@ -456,8 +563,12 @@ bool is_background(const SolidBorder& border, const LightField& light, const Gra
     return static_cast<std::size_t>(std::clamp(at / light.spacing_px + 0.5, 0.0, nodes - 1.0));
   };
   const std::size_t at = node(y, light.rows) * static_cast<std::size_t>(light.columns) + node(x, light.columns);
-  return std::abs(border.level - static_cast<double>(light.background[at])) <
-         same * std::abs(static_cast<double>(light.contrast[at]));
+  return (border.level - static_cast<double>(light.background[at])) / static_cast<double>(light.contrast[at]);
+}
+
+bool is_background(const SolidBorder& border, const LightField& light, const GrayFrame& frame) {
+  constexpr double same = 0.15;
+  return std::abs(level_in(light, border, frame)) < same;
 }
 
 // Takes out what has the level of the background already at first sight.
@@ -486,14 +597,21 @@ struct Learned {
   CalibrationResult result;
   double typical = 0;      // share of the contrast that a good bead explains
   bool one_sided = false;  // light from one side was allowed for
+  bool background_corrected = false;
   double unexplained = 0;  // of the first frame, grey levels squared
   bool complete = false;   // hardly more than its noise
   bool astray = false;     // the radius went as far from the estimate as it may
 };
 
+// What learning may take into account.
+struct Allowed {
+  bool one_sided = true;             // light from one side
+  bool corrected_background = true;  // see correct_background()
+};
+
 // Learns all there is to learn, starting from a radius and a polarity.
 Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                   const RadiusEstimate& estimate, bool allow_one_sided = true) {
+                   const RadiusEstimate& estimate, Allowed allowed) {
   Learned all;
   CalibrationResult& result = all.result;
   FinderCalibration& calibration = result.calibration;
@@ -508,6 +626,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     if (frame->width == calibration.width && frame->height == calibration.height) used.push_back(frame);
   // What is even and ends in a straight line at the border is floor, wall or lid, unless it is background.
   constexpr double usual_edge = 0.75;
+  const std::vector<const GrayFrame*> recorded = used;
   std::vector<std::vector<SolidBorder>> borders;
   std::vector<GrayFrame> seen;
   for (const GrayFrame* frame : used) {
@@ -554,6 +673,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   double last_change = 0;
   double knot = 0.25;
   double moved_by = 0;  // px, by the outline
+  bool background_looked_at = !allowed.corrected_background;
   for (int round = 0;; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
@@ -586,6 +706,28 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
       result.why_not =
           "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but no filled disk fits";
       return all;
+    }
+    if (round == 0 && !background_looked_at) {
+      background_looked_at = true;
+      const double clear = 1.15 * radius + 2;
+      std::vector<TileSums> open = open_background(flats.front(), disks.front(), clear);
+      if (open.size() < fewest_open_tiles && !borders.front().empty()) {
+        // No background is seen between the beads: what was taken for a wall, but lies beyond the background, is it.
+        for (std::size_t f = 0; f < used.size(); ++f) {
+          const auto removed = std::erase_if(borders[f], [&](const SolidBorder& border) {
+            return level_in(light, border, seen[f]) < well_beyond_background;
+          });
+          if (removed == 0) continue;
+          seen[f] = without_borders(*recorded[f], borders[f], border_margin(usual_edge));
+          flats[f] = flatten(seen[f], light);
+        }
+        open = open_background(flats.front(), disks.front(), clear);
+      }
+      if (correct_background(light, flats.front(), open, disks.front())) {
+        all.background_corrected = true;
+        --round;
+        continue;
+      }
     }
     std::vector<double> explained;
     for (const auto& one : disks)
@@ -627,7 +769,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
       profile = options.learn_profile ? learned : ideal_profile(radius, edge, reach_of(radius, edge));
     }
     moved_by = 0;
-    if (allow_one_sided && options.learn_profile && round >= 1 && (round <= 2 || profile.asymmetry)) {
+    if (allowed.one_sided && options.learn_profile && round >= 1 && (round <= 2 || profile.asymmetry)) {
       // Light from one side: the lit side pulls at the centres of radial beads. The outline tells where they are.
       const ProfileTable latest(profile, radius, edge, 0);
       for (std::size_t f = 0; f < used.size(); ++f) {
@@ -782,22 +924,30 @@ CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, 
     result.why_not = "no disks seen: " + estimate.why_not;
     return result;
   }
-  const auto learn_from_here = [&](RadiusEstimate from, bool allow_one_sided) {
+  const auto learn_from_here = [&](RadiusEstimate from, Allowed allowed) {
     constexpr int most_starts = 3;
-    Learned best = learn_from(frames, options, from, allow_one_sided);
+    Learned best = learn_from(frames, options, from, allowed);
+    if (best.background_corrected && !best.complete) {
+      allowed.corrected_background = false;
+      Learned as_seen = learn_from(frames, options, from, allowed);
+      if (as_seen.result.found && (!best.result.found || as_seen.unexplained < best.unexplained))
+        best = std::move(as_seen);
+      else
+        allowed.corrected_background = true;
+    }
     for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
       from.radius_px = best.result.calibration.rim_radius_px;
-      Learned again = learn_from(frames, options, from, allow_one_sided);
+      Learned again = learn_from(frames, options, from, allowed);
       if (!again.result.found || !again.complete || again.unexplained > 1.02 * best.unexplained) break;
       best = std::move(again);
     }
     return best;
   };
   const auto learn = [&](const RadiusEstimate& from) {
-    Learned best = learn_from_here(from, true);
+    Learned best = learn_from_here(from, {});
     if (!best.one_sided || (best.complete && !best.astray)) return best;
     // Shadows beside the beads, say, are not the beads' own light.
-    Learned plain = learn_from_here(from, false);
+    Learned plain = learn_from_here(from, {.one_sided = false});
     return plain.result.found ? plain : best;
   };
   // What explains the frame little gives way to what explains it better: the bright middle of a glass bead to the
@@ -907,16 +1057,15 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
 
   // A dark band at the border, a floor say, can be laid out with cut beads; but a bead has something else around it.
   const std::size_t before_bands = disks.size();
-  std::vector<ModelDisk> in_bands;
+  std::vector<ModelDisk> in_bands, outside_bands;
   for (const ModelDisk& disk : disks) {
     const bool cut =
         disk.x < radius || disk.y < radius || disk.x > frame.width - 1 - radius || disk.y > frame.height - 1 - radius;
-    if (cut && unexplained_around(fit, disk, radius, edge, noise) > most_unexplained_around) in_bands.push_back(disk);
+    const bool in_band = cut && unexplained_around(fit, disk, radius, edge, noise) > most_unexplained_around;
+    (in_band ? in_bands : outside_bands).push_back(disk);
   }
-  for (const ModelDisk& band : in_bands) {
-    fit.subtract(band.x, band.y, -1.0F);
-    std::erase_if(disks, [&](const ModelDisk& disk) { return disk.x == band.x && disk.y == band.y; });
-  }
+  for (const ModelDisk& band : in_bands) fit.subtract(band.x, band.y, -1.0F);
+  disks = std::move(outside_bands);
   dropped += before_bands - disks.size();
 
   std::vector<double> explained;
@@ -941,11 +1090,13 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     const std::vector<ModelDisk> before = disks;
     fit_again();
     bool put_back = false;
+    const Nearby near_before = nearby(before, 2.6 * radius);
     for (const ModelDisk& disk : taken_out) {
       double gain = 0;
-      for (std::size_t i = 0; i < before.size(); ++i)
-        if (std::hypot(before[i].x - disk.x, before[i].y - disk.y) < 2.6 * radius)
-          gain += disks[i].explained - before[i].explained;
+      near_before.any_near(disk.x, disk.y, [&](std::size_t i) {
+        gain += disks[i].explained - before[i].explained;
+        return false;
+      });
       const bool reported = disk.explained >= 0.5 * typical && options.keep_half_hidden;
       if (gain > 0 && !reported) {
         ++dropped;

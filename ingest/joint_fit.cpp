@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "ingest/nearby.hpp"
 #include "ingest/solid_borders.hpp"
 #include "ingest/vector_lanes.hpp"
 
@@ -336,23 +337,19 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
     double xx, xy, yy;
   };
   std::vector<Pair> pairs;
-  std::vector<std::size_t> order(n);
-  for (std::size_t i = 0; i < n; ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return disks[a].y < disks[b].y; });
-  const double far = 2 * table_->reach_;
-  for (std::size_t a = 0; a < n; ++a)
-    for (std::size_t b = a + 1; b < n; ++b) {
-      const ModelDisk &one = disks[order[a]], &other = disks[order[b]];
-      const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
-      if (dy > far) break;
-      if (squared >= far * far || squared < 1e-6) continue;
-      const auto [along, across] = table_->overlap(std::sqrt(squared));
-      // Of a bead cut by the border only a part is there to be shared.
-      const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
-      const double along_more = scale * (along - across) / squared;
-      pairs.push_back({order[a], order[b], scale * across + along_more * dx * dx, along_more * dx * dy,
-                       scale * across + along_more * dy * dy});
-    }
+  const Nearby near(n, 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
+  near.pairs([&](std::size_t a, std::size_t b) {
+    const ModelDisk &one = disks[a], &other = disks[b];
+    const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
+    if (squared < 1e-6) return false;
+    const auto [along, across] = table_->overlap(std::sqrt(squared));
+    // Of a bead cut by the border only a part is there to be shared.
+    const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
+    const double along_more = scale * (along - across) / squared;
+    pairs.push_back(
+        {a, b, scale * across + along_more * dx * dx, along_more * dx * dy, scale * across + along_more * dy * dy});
+    return false;
+  });
   // Conjugate gradients, each bead's own 2 x 2 block taken out beforehand.
   std::vector<double> left = descent, direction(2 * n), towards(2 * n), image(2 * n);
   const auto own_solution = [&](const std::vector<double>& from, std::vector<double>& to) {

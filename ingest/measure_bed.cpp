@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "ingest/atomic_file.hpp"
+#include "ingest/nearby.hpp"
 #include "ingest/smooth_field.hpp"
 #include "ingest/solid_borders.hpp"
 
@@ -102,11 +103,9 @@ std::vector<FoundDisk> find_second(const GrayFrame& frame, const FindResult& fou
                                    const FinderCalibration& second, const FindOptions& options) {
   std::vector<FoundDisk> disks = find_disks(without_disks(frame, found, finder), second, options).disks;
   const double near = 0.72 * (finder.radius_px + second.radius_px);
-  std::erase_if(disks, [&](const FoundDisk& disk) {
-    return std::any_of(found.disks.begin(), found.disks.end(), [&](const FoundDisk& other) {
-      return std::hypot(disk.x_px - other.x_px, disk.y_px - other.y_px) < near;
-    });
-  });
+  const Nearby taken(found.disks.size(), near,
+                     [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });
+  std::erase_if(disks, [&](const FoundDisk& disk) { return taken.any_near(disk.x_px, disk.y_px); });
   return disks;
 }
 

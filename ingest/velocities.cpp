@@ -8,6 +8,8 @@
 #include <string>
 #include <unordered_map>
 
+#include "ingest/nearby.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
@@ -27,25 +29,24 @@ std::vector<std::pair<std::size_t, std::size_t>> ranges_of(const Measurement& me
   return ranges;
 }
 
-// For each disk of `from`, the nearest of `to` within `reach` (D), by sorting on height.
+// For each disk of `from`, the nearest of `to` within `reach` (D).
 std::vector<std::size_t> nearest(const std::vector<MeasuredDisk>& disks, std::pair<std::size_t, std::size_t> from,
                                  std::pair<std::size_t, std::size_t> to, double reach) {
-  std::vector<std::size_t> order;
-  for (std::size_t k = to.first; k < to.second; ++k) order.push_back(k);
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return disks[a].z < disks[b].z; });
+  const Nearby candidates(to.second - to.first, reach,
+                          [&](std::size_t i) { return std::pair(disks[to.first + i].x, disks[to.first + i].z); });
   std::vector<std::size_t> result;
   for (std::size_t k = from.first; k < from.second; ++k) {
-    const auto low = std::lower_bound(order.begin(), order.end(), disks[k].z - reach,
-                                      [&](std::size_t a, double z) { return disks[a].z < z; });
     double best = reach;
     std::size_t winner = nobody;
-    for (auto at = low; at != order.end() && disks[*at].z <= disks[k].z + reach; ++at) {
-      const double distance = std::hypot(disks[*at].x - disks[k].x, disks[*at].z - disks[k].z);
+    candidates.any_near(disks[k].x, disks[k].z, [&](std::size_t i) {
+      const MeasuredDisk& disk = disks[to.first + i];
+      const double distance = std::hypot(disk.x - disks[k].x, disk.z - disks[k].z);
       if (distance < best) {
         best = distance;
-        winner = *at;
+        winner = to.first + i;
       }
-    }
+      return false;
+    });
     result.push_back(winner);
   }
   return result;

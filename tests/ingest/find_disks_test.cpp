@@ -74,6 +74,32 @@ INSTANTIATE_TEST_SUITE_P(Finder, Looks,
                                          Look{"shaded_b2_n15", BeadShading::shaded, 2, 15, 0.105, 0.04}),
                          [](const auto& test_info) { return std::string(test_info.param.name); });
 
+// Small beads, packed, leave no background between them: what tells it is the margin of the frame, the less of it the
+// larger the frame. Taken from the voids instead, the contrast would be too low by a third and the radius off by a
+// tenth.
+TEST(Finder, APackedBedThatFillsALargeFrameIsSeenBeforeTheBackgroundOfItsMargin) {
+  constexpr int width = 1500, height = 1300;
+  Camera camera;
+  camera.width = width, camera.height = height;
+  camera.background_level = 178, camera.bead_level = 50;
+  camera.blur_px = 0.8, camera.read_noise = 5;
+  camera.gradient_x = 0.1, camera.gradient_y = -0.05, camera.vignette = 0.08;
+  std::vector<RenderedDisk> truth;
+  constexpr double radius = 6, margin = 12;
+  const double row_height = radius * std::sqrt(3.0);
+  for (int row = 0; margin + 2 * radius + row * row_height < height - margin; ++row)
+    for (double x = margin + radius + (row % 2) * radius; x + radius < width - margin; x += 2 * radius)
+      truth.push_back({.x_px = x, .y_px = height - margin - radius - row * row_height, .radius_px = radius});
+  FinderCalibration calibration;
+  const FindResult result = find_disks(render_frame(truth, camera), {}, &calibration);
+  const test::Score score = test::score(result.disks, truth, width, height);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+  EXPECT_LT(score.rms_px, 0.03);
+  EXPECT_NEAR(calibration.radius_px, radius, 0.02);
+  EXPECT_NEAR(calibration.contrast_level, -128, 8);
+}
+
 // Fifteen touching rows, so blurred that a void is as dark as a bead's rim and so noisy that a row can slip by half a
 // bead: all must be found, at 1.3 times the Cramer-Rao bound of this very frame.
 TEST(Finder, RowsOfABlurredNoisyCrystalDoNotSlip) {
