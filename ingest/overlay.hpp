@@ -18,7 +18,7 @@ struct OverlayOptions {
 };
 
 // Writes a colour PNG: green circles for beads, orange for cut or half-hidden ones, blue lines for floor and walls.
-// Atomic. Throws InputError if it cannot be written.
+// Atomic. Throws OutputError if it cannot be written.
 void write_overlay(const std::filesystem::path& path, const GrayFrame& frame, const std::vector<FoundDisk>& disks,
                    const OverlayOptions& options = {});
 

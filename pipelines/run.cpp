@@ -231,6 +231,22 @@ std::vector<bool> selection(const Plan& plan, const RunOptions& options) {
 
 int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
+// What a stage read must be there at its end as it was at its beginning: files that vanish or change meanwhile give a
+// result that belongs to neither, and its record would say that it counts.
+void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, const fs::path& out) {
+  const std::size_t first_external = fresh.inputs.size() - stage.input_files.size();
+  for (std::size_t i = 0; i < fresh.inputs.size(); ++i) {
+    const Fingerprint& was = fresh.inputs[i];
+    const fs::path path = i < first_external ? out / was.file : stage.input_files[i - first_external].second;
+    std::error_code error;
+    const auto bytes = fs::file_size(path, error);
+    if (error) throw StageError(fmt::format("{}: vanished while it was read; run again", path.string()));
+    if (bytes != was.bytes || fast_hash_of_file(path) != was.fast)
+      throw StageError(
+          fmt::format("{}: changed while it was read, or is not what its record says; run again", path.string()));
+  }
+}
+
 StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<Input> inputs,
                       const RunOptions& options, Console* console) {
   const fs::path place = options.out / stage.id;
@@ -256,6 +272,7 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
   StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
   stage.stage->run(context);
   context.check_interrupted();
+  check_inputs_stayed(stage, fresh, options.out);
   fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
   fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
   fresh.outputs = fingerprint_directory(working, true);
@@ -475,11 +492,16 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& co
     if (fs::is_symlink(link, error)) fs::remove(link, error);
     if (same == 1 && !fs::exists(link, error)) fs::create_directory_symlink(stage.id, link, error);
   }
-  write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
-  write_file_atomically(options.out / "summary.json", dump(summary_json(plan, outcome)));
-  write_file_atomically(options.out / "report.html", report_html(plan, outcome));
-  write_file_atomically(options.out / "summary.md", summary_markdown(plan, outcome));
-  write_file_atomically(options.out / "manifest.json", dump(manifest_json(plan, options, outcome, started)));
+  try {
+    write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
+    write_file_atomically(options.out / "summary.json", dump(summary_json(plan, outcome)));
+    write_file_atomically(options.out / "report.html", report_html(plan, outcome));
+    write_file_atomically(options.out / "summary.md", summary_markdown(plan, outcome));
+    write_file_atomically(options.out / "manifest.json", dump(manifest_json(plan, options, outcome, started)));
+  } catch (const Error& error) {
+    if (outcome.error.empty()) throw;
+    outcome.error += fmt::format("; besides, {}", error.what());  // the stage that failed comes first
+  }
   return outcome;
 }
 

@@ -1,4 +1,5 @@
 #include "ingest/frames.hpp"
+#include "ingest/atomic_file.hpp"
 
 #include <gtest/gtest.h>
 
@@ -310,7 +311,7 @@ TEST(Frames, EnormousPictureIsRefusedBeforeItIsDecoded) {
 }
 
 TEST(Frames, WritingWhereNothingCanBeWrittenSaysSo) {
-  EXPECT_THROW(write_png("/nonexistent_folder/a.png", ramp(4, 4, 0)), InputError);
+  EXPECT_THROW(write_png("/nonexistent_folder/a.png", ramp(4, 4, 0)), OutputError);
   EXPECT_THROW(write_png("a.png", GrayFrame{}), InputError);
 }
 

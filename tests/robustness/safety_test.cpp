@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 
 #include "pipelines/files.hpp"
 #include "tests/pipelines/program.hpp"
@@ -82,6 +83,62 @@ TEST(Safety, FileNamesOfTheUsersStartNoProgram) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / "o"))
       EXPECT_NE(entry.path().filename(), "pwned") << name;
   }
+}
+
+TEST(Safety, NoShellIsEverNeeded) {
+  // With every shell of the machine replaced by an empty file, where the kernel lets us do that, figures are drawn
+  // still.
+  ScratchFolder folder;
+  write_text(folder / "r.json", with_figure("t"));
+  std::set<std::string> shells;
+  for (const char* name : {"/bin/sh", "/bin/bash", "/bin/dash"}) {
+    if (fs::exists(name)) shells.insert(fs::canonical(name).string());
+  }
+  std::string mounts;
+  for (const std::string& shell : shells) mounts += "mount --bind /dev/null " + shell + " && ";
+  const std::string enter = "cd '" + folder.path().string() + "' && unshare -rm sh -c '";
+  if (std::system((enter + mounts + "true' 2> /dev/null").c_str()) != 0) GTEST_SKIP() << "nothing may be mounted here";
+  EXPECT_NE(std::system((enter + mounts + "/bin/sh -c true' 2> /dev/null").c_str()), 0) << "the shell is still there";
+  EXPECT_EQ(std::system(
+                (enter + mounts + "exec " + SHAKEBED_PROGRAM + " run r.json --out o' > /dev/null 2> err.txt").c_str()),
+            0)
+      << read_text(folder / "err.txt");
+  EXPECT_TRUE(fs::is_regular_file(folder / "o/figure/profile.svg"));
+}
+
+TEST(Safety, ChartsStartNoProgramAndStayInTheirFolder) {
+  const auto with_chart = [](const std::string& name, const std::string& label, const std::string& file) {
+    std::string text = small_recipe();
+    replace(text, "{ \"stage\": \"check\"",
+            "{ \"stage\": \"chart\", \"id\": \"c\", \"from\": [\"bed\"], \"charts\": [{ \"name\": \"" + name +
+                "\", \"x_label\": \"" + label + "\", \"y_label\": \"" + label + "\", \"caption\": \"" + label +
+                "\", \"points\": [{ \"name\": \"p\", \"file\": \"" + file +
+                "\", \"x\": \"height\", \"y\": \"number_density\", \"label\": \"" + label +
+                "\" }] }] },\n    { \"stage\": \"check\"");
+    return text;
+  };
+  const auto run = [&](const std::string& recipe, std::set<int> codes) {
+    ScratchFolder folder;
+    fs::create_directory(folder / "inner");
+    write_text(folder / "inner/r.json", recipe);
+    const auto before = listing(folder / "inner", "o");
+    const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder / "inner");
+    EXPECT_TRUE(codes.contains(result.exit_code)) << recipe << result.exit_code << " " << result.err;
+    EXPECT_EQ(listing(folder / "inner", "o"), before) << recipe;
+    EXPECT_EQ(listing(folder.path(), "inner"), std::vector<std::string>{}) << recipe;
+    if (fs::exists(folder / "inner/o")) {
+      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / "inner/o"))
+        EXPECT_NE(entry.path().filename().stem(), "pwned") << recipe;
+    }
+  };
+  for (const char* name : {"../pwned", "../../pwned", "/tmp/shakebed-pwned", "..", "a/pwned", "", ".record"})
+    run(with_chart(name, "x", "profile.csv"), {3});
+  EXPECT_FALSE(fs::exists("/tmp/shakebed-pwned.svg"));
+  for (const char* label :
+       {"`touch pwned`", "'; system('touch pwned'); '", "$(touch pwned)", "@x {/Symbol", "\\n!touch pwned"})
+    run(with_chart("a", label, "profile.csv"), {0});
+  // Only results of the stage it names are read.
+  for (const char* file : {"../../r.json", "/etc/passwd", "../fit/fit.json"}) run(with_chart("a", "x", file), {3, 4});
 }
 
 TEST(Safety, ResultsStayBelowOut) {
@@ -202,6 +259,44 @@ TEST(Safety, PicturesThatClaimToBeHugeAreRefused) {
   for (const char* name : {"bomb.png", "bomb.pgm", "bomb.bmp"}) {
     const ProgramResult result =
         within(4ull << 30, {"fit-images", name, "--diameter", "3 mm", "--out", "o"}, folder.path());
+    EXPECT_EQ(result.exit_code, 4) << name << " " << result.err;
+    EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+  }
+}
+
+// A film of one picture, as its header and its data say.
+std::string avi(std::uint32_t width, std::uint32_t height, const std::string& codec, const std::string& picture) {
+  const auto little = [](std::uint32_t value) {
+    std::string out;
+    for (int shift = 0; shift < 32; shift += 8) out += static_cast<char>(value >> shift & 0xff);
+    return out;
+  };
+  const auto chunk = [&](const std::string& kind, const std::string& body) {
+    return kind + little(static_cast<std::uint32_t>(body.size())) + body + std::string(body.size() % 2, '\0');
+  };
+  std::string head;
+  for (const std::uint32_t value : {40'000u, 0u, 0u, 16u, 1u, 0u, 1u, 0u, width, height, 0u, 0u, 0u, 0u})
+    head += little(value);
+  std::string stream = "vids" + codec;
+  for (const std::uint32_t value : {0u, 0u, 0u, 1u, 25u, 0u, 1u, 0u, 0u, 0u, 0u, 0u}) stream += little(value);
+  const std::string format = little(40) + little(width) + little(height) + std::string("\x01\0\x18\0", 4) + codec +
+                             little(0) + std::string(16, '\0');
+  const std::string headers = chunk(
+      "LIST", "hdrl" + chunk("avih", head) + chunk("LIST", "strl" + chunk("strh", stream) + chunk("strf", format)));
+  return chunk("RIFF", "AVI " + headers + chunk("LIST", "movi" + chunk("00dc", picture)));
+}
+
+TEST(Safety, FilmsThatClaimToBeHugeAreRefused) {
+  ScratchFolder folder;
+  const std::string small_data("\x78\x9c\x63\x60\x60\x00\x00\x00\x04\x00\x01", 11);
+  write_text(folder / "claims.avi", avi(30'000, 30'000, std::string(4, '\0'), std::string(100, 'x')));
+  write_text(folder / "picture.avi", avi(64, 64, "MPNG", png(16'000, 16'000, small_data)));  // the header is modest
+  write_text(folder / "both.avi", avi(65'000, 65'000, "MPNG", png(65'000, 65'000, small_data)));
+  write_text(folder / "jpeg.avi", avi(40'000, 40'000, "MJPG", "\xff\xd8\xff\xd9"));
+  write_text(folder / "damage.mp4", std::string(1'000, 'x'));
+  for (const char* name : {"claims.avi", "picture.avi", "both.avi", "jpeg.avi", "damage.mp4"}) {
+    const ProgramResult result =
+        within(3ull << 30, {"fit-images", name, "--diameter", "3 mm", "--out", "o"}, folder.path());
     EXPECT_EQ(result.exit_code, 4) << name << " " << result.err;
     EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
   }

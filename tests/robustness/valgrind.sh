@@ -1,0 +1,79 @@
+#!/bin/sh
+# One small run of each command under valgrind's memcheck: bytes used before they were written, read or written beyond
+# their end, freed twice, lost for good. A line for each; fails when any run has an error or does not end as expected.
+# Children (gnuplot) are not looked into. Skipped (77) without valgrind. Ten minutes of CPU: ctest -L study -R memcheck.
+#   valgrind.sh PROGRAM [COMMAND...]       all commands, or those named
+set -eu
+program=$1
+shift
+here=$(cd "$(dirname "$0")" && pwd)
+command -v valgrind >/dev/null || { echo "skipped: there is no valgrind"; exit 77; }
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder"
+bed='{ "stage": "simulate", "id": "bed", "seed": 7, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
+  "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+  "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.9 },
+  "observe": ["order", "velocities", "displacement", "pressure", "phases"],
+  "settle": "0.1 s", "measure": "0.2 s", "frames": { "count": 4, "phases": 4 } }'
+cat >bed.json <<END
+{ "name": "bed", "stages": [ $bed,
+  { "stage": "render", "from": "bed", "scale": "0.3 mm/px" },
+  { "stage": "extract", "from": "render", "diameter": "3 mm" },
+  { "stage": "fit", "from": "bed", "plateau_density": 1.1 },
+  { "stage": "map", "from": ["fit", "bed"] },
+  { "stage": "figure", "from": ["bed", "fit"] },
+  { "stage": "check", "from": ["bed", "fit"], "expect": { "/bed/column_number": { "value": 4, "relative": 1e-12 } } } ] }
+END
+cat >sweep.json <<END
+{ "name": "sweep", "stages": [ $bed, { "stage": "fit", "from": "bed", "plateau_density": 1.1 } ],
+  "sweep": { "over": { "/stages/bed/disks/restitution": [0.7, 0.8] } } }
+END
+cat >cluster.json <<END
+{ "name": "cluster", "stages": [ $bed ], "sweep": { "over": { "/stages/bed/disks/restitution": [0.7, 0.8] } } }
+END
+
+failed=0
+# check NAME EXPECTED_CODES ARGUMENTS...: runs it unless others were asked for.
+wanted=" $* "
+check() {
+  name=$1 expected=$2
+  shift 2
+  case "$wanted" in "  " | *" $name "*) ;; *) return 0 ;; esac
+  code=0
+  valgrind --quiet --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite --show-leak-kinds=definite \
+    --num-callers=30 --gen-suppressions=all --suppressions="$here/valgrind.supp" --log-file="$name.log" \
+    "$program" "$@" >"$name.out" 2>"$name.err" || code=$?
+  case " $expected " in
+  *" $code "*) printf '%-12s ends with %d, no error\n' "$name" "$code" ;;
+  *)
+    printf '%-12s ends with %d\n' "$name" "$code"
+    tail -n 5 "$name.err"
+    head -n 60 "$name.log"
+    failed=1
+    ;;
+  esac
+}
+check theory 0 theory --json
+check map 0 map --gamma 4 --frequency 20 --diameter 3e-3 --initial-height 10
+check audit "0 6" audit
+check init 0 init mine.json
+check schema 0 schema
+check validate 0 validate bed.json
+check run 0 run bed.json --out results/bed
+# The commands below read what `run` left; by itself it need not be watched.
+[ -d results/bed ] || "$program" run bed.json --out results/bed --quiet >/dev/null 2>&1
+check sweep 0 run sweep.json --out results/sweep
+check explain 0 explain bed.json --out results/bed
+check graph 0 graph bed.json
+check status 0 status results/bed
+check verify 0 verify results/bed
+check rerun "0 6" rerun results/bed --out again
+check fit-profile 0 fit-profile results/bed/bed/profile.csv --out profile
+check fit-images 0 fit-images results/bed/render/frames --diameter "3 mm" --out images
+check reproduce "0 6" reproduce --set "/stages/bed/settle=0.1 s" --set "/stages/bed/measure=0.1 s" \
+  --set /stages/bed/frames/count=2 --set /stages/bed/frames/phases=2 --out figure
+check submit 0 submit slurm cluster.json --out cluster --dry-run
+check bench "0 6" bench fit --quick --out bench
+check clean 0 clean results
+exit $failed
