@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <numbers>
 #include <vector>
 
@@ -24,7 +23,22 @@ constexpr double just_below_close_packing = close_packing_density * (1.0 - 1e-12
 // 2/sqrt 3 can be computed in ways that differ in the last digits; they all mean close packing.
 bool is_at(double density, double limit) { return std::abs(density - limit) <= 4e-16 * limit; }
 
-constexpr double square(double x) { return x * x; }
+template <class Real>
+constexpr Real square(Real x) {
+  return x * x;
+}
+
+// The forms below are written once for double, in which they are evaluated, and for extended precision, in which the
+// tables of their inverses are built.
+using Extended = long double;
+template <class Real>
+constexpr Real pi_of = std::numbers::pi_v<Real>;
+template <class Real>
+constexpr Real area_of = pi_of<Real> / 4;  // nu = (pi/4) phi
+template <class Real>
+constexpr Real nu_max_of = Real(0.906899682117108925297039128820778773L);
+template <class Real>
+constexpr Real close_packing_of = Real(1.15470053837925152901829756100391491L);
 
 }  // namespace
 
@@ -71,24 +85,64 @@ Value EquationOfState::f(double number_density) const {
   if (number_density == 0.0) return no_value(ValueStatus::pole);  // ln 0
   const Value z = compressibility_factor(number_density);
   if (!z.ok()) return z;
-  return {std::log(number_density) + (f_constant() + excess(number_density))};
+  return {reduced_f(number_density)};
+}
+
+double EquationOfState::reduced_f(double number_density) const {
+  return std::log(number_density) + (f_constant() + excess(number_density));
+}
+
+const InverseTable& EquationOfState::inverse_table() const {
+  std::call_once(table_->built, [this] { table_->table = InverseTable(pieces()); });
+  return table_->table;
+}
+
+std::vector<InverseTable::Piece> EquationOfState::pieces() const {
+  return {piece(0.0L, static_cast<long double>(largest_invertible_density()))};
+}
+
+InverseTable::Piece EquationOfState::piece(long double lowest, long double highest) const {
+  return {lowest, highest, [this](long double phi) { return std::log(phi) + extended_excess(phi); },
+          [this](double phi) { return local(phi).stiffness; }};
+}
+
+// F = f - K is kept in two doubles, because one rounding of F is 500 units in the last place of phi at 1e-300.
+double EquationOfState::invert(const InverseTable& table, double f) const {
+  const double high = f - row_.f_constant;
+  const double back = high - f;
+  const double low = ((f - (high - back)) - (row_.f_constant + back)) - row_.f_constant_low;
+  if (high < InverseTable::lowest_f) return std::exp(high) * (1.0 + low);
+  return std::min(table.density(std::min(high, table.largest_f()), low), row_.largest_invertible_density);
+}
+
+// A few roundings of f above the end are the end. A form with a pole reaches every f.
+double EquationOfState::largest_f(const InverseTable& table) const {
+  if (has_pole()) return std::numeric_limits<double>::max();
+  const double largest = table.largest_f() + row_.f_constant;
+  return largest + 4e-15 * std::abs(largest);
 }
 
 Value EquationOfState::density_from_f(double f) const {
   if (std::isnan(f)) return no_value(ValueStatus::invalid_argument);
-  if (f == -std::numeric_limits<double>::infinity()) return {0.0};
-  // A few roundings of f above the end are the end.
-  if (f > largest_f() + 4e-15 * std::abs(f)) return no_value(ValueStatus::outside_range);
-  return {std::min(invert_f(std::min(f, largest_f())), largest_invertible_density())};
+  const InverseTable& table = inverse_table();
+  if (f > largest_f(table)) return no_value(ValueStatus::outside_range);
+  return {invert(table, f)};
 }
 
 ValueStatus EquationOfState::densities_from_f(std::span<const double> f, std::span<double> out) const {
+  const InverseTable& table = inverse_table();
+  const double largest = largest_f(table);
   ValueStatus first = ValueStatus::ok;
   const std::size_t count = std::min(f.size(), out.size());
   for (std::size_t i = 0; i < count; ++i) {
-    const Value density = density_from_f(f[i]);
-    out[i] = density.value;
-    if (!density.ok() && first == ValueStatus::ok) first = density.status;
+    if (f[i] <= largest) {
+      out[i] = invert(table, f[i]);
+    } else {
+      out[i] = 0.0;
+      if (first == ValueStatus::ok) {
+        first = std::isnan(f[i]) ? ValueStatus::invalid_argument : ValueStatus::outside_range;
+      }
+    }
   }
   return first;
 }
@@ -124,53 +178,6 @@ Value EquationOfState::density_from_scaled_pressure(double scaled_pressure) cons
 
 namespace {
 
-// Rows that invert by table and one Newton step. The table is built at the first use of the inverse.
-class TabulatedEquation : public EquationOfState {
- public:
-  const InverseTable& inverse_table() const override {
-    std::call_once(built_, [this] { table_ = InverseTable(pieces()); });
-    return table_;
-  }
-
- protected:
-  using EquationOfState::EquationOfState;
-
-  virtual std::vector<InverseTable::Piece> pieces() const { return {piece(0.0, largest_invertible_density())}; }
-  InverseTable::Piece piece(double lowest, double highest, double spacing = 1.0 / 16.0) const {
-    return {lowest,
-            highest,
-            has_pole() ? largest_density() : 0.0,
-            spacing,
-            [this](double phi) { return std::log(phi) + excess(phi); },
-            [this](double phi) { return local(phi).stiffness; }};
-  }
-  double largest_f() const override {
-    return has_pole() ? std::numeric_limits<double>::max() : inverse_table().largest_f() + f_constant();
-  }
-  double invert_f(double f) const override {
-    const double big_f = f - f_constant();
-    const InverseTable& table = inverse_table();
-    if (big_f >= table.largest_f()) return largest_invertible_density();
-    const double guess = table.density(big_f);
-    if (big_f < InverseTable::lowest_f) return guess;
-    // One Newton step takes away the table's error; more are needed only where the stiffness ends at zero.
-    double density = guess;
-    for (int step = 0; step < 60; ++step) {
-      const double kappa = local(density).stiffness;
-      if (!(kappa > 0.0)) break;  // rounded into a coexistence
-      const double correction = (big_f - std::log(density) - excess(density)) / kappa;
-      if (std::abs(correction) > 1e-2) break;
-      density = std::min(density * (1.0 + correction), largest_invertible_density());
-      if (std::abs(correction) < 1e-9) return density;
-    }
-    return density == guess ? guess : std::clamp(density, 0.99 * guess, 1.01 * guess);
-  }
-
- private:
-  mutable std::once_flag built_;
-  mutable InverseTable table_;
-};
-
 // --- Enskog with the Ree-Hoover pair function ----------------------------------------------------------------------
 
 // [Hong1999], the pair function of [ReeHoover1967]: chi = (1 - a1 phi + a2 phi^2)/(1 - a phi)^2.
@@ -187,12 +194,12 @@ constexpr double enskog_c4 = (pi / 2.0) * (1.0 - enskog_a1 / enskog_a + enskog_a
 constexpr double enskog_k = 0x1.fce676e9ffd73p+0;
 constexpr double enskog_k_low = -0x1.326ba350fa0a4p-54;
 
-class Enskog final : public TabulatedEquation {
+class Enskog final : public EquationOfState {
  public:
   Enskog()
-      : TabulatedEquation({"enskog", "Enskog with the Ree-Hoover pair function", "Hong1999",
-                           "fluid branch; within 0.15 % of Kolafa-Rottner up to area fraction 0.65, 1 % to 0.67", 0.852,
-                           close_packing_density, close_packing_density, false, enskog_k}) {}
+      : EquationOfState({"enskog", "Enskog with the Ree-Hoover pair function", "Hong1999",
+                         "fluid branch; within 0.15 % of Kolafa-Rottner up to area fraction 0.65, 1 % to 0.67", 0.852,
+                         close_packing_density, close_packing_density, false, enskog_k, enskog_k_low}) {}
 
   Local local(double phi) const override {
     const double numerator = 1.0 - enskog_a1 * phi + enskog_a2 * phi * phi;
@@ -215,64 +222,26 @@ class Enskog final : public TabulatedEquation {
     return (1.0 - enskog_a1 * phi + enskog_a2 * phi * phi) / square(1.0 - enskog_a * phi);
   }
 
-  ValueStatus densities_from_f(std::span<const double> f, std::span<double> out) const override {
-    const InverseTable& table = inverse_table();
-    const double largest = largest_f();
-    ValueStatus first = ValueStatus::ok;
-    const std::size_t count = std::min(f.size(), out.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      if (f[i] <= largest + 4e-15 * std::abs(f[i])) {
-        out[i] = std::min(invert(table, std::min(f[i], largest)), close_packing_density);
-      } else {
-        out[i] = 0.0;
-        if (first == ValueStatus::ok) {
-          first = std::isnan(f[i]) ? ValueStatus::invalid_argument : ValueStatus::outside_range;
-        }
-      }
-    }
-    return first;
-  }
-
  protected:
-  double invert_f(double f) const override { return invert(inverse_table(), f); }
-
- private:
-  // To the last digits of phi, from 1e-300 to 2/sqrt 3. F = f - K is kept in two doubles, because one rounding of F is
-  // 500 units in the last place of phi at 1e-300. The last step is taken on E = exp(F - g(phi)), which equals phi at
-  // the solution: its rounding errors reach phi divided by kappa >= 1 + g.
-  static double invert(const InverseTable& table, double f) {
-    const double high = f - enskog_k;
-    const double back = high - f;
-    const double low = ((f - (high - back)) - (enskog_k + back)) - enskog_k_low;
-    if (high < InverseTable::lowest_f) return std::exp(high) * (1.0 + low);
-    const double guess = table.density(std::min(high, table.largest_f()));
-    const double inverse = 1.0 / (1.0 - enskog_a * guess);
-    const double u = enskog_a * guess * inverse;
-    // ln(1 + u) to an absolute error is enough here, and faster than log1p.
-    const double g = enskog_c1 * guess + enskog_c3 * (u + std::log(1.0 + u)) + enskog_c4 * u * (2.0 + u);
-    const double difference = high - g;
-    const double carry = difference - high;
-    const double difference_low = ((high - (difference - carry)) - (g + carry)) + low;
-    const double e = std::exp(difference);
-    const double numerator = 1.0 - enskog_a1 * guess + enskog_a2 * guess * guess;
-    const double chi = numerator * inverse * inverse;
-    const double chi_slope =
-        ((2.0 * enskog_a2 * guess - enskog_a1) + 2.0 * enskog_a * numerator * inverse) * inverse * inverse;
-    const double kappa = 1.0 + 0.5 * pi * guess * (2.0 * chi + guess * chi_slope);
-    // ln(E/phi) = (E - phi)/phi: the table leaves 1e-11, whose square is nothing.
-    return guess + ((e - guess) + e * difference_low) / kappa;
+  long double extended_excess(long double phi) const override {
+    constexpr Extended half_pi = pi_of<Extended> / 2;
+    constexpr Extended a = 0.489351L * half_pi, a1 = 0.196703L * half_pi, a2 = 0.006519L * half_pi * half_pi;
+    constexpr Extended c1 = 2 * half_pi * a2 / (a * a), c3 = half_pi * (a1 - 2 * a2 / a) / (a * a),
+                       c4 = half_pi * (1 - a1 / a + a2 / (a * a)) / a;
+    const Extended u = a * phi / (1 - a * phi);
+    return c1 * phi + c3 * (u + std::log1p(u)) + c4 * u * (2 + u);
   }
 };
 
 // --- closed forms of the fluid --------------------------------------------------------------------------------------
 
 // [Henderson1975]: Z = (1 + eta^2/8)/(1 - eta)^2.
-class Henderson final : public TabulatedEquation {
+class Henderson final : public EquationOfState {
  public:
   Henderson()
-      : TabulatedEquation({"henderson", "Henderson", "Henderson1975",
-                           "fluid branch; +0.7 % at area fraction 0.55, 1 % at 0.58", 0.738, close_packing_density,
-                           close_packing_density, false, 0.0}) {}
+      : EquationOfState({"henderson", "Henderson", "Henderson1975",
+                         "fluid branch; +0.7 % at area fraction 0.55, 1 % at 0.58", 0.738, close_packing_density,
+                         close_packing_density, false, 0.0}) {}
   Local local(double phi) const override {
     const double eta = per_density * phi;
     const double inverse = 1.0 / (1.0 - eta);
@@ -285,22 +254,29 @@ class Henderson final : public TabulatedEquation {
     const double eta = per_density * phi;
     return (1.0 - 0.4375 * eta) / square(1.0 - eta);
   }
-  double excess(double phi) const override {
-    const double eta = per_density * phi;
-    const double one = 1.0 - eta;
-    const double z_minus_one = eta * (2.0 - 0.875 * eta) / square(one);
-    return z_minus_one + 1.125 * eta / one - 0.875 * std::log1p(-eta);
+  double excess(double phi) const override { return excess_of(phi); }
+
+ protected:
+  long double extended_excess(long double phi) const override { return excess_of(phi); }
+
+ private:
+  template <class Real>
+  static Real excess_of(Real phi) {
+    const Real eta = area_of<Real> * phi;
+    const Real one = 1 - eta;
+    const Real z_minus_one = eta * (2 - Real(0.875) * eta) / square(one);
+    return z_minus_one + Real(1.125) * eta / one - Real(0.875) * std::log1p(-eta);
   }
 };
 
 // [SantosLopezYuste1995]: Z = 1/(1 - 2 eta + (2 nu_max - 1) eta^2/nu_max^2) = 1/((1 - eta/nu_max)(1 - b eta)),
 // b = 2 - 1/nu_max.
-class SantosLopezYuste final : public TabulatedEquation {
+class SantosLopezYuste final : public EquationOfState {
  public:
   SantosLopezYuste()
-      : TabulatedEquation({"santos-lopez-yuste", "Santos, Lopez de Haro and Yuste", "SantosLopezYuste1995",
-                           "fluid branch; within 1.6 % up to area fraction 0.66; pole at close packing", 0.407,
-                           close_packing_density, just_below_close_packing, true, 0.0}) {}
+      : EquationOfState({"santos-lopez-yuste", "Santos, Lopez de Haro and Yuste", "SantosLopezYuste1995",
+                         "fluid branch; within 1.6 % up to area fraction 0.66; pole at close packing", 0.407,
+                         close_packing_density, just_below_close_packing, true, 0.0}) {}
   Local local(double phi) const override {
     const double eta = per_density * phi;
     const double z = 1.0 / ((1.0 - phi / close_packing_density) * (1.0 - b * eta));
@@ -310,26 +286,33 @@ class SantosLopezYuste final : public TabulatedEquation {
     const double eta = per_density * phi;
     return (1.0 - 0.5 * b * eta / nu_max) / ((1.0 - phi / close_packing_density) * (1.0 - b * eta));
   }
-  double excess(double phi) const override {
-    const double eta = per_density * phi;
-    const double far = 1.0 - phi / close_packing_density;
-    const double z_minus_one = eta * (2.0 - b * eta / nu_max) / (far * (1.0 - b * eta));
-    // (Z - 1)/eta = A/(1 - eta/nu_max) + B/(1 - b eta).
-    constexpr double a = 1.0 / (2.0 * nu_max * (1.0 - nu_max));
-    return z_minus_one - a * nu_max * std::log1p(-phi / close_packing_density) - (2.0 - a) / b * std::log1p(-b * eta);
-  }
+  double excess(double phi) const override { return excess_of(phi); }
+
+ protected:
+  long double extended_excess(long double phi) const override { return excess_of(phi); }
 
  private:
+  template <class Real>
+  static Real excess_of(Real phi) {
+    constexpr Real densest = nu_max_of<Real>, slope = 2 - 1 / densest;
+    const Real eta = area_of<Real> * phi;
+    const Real far = 1 - phi / close_packing_of<Real>;
+    const Real z_minus_one = eta * (2 - slope * eta / densest) / (far * (1 - slope * eta));
+    // (Z - 1)/eta = A/(1 - eta/nu_max) + B/(1 - b eta).
+    constexpr Real a = 1 / (2 * densest * (1 - densest));
+    return z_minus_one - a * densest * std::log1p(-phi / close_packing_of<Real>) -
+           (2 - a) / slope * std::log1p(-slope * eta);
+  }
   static constexpr double b = 2.0 - 1.0 / nu_max;
 };
 
 // [Helfand1961], scaled particle theory, the Percus-Yevick compressibility form in 2D: Z = 1/(1 - eta)^2.
-class PercusYevick final : public TabulatedEquation {
+class PercusYevick final : public EquationOfState {
  public:
   PercusYevick()
-      : TabulatedEquation({"percus-yevick", "Percus-Yevick (scaled particle)", "Helfand1961",
-                           "fluid branch; within 1 % up to area fraction 0.28, -3 % at 0.6", 0.357,
-                           close_packing_density, close_packing_density, false, 0.0}) {}
+      : EquationOfState({"percus-yevick", "Percus-Yevick (scaled particle)", "Helfand1961",
+                         "fluid branch; within 1 % up to area fraction 0.28, -3 % at 0.6", 0.357, close_packing_density,
+                         close_packing_density, false, 0.0}) {}
   Local local(double phi) const override {
     const double eta = per_density * phi;
     const double inverse = 1.0 / (1.0 - eta);
@@ -340,10 +323,17 @@ class PercusYevick final : public TabulatedEquation {
     const double eta = per_density * phi;
     return (1.0 - 0.5 * eta) / square(1.0 - eta);
   }
-  double excess(double phi) const override {
-    const double eta = per_density * phi;
-    const double one = 1.0 - eta;
-    return eta * (2.0 - eta) / square(one) + eta / one - std::log1p(-eta);
+  double excess(double phi) const override { return excess_of(phi); }
+
+ protected:
+  long double extended_excess(long double phi) const override { return excess_of(phi); }
+
+ private:
+  template <class Real>
+  static Real excess_of(Real phi) {
+    const Real eta = area_of<Real> * phi;
+    const Real one = 1 - eta;
+    return eta * (2 - eta) / square(one) + eta / one - std::log1p(-eta);
   }
 };
 
@@ -351,29 +341,34 @@ class PercusYevick final : public TabulatedEquation {
 // -----------------------------------------------------------------------------------------------
 
 // [KolafaRottner2006]: Z = sum A_i y^i, y = eta/(1 - eta).
+template <class Real>
 struct KolafaRottnerForm {
-  static constexpr std::array<double, 13> low{
-      1.0,          2.0,           1.12801775,     0.00181895291, -0.0526134737,  0.0504960168,  -0.0325537792,
-      0.0134578632, 0.00140888182, -0.00834273601, 0.00694127367, -0.00262254723, 0.000355746352};
-  static constexpr double a22 = -5.24672938e-9;
-  static constexpr double a57 = 5.88054639e-23;
+  static constexpr std::array<Real, 13> low{Real(1.0L),           Real(2.0L),
+                                            Real(1.12801775L),    Real(0.00181895291L),
+                                            Real(-0.0526134737L), Real(0.0504960168L),
+                                            Real(-0.0325537792L), Real(0.0134578632L),
+                                            Real(0.00140888182L), Real(-0.00834273601L),
+                                            Real(0.00694127367L), Real(-0.00262254723L),
+                                            Real(0.000355746352L)};
+  static constexpr Real a22 = Real(-5.24672938e-9L);
+  static constexpr Real a57 = Real(5.88054639e-23L);
 
   // (Z - 1)/y = sum_{i>=1} A_i y^(i-1) = Q(y) (1 + y) + R, for integral (Z - 1)/(y (1 + y)) dy = integral Q + R ln(1 +
   // y).
-  std::array<double, 56> quotient_integral{};  // of y^1 .. y^56
-  double remainder = 0.0;
+  std::array<Real, 56> quotient_integral{};  // of y^1 .. y^56
+  Real remainder = 0;
 
   KolafaRottnerForm() {
-    std::array<double, 57> coefficient{};
-    for (std::size_t i = 1; i < low.size(); ++i) coefficient[i - 1] = low[i];
-    coefficient[21] = a22;
-    coefficient[56] = a57;
-    double carry = coefficient[56];
+    std::array<Extended, 57> coefficient{};
+    for (std::size_t i = 1; i < low.size(); ++i) coefficient[i - 1] = KolafaRottnerForm<Extended>::low[i];
+    coefficient[21] = KolafaRottnerForm<Extended>::a22;
+    coefficient[56] = KolafaRottnerForm<Extended>::a57;
+    Extended carry = coefficient[56];
     for (std::size_t i = 56; i-- > 0;) {
-      quotient_integral[i] = carry / static_cast<double>(i + 1);
+      quotient_integral[i] = static_cast<Real>(carry / static_cast<Extended>(i + 1));
       carry = coefficient[i] - carry;
     }
-    remainder = carry;
+    remainder = static_cast<Real>(carry);
   }
 
   static EquationOfState::Local local(double phi) {
@@ -395,23 +390,27 @@ struct KolafaRottnerForm {
     return {z, z + y * inverse * slope};  // eta dy/deta = eta/(1 - eta)^2
   }
 
-  double excess(double phi) const {
-    const double eta = per_density * phi;
-    const double y = eta / (1.0 - eta);
-    double integral = 0.0;
+  static Real compressibility_factor_minus_one(Real y) {
+    Real sum = 0;
+    for (std::size_t i = low.size(); i-- > 1;) sum = (sum + low[i]) * y;
+    const Real y2 = y * y;
+    const Real y4 = y2 * y2;
+    const Real y22 = y4 * y4 * y4 * y4 * y4 * y2;
+    return sum + a22 * y22 + a57 * y22 * y22 * y4 * y4 * y4 * y;
+  }
+
+  Real excess(Real phi) const {
+    const Real eta = area_of<Real> * phi;
+    const Real y = eta / (1 - eta);
+    Real integral = 0;
     for (std::size_t i = quotient_integral.size(); i-- > 0;) integral = (integral + quotient_integral[i]) * y;
-    double z_minus_one = 0.0;
-    for (std::size_t i = low.size(); i-- > 1;) z_minus_one = (z_minus_one + low[i]) * y;
-    const double y2 = y * y;
-    const double y4 = y2 * y2;
-    const double y22 = y4 * y4 * y4 * y4 * y4 * y2;
-    z_minus_one += a22 * y22 + a57 * y22 * y22 * y4 * y4 * y4 * y;
-    return z_minus_one + integral + remainder * std::log1p(y);
+    return compressibility_factor_minus_one(y) + integral + remainder * std::log1p(y);
   }
 };
 
-const KolafaRottnerForm& kolafa_rottner_form() {
-  static const KolafaRottnerForm form;
+template <class Real>
+const KolafaRottnerForm<Real>& kolafa_rottner_form() {
+  static const KolafaRottnerForm<Real> form;
   return form;
 }
 
@@ -419,46 +418,26 @@ const KolafaRottnerForm& kolafa_rottner_form() {
 double kolafa_rottner_pair_function(double phi) {
   const double y = per_density * phi / (1.0 - per_density * phi);
   double sum = 0.0;  // (Z - 1)/y
-  for (std::size_t i = KolafaRottnerForm::low.size(); i-- > 1;) sum = sum * y + KolafaRottnerForm::low[i];
-  sum += KolafaRottnerForm::a22 * std::pow(y, 21) + KolafaRottnerForm::a57 * std::pow(y, 56);
+  using Form = KolafaRottnerForm<double>;
+  for (std::size_t i = Form::low.size(); i-- > 1;) sum = sum * y + Form::low[i];
+  sum += Form::a22 * std::pow(y, 21) + Form::a57 * std::pow(y, 56);
   return 0.5 * sum / (1.0 - per_density * phi);
 }
 
-// Its stiffness almost vanishes at freezing, where the density therefore follows f like a square root: nodes gather
-// there.
-class KolafaRottnerFluid : public TabulatedEquation {
- protected:
-  using TabulatedEquation::TabulatedEquation;
-  [[nodiscard]] std::vector<InverseTable::Piece> fluid_pieces() const {
-    constexpr std::array<double, 5> ends{0.0, 0.66, 0.69, 0.697, freezing_area_fraction};
-    constexpr std::array<double, 4> spacing{1.0 / 16.0, 1.0 / 256.0, 1.0 / 1024.0, 1.0 / 4096.0};
-    std::vector<InverseTable::Piece> all;
-    for (std::size_t i = 0; i < spacing.size(); ++i) {
-      all.push_back(piece(ends[i] / per_density, ends[i + 1] / per_density, spacing[i]));
-      all.back().pole = 0.0;
-    }
-    return all;
-  }
-};
-
-class KolafaRottner final : public KolafaRottnerFluid {
+class KolafaRottner final : public EquationOfState {
  public:
   KolafaRottner()
-      : KolafaRottnerFluid(
-            {"kolafa-rottner", "Kolafa and Rottner", "KolafaRottner2006",
-             "fluid branch to freezing (area fraction 0.70); a loop inside the transition, no number above "
-             "phi = 0.90",
-             freezing_area_fraction / per_density, 0.90, freezing_area_fraction / per_density, false, 0.0}),
-        form_(kolafa_rottner_form()) {}
-  Local local(double phi) const override { return KolafaRottnerForm::local(phi); }
+      : EquationOfState({"kolafa-rottner", "Kolafa and Rottner", "KolafaRottner2006",
+                         "fluid branch to freezing (area fraction 0.70); a loop inside the transition, no number above "
+                         "phi = 0.90",
+                         freezing_area_fraction / per_density, 0.90, freezing_area_fraction / per_density, false,
+                         0.0}) {}
+  Local local(double phi) const override { return KolafaRottnerForm<double>::local(phi); }
   double pair_function(double phi) const override { return kolafa_rottner_pair_function(phi); }
-  double excess(double phi) const override { return form_.excess(phi); }
+  double excess(double phi) const override { return kolafa_rottner_form<double>().excess(phi); }
 
  protected:
-  std::vector<InverseTable::Piece> pieces() const override { return fluid_pieces(); }
-
- private:
-  const KolafaRottnerForm& form_;
+  long double extended_excess(long double phi) const override { return kolafa_rottner_form<Extended>().excess(phi); }
 };
 
 // --- the dense branch
@@ -473,25 +452,30 @@ struct DenseForm {
     const double slope = 2.0 * nu_max * (1.0 / (x * x) - 6.5 * x);  // dZ/dnu
     return {z, z + per_density * phi * slope};
   }
+  template <class Real>
+  static Real compressibility_factor(Real phi) {
+    const Real x = area_of<Real> * (close_packing_of<Real> - phi);
+    return 2 * nu_max_of<Real> * (1 / x - Real(0.04L) + Real(3.25L) * x * x);
+  }
   // Z + integral (Z/nu) dnu, up to a constant: F along the branch.
-  static double f(double phi) {
-    const double x = gap(phi);
-    const double log_nu = std::log(per_density * phi);
-    const double z = 2.0 * nu_max * (1.0 / x - 0.04 + 3.25 * x * x);
-    return z - 2.0 * std::log(x) + 2.0 * log_nu - 0.08 * nu_max * log_nu +
-           6.5 * nu_max * (0.5 * x * x + nu_max * x + nu_max * nu_max * log_nu);
+  template <class Real>
+  static Real f(Real phi) {
+    constexpr Real densest = nu_max_of<Real>;
+    const Real x = area_of<Real> * (close_packing_of<Real> - phi);
+    const Real log_nu = std::log(area_of<Real> * phi);
+    return compressibility_factor(phi) - 2 * std::log(x) + 2 * log_nu - Real(0.08L) * densest * log_nu +
+           Real(6.5L) * densest * (x * x / 2 + densest * x + densest * densest * log_nu);
   }
 };
 
 // [Luding2001], global: the fluid form Z4 blended into the dense one over the transition.
-class Luding final : public TabulatedEquation {
+class Luding final : public EquationOfState {
  public:
   Luding()
-      : TabulatedEquation(
-            {"luding", "Luding, global", "Luding2001",
-             "fluid, transition and solid; within 0.3 % up to area fraction 0.67, 1.7 % in the transition; "
-             "pole at close packing",
-             0.866, close_packing_density, just_below_close_packing, true, 0.0}) {
+      : EquationOfState({"luding", "Luding, global", "Luding2001",
+                         "fluid, transition and solid; within 0.3 % up to area fraction 0.67, 1.7 % in the transition; "
+                         "pole at close packing",
+                         0.866, close_packing_density, just_below_close_packing, true, 0.0}) {
     // integral (Z - 1)/phi dphi up to the edges of panels: even below the transition, fine across it (the blend has
     // poles 0.035 in nu off the axis), and halving the gap on the way to close packing.
     for (int i = 0; i <= 24; ++i) edges_.push_back(0.60 * i / 24.0 / per_density);
@@ -500,9 +484,10 @@ class Luding final : public TabulatedEquation {
       gap *= 0.7;
       edges_.push_back(close_packing_density - gap);
     }
-    sums_.push_back(0.0);
+    sums_.push_back(0.0L);
     for (std::size_t i = 1; i < edges_.size(); ++i) {
-      sums_.push_back(sums_.back() + integrate_panel<16>(edges_[i - 1], edges_[i], integrand));
+      sums_.push_back(sums_.back() +
+                      integrate_panel<16>(Extended(edges_[i - 1]), Extended(edges_[i]), integrand<Extended>));
     }
   }
   Local local(double phi) const override {
@@ -526,85 +511,96 @@ class Luding final : public TabulatedEquation {
     return {z, z + nu * slope};
   }
   double pair_function(double phi) const override { return integrand(phi) / (0.5 * pi); }
-  double excess(double phi) const override {
-    const auto edge =
-        static_cast<std::size_t>(std::upper_bound(edges_.begin(), edges_.end(), phi) - edges_.begin()) - 1;
-    const double partial = integrate_panel<12>(edges_[edge], phi, integrand);
-    return local(phi).compressibility_factor - 1.0 + (sums_[edge] + partial);
-  }
+  double excess(double phi) const override { return excess_of(phi); }
 
  protected:
-  // Across the transition the density changes fast with f.
-  std::vector<InverseTable::Piece> pieces() const override {
-    return {piece(0.0, 0.64 / per_density), piece(0.64 / per_density, 0.76 / per_density, 1.0 / 400.0),
-            piece(0.76 / per_density, just_below_close_packing)};
-  }
+  long double extended_excess(long double phi) const override { return excess_of(phi); }
 
  private:
-  static double integrand(double phi) {
-    const double nu = per_density * phi;
-    const double inverse2 = 1.0 / square(1.0 - nu);
-    const double g4 = (1.0 - 7.0 * nu / 16.0) * inverse2 - nu * nu * nu / 128.0 * inverse2 * inverse2;
-    if (nu < 0.2) return 0.5 * pi * g4;  // the weight of the dense form is below 3e-20
-    const double weight = 1.0 / (1.0 + std::exp(-(nu - 0.70) / 0.0111));
-    const double x = DenseForm::gap(phi);
-    const double dense = 2.0 * nu_max * (1.0 / x - 0.04 + 3.25 * x * x);
-    return (1.0 - weight) * 0.5 * pi * g4 + weight * (dense - 1.0) / phi;
+  template <class Real>
+  Real excess_of(Real phi) const {
+    const auto edge = static_cast<std::size_t>(
+        std::max<std::ptrdiff_t>(
+            std::upper_bound(edges_.begin(), edges_.end(), static_cast<double>(phi)) - edges_.begin(), 1) -
+        1);
+    const Real partial = integrate_panel<12>(Real(edges_[edge]), phi, integrand<Real>);
+    return phi * integrand(phi) + (static_cast<Real>(sums_[edge]) + partial);
+  }
+  // (Z - 1)/phi
+  template <class Real>
+  static Real integrand(Real phi) {
+    const Real nu = area_of<Real> * phi;
+    const Real inverse2 = 1 / square(1 - nu);
+    const Real g4 = (1 - 7 * nu / 16) * inverse2 - nu * nu * nu / 128 * inverse2 * inverse2;
+    // Below, the weight of the dense form is less than 3e-20.
+    if (nu < Real(0.2)) return pi_of<Real> / 2 * g4;
+    const Real weight = 1 / (1 + std::exp(-(nu - Real(0.70L)) / Real(0.0111L)));
+    return (1 - weight) * pi_of<Real> / 2 * g4 + weight * (DenseForm::compressibility_factor(phi) - 1) / phi;
   }
   std::vector<double> edges_;
-  std::vector<double> sums_;
+  std::vector<Extended> sums_;
 };
 
 // Kolafa-Rottner up to freezing at nu = 0.700, its pressure there held across the transition, then the dense branch of
 // Luding from where it has that pressure. True disks coexist from 0.700 to 0.716 and the hexatic above is nearly flat
 // [Bernard2011] [Engel2013]; the dense branch meets the coexistence pressure at 0.7227.
-class BestOf final : public KolafaRottnerFluid {
+class BestOf final : public EquationOfState {
  public:
   BestOf()
-      : KolafaRottnerFluid({"best-of", "Kolafa-Rottner, coexistence, Luding's dense branch", "KolafaRottner2006",
-                            "fluid, coexistence and solid; pole at close packing", 1.15, close_packing_density,
-                            just_below_close_packing, true, 0.0}),
-        form_(kolafa_rottner_form()) {
-    freezing_ = freezing_area_fraction / per_density;
-    scaled_pressure_ = freezing_ * KolafaRottnerForm::local(freezing_).compressibility_factor;
-    double below = melting_area_fraction / per_density;
-    double above = 0.75 / per_density;
+      : EquationOfState({"best-of", "Kolafa-Rottner, coexistence, Luding's dense branch", "KolafaRottner2006",
+                         "fluid, coexistence and solid; pole at close packing", 1.15, close_packing_density,
+                         just_below_close_packing, true, 0.0}) {
+    const KolafaRottnerForm<Extended>& fluid = kolafa_rottner_form<Extended>();
+    constexpr Extended nu = 0.700L;
+    freezing_ = nu / area_of<Extended>;
+    const Extended pressure = freezing_ * (1 + fluid.compressibility_factor_minus_one(nu / (1 - nu)));
+    Extended below = 0.716L / area_of<Extended>;
+    Extended above = 0.75L / area_of<Extended>;
     for (int i = 0; i < 100; ++i) {
-      const double middle = 0.5 * (below + above);
-      (middle * DenseForm::local(middle).compressibility_factor < scaled_pressure_ ? below : above) = middle;
+      const Extended middle = (below + above) / 2;
+      (middle * DenseForm::compressibility_factor(middle) < pressure ? below : above) = middle;
     }
     melting_ = above;
-    breaks_ = {freezing_, melting_};
-    f_coexistence_ = std::log(freezing_) + form_.excess(freezing_);
+    scaled_pressure_ = static_cast<double>(pressure);
+    breaks_ = {static_cast<double>(freezing_), static_cast<double>(melting_)};
+    f_coexistence_ = std::log(freezing_) + fluid.excess(freezing_);
     dense_offset_ = f_coexistence_ - DenseForm::f(melting_);
   }
   Local local(double phi) const override {
-    if (phi <= freezing_) return KolafaRottnerForm::local(phi);
-    if (phi < melting_) return {scaled_pressure_ / phi, 0.0};
+    if (phi <= breaks_[0]) return KolafaRottnerForm<double>::local(phi);
+    if (phi < breaks_[1]) return {scaled_pressure_ / phi, 0.0};
     return DenseForm::local(phi);
   }
   double excess(double phi) const override {
-    if (phi <= freezing_) return form_.excess(phi);
-    if (phi < melting_) return f_coexistence_ - std::log(phi);
-    return DenseForm::f(phi) + dense_offset_ - std::log(phi);
+    if (phi <= breaks_[0]) return kolafa_rottner_form<double>().excess(phi);
+    if (phi < breaks_[1]) return static_cast<double>(f_coexistence_) - std::log(phi);
+    return DenseForm::f(phi) + static_cast<double>(dense_offset_) - std::log(phi);
   }
   double pair_function(double phi) const override {
-    return phi <= freezing_ ? kolafa_rottner_pair_function(phi) : EquationOfState::pair_function(phi);
+    return phi <= breaks_[0] ? kolafa_rottner_pair_function(phi) : EquationOfState::pair_function(phi);
   }
   std::span<const double> breaks() const override { return breaks_; }
+  std::vector<InverseTable::Piece> pieces() const override {
+    return {piece(0.0L, freezing_), piece(melting_, static_cast<Extended>(largest_invertible_density()))};
+  }
 
  protected:
-  std::vector<InverseTable::Piece> pieces() const override {
-    std::vector<InverseTable::Piece> all = fluid_pieces();
-    all.push_back(piece(melting_, just_below_close_packing));
-    all.back().pole = close_packing_density;
-    return all;
+  // One and the same number across the coexistence: its inverse is the fluid's density.
+  double reduced_f(double phi) const override {
+    const auto coexistence = static_cast<double>(f_coexistence_);
+    if (phi > breaks_[0] && phi < breaks_[1]) return coexistence;
+    const double f = EquationOfState::reduced_f(phi);
+    return phi <= breaks_[0] ? std::min(f, coexistence) : std::max(f, coexistence);
+  }
+  long double extended_excess(long double phi) const override {
+    if (phi <= freezing_) return kolafa_rottner_form<Extended>().excess(phi);
+    return DenseForm::f(phi) + dense_offset_ - std::log(phi);
   }
 
  private:
-  const KolafaRottnerForm& form_;
   std::array<double, 2> breaks_{};
-  double freezing_ = 0.0, melting_ = 0.0, scaled_pressure_ = 0.0, f_coexistence_ = 0.0, dense_offset_ = 0.0;
+  double scaled_pressure_ = 0.0;
+  Extended freezing_ = 0.0L, melting_ = 0.0L, f_coexistence_ = 0.0L, dense_offset_ = 0.0L;
 };
 
 }  // namespace

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string_view>
+#include <vector>
 
+#include "fit/inverse_table.hpp"
 #include "fit/value.hpp"
 
 // Equations of state of hard disks, one row each. Densities are number densities phi = n D^2 (not area fractions);
@@ -15,8 +19,6 @@
 // where g is positive and vanishes with phi, and the constant K is that of the printed Enskog f (K = c3 + c4) and 0 for
 // the other rows. Only differences of f mean anything. [QuinnHong2000]
 namespace shakebed::fit {
-
-class InverseTable;
 
 // 2/sqrt(3): the number density of close packing.
 inline constexpr double close_packing_density = 1.1547005383792515290;
@@ -58,8 +60,9 @@ class EquationOfState {
   [[nodiscard]] Value stiffness(double number_density) const;
   // f(phi), for phi > 0.
   [[nodiscard]] Value f(double number_density) const;
-  // The inverse: phi from f. Strictly increasing; across a coexistence (best-of) the density jumps and the fluid side
-  // is returned at the exact f of the jump. outside_range above the largest f; exp underflow gives phi = 0, status ok.
+  // The inverse: phi from f, to 4 units in the last place. Strictly increasing; across a coexistence (best-of) the
+  // density jumps and the fluid side is returned at the exact f of the jump. outside_range above the largest f; exp
+  // underflow gives phi = 0, status ok.
   [[nodiscard]] Value density_from_f(double f) const;
   // phi from the scaled pressure p = P/T = phi Z (the bottom density of a column: p = (N D/W)/T).
   [[nodiscard]] Value density_from_scaled_pressure(double scaled_pressure) const;
@@ -68,7 +71,7 @@ class EquationOfState {
   [[nodiscard]] double f_constant() const { return row_.f_constant; }
 
   // Batch form of density_from_f: out[i] = phi(f[i]), 0 where there is none. Returns the first status that is not ok.
-  virtual ValueStatus densities_from_f(std::span<const double> f, std::span<double> out) const;
+  ValueStatus densities_from_f(std::span<const double> f, std::span<double> out) const;
 
   // Fast forms for inner loops: no checks. The caller guarantees 0 < phi <= largest_density() (or < for a pole).
   // value, and d(phi Z)/dphi.
@@ -83,24 +86,35 @@ class EquationOfState {
   [[nodiscard]] virtual double pair_function(double number_density) const;
   // Densities where Z has a kink or a jump of slope (the ends of a coexistence).
   [[nodiscard]] virtual std::span<const double> breaks() const { return {}; }
-  // phi against f - f_constant(), to 1e-11: for loops that evaluate whole profiles. Built at the first call.
-  [[nodiscard]] virtual const InverseTable& inverse_table() const = 0;
+  // phi against f - f_constant(): for loops that evaluate whole profiles. Built at the first call.
+  [[nodiscard]] const InverseTable& inverse_table() const;
+  // What it is built from, the smooth pieces of the range upwards: one, unless there is a coexistence.
+  [[nodiscard]] virtual std::vector<InverseTable::Piece> pieces() const;
 
  protected:
   struct Row {
     std::string_view name, title, source, validity;
     double accurate_density, largest_density, largest_invertible_density;
     bool has_pole;
-    double f_constant;
+    double f_constant, f_constant_low = 0.0;  // K, in two doubles
   };
-  explicit EquationOfState(const Row& row) : row_(row) {}
-  EquationOfState(const EquationOfState&) = default;
-  EquationOfState& operator=(const EquationOfState&) = default;
-  // phi(f) for finite f within range.
-  [[nodiscard]] virtual double invert_f(double f) const = 0;
-  [[nodiscard]] virtual double largest_f() const = 0;
+  explicit EquationOfState(const Row& row) : row_(row), table_(std::make_unique<Table>()) {}
+  // f(phi), status ok.
+  [[nodiscard]] virtual double reduced_f(double number_density) const;
+  // g(phi) in extended precision, from which the table is built.
+  [[nodiscard]] virtual long double extended_excess(long double number_density) const = 0;
+  [[nodiscard]] InverseTable::Piece piece(long double lowest, long double highest) const;
+
+ private:
+  struct Table {
+    std::once_flag built;
+    InverseTable table;
+  };
+  [[nodiscard]] double invert(const InverseTable& table, double f) const;
+  [[nodiscard]] double largest_f(const InverseTable& table) const;
 
   Row row_;
+  std::unique_ptr<Table> table_;
 };
 
 // The table: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, best-of. The objects live

@@ -29,19 +29,21 @@ double least_time(int repeats, Work&& work) {
 
 // The inverse against the density its f was computed from. One rounding of f moves phi by |f| eps/kappa; that part is
 // the input's, not the inverse's, and is taken off.
-FitBenchmarkRow inverse_row(const EquationOfState& equation, int count, int repeats) {
+FitBenchmarkRow inverse_row(const EquationOfState& equation, int count, int repeats, bool whole_range) {
   std::vector<double> density;
   std::vector<double> f;
   std::vector<double> back(static_cast<std::size_t>(count));
   const double top = std::min(1.15, equation.largest_invertible_density());
   for (int i = 0; i < count; ++i) {
-    const double phi = top * std::exp(-30.0 * std::fmod(0.61803398875 * i, 1.0) * std::fmod(0.61803398875 * i, 1.0));
+    const double fraction = std::fmod(0.61803398875 * i, 1.0);
+    const double phi = top * (whole_range ? std::exp(-690.0 * fraction) : std::exp(-30.0 * fraction * fraction));
     if (equation.stiffness(phi).value <= 0.0) continue;
     density.push_back(phi);
     f.push_back(equation.f(phi).value);
   }
   back.resize(f.size());
-  FitBenchmarkRow row{"inverse", std::string(equation.name()) + ", batch", static_cast<int>(f.size()), 0.0, 0.0};
+  FitBenchmarkRow row{"inverse", std::string(equation.name()) + (whole_range ? ", batch, from 1e-300" : ", batch"),
+                      static_cast<int>(f.size()), 0.0, 0.0};
   row.nanoseconds = least_time(repeats, [&] { equation.densities_from_f(f, back); }) / static_cast<double>(f.size());
   for (std::size_t i = 0; i < f.size(); ++i) {
     const double input = 1.2e-16 * std::abs(f[i]) / equation.stiffness(density[i]).value;
@@ -128,37 +130,36 @@ void add_iterations(double effort, std::vector<FitTradeOff>& rows) {
 
 void add_tables(double effort, std::vector<FitTradeOff>& rows) {
   const EquationOfState& equation = enskog();
-  const double constant = equation.f(1e-30).value - std::log(1e-30);
-  const auto big_f = [&](double phi) { return equation.f(phi).value - constant; };
-  const auto stiffness = [&](double phi) { return equation.stiffness(phi).value; };
+  const std::vector<InverseTable::Piece> pieces = equation.pieces();
+  const double constant = equation.f_constant();
   const double top = equation.largest_invertible_density();
   constexpr int count = 20000;
   std::vector<double> f, exact, found(count);
   for (int i = 0; i < count; ++i) {
     exact.push_back(std::min(top, 1.15) * std::exp(-30.0 * std::pow(std::fmod(0.61803398875 * i, 1.0), 2)));
-    f.push_back(big_f(exact.back()));
+    f.push_back(static_cast<double>(pieces[0].f_of_density(exact.back())));
   }
   for (const bool newton : {false, true}) {
-    for (const double spacing : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625}) {
-      const InverseTable table({InverseTable::Piece{0.0, top, 0.0, spacing, big_f, stiffness}});
-      FitTradeOff row{"table size",
-                      newton ? "with one Newton step" : "interpolation alone",
-                      (big_f(top) - InverseTable::lowest_f) / spacing,
-                      0.0,
-                      0.0,
-                      newton && spacing == 0.0625};
+    for (const double widest : {32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125}) {
+      const InverseTable table(pieces, {widest, 1.0});
+      FitTradeOff row{
+          "table size", newton ? "with one Newton step" : "interpolation alone", static_cast<double>(table.size()), 0.0,
+          0.0,          !newton && widest == InverseTable::Fineness{}.widest};
       row.nanoseconds = least_time(std::max(3, static_cast<int>(3 * effort)),
                                    [&] {
                                      for (std::size_t i = 0; i < f.size(); ++i) {
                                        double density = table.density(f[i]);
-                                       if (newton) density *= 1.0 - (big_f(density) - f[i]) / stiffness(density);
+                                       if (newton) {
+                                         const double big_f = equation.f(density).value - constant;
+                                         density *= 1.0 - (big_f - f[i]) / equation.stiffness(density).value;
+                                       }
                                        found[i] = density;
                                      }
                                    }) /
                         count;
       for (std::size_t i = 0; i < f.size(); ++i) {
         // One rounding of F moves phi by |F| eps/kappa: the input's part.
-        const double input = 1.2e-16 * std::abs(f[i]) / stiffness(exact[i]);
+        const double input = 1.2e-16 * std::abs(f[i]) / equation.stiffness(exact[i]).value;
         row.error = std::max(row.error, std::abs(found[i] / exact[i] - 1.0) - input);
       }
       rows.push_back(row);
@@ -193,7 +194,8 @@ std::vector<FitBenchmarkRow> benchmark_fit(double effort) {
   const auto repeats = [effort](double count) { return static_cast<int>(std::max(1.0, count * effort)); };
   std::vector<FitBenchmarkRow> rows;
   for (const EquationOfState* equation : equations_of_state())
-    rows.push_back(inverse_row(*equation, 20000, repeats(5)));
+    rows.push_back(inverse_row(*equation, 20000, repeats(5), false));
+  rows.push_back(inverse_row(enskog(), 20000, repeats(5), true));
   for (const double phi : {1e-8, 0.5, close_packing_density}) {
     FitBenchmarkRow row{"constants", "phi_0 = " + std::to_string(phi), 1, 0.0, 0.0};
     ExpansionConstants constants;

@@ -1,88 +1,148 @@
 #include "fit/inverse_table.hpp"
 
+#include <numbers>
+
 namespace shakebed::fit {
 
 namespace {
 
-// phi with F(phi) = big_f on a piece, by Newton in ln phi kept inside a bracket.
-double solve(const InverseTable::Piece& piece, double big_f, double start) {
-  double low = piece.lowest_density > 0.0 ? piece.lowest_density : std::exp(InverseTable::lowest_f - 1.0);
-  double high = piece.highest_density;
-  double density = std::clamp(start, low, high);
+// phi with F(phi) = big_f on a piece, by Newton in ln phi kept inside a bracket, to the last digits of extended
+// precision.
+long double solve(const InverseTable::Piece& piece, long double big_f, long double start) {
+  long double low = piece.lowest_density > 0.0L ? piece.lowest_density
+                                                : std::exp(static_cast<long double>(InverseTable::lowest_f) - 1.0L);
+  long double high = piece.highest_density;
+  long double density = std::clamp(start, low, high);
+  long double last_step = 0.0L;
   for (int iteration = 0; iteration < 200; ++iteration) {
-    const double residual = piece.f_of_density(density) - big_f;
-    if (residual > 0.0) {
-      high = density;
-    } else {
-      low = density;
+    const long double residual = piece.f_of_density(density) - big_f;
+    (residual > 0.0L ? high : low) = density;
+    const long double step = std::clamp(-residual / piece.stiffness(static_cast<double>(density)), -1.0L, 1.0L);
+    const long double next = density * (std::abs(step) < 1e-6L ? 1.0L + step + 0.5L * step * step : std::exp(step));
+    // The next step would be no longer than this; or rounding is all that is left.
+    const long double ahead = step * step / last_step;
+    if (std::abs(step) < 1e-6L && (std::abs(ahead) < 1e-20L || std::abs(step) < 1e-18L)) {
+      return std::clamp(next, low, high);
     }
-    const double step = -residual / piece.stiffness(density);
-    double next = density * std::exp(std::clamp(step, -1.0, 1.0));
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double change = std::abs(next - density);
-    density = next;
-    if (change <= 4e-16 * density) break;
+    last_step = step;
+    density = next > low && next < high ? next : 0.5L * (low + high);
   }
   return density;
 }
 
+// The Chebyshev nodes of [-1, 1], upwards, and what turns values there into coefficients.
+template <std::size_t Terms>
+struct Chebyshev {
+  using Row = std::array<long double, Terms>;
+  Row node{};
+  std::array<Row, Terms> of_values{};   // [k][j]: of the coefficient of T_k by the value at node j
+  std::array<Row, Terms> polynomial{};  // [k][i]: of x^i in T_k
+
+  Chebyshev() {
+    constexpr auto terms = static_cast<long double>(Terms);
+    for (std::size_t j = 0; j < Terms; ++j) {
+      const long double angle = std::numbers::pi_v<long double> * (terms - static_cast<long double>(j) - 0.5L) / terms;
+      node[j] = std::cos(angle);
+      for (std::size_t k = 0; k < Terms; ++k) {
+        of_values[k][j] = (k == 0 ? 1.0L : 2.0L) / terms * std::cos(static_cast<long double>(k) * angle);
+      }
+    }
+    polynomial[0][0] = 1.0L;
+    polynomial[1][1] = 1.0L;
+    for (std::size_t k = 2; k < Terms; ++k) {  // T_k = 2 x T_{k-1} - T_{k-2}
+      for (std::size_t i = 0; i < Terms; ++i) {
+        polynomial[k][i] = (i > 0 ? 2.0L * polynomial[k - 1][i - 1] : 0.0L) - polynomial[k - 2][i];
+      }
+    }
+  }
+};
+
+// The polynomial through the values at the nodes, and an estimate of its relative error from how its Chebyshev
+// coefficients fall.
+template <std::size_t Terms>
+struct Expansion {
+  std::array<long double, Terms> power{};  // coefficients of x^i
+  double error = 0.0;
+
+  Expansion(const Chebyshev<Terms>& basis, const std::array<long double, Terms>& value) {
+    std::array<long double, Terms> c{};
+    for (std::size_t k = 0; k < Terms; ++k) {
+      for (std::size_t j = 0; j < Terms; ++j) c[k] += basis.of_values[k][j] * value[j];
+      for (std::size_t i = 0; i <= k; ++i) power[i] += c[k] * basis.polynomial[k][i];
+    }
+    const long double last = std::abs(c[Terms - 1]), before = std::abs(c[Terms - 2]),
+                      third = std::max(std::abs(c[Terms - 3]), 1e-300L);
+    const long double ratio = std::min(1.0L, std::max(last / std::max(before, 1e-300L), before / third));
+    error = static_cast<double>(std::max(last, ratio * before) * ratio / std::abs(c[0]));
+  }
+};
+
 }  // namespace
 
-InverseTable::InverseTable(const std::vector<Piece>& pieces) {
-  // The density follows F smoothly on the scale 1 up to about here; beyond, on the scale F itself.
-  constexpr double logarithmic_from = 120.0;
-  for (const Piece& piece : pieces) {
-    const double first = piece.lowest_density > 0.0 ? piece.f_of_density(piece.lowest_density) : lowest_f;
-    const double last = piece.f_of_density(piece.highest_density);
-    if (first < logarithmic_from) {
-      add_segment(piece, first, std::min(last, logarithmic_from), false, piece.spacing);
-    }
-    if (last > logarithmic_from) add_segment(piece, std::max(first, logarithmic_from), last, true, 1.0 / 16.0);
-    largest_f_ = last;
-  }
+InverseTable::InverseTable(const std::vector<Piece>& pieces, const Fineness& fineness)
+    : blocks_per_f_(1.0 / fineness.widest),
+      octave_blocks_(static_cast<std::size_t>((octaves_from - lowest_f) / fineness.widest)) {
+  for (const Piece& piece : pieces) add_segment(piece, fineness.tolerance);
 }
 
-void InverseTable::add_segment(const Piece& piece, double first_f, double last_f, bool logarithmic, double spacing) {
+std::size_t InverseTable::size() const {
+  std::size_t cells = 0;
+  for (const Segment& segment : segments_) cells += segment.cells.size();
+  return cells;
+}
+
+double InverseTable::block_start(std::size_t number) const {
+  if (number <= octave_blocks_) return lowest_f + static_cast<double>(number) / blocks_per_f_;
+  const std::uint64_t quarter = (std::bit_cast<std::uint64_t>(octaves_from) >> 50U) + (number - octave_blocks_);
+  return std::bit_cast<double>(quarter << 50U);
+}
+
+void InverseTable::add_segment(const Piece& piece, double tolerance) {
+  static const Chebyshev<degree + 1> basis;
   Segment segment;
-  segment.first_f = first_f;
-  segment.last_f = last_f;
-  segment.logarithmic = logarithmic;
-  segment.origin = logarithmic ? std::log(first_f) : first_f;
-  const double length = (logarithmic ? std::log(last_f) : last_f) - segment.origin;
-  const auto cells = static_cast<std::size_t>(std::max(2.0, std::ceil(length / spacing)));
-  const double h = length / static_cast<double>(cells);
-  segment.per_node = 1.0 / h;
-  segment.nodes.resize(cells + 1);
-  double density = piece.lowest_density > 0.0 ? piece.lowest_density : std::exp(first_f);
-  for (std::size_t i = 0; i <= cells; ++i) {
-    const double x = segment.origin + h * static_cast<double>(i);
-    const double big_f = i == cells ? last_f : (logarithmic ? std::exp(x) : x);
-    if (i == cells && last_f == piece.f_of_density(piece.highest_density)) {
-      density = piece.highest_density;
-    } else if (i > 0 || piece.lowest_density == 0.0 || first_f > piece.f_of_density(piece.lowest_density)) {
-      density = solve(piece, big_f, density);
-    }
-    const double kappa = piece.stiffness(density);
-    // kappa'(phi) by a difference: its small error is multiplied by h^2 in the interpolation.
-    const double lowest = piece.lowest_density > 0.0 ? piece.lowest_density : 0.0;
-    const double step = 1e-4 * (piece.pole > 0.0 ? std::min(density, piece.pole - density) : 0.1 * density);
-    double below = density - step;
-    double above = density + step;
-    if (below < lowest) below = density;
-    if (above > piece.highest_density) above = density;
-    const double slope = above > below ? (piece.stiffness(above) - piece.stiffness(below)) / (above - below) : 0.0;
-    const double first = density / kappa;                                   // d phi/dF
-    const double second = first / kappa * (1.0 - density * slope / kappa);  // d2 phi/dF2
-    Node& node = segment.nodes[i];
-    node.value = density;
-    if (logarithmic) {  // d/dx with F = e^x
-      node.first = h * first * big_f;
-      node.second = 0.5 * h * h * (second * big_f * big_f + first * big_f);
-    } else {
-      node.first = h * first;
-      node.second = 0.5 * h * h * second;
+  const bool from_zero = !(piece.lowest_density > 0.0L);
+  const double first_f = from_zero ? lowest_f : static_cast<double>(piece.f_of_density(piece.lowest_density));
+  segment.last_f = static_cast<double>(piece.f_of_density(piece.highest_density));
+  segment.first_block = block_number(first_f);
+  const std::size_t last_block = block_number(segment.last_f);
+  long double start = from_zero ? std::exp(static_cast<long double>(lowest_f)) : piece.lowest_density;
+  for (std::size_t number = segment.first_block; number <= last_block; ++number) {
+    const long double from = std::max(block_start(number), first_f);
+    const long double to = std::min(block_start(number + 1), segment.last_f);
+    if (!(to > from)) continue;
+    const long double start_of_block = start;
+    // Halve the cells until the worst is exact.
+    for (std::uint32_t cells = 1;; cells *= 2) {
+      start = start_of_block;
+      const long double half = 0.5L * (to - from) / static_cast<long double>(cells);
+      const std::size_t first_cell = segment.cells.size();
+      double worst = 0.0;
+      for (std::uint32_t i = 0; i < cells; ++i) {
+        const auto middle = static_cast<double>(from + half * static_cast<long double>(2 * i + 1));
+        std::array<long double, degree + 1> value{};
+        for (std::size_t j = 0; j <= degree; ++j) {
+          value[j] = start = solve(piece, middle + half * basis.node[j], start);
+        }
+        const Expansion<degree + 1> expansion(basis, value);
+        worst = std::max(worst, expansion.error);
+        Cell cell{middle, {}};
+        long double scale = 1.0L;
+        for (std::size_t k = 0; k <= degree; ++k) {
+          cell.coefficient[k] = static_cast<double>(expansion.power[k] / scale);
+          scale *= half;
+        }
+        segment.cells.push_back(cell);
+      }
+      if (worst <= tolerance || cells >= 4096) {
+        segment.blocks.push_back(
+            {static_cast<double>(from), static_cast<double>(static_cast<long double>(cells) / (to - from)),
+             static_cast<std::uint32_t>(first_cell), static_cast<std::uint32_t>(segment.cells.size() - 1)});
+        break;
+      }
+      segment.cells.resize(first_cell);
     }
   }
+  largest_f_ = segment.last_f;
   segments_.push_back(std::move(segment));
 }
 

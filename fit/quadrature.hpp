@@ -6,31 +6,37 @@
 // Gauss-Legendre rules on [-1, 1], computed once to the last digit. Internal to fit.
 namespace shakebed::fit {
 
-template <std::size_t Points>
+template <std::size_t Points, class Real = double>
 struct GaussLegendre {
-  std::array<double, Points> node{};
-  std::array<double, Points> weight{};
+  std::array<Real, Points> node{};
+  std::array<Real, Points> weight{};
 };
 
-void fill_gauss_legendre(std::size_t points, double* nodes, double* weights);
+// Nodes, ascending, and weights.
+void fill_gauss_legendre(std::size_t points, long double* nodes, long double* weights);
 
-template <std::size_t Points>
-const GaussLegendre<Points>& gauss_legendre() {
-  static const GaussLegendre<Points> rule = [] {
-    GaussLegendre<Points> built;
-    fill_gauss_legendre(Points, built.node.data(), built.weight.data());
+template <std::size_t Points, class Real = double>
+const GaussLegendre<Points, Real>& gauss_legendre() {
+  static const GaussLegendre<Points, Real> rule = [] {
+    GaussLegendre<Points, long double> exact;
+    fill_gauss_legendre(Points, exact.node.data(), exact.weight.data());
+    GaussLegendre<Points, Real> built;
+    for (std::size_t i = 0; i < Points; ++i) {
+      built.node[i] = static_cast<Real>(exact.node[i]);
+      built.weight[i] = static_cast<Real>(exact.weight[i]);
+    }
     return built;
   }();
   return rule;
 }
 
 // integral_a^b function, one panel.
-template <std::size_t Points, class Function>
-double integrate_panel(double a, double b, Function&& function) {
-  const auto& rule = gauss_legendre<Points>();
-  const double half = 0.5 * (b - a);
-  const double middle = 0.5 * (b + a);
-  double sum = 0.0;
+template <std::size_t Points, class Real, class Function>
+Real integrate_panel(Real a, Real b, Function&& function) {
+  const auto& rule = gauss_legendre<Points, Real>();
+  const Real half = (b - a) / 2;
+  const Real middle = (b + a) / 2;
+  Real sum = 0;
   for (std::size_t i = 0; i < Points; ++i) sum += rule.weight[i] * function(middle + half * rule.node[i]);
   return half * sum;
 }
