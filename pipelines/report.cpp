@@ -532,6 +532,20 @@ class Report {
     return out;
   }
 
+  // What the map between simulated beds says of this one.
+  static std::string simulated_beds(const Json& simulated) {
+    const auto value = [&](const char* key) {
+      return simulated.contains(key) && simulated[key].is_object() ? shown(simulated[key]) : std::string("–");
+    };
+    std::string at;
+    for (const auto& [name, place] : simulated.value("at", Json::object()).items())
+      at += fmt::format("{}{} = {:.4g}", at.empty() ? "" : ", ", name, place.get<double>());
+    return fmt::format(
+        "<p>Interpolated between {} simulated beds at {}: T/T_c = <strong>{}</strong>, T/(m g) = {}{}.</p>\n",
+        simulated.value("beds", 0), html(at), value("reduced_temperature"), value("temperature_over_mg"),
+        simulated.value("inside", true) ? "" : "; this bed lies outside the table");
+  }
+
   std::string maps() const {
     std::string out;
     for (const PlannedStage& stage : plan_.stages) {
@@ -544,6 +558,7 @@ class Report {
           html(stage.id), map.contains("gamma") ? shown(map["gamma"]) : "?");
       if (map.contains("measured_reduced_temperature"))
         out += fmt::format("<p>Measured T/T_c = <strong>{}</strong></p>\n", shown(map["measured_reduced_temperature"]));
+      if (map.contains("simulated")) out += simulated_beds(map["simulated"]);
       out += "<div class=\"scroll\"><table>\n<tr><th>reading</th><th>H₀ / D</th><th>T/T_c</th><th>in range</th></tr>\n";
       for (const Json& row : map["readings"]) {
         const bool in_range = row.value("in_range", false);
