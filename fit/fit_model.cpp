@@ -42,6 +42,10 @@ class RectangleWithTail final : public FitModel {
   std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
     return tail_.smoothed_with_gradient(height, rule);
   }
+  void smoothed_with_gradient(std::span<const double> heights, const KernelRule& rule,
+                              std::span<std::array<double, 4>> out) const override {
+    tail_.smoothed_with_gradient(heights, rule, out);
+  }
   double shift() const override { return tail_.reference; }
   double solid_height() const override { return std::max(0.0, tail_.reference - base_); }
   double column_number() const override {
@@ -123,6 +127,10 @@ class WholeColumn final : public FitModel {
   std::array<double, 4> smoothed_with_gradient(double height, const KernelRule& rule) const override {
     return tail_.smoothed_with_gradient(height, rule);
   }
+  void smoothed_with_gradient(std::span<const double> heights, const KernelRule& rule,
+                              std::span<std::array<double, 4>> out) const override {
+    tail_.smoothed_with_gradient(heights, rule, out);
+  }
   // Above T_c the shift is where the curve would reach phi_0 below the floor; the floor itself when it never would.
   double shift() const override {
     if (has_rectangle_ || !reachable_) return tail_.reference;
@@ -168,6 +176,7 @@ class WholeColumn final : public FitModel {
 class Fermi final : public FitModel {
  public:
   using FitModel::FitModel;
+  using FitModel::smoothed_with_gradient;
 
   bool set(const Parameters& p) override {
     if (!(p[temperature] > 0.0) || !std::isfinite(p[place]) || !(p[plateau] > 0.0) || p[plateau] > largest_plateau()) {
@@ -218,6 +227,7 @@ class Fermi final : public FitModel {
 // A rectangle, parameters (-, top, phi_0).
 class Rectangle final : public FitModel {
  public:
+  using FitModel::smoothed_with_gradient;
   Rectangle(double base, double resolution) : FitModel(base), stand_in_{KernelKind::top_hat, resolution} {}
   bool uses_temperature() const override { return false; }
   bool set(const Parameters& p) override {

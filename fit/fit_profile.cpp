@@ -81,17 +81,21 @@ FitStatus check_numbers(const Profile& profile, FitResult& result) {
   for (const double entry : profile.covariance) {
     if (!std::isfinite(entry)) return bad_input(result, "the covariance has an entry that is not a finite number");
   }
+  std::vector<double> sigma;
   for (std::size_t i = 0; i < n && !profile.covariance.empty(); ++i) {
     const auto entry = [&](std::size_t a, std::size_t b) { return profile.covariance[a * n + b]; };
     if (entry(i, i) < 0.0) return bad_input(result, "the covariance says that a variance is negative" + at_bin(i));
+    sigma.push_back(std::sqrt(entry(i, i)));
+    const auto between = [i](std::size_t j) {
+      return " between bins " + std::to_string(j) + " and " + std::to_string(i);
+    };
     for (std::size_t j = 0; j < i; ++j) {
-      const double limit = std::sqrt(entry(i, i)) * std::sqrt(entry(j, j));
-      const std::string pair = " between bins " + std::to_string(j) + " and " + std::to_string(i);
+      const double limit = sigma[i] * sigma[j];
       if (std::abs(entry(i, j) - entry(j, i)) > 1e-6 * limit) {
-        return bad_input(result, "the covariance is not symmetric" + pair);
+        return bad_input(result, "the covariance is not symmetric" + between(j));
       }
       if (std::abs(entry(i, j)) > limit * (1.0 + 1e-6)) {
-        return bad_input(result, "the covariance has a correlation beyond 1" + pair);
+        return bad_input(result, "the covariance has a correlation beyond 1" + between(j));
       }
     }
   }
@@ -826,7 +830,7 @@ void sweep_windows(const Cleaned& cleaned, const Window& window, const Profile& 
       row.status = fit.converged ? FitStatus::ok : FitStatus::not_converged;
       row.temperature.value = fit.parameters[0];
       row.temperature.std_error = parameter_error(setup, fit, 0, fitted.error_scale);
-      if (row.temperature.std_error > 0.5 * fit.parameters[0] || fit.temperature_at_bound) {
+      if (row.temperature.std_error > 0.5 * fit.parameters[0] || fit.temperature_at_bound || fit.undetermined) {
         row.status = FitStatus::unresolved_temperature;
       }
       row.shift.value = setup.model->shift();
@@ -852,8 +856,8 @@ ModelFit model_row(const FitOptions& options, Setup& setup, const Fitted& fitted
   row.status = solution.converged ? FitStatus::ok : FitStatus::not_converged;
   row.temperature = {setup.model->uses_temperature() ? solution.parameters[0] : 0.0,
                      parameter_error(setup, solution, 0, fitted.error_scale), !setup.least_squares.free[0]};
-  if (setup.least_squares.free[0] &&
-      (solution.temperature_at_bound || row.temperature.std_error > 0.5 * row.temperature.value)) {
+  if (setup.least_squares.free[0] && (solution.temperature_at_bound || solution.undetermined ||
+                                      row.temperature.std_error > 0.5 * row.temperature.value)) {
     row.status = FitStatus::unresolved_temperature;
   }
   row.shift = {setup.model->shift(),
@@ -1179,7 +1183,8 @@ FitResult fit_profile(const Profile& profile, const FitOptions& options) {
     result.solid_height_by_sum_rule = column() / solution.parameters[2] - result.temperature.value * z;
   }
   if (free[0] && result.status == FitStatus::ok &&
-      (solution.temperature_at_bound || result.temperature.std_error > 0.5 * result.temperature.value)) {
+      (solution.temperature_at_bound || solution.undetermined ||
+       result.temperature.std_error > 0.5 * result.temperature.value)) {
     result.status = FitStatus::unresolved_temperature;
     result.message =
         "the profile falls more sharply than its bins and kernel can tell: the temperature is only bounded above";

@@ -42,24 +42,22 @@ class InverseTable {
     double density;  // phi
     double slope;    // d phi/dF = phi/kappa
   };
-  // phi(F) and its slope for F <= largest_f().
+  // phi(F) and its slope; those of largest_f() above it.
   [[nodiscard]] Point point(double big_f) const {
     if (big_f < lowest_f) {
       const double density = std::exp(big_f);
       return {density, density};
     }
-    const Cell& cell = cell_of(big_f);
-    const std::array<double, degree + 1>& a = cell.coefficient;
-    const double u = big_f - cell.middle;
-    double slope = static_cast<double>(degree) * a[degree];
-    for (std::size_t k = degree - 1; k > 0; --k) slope = slope * u + static_cast<double>(k) * a[k];
-    return {cell.value(u), slope};
+    const double within = std::min(big_f, largest_f_);
+    const Cell& cell = cell_of(within);
+    const double u = within - cell.middle;
+    return {cell.value(u), cell.slope(u)};
   }
-  // phi(F) for F <= largest_f().
   [[nodiscard]] double density(double big_f) const {
     if (big_f < lowest_f) return std::exp(big_f);
-    const Cell& cell = cell_of(big_f);
-    return cell.value(big_f - cell.middle);
+    const double within = std::min(big_f, largest_f_);
+    const Cell& cell = cell_of(within);
+    return cell.value(within - cell.middle);
   }
   // phi(F + low) for lowest_f <= F <= largest_f(): F in two doubles, for the last digit.
   [[nodiscard]] double density(double big_f, double low) const {
@@ -83,6 +81,13 @@ class InverseTable {
       const double rest = ((a[1] + a[2] * u) + u2 * (a[3] + a[4] * u)) +
                           u4 * (((a[5] + a[6] * u) + u2 * (a[7] + a[8] * u)) + u4 * a[9]);
       return a[0] + u * rest;
+    }
+    [[nodiscard]] double slope(double u) const {
+      const std::array<double, degree + 1>& a = coefficient;
+      const double u2 = u * u;
+      const double u4 = u2 * u2;
+      return ((a[1] + 2.0 * a[2] * u) + u2 * (3.0 * a[3] + 4.0 * a[4] * u)) +
+             u4 * (((5.0 * a[5] + 6.0 * a[6] * u) + u2 * (7.0 * a[7] + 8.0 * a[8] * u)) + u4 * (9.0 * a[9]));
     }
   };
   // Cells of equal width, as many as this stretch of F needs.

@@ -99,9 +99,11 @@ class Solver {
     const auto columns = static_cast<Eigen::Index>(free_.size());
     Matrix& both = scratch_;
     both.resize(n, columns + 1);
+    values_.resize(bins_.size());
+    model_.smoothed_with_gradient(bins_.height, options_.kernel, values_);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto bin = static_cast<std::size_t>(i);
-      const std::array<double, 4> value = model_.smoothed_with_gradient(bins_.height[bin], options_.kernel);
+      const std::array<double, 4>& value = values_[bin];
       both(i, columns) = value[0] - bins_.density[bin];
       for (Eigen::Index c = 0; c < columns; ++c) {
         const std::size_t parameter = free_[static_cast<std::size_t>(c)];
@@ -261,6 +263,9 @@ class Solver {
     for (Eigen::Index i = 0; i < columns; ++i) unit[i] = 1.0 / std::sqrt(std::max(a(i, i), 1e-300));
     const Matrix scaled = unit.asDiagonal() * a * unit.asDiagonal();
     Matrix inverse = scaled.ldlt().solve(Matrix::Identity(columns, columns));
+    for (Eigen::Index i = 0; i < columns; ++i) {
+      solution.undetermined = solution.undetermined || !(inverse(i, i) > 0.0) || !(a(i, i) > 1e-280);
+    }
     solution.expected_chi2 = static_cast<double>(residual_.size() - columns);
     solution.chi2_variance = 2.0 * solution.expected_chi2;
     if (bins_.correlation.size() > 0 && columns > 0) {
@@ -343,6 +348,7 @@ class Solver {
   int shrinks_ = 0;
   Vector residual_;
   Matrix jacobian_, scratch_;
+  std::vector<std::array<double, 4>> values_;
 };
 
 }  // namespace

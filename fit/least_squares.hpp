@@ -37,6 +37,7 @@ struct Solution {
   bool has_curve = false;  // the model had a curve at all
   bool temperature_at_bound = false;
   bool plateau_at_bound = false;
+  bool undetermined = false;  // nothing in the bins depends on one of the free parameters, to rounding
   FitModel::Parameters parameters{};
   Eigen::MatrixXd covariance;  // of the free parameters in natural units, before any scaling by chi2 (robust: final)
   double chi2 = 0.0;           // sum of squared weighted residuals

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "fit/convolution.hpp"
 #include "fit/equation_of_state.hpp"
@@ -48,8 +49,18 @@ struct Tail {
   // The same and its derivatives by the parameters.
   [[nodiscard]] std::array<double, 1 + max_parameters> smoothed_with_gradient(double height,
                                                                               const KernelRule& rule) const;
+  // The same of many heights, ascending. Through a Gaussian all share one set of nodes: the curve is computed once at
+  // each, not once for every bin that sees it.
+  void smoothed_with_gradient(std::span<const double> heights, const KernelRule& rule,
+                              std::span<std::array<double, 1 + max_parameters>> out) const;
 
  private:
+  // Of what the kernel leaves of (phi, slope, slope (h - reference)) of the tail at a height: everything but the
+  // rectangle's share.
+  [[nodiscard]] std::array<double, 1 + max_parameters> gathered(double height, const KernelRule& rule,
+                                                                const std::array<double, 3>& sum) const;
+  // A length of tail about `height` that 8 Gauss points integrate.
+  [[nodiscard]] double panel_at(double height) const;
   [[nodiscard]] double rectangle_cover(double height, const Kernel& kernel) const;
   template <std::size_t Components, class Curve>
   void add_tail(double height, const KernelRule& rule, Curve&& curve, std::array<double, Components>& sum) const;
