@@ -1,12 +1,11 @@
 #!/bin/sh
 # One small run of each command under valgrind's memcheck: bytes used before they were written, read or written beyond
 # their end, freed twice, lost for good. A line for each; fails when any run has an error or does not end as expected.
-# Children (gnuplot) are not looked into. Skipped (77) without valgrind. Ten minutes of CPU: ctest -L study -R memcheck.
+# Children (gnuplot) are not looked into. Skipped (77) without valgrind. Three minutes of CPU.
 #   valgrind.sh PROGRAM [COMMAND...]       all commands, or those named
 set -eu
 program=$1
 shift
-here=$(cd "$(dirname "$0")" && pwd)
 command -v valgrind >/dev/null || { echo "skipped: there is no valgrind"; exit 77; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -42,7 +41,7 @@ check() {
   case "$wanted" in "  " | *" $name "*) ;; *) return 0 ;; esac
   code=0
   valgrind --quiet --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite --show-leak-kinds=definite \
-    --num-callers=30 --gen-suppressions=all --suppressions="$here/valgrind.supp" --log-file="$name.log" \
+    --num-callers=30 --log-file="$name.log" \
     "$program" "$@" >"$name.out" 2>"$name.err" || code=$?
   case " $expected " in
   *" $code "*) printf '%-12s ends with %d, no error\n' "$name" "$code" ;;
@@ -72,7 +71,7 @@ check rerun "0 6" rerun results/bed --out again
 check fit-profile 0 fit-profile results/bed/bed/profile.csv --out profile
 check fit-images 0 fit-images results/bed/render/frames --diameter "3 mm" --out images
 check reproduce "0 6" reproduce --set "/stages/bed/settle=0.1 s" --set "/stages/bed/measure=0.1 s" \
-  --set /stages/bed/frames/count=2 --set /stages/bed/frames/phases=2 --out figure
+  --set /stages/bed/frames/count=4 --set /stages/bed/frames/phases=4 --out figure
 check submit 0 submit slurm cluster.json --out cluster --dry-run
 check bench "0 6" bench fit --quick --out bench
 check clean 0 clean results
