@@ -312,6 +312,17 @@ Window choose_window(Cleaned& cleaned, const FitOptions& options) {
 
 // --- one fit on one window -------------------------------------------------------------------------------------------
 
+// How far correlations estimated from `samples` normal samples are best shrunk towards none, by their expected squared
+// error: the oracle approximating shrinkage of [Chen2010], a form of [LedoitWolf2004] that needs no more than the
+// matrix.
+double sampling_shrinkage(const Eigen::MatrixXd& correlation, int samples) {
+  const auto n = static_cast<double>(correlation.rows());
+  const double trace2 = correlation.squaredNorm();
+  const double off = trace2 - n;  // tr(R^2) - tr(R)^2/n, as tr(R) = n
+  if (!(off > 0.0)) return 1.0;
+  return std::min(1.0, ((1.0 - 2.0 / n) * trace2 + n * n) / ((samples + 1.0 - 2.0 / n) * off));
+}
+
 Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_samples, FitResult* result) {
   Bins bins;
   std::vector<Eigen::Index> chosen;
@@ -360,10 +371,16 @@ Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_sample
           weight_error.cwiseInverse().asDiagonal() * covariance * weight_error.cwiseInverse().asDiagonal();
       return bins;
     }
-    covariance /= correction;
   }
-  // Shrink the correlations until the matrix is safely positive.
-  double shrink = 0.0;
+  // A kernel wider than the bins makes neighbours nearly equal: some eigenvalues are then far below what the samples
+  // can tell, and weighing by them would make errors of the model's last digits into thousands of standard errors. So
+  // the correlations are first shrunk by what their samples' own noise asks, then, if need be, until they are positive.
+  double shrink = covariance_samples > 0 ? sampling_shrinkage(correlation, covariance_samples) : 0.0;
+  if (shrink > 0.0) {
+    correlation *= 1.0 - shrink;
+    correlation.diagonal().setOnes();
+    shrink = 0.0;
+  }
   Eigen::LLT<Eigen::MatrixXd> cholesky(correlation);
   const auto safe = [&] {
     if (cholesky.info() != Eigen::Success) return false;
@@ -381,6 +398,12 @@ Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_sample
                                number(100.0 * shrink, 2) + " %");
   }
   bins.whitening = covariance.diagonal().cwiseSqrt().asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
+  if (covariance_samples > 0) {  // shrunk correlations weigh; the errors come through those measured
+    const auto lower = bins.whitening.triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd half = lower.solve(covariance).transpose();
+    const Eigen::MatrixXd whitened = lower.solve(half);
+    bins.correlation = 0.5 * (whitened + whitened.transpose());
+  }
   return bins;
 }
 

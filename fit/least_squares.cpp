@@ -284,10 +284,10 @@ class Solver {
     }
   }
 
-  // Diagonal weights, correlated bins: the covariance of the estimate is B J^T R J B with B the inverse of J^T J and R
-  // the bins' correlations; chi2 is no longer a chi-squared number, but its mean and variance are known:
-  // tr(P R) and 2 tr(P R P R), P projecting off the tangent plane. The latter is freed of what the few samples behind R
-  // add to it [Srivastava2005].
+  // Weights that are not the inverse of the bins' covariance: the covariance of the estimate is B J^T R J B with B the
+  // inverse of J^T J and R the bins' correlations; chi2 is no longer a chi-squared number, but its mean and variance
+  // are known: tr(P R) and 2 tr(P R P R), P projecting off the tangent plane. The latter is freed of what the few
+  // samples behind R add to it [Srivastava2005].
   void through_correlations(const Vector& unit, Matrix& inverse, Solution& solution) const {
     const double naive = inverse(0, 0);
     Matrix weighted = jacobian_ * unit.asDiagonal();

@@ -15,8 +15,9 @@ struct Bins {
   std::vector<double> height, density;
   std::vector<double> inverse_error;  // 1/sigma; used when there is no covariance
   Eigen::MatrixXd whitening;          // lower Cholesky factor of the covariance; empty: diagonal
-  // Correlations of the bins where they are known too badly to weigh by: the weights are then diagonal and the errors
-  // come through these (the "sandwich" [White1980]). Empty: none.
+  // The covariance of the weighted densities where it is not the identity, because the measured one is known too badly
+  // to weigh by: the weights are then diagonal, or of shrunk correlations, and the errors come through this (the
+  // "sandwich" [White1980]). Empty: none.
   Eigen::MatrixXd correlation;
   int samples = 0;  // independent ones behind covariance or correlation, 0 if not known
   [[nodiscard]] std::size_t size() const { return height.size(); }

@@ -502,7 +502,7 @@ void Fit::run(RunContext& context) const {
 
 StageRow fit_stage() {
   return {.name = "fit",
-          .version = 4,
+          .version = 5,
           .summary = "fits temperature and solid height to a density profile",
           .accepts = {"extract", "simulate"},
           .fewest_inputs = 0,

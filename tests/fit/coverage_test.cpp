@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "fit/expansion.hpp"
 #include "tests/fit/synthetic.hpp"
@@ -67,6 +69,77 @@ TEST(Coverage, OfAThousandSyntheticProfilesIsNinetyFivePerCent) {
       EXPECT_LE(held, 970) << row.reduced;
     }
     EXPECT_LE(std::abs(c.mean_pull), 4.0 / std::sqrt(1000.0)) << "bias beyond 4 standard errors of the mean";
+  }
+}
+
+// A profile as frames give it: many noisy ones through a kernel wider than the bins, so that neighbours are nearly
+// equal and the covariance, estimated from the frames, is singular but for their number.
+TEST(Coverage, WithACovarianceEstimatedFromFramesIsNinetyFivePerCent) {
+  constexpr int bins = 44, taps = 12, trials = 1000;
+  constexpr double spacing = 0.25, lowest = 2.0, noise = 0.3;
+  const Column column{11.22, 1.10};
+  const Kernel kernel{KernelKind::gaussian, 0.5};
+  const double t = 0.6 * critical_temperature(enskog(), column).value;
+  const auto truth = HydrostaticProfile::of_column(enskog(), t, column);
+  Profile clean;
+  for (int i = 0; i < bins; ++i) clean.height.push_back(lowest + spacing * i);
+  clean.number_density.resize(bins);
+  truth.sample(clean.height, kernel, clean.number_density);
+  std::array<double, 2 * taps + 1> weight{};
+  for (int k = -taps; k <= taps; ++k) weight[static_cast<std::size_t>(k + taps)] = kernel_density(kernel, spacing * k);
+  FitOptions options;
+  options.plateau_density = 1.10;
+  options.kernel = kernel;
+  options.sweep = options.compare = false;
+  options.curve_points = 0;
+  options.window.low = 4.5, options.window.high = 12.0;
+  std::printf("[ coverage ] %d profiles a row, averaged over frames, T = 0.6 T_c, 31 bins of 0.25 D, kernel 0.5 D\n",
+              trials);
+  for (const int frames : {80, 200, 640}) {
+    int by_error = 0, by_likelihood = 0;
+    double chi2 = 0.0, squares = 0.0, stated = 0.0;
+    for (int trial = 0; trial < trials; ++trial) {
+      synthetic::Normal normal(static_cast<std::uint64_t>(1000 * frames + trial));
+      Profile data = clean;
+      std::vector<double> sum(bins), products(bins * bins), white(bins + 2 * taps), one(bins);
+      for (int frame = 0; frame < frames; ++frame) {
+        for (double& w : white) w = normal();
+        for (std::size_t i = 0; i < bins; ++i) {
+          one[i] = 0.0;
+          for (std::size_t k = 0; k < weight.size(); ++k) one[i] += weight[k] * white[i + k];
+          one[i] *= noise * std::sqrt(clean.number_density[i] + 0.01);
+          sum[i] += one[i];
+        }
+        for (std::size_t i = 0; i < bins; ++i) {
+          for (std::size_t j = 0; j <= i; ++j) products[i * bins + j] += one[i] * one[j];
+        }
+      }
+      data.covariance.resize(bins * bins);
+      data.covariance_samples = frames;
+      for (std::size_t i = 0; i < bins; ++i) {
+        data.number_density[i] += sum[i] / frames;
+        for (std::size_t j = 0; j <= i; ++j) {
+          const double covariance = (products[i * bins + j] - sum[i] * sum[j] / frames) / (frames - 1.0) / frames;
+          data.covariance[i * bins + j] = data.covariance[j * bins + i] = covariance;
+        }
+      }
+      const FitResult fit = fit_profile(data, options);
+      ASSERT_TRUE(fit.ok()) << fit.message;
+      const double off = fit.temperature.value - t;
+      by_error += std::abs(off) < 1.959964 * fit.temperature.std_error;
+      by_likelihood += fit.temperature_interval.low <= t && t <= fit.temperature_interval.high;
+      chi2 += fit.chi2_per_dof / trials;
+      squares += off * off / trials;
+      stated += fit.temperature.std_error * fit.temperature.std_error / trials;
+    }
+    std::printf(
+        "[ coverage ] %4d frames: T +- s.e. %.1f %%, likelihood %.1f %%, mean chi2/dof %.3f, stated/true %.3f\n",
+        frames, 0.1 * by_error, 0.1 * by_likelihood, chi2, std::sqrt(stated / squares));
+    for (const int held : {by_error, by_likelihood}) {
+      EXPECT_GE(held, 930) << frames;
+      EXPECT_LE(held, 970) << frames;
+    }
+    EXPECT_NEAR(chi2, 1.0, 0.15) << frames;
   }
 }
 
