@@ -528,7 +528,6 @@ RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_p
   };
   try_all(data, 1);
   // In light, for a camera that encodes for display.
-  constexpr double display_exponent = 0.45;
   const double brightest = std::max({background_level, bead_level, 1.0});
   const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
   const double background = light(background_level), bead = light(bead_level);
@@ -556,10 +555,9 @@ RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_p
   choice.exponent = least.exponent;
   constexpr double fair = 5;  // chi^2 a point
   choice.rim.good = least.rim.squares < fair * points;
-  // Shapes that do as well each have their say; in the error, odd ones as much as any other.
+  // Shapes and tone curves that do as well each have their say; in the error, odd ones as much as any other.
   double weights = 0, mean = 0;
   for (const Trial& trial : trials) {
-    if (trial.exponent != choice.exponent) continue;
     const double weight = std::exp(0.5 * std::max(-60.0, cost(least) - cost(trial)));
     weights += weight;
     mean += weight * trial.rim.radius_px;
@@ -567,8 +565,8 @@ RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_p
   mean /= weights;
   double fair_weights = 0, square = 0;
   for (const Trial& trial : trials) {
-    if (trial.exponent != choice.exponent) continue;
-    const double surplus = cost(trial) - cost(least) - (trial.odd && !least.odd ? price_of_oddity : 0);
+    const double surplus = cost(trial) - cost(least) - (trial.odd && !least.odd ? price_of_oddity : 0) -
+                           (trial.exponent != 1 && least.exponent == 1 ? price_of_curve : 0);
     const double weight = std::exp(-0.5 * std::clamp(surplus, 0.0, 60.0));
     fair_weights += weight;
     square += weight * (std::pow(trial.rim.radius_px - mean, 2) + scale * std::pow(trial.rim.std_error_px, 2));
@@ -638,9 +636,8 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
                           double radius_guess_px, double edge_guess_px) {
   ToneFit fit;
   fit.linear = fit_flat_rim(profile, radius_guess_px, edge_guess_px);
-  fit.chosen = fit.linear;
+  fit.radius_px = fit.linear.radius_px;
   constexpr double already_good = 0.005;  // rms misfit in units of the bead's contrast
-  constexpr double display_exponent = 0.45;
   const double middle = value_at(profile.level, profile.step_px, 0.6 * radius_guess_px);
   const double nearer_rim = value_at(profile.level, profile.step_px, radius_guess_px - 3 * edge_guess_px);
   const bool flat = std::abs(middle - nearer_rim) < 0.03 * std::abs(middle);
@@ -654,11 +651,17 @@ ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, d
     const double recorded = background_level + (bead_level - background_level) * static_cast<double>(level) / middle;
     level = static_cast<float>((light(recorded) - background) / (bead - background));
   }
-  const RimFit encoded = fit_flat_rim(straightened, radius_guess_px, edge_guess_px);
-  if (encoded.good && encoded.misfit < 0.98 * fit.linear.misfit) {
-    fit.exponent = display_exponent;
-    fit.chosen = encoded;
-  }
+  fit.encoded = fit_flat_rim(straightened, radius_guess_px, edge_guess_px);
+  if (!fit.encoded.good) return fit;
+  fit.open = true;
+  // Likelihoods when the size of the misfits is not known beforehand: a power of their ratio. The rim fitted is seven
+  // edge widths wide, of which blur leaves as many independent points, less the four numbers fitted.
+  constexpr double degrees_of_freedom = 3;
+  const double ratio = std::pow(fit.encoded.misfit / fit.linear.misfit, degrees_of_freedom);
+  fit.encoded_weight = 1 / (1 + ratio);
+  const double difference = fit.encoded.radius_px - fit.linear.radius_px;
+  fit.radius_px += fit.encoded_weight * difference;
+  fit.std_error_px = std::sqrt(fit.encoded_weight * (1 - fit.encoded_weight)) * std::abs(difference);
   return fit;
 }
 

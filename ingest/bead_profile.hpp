@@ -59,19 +59,25 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
 // recorded.
 struct RimChoice {
   RimFit rim;
-  double exponent = 1;
+  double exponent = 1;  // of the likeliest; radius and error go over both
 };
 RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
                      double beads, double background_level, double bead_level, double from_px = 0,
                      bool linear_only = false);
 
+// What a camera that encodes for display makes of light: recorded level = light^0.45.
+constexpr double display_exponent = 0.45;
+
 // The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides; one
 // that encodes for display (exponent 0.45) draws the dark side steep and the bright side long, and puts the edge at
-// another place. Of the two, the one in which the rim of a blurred flat disk fits best; linear when the linear fit
-// leaves nothing to explain or the bead is not flat. Levels are recorded grey levels; level 0 is taken as no light.
+// another place. For rims of flat beads that neither explains down to the noise (clipped levels, glare): both readings,
+// each by how well a blurred flat disk fits in it, and the radius as their mean, with an error that holds both unless
+// one of them is clearly out. Levels are recorded grey levels; level 0 is taken as no light.
 struct ToneFit {
-  double exponent = 1;
-  RimFit linear, chosen;  // `chosen` is in light, not in recorded level
+  bool open = false;          // both were tried: the bead is flat, and the linear fit leaves something to explain
+  RimFit linear, encoded;     // `encoded` is in light, not in recorded level
+  double encoded_weight = 0;  // 0 .. 1
+  double radius_px = 0, std_error_px = 0;
 };
 ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, double bead_level,
                           double radius_guess_px, double edge_guess_px);

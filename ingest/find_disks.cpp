@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
@@ -72,6 +73,14 @@ Nearby nearby(const std::vector<ModelDisk>& disks, double distance) {
   return {disks.size(), distance, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); }};
 }
 
+// What lies near a bead that came or went has to be fitted again.
+void wake(const Nearby& near, std::vector<ModelDisk>& disks, const ModelDisk& changed) {
+  near.any_near(changed.x, changed.y, [&](std::size_t i) {
+    disks[i].last_step = ModelDisk().last_step;
+    return false;
+  });
+}
+
 // Takes out beads that explain nothing and the worse of two in one place, as judged; puts their share back into the
 // residual.
 std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double least) {
@@ -93,6 +102,11 @@ std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, d
       kept.push_back(disks[i]);
   }
   const std::size_t dropped = disks.size() - kept.size();
+  if (dropped > 0) {
+    const Nearby near = nearby(kept, 2 * fit.reach());
+    for (std::size_t i = 0; i < disks.size(); ++i)
+      if (drop[i]) wake(near, kept, disks[i]);
+  }
   disks = std::move(kept);
   return dropped;
 }
@@ -254,7 +268,7 @@ bool correct_background(LightField& light, const GrayFrame& flat, const std::vec
     levels.push_back(field_at(light, light.background, x_of(tile), y_of(tile)) +
                      tile.flat * field_at(light, light.contrast, x_of(tile), y_of(tile)));
   const double middle = median_of(levels);
-  const auto [lowest, highest] = std::minmax_element(levels.begin(), levels.end());
+  const auto edges = std::minmax_element(levels.begin(), levels.end());
   for (std::size_t k = 0; k < open.size(); ++k) {
     polynomial_values(open[k].u, open[k].v, order, basis.data());
     for (std::size_t a = 0; a < terms; ++a) {
@@ -270,7 +284,7 @@ bool correct_background(LightField& light, const GrayFrame& flat, const std::vec
                       std::clamp((2 * y + 1) / flat.height - 1, -1.0, 1.05), order, basis.data());
     double level = middle;
     for (std::size_t a = 0; a < terms; ++a) level += fit[a] * basis[a];
-    return std::clamp(level, *lowest, *highest);
+    return std::clamp(level, *edges.first, *edges.second);
   };
   double beyond = 0;
   for (const ModelDisk& disk : disks)
@@ -436,6 +450,9 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
     disk.quiet_sweeps = 0;
     fit.subtract(disk.x, disk.y, 1.0F);
   }
+  const Nearby all_kept = nearby(kept, 2 * fit.reach());
+  for (const auto* changed_ones : {&added, &suspects})
+    for (const ModelDisk& disk : *changed_ones) wake(all_kept, kept, disk);
   const std::size_t changed = std::max(suspects.size(), added.size());
   if (changed)
     for (ModelDisk& disk : kept) disk.quiet_sweeps = 0;
@@ -462,6 +479,7 @@ bool settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {
       disk.x = disk.former_x;
       disk.y = disk.former_y;
       disk.quiet_sweeps = 0;
+      disk.last_step = ModelDisk().last_step;
       fit.subtract(disk.x, disk.y, 1.0F);
       went_back = true;
     }
@@ -489,13 +507,15 @@ double unexplained_around(const JointFit& fit, const ModelDisk& disk, double rad
 }
 constexpr double most_unexplained_around = 0.12;
 
-// A Newton step of all beads together, then sweeps, at most `sweeps`, for the few that have a longer way to go (cut
-// ones outside the frame) and those they touch. True when nothing moves by more than the tolerance any more.
+// A Newton step of all beads together that are not still yet, then sweeps, at most `sweeps`, for the few that have a
+// longer way to go (cut ones outside the frame) and those they touch. True when nothing moves by more than the
+// tolerance any more.
 bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disks, double tolerance, double bound,
               int sweeps) {
   constexpr double quadratic = 10;  // what a step together leaves is less than a tenth of it
   constexpr double longest_step = 0.5;
-  if (fit.step_together(flat, disks, longest_step, bound) < quadratic * tolerance) return true;
+  const double still = quadratic * tolerance;
+  if (fit.step_together(flat, disks, longest_step, bound, still) < still) return true;
   std::vector<std::size_t> far;
   for (std::size_t i = 0; i < disks.size(); ++i) {
     disks[i].quiet_sweeps = 2;
@@ -527,6 +547,90 @@ double radius_error(const FinderCalibration& calibration, double spread, double 
   const double information = beads * 2 * 3.14159265 * calibration.rim_radius_px /
                              (2 * std::sqrt(3.14159265) * std::max(0.3, calibration.edge_width_px));
   return std::hypot(spread / std::sqrt(information), 0.002, doubt);
+}
+
+// The same frame read as one encoded for display: put back into light, where rims of touching beads add up, the bead
+// learned there, and the frame it makes encoded again.
+struct ReadingInLight {
+  BeadProfile profile;  // of light
+  double noise = 0;     // contrast units of light
+  // What remains where rims are, in squares of grey levels: of this reading, and of the levels as recorded.
+  double unexplained = 0, unexplained_as_recorded = 0;
+  std::size_t pixels = 0;
+};
+ReadingInLight read_in_light(const GrayFrame& frame, const JointFit& as_recorded, const LightField& light,
+                             const std::vector<ModelDisk>& disks, const BeadProfile& profile, double radius,
+                             double edge, double knot) {
+  double brightest = 1;
+  for (std::size_t k = 0; k < light.background.size(); ++k)
+    brightest = std::max({brightest, static_cast<double>(light.background[k]),
+                          static_cast<double>(light.background[k] + light.contrast[k])});
+  const auto to_light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
+  // Levels come in a few hundred values: a table is as good.
+  constexpr int parts = 8, highest = 512 * parts;
+  std::vector<float> table_of_light(highest + 2), table_of_levels(4097);
+  for (std::size_t k = 0; k < table_of_light.size(); ++k)
+    table_of_light[k] = static_cast<float>(to_light(brightest * static_cast<double>(k) / (highest / 2)));
+  for (std::size_t k = 0; k < table_of_levels.size(); ++k)
+    table_of_levels[k] = static_cast<float>(brightest * std::pow(static_cast<double>(k) / 2048, display_exponent));
+  const auto look_up = [](const std::vector<float>& table, float place) {
+    const float inside = std::clamp(place, 0.0F, static_cast<float>(static_cast<int>(table.size()) - 2));
+    const auto cell = static_cast<std::size_t>(inside);
+    return table[cell] + (inside - static_cast<float>(static_cast<int>(cell))) * (table[cell + 1] - table[cell]);
+  };
+  GrayFrame in_light = frame;
+  const float per_level = static_cast<float>(highest / 2 / brightest);
+  for (float& level : in_light.pixels)
+    if (!unseen(level)) level = look_up(table_of_light, level * per_level);
+  LightField field = light;
+  for (std::size_t k = 0; k < light.background.size(); ++k) {
+    const double background = to_light(static_cast<double>(light.background[k]));
+    field.background[k] = static_cast<float>(background);
+    field.contrast[k] =
+        static_cast<float>(to_light(static_cast<double>(light.background[k] + light.contrast[k])) - background);
+  }
+  ReadingInLight reading;
+  reading.profile = profile;
+  reading.profile.fourth_harmonic.assign(profile.fourth_harmonic.size(), 0.0F);
+  reading.profile.asymmetry = nullptr;
+  const double background = mean_background(light), contrast = mean_contrast(light);
+  const double from = to_light(background), span = to_light(background + contrast) - from;
+  if (!(std::abs(span) > 0.02)) return reading;
+  for (float& level : reading.profile.level)
+    level = static_cast<float>((to_light(background + contrast * static_cast<double>(level)) - from) / span);
+  const GrayFrame flat = flatten(in_light, field);
+  JointFit fit(flat);
+  constexpr int rounds = 3;
+  for (int round = 0;; ++round) {
+    const ProfileTable table(reading.profile, radius, edge, 0);
+    fit.set_table(&table);
+    fit.reset(flat, disks);
+    if (round == rounds) break;
+    reading.profile = learn_profile({&fit}, {&disks}, reading.profile, reading.profile.reach_px(), knot, radius, false,
+                                    round + 1 == rounds ? 1 : 2);
+  }
+  reading.noise = residual_spread(fit);
+  constexpr float no_rim = 0.02F, no_bead = 0.4F;
+  for (int row = 0; row < frame.height; ++row) {
+    const float* left_in_light = fit.residual_row(row);
+    const float* left = as_recorded.residual_row(row);
+    for (int column = 0; column < frame.width; ++column) {
+      const std::size_t at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(column);
+      if (unseen(left[column]) || std::abs(left[column]) > no_bead) continue;
+      const float model = flat.pixels[at] - left_in_light[column];
+      if (model < no_rim || model > 1 - no_rim || std::abs(left_in_light[column]) > no_bead) continue;
+      const double here = field_at(field, field.contrast, column, row);
+      const float expected =
+          look_up(table_of_levels, (in_light.pixels[at] - left_in_light[column] * static_cast<float>(here)) * 2048);
+      const double gap = static_cast<double>(frame.pixels[at] - expected);
+      const double as_seen = static_cast<double>(left[column]) * field_at(light, light.contrast, column, row);
+      ++reading.pixels;
+      reading.unexplained += gap * gap;
+      reading.unexplained_as_recorded += as_seen * as_seen;
+    }
+  }
+  return reading;
 }
 
 // What remains of the frame, in squares of grey levels, once background and beads are taken out.
@@ -828,36 +932,70 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     calibration.tone_exponent = choice.exponent;
     radius_doubt = choice.rim.std_error_px;
   };
-  if (!options.hold_radius && packed.rim.good) {
+  // Rims add up where beads touch: in light, or in levels as recorded. The one that makes up the frame is the camera's.
+  bool encoded = false, linear = false;
+  if (!options.hold_radius && options.learn_profile && (!packed.rim.good || packed.exponent != 1)) {
+    const ReadingInLight reading =
+        read_in_light(*used.front(), *fits.front(), light, disks.front(), profile, radius, edge, knot);
+    constexpr double clearly_less = 0.9, clearly_more = 1.03, fair = 2;
+    const double noise = fair * spread * mean_contrast(light), pixels = static_cast<double>(reading.pixels);
+    if (pixels > 0 && reading.unexplained < clearly_less * reading.unexplained_as_recorded) {
+      const RimChoice choice =
+          choose_rim(reading.profile, radius, edge, knot, reading.noise, static_cast<double>(total), 0, 1, 0, true);
+      encoded = choice.rim.std_error_px > 0;
+      if (encoded) take({choice.rim, display_exponent});
+    }
+    linear = pixels > 0 && reading.unexplained > clearly_more * reading.unexplained_as_recorded &&
+             reading.unexplained_as_recorded < noise * noise * pixels;
+  }
+  const bool as_packed = packed.rim.good && !encoded && !(linear && packed.exponent != 1);
+  if (!options.hold_radius && as_packed) {
     take(packed);
     calibration.radius_of_all_rims = true;
   }
-  if (!packed.rim.good) radius_doubt = 0.5 * std::abs(packed.rim.radius_px - radius);  // nothing explains the rim
-  if (!options.hold_radius && !packed.rim.good) {
+  if (!as_packed && !encoded) {  // nothing explains the rim
+    constexpr double poorly_known = 0.002;
+    radius_doubt = std::hypot(0.5 * (packed.rim.radius_px - radius), poorly_known * radius);
+  }
+  if (!options.hold_radius && !as_packed && !encoded) {
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
     for (const auto& one : disks) disk_pointers.push_back(&one);
     const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
       constexpr double poor_misfit = 0.012;
-      RimChoice open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
-                                  static_cast<double>(free_rim.sectors) / 16, background,
-                                  std::max(0.0, background + contrast), free_rim.inner_px);
+      const auto choose_open = [&](bool linear_only) {
+        return choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
+                          static_cast<double>(free_rim.sectors) / 16, background, std::max(0.0, background + contrast),
+                          free_rim.inner_px, linear_only);
+      };
+      RimChoice open = choose_open(linear);
       if (open.rim.good && open.exponent != 1 && packed.exponent == 1) {  // a tone curve is every rim's
         const double curved = open.rim.radius_px;
-        open = choose_rim(free_rim.profile, radius, edge, free_rim.profile.step_px, spread,
-                          static_cast<double>(free_rim.sectors) / 16, background, std::max(0.0, background + contrast),
-                          free_rim.inner_px, true);
+        open = choose_open(true);
         open.rim.std_error_px = std::hypot(open.rim.std_error_px, 0.25 * (curved - open.rim.radius_px));
       }
       const ToneFit tone =
           fit_tone_exponent(free_rim.profile, background, std::max(0.0, background + contrast), radius, edge);
+      const double doubt = radius_doubt;
       if (open.rim.good) {
         take(open);
-      } else if (tone.chosen.good && fit_rim(profile, radius, edge).misfit > poor_misfit) {
-        calibration.tone_exponent = tone.exponent;
-        calibration.radius_px = tone.chosen.radius_px;
-        if (tone.exponent != 1) radius_doubt += 0.25 * std::abs(tone.chosen.radius_px - tone.linear.radius_px);
+        radius_doubt = std::hypot(doubt, radius_doubt);
+      } else if (tone.linear.good && ((tone.open && !linear) || fit_rim(profile, radius, edge).misfit > poor_misfit)) {
+        constexpr double believed = 0.9;
+        const double weight = linear ? 0 : tone.encoded_weight;
+        calibration.tone_exponent = weight > believed ? display_exponent : 1;
+        calibration.radius_px = linear ? tone.linear.radius_px : tone.radius_px;
+        if (!linear) radius_doubt = std::hypot(doubt, tone.std_error_px);
+        if (weight > 1 - believed && weight < believed) {
+          char text[400];
+          std::snprintf(text, sizeof text,
+                        "The rims do not tell whether levels grow as light does (radius %.2f px) or are encoded for "
+                        "display (%.2f px): the radius is taken between the two, with an error that holds both; a "
+                        "scale of your own would settle it.",
+                        tone.linear.radius_px, tone.encoded.radius_px);
+          calibration.warnings.emplace_back(text);
+        }
       }
     }
   }
@@ -1032,6 +1170,8 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   const double bound = std::max(residual_bound, 4 * noise);
   for (int sweep = 0; sweep < options.joint_fit_sweeps; ++sweep) {
     fit.set_table(sweep < 2 ? &soft : &exact);
+    if (sweep == 2)
+      for (ModelDisk& disk : disks) disk.last_step = ModelDisk().last_step;  // still by the soft table only
     bool converged = false;
     if (sweep < 2) {
       fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance, bound);
@@ -1066,6 +1206,11 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   }
   for (const ModelDisk& band : in_bands) fit.subtract(band.x, band.y, -1.0F);
   disks = std::move(outside_bands);
+  const auto wake_near = [&](const std::vector<ModelDisk>& changed) {
+    const Nearby near = nearby(disks, 2 * fit.reach());
+    for (const ModelDisk& disk : changed) wake(near, disks, disk);
+  };
+  wake_near(in_bands);
   dropped += before_bands - disks.size();
 
   std::vector<double> explained;
@@ -1088,8 +1233,9 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   });
   if (!taken_out.empty() || dropped_last > 0 || !in_bands.empty()) {
     const std::vector<ModelDisk> before = disks;
+    wake_near(taken_out);
     fit_again();
-    bool put_back = false;
+    std::vector<ModelDisk> put_back;
     const Nearby near_before = nearby(before, 2.6 * radius);
     for (const ModelDisk& disk : taken_out) {
       double gain = 0;
@@ -1104,9 +1250,10 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
       }
       fit.subtract(disk.x, disk.y, 1.0F);
       disks.push_back(disk);
-      put_back = true;
+      put_back.push_back(disk);
     }
-    if (put_back) fit_again();
+    wake_near(put_back);
+    if (!put_back.empty()) fit_again();
   }
   if (options.learn_rim) {
     std::vector<ModelDisk> clear;

@@ -322,12 +322,32 @@ double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, doubl
   return largest;
 }
 
-double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step,
-                               double bound) {
-  const std::size_t n = disks.size();
+double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
+                               double still) {
+  const Nearby near(disks.size(), 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
+  // The beads that take part, and their places in what follows.
+  constexpr std::size_t stays = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> place(disks.size(), stays), moving;
+  for (std::size_t i = 0; i < disks.size(); ++i) place[i] = disks[i].last_step >= still ? 0 : stays;
+  if (still > 0) {
+    std::vector<std::size_t> woken;
+    near.pairs([&](std::size_t a, std::size_t b) {
+      const bool one = disks[a].last_step >= still, other = disks[b].last_step >= still;
+      if (one != other) woken.push_back(one ? b : a);
+      return false;
+    });
+    for (const std::size_t i : woken) place[i] = 0;
+  }
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    if (place[i] == stays) continue;
+    place[i] = moving.size();
+    moving.push_back(i);
+  }
+  const std::size_t n = moving.size();
+  if (n == 0) return 0;
   std::vector<double> descent(2 * n), step(2 * n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
-    const Descent one = descent_of(disks[i], static_cast<float>(bound));
+    const Descent one = descent_of(disks[moving[i]], static_cast<float>(bound));
     descent[2 * i] = table_->relaxation_ * one.x;
     descent[2 * i + 1] = table_->relaxation_ * one.y;
   }
@@ -337,8 +357,8 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
     double xx, xy, yy;
   };
   std::vector<Pair> pairs;
-  const Nearby near(n, 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
   near.pairs([&](std::size_t a, std::size_t b) {
+    if (place[a] == stays || place[b] == stays) return false;
     const ModelDisk &one = disks[a], &other = disks[b];
     const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
     if (squared < 1e-6) return false;
@@ -346,8 +366,8 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
     // Of a bead cut by the border only a part is there to be shared.
     const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
     const double along_more = scale * (along - across) / squared;
-    pairs.push_back(
-        {a, b, scale * across + along_more * dx * dx, along_more * dx * dy, scale * across + along_more * dy * dy});
+    pairs.push_back({place[a], place[b], scale * across + along_more * dx * dx, along_more * dx * dy,
+                     scale * across + along_more * dy * dy});
     return false;
   });
   // Conjugate gradients, each bead's own 2 x 2 block taken out beforehand.
@@ -355,7 +375,7 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
   const auto own_solution = [&](const std::vector<double>& from, std::vector<double>& to) {
     for (std::size_t i = 0; i < n; ++i) {
       to[2 * i] = to[2 * i + 1] = 0;
-      solve_own(disks[i], from[2 * i], from[2 * i + 1], to[2 * i], to[2 * i + 1]);
+      solve_own(disks[moving[i]], from[2 * i], from[2 * i + 1], to[2 * i], to[2 * i + 1]);
     }
   };
   const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
@@ -370,7 +390,7 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
   constexpr int most_rounds = 60;
   for (int round = 0; round < most_rounds && norm > enough; ++round) {
     for (std::size_t i = 0; i < n; ++i) {
-      const ModelDisk& disk = disks[i];
+      const ModelDisk& disk = disks[moving[i]];
       const double damping = 1e-9 + 1e-4 * (disk.hessian_xx + disk.hessian_yy);
       const double x = direction[2 * i], y = direction[2 * i + 1];
       image[2 * i] = (disk.hessian_xx + damping) * x + disk.hessian_xy * y;
@@ -396,15 +416,19 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
     norm = next;
   }
   double largest = 0;
+  const bool few = 4 * n < disks.size();  // then each is taken from the residual and put back on its own
   for (std::size_t i = 0; i < n; ++i) {
+    ModelDisk& disk = disks[moving[i]];
     const double length = std::hypot(step[2 * i], step[2 * i + 1]);
     const double share = length > largest_step ? largest_step / length : 1.0;
-    disks[i].x += share * step[2 * i];
-    disks[i].y += share * step[2 * i + 1];
-    disks[i].last_step = share * length;
-    largest = std::max(largest, disks[i].last_step);
+    const double x = disk.x + share * step[2 * i], y = disk.y + share * step[2 * i + 1];
+    if (few) move(disk.x, disk.y, x, y);
+    disk.x = x;
+    disk.y = y;
+    disk.last_step = share * length;
+    largest = std::max(largest, disk.last_step);
   }
-  reset(flat, disks);
+  if (!few) reset(flat, disks);
   return largest;
 }
 

@@ -71,8 +71,10 @@ class JointFit {
   double sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound);
   // One Newton step of all beads at once: where blur makes touching beads share pixels, sweeps creep and this does
   // not. The coupling of two beads is that of two whole beads; what it leaves is taken up by the next step. `flat` as
-  // in reset(). Returns the largest move, at most `largest_step` px.
-  double step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound);
+  // in reset(). Beads whose last move was below `still`, as were those of all that share pixels with them, stay where
+  // they are. Returns the largest move, at most `largest_step` px.
+  double step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
+                       double still = 0);
   // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
   void judge(std::vector<ModelDisk>& disks, double radius) const;
   // Residual (flat frame minus model) at a pixel.

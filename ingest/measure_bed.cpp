@@ -446,7 +446,25 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     for (const GrayFrame& frame : painted) pointers.push_back(&frame);
     CalibrationResult result = calibrate_finder(pointers, find_second_kind);
     constexpr double nearly = 0.08;
-    if (result.found && std::abs(result.calibration.radius_px / expected - 1) < nearly)
+    const auto as_expected = [&](const CalibrationResult& one) {
+      return one.found && std::abs(one.calibration.radius_px / expected - 1) < nearly;
+    };
+    // Several small disks can stand in for a large one: what is found with nothing asked for must not do better.
+    const auto left_by = [&](const FinderCalibration& calibration) {
+      double square = 0;
+      for (const GrayFrame& frame : painted)
+        for (const float level :
+             residual_frame(frame, find_disks(frame, calibration, find_second_kind), calibration).pixels)
+          square += static_cast<double>(level * level);
+      return square;
+    };
+    if (as_expected(result)) {
+      find_second_kind.radius_px.reset();
+      CalibrationResult free = calibrate_finder(pointers, find_second_kind);
+      if (free.found && !as_expected(free) && left_by(free.calibration) < left_by(result.calibration))
+        result = std::move(free);
+    }
+    if (as_expected(result))
       measurement.second_finder = std::move(result.calibration);
     else
       measurement.warnings.push_back("No beads of the second diameter were found: " +
