@@ -255,10 +255,23 @@ void errors_by_dial(const Effort& effort, StageResult& result) {
           "For {:g} % in T use {}, fitted with {}: {:.1f} CPU seconds (measured: {:.2g} % rms over {} beds).",
           100 * goal, settings_text(cheapest->settings), ways[by].name, cheapest->cost.all(),
           100 * cheapest->error[by].rms(), seeds));
-    } else {
-      result.sentences.push_back(
-          fmt::format("For {:g} % in T: none of the settings measured here keeps it with certainty.", 100 * goal));
+      continue;
     }
+    const Trial* nearest = nullptr;
+    for (const Trial& trial : trials) {
+      for (std::size_t k = 0; k < way_count; ++k) {
+        if (trial.error[k].count < seeds) continue;
+        if (nearest == nullptr || trial.error[k].rms() < nearest->error[by].rms()) nearest = &trial, by = k;
+      }
+    }
+    result.sentences.push_back(fmt::format(
+        "For {:g} % in T: none of the settings measured here keeps it with certainty{}.", 100 * goal,
+        nearest == nullptr
+            ? std::string()
+            : fmt::format("; nearest come {}, fitted with {}: {:.1f} CPU seconds (measured: {:.2g} % rms over {} beds, "
+                          "the mean off by {:+.2g} %)",
+                          settings_text(nearest->settings), ways[by].name, nearest->cost.all(),
+                          100 * nearest->error[by].rms(), seeds, 100 * nearest->error[by].mean())));
   }
   result.figures.push_back(std::move(figure));
   result.tables.push_back(std::move(table));
