@@ -75,6 +75,9 @@ void describe_report(Fields& fields, ReportOptions& report) {
                                          "is not a JSON pointer");
                              },
                              {.help = "inputs that the source does not give: marked so in the report"});
+  fields.boolean(
+      "audit", report.audit,
+      {.help = "the numbers that Quinn and Hong print beside recomputed ones, as shakebed audit gives them"});
 }
 
 void describe_sweep(Fields& fields, SweepOptions& sweep) {

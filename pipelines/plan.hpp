@@ -47,6 +47,7 @@ struct ReportOptions {
   std::vector<std::string> text;  // paragraphs
   std::vector<PublishedNumber> published;
   std::vector<AssumedInput> assumed;
+  bool audit = false;  // the table of `shakebed audit`, too
 };
 
 struct SweepAxis {

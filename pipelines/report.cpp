@@ -11,6 +11,7 @@
 #include "pipelines/files.hpp"
 #include "pipelines/manifest.hpp"
 #include "pipelines/stages/check.hpp"
+#include "pipelines/theory.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -183,7 +184,7 @@ class Report {
     if (plan_.report.text.empty() && !plan_.description.empty())
       out += fmt::format("<p>{}</p>\n", html(plan_.description));
     out += banners() + warnings() + claims() + figures() + published() + checks() + bed_in_motion() + overlays() +
-           fits() + maps() + assumed() + graph() + downloads() + provenance();
+           fits() + maps() + audit() + assumed() + graph() + downloads() + provenance();
     return out + "</main>\n</body>\n</html>\n";
   }
 
@@ -573,6 +574,29 @@ class Report {
       out += "</table></div>\n";
     }
     return out;
+  }
+
+  std::string audit() const {
+    if (!plan_.report.audit) return "";
+    const Json audit = audit_json();
+    std::string out = fmt::format(
+        "<h2>The paper's numbers, recomputed</h2>\n<p class=\"soft\">{}: what it prints, and the same from its own "
+        "formulas.</p>\n<div class=\"scroll\"><table>\n<tr><th>number</th><th>printed</th><th>recomputed</th><th>"
+        "difference</th><th>status</th><th>explanation</th></tr>\n",
+        html(audit["paper"].get<std::string>()));
+    for (const Json& row : audit["rows"]) {
+      const std::string status = row["status"].get<std::string>();
+      const std::string difference = row.contains("relative_difference")
+                                         ? fmt::format("{:+.3g} %", 100 * row["relative_difference"].get<double>())
+                                         : std::string("–");
+      out += fmt::format(
+          "<tr><td>{}<br><span class=\"soft\">{}</span></td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td "
+          "class=\"{}\">{}</td><td>{}</td></tr>\n",
+          prose(row["quantity"].get<std::string>()), html(row["place"].get<std::string>()),
+          prose(row["printed_text"].get<std::string>()), prose(row["recomputed_text"].get<std::string>()), difference,
+          status == "open" ? "bad" : "good", html(status), prose(row["explanation"].get<std::string>()));
+    }
+    return out + "</table></div>\n";
   }
 
   std::string assumed() const {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "pipelines/bench/results.hpp"
@@ -297,6 +299,19 @@ void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effor
   if (!(overlap <= 1e-9)) one.pass = false;
 }
 
+// A checkpoint's state, put that many synchronisation intervals later: they are counted after the magic number, the
+// number of disks and the interval; the last eight bytes are the checksum (FNV-1a).
+std::vector<std::uint8_t> much_later(std::vector<std::uint8_t> state, std::uint64_t intervals) {
+  constexpr std::size_t place = 8 + 4 + 8;
+  std::uint64_t done = 0, hash = 0xcbf29ce484222325;
+  std::memcpy(&done, &state[place], sizeof done);
+  done += intervals;
+  std::memcpy(&state[place], &done, sizeof done);
+  for (std::size_t k = 0; k + 8 < state.size(); ++k) hash = (hash ^ state[k]) * 0x100000001b3;
+  std::memcpy(&state[state.size() - 8], &hash, sizeof hash);
+  return state;
+}
+
 // A disk that rests has a contact each contact duration: that, not a time step, is what piles cost here.
 void hard_cases(const Effort& effort, StageResult& result) {
   effort.step("simulate: hard cases");
@@ -374,6 +389,97 @@ void hard_cases(const Effort& effort, StageResult& result) {
     scene.start = sim::RandomStart{0};
     run_scene(one, scene, 20, effort);
   });
+  add("close-packed start, phi = (1 - 1e-10) 2/sqrt 3", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene;
+    scene.gravity = sim::Weightless{};
+    scene.disks.species = {{900, 1, 1}};
+    const double spacing = std::sqrt(1 / (1 - 1e-10));
+    scene.box.width = 30 * spacing;
+    scene.box.sides = sim::PeriodicSides{};
+    scene.box.top = sim::PeriodicTop{30 * spacing * std::numbers::sqrt3 / 2};
+    scene.start = sim::HexagonalStart{30, 0};
+    run_scene(one, scene, 1e-9, effort);
+  });
+  add("two disks hit a third at one instant, again and again", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(3, 12, 1, 0);
+    constexpr double c = std::numbers::sqrt3 / 2;
+    scene.start = sim::PlacedStart{
+        {{6, 5, 0, 0, 0, 0}, {6 - 2, 5 + 4 * c, 1, -2 * c, 0, 0}, {6 + 2, 5 + 4 * c, -1, -2 * c, 0, 0}}};
+    run_scene(one, scene, 50, effort);
+  });
+  add("a lattice hit by its lowest row: triple contacts everywhere", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(80, 10.5, 0.6, 1e-3);
+    scene.box.sides = sim::PeriodicSides{};
+    sim::PlacedStart start;
+    for (int k = 0; k < 80; ++k) {
+      const int row = k / 10;
+      start.disks.push_back({k % 10 + 0.25 + 0.5 * (row % 2), 0.51 + row * (std::numbers::sqrt3 / 2 + 0.01), 0,
+                             row == 0 ? 2.0 : 0.0, 0, 0});
+    }
+    scene.start = start;
+    run_scene(one, scene, 20, effort);
+  });
+  for (const double duration : {0.0, 1e-4}) {
+    add(fmt::format("a row of touching disks that fills the width, {} contact clock", duration > 0 ? "with" : "no"),
+        1e-10, 10, [&](HardCase& one) {
+          sim::Scene scene = pile(12, 12, 0.9, duration);
+          sim::PlacedStart start;
+          for (int k = 0; k < 12; ++k) start.disks.push_back({0.5 + k, 0.5, k == 3 ? 1.0 : 0.0, 1, 0, 0});
+          scene.start = start;
+          run_scene(one, scene, 20, effort);
+        });
+  }
+  add("masses 1:1e6", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(0, 10, 1, 0);
+    scene.disks.species = {{30, 1, 1}, {30, 1, 1e6}};
+    run_scene(one, scene, 3, effort);
+  });
+  add("radii 1:5", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(0, 30, 0.9, 1e-3);
+    scene.disks.species = {{200, 1, 1}, {10, 5, 25}};
+    scene.start = sim::RandomStart{};
+    run_scene(one, scene, 50, effort);
+  });
+  add("T = 1e-12 m g D", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(100, 12, 1, 0);
+    scene.start_temperature = 1e-12;
+    run_scene(one, scene, 1e-3, effort);
+  });
+  add("a disk at rest on the floor", 1e-10, 10, [&](HardCase& one) {
+    sim::Scene scene = pile(1, 4, 0.5, 0);
+    scene.start = sim::PlacedStart{{{2, 0.5, 0, 0, 0, 0}}};
+    run_scene(one, scene, 10, effort);
+  });
+  add("an empty scene", 0, 10, [&](HardCase& one) {
+    const auto simulation = sim::simulate(pile(0, 4, 0.9, 0));
+    simulation->advance_to(100);
+    one.pass = simulation->time() == 100 && simulation->counters().collisions() == 0;
+    one.note = fmt::format("{} contacts", simulation->counters().collisions());
+  });
+  add("one disk, elastic, for 1000 time units", 1e-10, 10,
+      [&](HardCase& one) { run_scene(one, pile(1, 4, 1, 0), 1000, effort); });
+  // Time is counted from the last synchronisation: the same state put 2^33 intervals later, where a run would have had
+  // more than 1e10 contacts, must go on to the same places.
+  result.hard_cases.push_back(
+      run_hard_case("the clock after 1e10 contacts", "D, largest difference", 0, 10, [&](HardCase& one) {
+        const sim::Scene scene = Bed::scene(1e-6);
+        const auto early = sim::simulate(scene), late = sim::simulate(scene);
+        for (int k = 0; k < 5; ++k) early->advance_to(early->next_synchronisation());
+        late->restore(much_later(early->checkpoint(), std::uint64_t{1} << 33U));
+        for (int k = 0; k < 20; ++k) {
+          early->advance_to(early->next_synchronisation());
+          late->advance_to(late->next_synchronisation());
+        }
+        sim::Snapshot a, b;
+        early->snapshot(a), late->snapshot(b);
+        double difference = 0;
+        for (std::size_t i = 0; i < a.x.size(); ++i)
+          difference = std::max({difference, std::abs(a.x[i] - b.x[i]), std::abs(a.z[i] - b.z[i])});
+        one.error = difference;
+        const double contacts = static_cast<double>(early->counters().collisions()) / early->time() * late->time();
+        one.pass = contacts > 1e10;
+        one.note = fmt::format("at time {:.4g}, {:.3g} contacts", late->time(), contacts);
+      }));
   result.hard_cases.push_back(
       run_hard_case("stopped at a checkpoint and gone on", "D, largest difference", 0, 10, [&](HardCase& one) {
         const sim::Scene scene = Bed::scene(1e-6);

@@ -35,6 +35,24 @@ class FitStage : public testing::Test {
   ScratchFolder folder_;
 };
 
+TEST_F(FitStage, ReportShowsTheAuditOfThePaper) {
+  write_text(folder_ / "r.json", R"({ "name": "t", "report": { "audit": true }, "stages": [
+    { "stage": "map", "gamma": 4, "frequency": "20 Hz", "initial_height": 10.2, "diameter": "2.99 mm" } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder_.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const std::string page = read_text(folder_ / "o/report.html");
+  const Json audit = Json::parse(run_shakebed({"audit", "--json"}, folder_.path()).out);
+  std::size_t at = page.find("numbers, recomputed");
+  ASSERT_NE(at, std::string::npos);
+  for (const Json& row : audit["rows"]) {  // each in its turn: its place in the paper, then its status
+    at = page.find(">" + row["place"].get<std::string>() + "<", at);
+    ASSERT_NE(at, std::string::npos) << row["quantity"];
+    at = page.find(">" + row["status"].get<std::string>() + "<", at);
+    ASSERT_NE(at, std::string::npos) << row["quantity"];
+  }
+  EXPECT_GE(audit["rows"].size(), 10U);
+}
+
 TEST_F(FitStage, MatchesAProfileAgainstSimulatedBeds) {
   std::string stages, ids;
   int seed = 100;
