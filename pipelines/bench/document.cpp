@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <thread>
 
@@ -135,12 +136,19 @@ bool drawable(double cost, double error) {
   return std::isfinite(cost) && std::isfinite(error) && cost > 0 && error > 0;
 }
 
+// A logarithmic axis with at least one power of ten on it, since only those carry a number.
+std::string axis_range(std::string_view axis, double low, double high) {
+  return fmt::format("set {}range [{}:{}]\n", axis, std::min(low, std::pow(10, std::floor(std::log10(high)))), high);
+}
+
 void draw(const Figure& figure, const fs::path& directory) {
   // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
   constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5C00"};
   constexpr std::array points = {7, 5, 9, 13, 11, 6, 4};
   std::string data, plot;
   int index = 0;
+  constexpr double largest = std::numeric_limits<double>::max();
+  double cheapest = largest, dearest = 0, best = largest, worst = 0;  // what is drawn lies between them
   const auto block = [&](const std::string& label, const auto& each) {
     data += "# " + label + "\n";
     each();
@@ -168,7 +176,10 @@ void draw(const Figure& figure, const fs::path& directory) {
     if (shown == 0) continue;
     block(curve.label, [&] {
       for (std::size_t i = 0; i < curve.cost.size(); ++i) {
-        if (drawable(curve.cost[i], curve.error[i])) data += fmt::format("{} {}\n", curve.cost[i], curve.error[i]);
+        if (!drawable(curve.cost[i], curve.error[i])) continue;
+        data += fmt::format("{} {}\n", curve.cost[i], curve.error[i]);
+        cheapest = std::min(cheapest, curve.cost[i]), dearest = std::max(dearest, curve.cost[i]);
+        best = std::min(best, curve.error[i]), worst = std::max(worst, curve.error[i]);
       }
     });
     if (curve.limit) {
@@ -197,9 +208,8 @@ void draw(const Figure& figure, const fs::path& directory) {
                   gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label), gnuplot_text(figure.title)) +
       "set logscale xy\nset format xy '%.0e'\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
       "'#dddddd' "
-      "lt 1 lw 0.6\nset offsets graph 0.04, graph 0.04, graph 0.08, graph 0.08\nset key below horizontal spacing 1.2 "
-      "samplen 2 font ',13'\n" +
-      plot + "\n";
+      "lt 1 lw 0.6\nset key below horizontal spacing 1.2 samplen 2 font ',12'\n" +
+      axis_range("x", cheapest / 1.3, dearest * 1.3) + axis_range("y", best / 1.6, worst * 1.6) + plot + "\n";
   write_file(directory / (figure.name + ".gp"), script);
   ProcessResult result;
   try {
