@@ -27,6 +27,36 @@ struct FrameFindings {
   std::vector<float> coverage_of_row;  // covered px of each row
 };
 
+// A row of numbers a frame, all equally long, in one piece of memory: a long film has many.
+class FrameRows {
+ public:
+  // `expected` rows, if known.
+  void add(const std::vector<double>& row, std::size_t expected) {
+    if (count_ == 0) {
+      length_ = row.size();
+      values_.reserve(length_ * expected);
+    }
+    ++count_;
+    for (const double value : row) values_.push_back(static_cast<float>(value));
+  }
+  [[nodiscard]] std::size_t size() const { return count_; }
+  // The first `length` numbers of the k-th row, or of all.
+  [[nodiscard]] std::vector<double> row(std::size_t k, std::size_t length) const {
+    const auto from = values_.begin() + static_cast<std::ptrdiff_t>(k * length_);
+    return {from, from + static_cast<std::ptrdiff_t>(std::min(length, length_))};
+  }
+  [[nodiscard]] std::vector<std::vector<double>> rows(std::size_t length) const {
+    std::vector<std::vector<double>> all;
+    all.reserve(count_);
+    for (std::size_t k = 0; k < count_; ++k) all.push_back(row(k, length));
+    return all;
+  }
+
+ private:
+  std::size_t length_ = 0, count_ = 0;
+  std::vector<float> values_;
+};
+
 void check(const MeasureOptions& options) {
   const auto require = [](bool condition, const std::string& what) {
     if (!condition) throw std::invalid_argument("measure_bed: " + what);
@@ -620,7 +650,10 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   double highest = 0;
   std::vector<double> counts;
   std::size_t good = 0, cut_below = 0;
-  std::vector<std::vector<double>> densities, second_densities, covered;
+  FrameRows densities, second_densities, covered;
+  constexpr std::size_t most_expected = 100000;
+  const std::size_t expected_frames = std::min(most_expected, source.count_if_known().value_or(0));
+  measurement.frames.reserve(expected_frames);
   std::vector<std::size_t> frame_of;
   std::vector<double> through_chord;  // what the centres say, seen through the bead as covered area sees it
   // Part of a bead's own contrast below a height (D) from its centre: a flat bead's is its chord's, a shaded one's is
@@ -657,7 +690,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     // A bead's contrast stands for the area of the radius known by now.
     const double bead_area = std::pow(refined.radius_px / finder.radius_px, 2);
     for (double& value : area) value *= bead_area * 4 / std::numbers::pi / (bins.width * diameter_px * counted_width);
-    covered.push_back(std::move(area));
+    covered.add(area, expected_frames);
     through_chord.resize(bins.count, 0.0);
     for (const double height : heights) {
       const double from = std::floor((height - bead_reach - bins.lowest) / bins.width) - 1;
@@ -707,8 +740,9 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     for (const FoundDisk& disk : frame.second) add(disk, 2);
     measurement.disk_total += disks.size();
     if (frame.report.status != FrameStatus::unreadable && frame.report.status != FrameStatus::size_changed) {
-      densities.push_back(density_of_frame(heights, bed.width, bins, options.kernel));
-      if (second) second_densities.push_back(density_of_frame(second_heights, bed.width, bins, options.kernel));
+      densities.add(density_of_frame(heights, bed.width, bins, options.kernel), expected_frames);
+      if (second)
+        second_densities.add(density_of_frame(second_heights, bed.width, bins, options.kernel), expected_frames);
       frame_of.push_back(frame.report.index);
       if (options.profile_from_coverage) add_coverage(frame.coverage_of_row, heights);
     }
@@ -786,26 +820,21 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   measurement.finder.radius_std_error_px = refined.radius_std_error_px;
 
   // Profiles.
-  const auto cut_to_bins = [&](std::vector<std::vector<double>>& rows) {
-    for (auto& row : rows) row.resize(bins.count);
-  };
   bins.count = std::min(bins.count, bins_up_to(options.highest.value_or(highest + 1)));
-  cut_to_bins(densities);
   if (second) {
-    cut_to_bins(second_densities);
-    measurement.second_profile = average_profile(second_densities, bins, options.kernel, bed.scale_relative_std_error);
+    measurement.second_profile =
+        average_profile(second_densities.rows(bins.count), bins, options.kernel, bed.scale_relative_std_error);
     for (std::size_t bin = 0; bin < bins.count; ++bin)
       measurement.second_profile->area_fraction[bin] *=
           std::pow(second->radius_px / refined.radius_px, 2);  // of their own size
   }
-  measurement.profile = average_profile(densities, bins, options.kernel, bed.scale_relative_std_error);
+  measurement.profile = average_profile(densities.rows(bins.count), bins, options.kernel, bed.scale_relative_std_error);
 
   if (options.profile_from_coverage) {
-    cut_to_bins(covered);
     through_chord.resize(bins.count, 0.0);
     for (double& value : through_chord) value /= static_cast<double>(std::max<std::size_t>(1, frame_of.size()));
     DensityProfile coverage =
-        average_profile(covered, bins, {KernelKind::disk_chord, 1.0}, bed.scale_relative_std_error);
+        average_profile(covered.rows(bins.count), bins, {KernelKind::disk_chord, 1.0}, bed.scale_relative_std_error);
     double square = 0;
     std::size_t compared = 0;
     for (std::size_t bin = 0; bin < bins.count; ++bin) {
@@ -834,7 +863,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       const double phase = turns - std::floor(turns);
       const auto bin = std::min(options.phase_bins - 1,
                                 static_cast<std::size_t>((phase + 1e-9) * static_cast<double>(options.phase_bins)));
-      by_phase[bin].push_back(densities[k]);
+      by_phase[bin].push_back(densities.row(k, bins.count));
     }
     for (std::size_t bin = 0; bin < options.phase_bins; ++bin) {
       if (by_phase[bin].empty()) continue;
