@@ -22,7 +22,7 @@ std::string look_of(const ingest::FinderBenchmarkRow& row) {
 
 void finder(const Effort& effort, StageResult& result) {
   ingest::FinderBenchmarkOptions options;
-  options.frames = effort.quick ? 4 : 20;
+  options.frames = 20;  // the limit of the time a frame holds for so many: the calibration is shared by them
   if (effort.quick) options.blurs = {1}, options.noises = {5};
   effort.step("extract: the finder, look by look");
   const auto rows = images_module().benchmark_finder(options, [&](const ingest::FinderBenchmarkRow& row) {
