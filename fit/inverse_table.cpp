@@ -1,5 +1,6 @@
 #include "fit/inverse_table.hpp"
 
+#include <limits>
 #include <numbers>
 
 namespace shakebed::fit {
@@ -19,9 +20,11 @@ long double solve(const InverseTable::Piece& piece, long double big_f, long doub
     (residual > 0.0L ? high : low) = density;
     const long double step = std::clamp(-residual / piece.stiffness(static_cast<double>(density)), -1.0L, 1.0L);
     const long double next = density * (std::abs(step) < 1e-6L ? 1.0L + step + 0.5L * step * step : std::exp(step));
-    // The next step would be no longer than this; or rounding is all that is left.
+    // The next step would be no longer than this; or rounding is all that is left, also where extended precision is
+    // no better than double (some machines, valgrind).
     const long double ahead = step * step / last_step;
-    if (std::abs(step) < 1e-6L && (std::abs(ahead) < 1e-20L || std::abs(step) < 1e-18L)) {
+    const bool only_rounding = std::abs(step) < 1e-18L || (iteration > 0 && std::abs(step) >= std::abs(last_step));
+    if (std::abs(step) < 1e-6L && (std::abs(ahead) < 1e-20L || only_rounding)) {
       return std::clamp(next, low, high);
     }
     last_step = step;
@@ -111,7 +114,9 @@ void InverseTable::add_segment(const Piece& piece, double tolerance) {
     const long double to = std::min(block_start(number + 1), segment.last_f);
     if (!(to > from)) continue;
     const long double start_of_block = start;
-    // Halve the cells until the worst is exact.
+    // Halve the cells until the worst is exact, or halving no longer helps: the rest is rounding.
+    constexpr double surely_small = 1e-12;
+    double worst_before = std::numeric_limits<double>::infinity();
     for (std::uint32_t cells = 1;; cells *= 2) {
       start = start_of_block;
       const long double half = 0.5L * (to - from) / static_cast<long double>(cells);
@@ -133,7 +138,9 @@ void InverseTable::add_segment(const Piece& piece, double tolerance) {
         }
         segment.cells.push_back(cell);
       }
-      if (worst <= tolerance || cells >= 4096) {
+      const bool only_rounding = worst < surely_small && worst > 0.5 * worst_before;
+      worst_before = worst;
+      if (worst <= tolerance || only_rounding || cells >= 4096) {
         segment.blocks.push_back(
             {static_cast<double>(from), static_cast<double>(static_cast<long double>(cells) / (to - from)),
              static_cast<std::uint32_t>(first_cell), static_cast<std::uint32_t>(segment.cells.size() - 1)});
