@@ -535,16 +535,19 @@ class Report {
 
   // What the map between simulated beds says of this one.
   static std::string simulated_beds(const Json& simulated) {
-    const auto value = [&](const char* key) {
-      return simulated.contains(key) && simulated[key].is_object() ? shown(simulated[key]) : std::string("–");
-    };
+    const Json asked = simulated.value("at", Json::object());
     std::string at;
-    for (const auto& [name, place] : simulated.value("at", Json::object()).items())
+    for (const auto& [name, place] : asked.items())
       at += fmt::format("{}{} = {:.4g}", at.empty() ? "" : ", ", name, place.get<double>());
-    return fmt::format(
-        "<p>Interpolated between {} simulated beds at {}: T/T_c = <strong>{}</strong>, T/(m g) = {}{}.</p>\n",
-        simulated.value("beds", 0), html(at), value("reduced_temperature"), value("temperature_over_mg"),
-        simulated.value("inside", true) ? "" : "; this bed lies outside the table");
+    const std::string beds = fmt::format("{} simulated beds", simulated.value("beds", 0));
+    const Json* reduced = find_pointer(simulated, "/reduced_temperature");
+    const Json* over_mg = find_pointer(simulated, "/temperature_over_mg");
+    if (reduced == nullptr || !reduced->is_object())
+      return fmt::format("<p>The {} give no temperature at {}.</p>\n", html(beds), html(at));
+    return fmt::format("<p>Interpolated between {} at {}: T/T_c = <strong>{}</strong>{}{}.</p>\n", html(beds), html(at),
+                       shown(*reduced),
+                       over_mg != nullptr && over_mg->is_object() ? ", T/(m g) = " + shown(*over_mg) : "",
+                       simulated.value("inside", true) ? "" : "; this bed lies outside the table");
   }
 
   std::string maps() const {

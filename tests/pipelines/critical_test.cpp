@@ -90,6 +90,7 @@ TEST_F(StudyTables, AreAMapFromGammaToTemperature) {
   EXPECT_LT(error, 0.2 * truth);
   EXPECT_NEAR(found["temperature_over_mg"]["value"].get<double>(), t * 2.99e-3, 1e-12);
   EXPECT_TRUE(json["readings"].size() > 4) << "the theory stands beside it";
+  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("simulated beds at"));
   std::string outside = map_stage;
   outside.replace(outside.find("3.5"), 3, "9.0");
   const ProgramResult beyond = run(outside);
@@ -115,6 +116,7 @@ TEST_F(StudyTables, ThatAreNoneAreNamed) {
   const ProgramResult few = run(map_stage);
   EXPECT_EQ(few.exit_code, 0);
   EXPECT_THAT(few.err, HasSubstr("gives no temperature"));
+  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("simulated beds give no temperature"));
   std::string without = map_stage;
   without.replace(without.find(R"("bead_friction": 0.1,)"), 21, "");
   EXPECT_THAT(run(without).err, HasSubstr("give bead_friction"));
