@@ -114,7 +114,7 @@ void expect_bias(const Bias& row, double limit) {
 void expect_fluid(double reduced, double from) {
   BedRun run;
   run.settle = 80, run.interval = 2, run.frames = 1000;
-  const auto table = measure(reduced, run, reduced > 30 ? 40 : 24, from,
+  const auto table = measure(reduced, run, reduced > 30 ? 40 : 32, from,
                              {{"enskog-rectangle", "above"},
                               {"hydrostatic:enskog", "above"},
                               {"hydrostatic:best-of", "above"},
