@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <ostream>
 #include <string>
 
 #include "pipelines/json.hpp"
@@ -21,6 +22,7 @@ struct Case {
   std::string model, window;  // of the fit, as a recipe says them
   double photographs;         // what they may add to T, relative
 };
+void PrintTo(const Case& c, std::ostream* out) { *out << c.temperature << " T_c, " << c.disks << " disks"; }
 
 std::string name_of(const testing::TestParamInfo<Case>& info) {
   std::string name = fmt::format("At{:g}CriticalTemperatures", info.param.temperature);
