@@ -3,7 +3,6 @@
 // run, left in peace, ends with the same files as one that was never disturbed.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -15,6 +14,7 @@
 #include <thread>
 
 #include "tests/pipelines/program.hpp"
+#include "tests/robustness/limit.hpp"
 
 namespace {
 
@@ -33,22 +33,6 @@ class Variable {
 };
 struct Shim : Variable {
   Shim() : Variable("LD_PRELOAD", SHAKEBED_FAULTS) {}
-};
-
-// A resource limit for the programs started while this lives.
-class Limit {
- public:
-  Limit(__rlimit_resource_t what, rlim_t value) : what_(what) {
-    ::getrlimit(what, &before_);
-    const rlimit now{std::min(value, before_.rlim_max), before_.rlim_max};
-    ::setrlimit(what, &now);
-  }
-  ~Limit() { ::setrlimit(what_, &before_); }
-  Limit(const Limit&) = delete;
-
- private:
-  __rlimit_resource_t what_;
-  rlimit before_{};
 };
 
 // simulate, fit, figure, check: text files, a compressed trajectory, gnuplot.

@@ -3,7 +3,6 @@
 // stays; left in peace, the next run ends with the same files as one that was never disturbed.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -14,27 +13,12 @@
 #include <thread>
 
 #include "tests/pipelines/program.hpp"
+#include "tests/robustness/limit.hpp"
 
 namespace {
 
 using namespace shakebed::tests;
 namespace fs = std::filesystem;
-
-// A resource limit for the programs started while this lives.
-class Limit {
- public:
-  Limit(__rlimit_resource_t what, rlim_t value) : what_(what) {
-    ::getrlimit(what, &before_);
-    const rlimit now{std::min(value, before_.rlim_max), before_.rlim_max};
-    ::setrlimit(what, &now);
-  }
-  ~Limit() { ::setrlimit(what_, &before_); }
-  Limit(const Limit&) = delete;
-
- private:
-  __rlimit_resource_t what_;
-  rlimit before_{};
-};
 
 // A bed of 40 disks, photographed and found again: half a second of CPU.
 std::string recipe(const std::string& scale = "0.25 mm/px") {
