@@ -106,8 +106,8 @@ class FrameSource {
 GrayFrame read_frame(const std::filesystem::path& path, std::size_t page = 0, const FrameSourceOptions& options = {});
 
 // Writes 8-bit grey PNG, levels rounded to nearest and clamped to 0 .. 255, into a temporary file beside `path` that is
-// then renamed, so that a half-written PNG is never seen. `compression` 0 (fast) .. 9 (small). Throws InputError for an empty frame,
-// OutputError (atomic_file.hpp) when it cannot be written.
+// then renamed, so that a half-written PNG is never seen. `compression` 0 (fast) .. 9 (small). Throws InputError for an
+// empty frame, OutputError (atomic_file.hpp) when it cannot be written.
 void write_png(const std::filesystem::path& path, const GrayFrame& frame, int compression = 1);
 
 }  // namespace shakebed::ingest

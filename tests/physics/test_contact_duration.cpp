@@ -54,8 +54,9 @@ Bed shaken(double contact_duration, int periods) {
           share * static_cast<double>(after.events() - before.events())};
 }
 
-// At 1e-2 another simulator's figure is 4.4 D, this one's 3.96 D (results/README.md). Whether the floor and the sides take part in the
-// clock moves it between 3.85 and 4.12 D, elastic walls give 4.24 D; a contact longer by sqrt(2) gives 4.37 D.
+// At 1e-2 another simulator's figure is 4.4 D, this one's 3.96 D (results/README.md). Whether the floor and the sides
+// take part in the clock moves it between 3.85 and 4.12 D, elastic walls give 4.24 D; a contact longer by sqrt(2)
+// gives 4.37 D.
 TEST(ContactDuration, IsADialOfSpeedAgainstError) {
   std::printf("  %10s %18s %18s %12s %12s %12s\n", "t_c", "rise [D]", "T_x/mg [mm]", "collisions", "elastic", "events");
   std::printf("  %10s %18s %18s %38s\n", "sqrt(D/g)", "", "", "(a disk and period)");
