@@ -29,6 +29,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/checkpoint_bytes.hpp"
 #include "sim/collision.hpp"
 #include "sim/contact_time.hpp"
 #include "sim/disk.hpp"

@@ -899,32 +899,6 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   predict_all();
 }
 
-namespace checkpoint_bytes {
-
-inline constexpr std::uint64_t magic = 0x32306465626b6873;  // "shkbed02", little-endian
-
-template <class T>
-void put(std::vector<std::uint8_t>& out, const T& value) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
-  out.insert(out.end(), bytes, bytes + sizeof value);
-}
-template <class T>
-void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
-  if (static_cast<std::size_t>(end - at) < sizeof value) throw std::invalid_argument("the checkpoint is cut short");
-  std::memcpy(&value, at, sizeof value);
-  at += sizeof value;
-}
-
-// The last eight bytes: FNV-1a of all others. A state that was damaged on a
-// disk must not be run from: it may never end.
-inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (; at != end; ++at) hash = (hash ^ *at) * 0x100000001b3;
-  return hash;
-}
-
-}  // namespace checkpoint_bytes
-
 // Calls visit(value) for everything that the future depends on besides the
 // disks, in a fixed order.
 template <class Space, class Rule, class Sizes>

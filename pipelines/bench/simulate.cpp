@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
 #include "pipelines/bench/results.hpp"
+#include "sim/checkpoint_bytes.hpp"
 #include "sim/observables.hpp"
 #include "sim/simulation.hpp"
 
@@ -299,19 +299,6 @@ void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effor
   if (!(overlap <= 1e-9)) one.pass = false;
 }
 
-// A checkpoint's state, put that many synchronisation intervals later: they are counted after the magic number, the
-// number of disks and the interval; the last eight bytes are the checksum (FNV-1a).
-std::vector<std::uint8_t> much_later(std::vector<std::uint8_t> state, std::uint64_t intervals) {
-  constexpr std::size_t place = 8 + 4 + 8;
-  std::uint64_t done = 0, hash = 0xcbf29ce484222325;
-  std::memcpy(&done, &state[place], sizeof done);
-  done += intervals;
-  std::memcpy(&state[place], &done, sizeof done);
-  for (std::size_t k = 0; k + 8 < state.size(); ++k) hash = (hash ^ state[k]) * 0x100000001b3;
-  std::memcpy(&state[state.size() - 8], &hash, sizeof hash);
-  return state;
-}
-
 // A disk that rests has a contact each contact duration: that, not a time step, is what piles cost here.
 void hard_cases(const Effort& effort, StageResult& result) {
   effort.step("simulate: hard cases");
@@ -465,7 +452,7 @@ void hard_cases(const Effort& effort, StageResult& result) {
         const sim::Scene scene = Bed::scene(1e-6);
         const auto early = sim::simulate(scene), late = sim::simulate(scene);
         for (int k = 0; k < 5; ++k) early->advance_to(early->next_synchronisation());
-        late->restore(much_later(early->checkpoint(), std::uint64_t{1} << 33U));
+        late->restore(sim::checkpoint_bytes::put_later(early->checkpoint(), std::uint64_t{1} << 33U));
         for (int k = 0; k < 20; ++k) {
           early->advance_to(early->next_synchronisation());
           late->advance_to(late->next_synchronisation());

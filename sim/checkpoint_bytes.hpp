@@ -1,0 +1,50 @@
+// The form of an engine's checkpoint: a magic number, the number of disks, the engine's state as visit_state() names it
+// (first how many intervals lie between synchronisations, then how many are done), the random numbers' state, a
+// checksum. The bytes are those of this kind of machine.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+namespace shakebed::sim::checkpoint_bytes {
+
+inline constexpr std::uint64_t magic = 0x32306465626b6873;  // "shkbed02", little-endian
+
+template <class T>
+void put(std::vector<std::uint8_t>& out, const T& value) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
+  out.insert(out.end(), bytes, bytes + sizeof value);
+}
+template <class T>
+void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
+  if (static_cast<std::size_t>(end - at) < sizeof value) throw std::invalid_argument("the checkpoint is cut short");
+  std::memcpy(&value, at, sizeof value);
+  at += sizeof value;
+}
+
+// The last eight bytes: FNV-1a of all others. A state that was damaged on a disk must not be run from: it may never
+// end.
+inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (; at != end; ++at) hash = (hash ^ *at) * 0x100000001b3;
+  return hash;
+}
+
+// The same state, that many intervals (periods of the floor) later: what a run is like that has had so many already.
+inline std::vector<std::uint8_t> put_later(std::vector<std::uint8_t> checkpoint, std::uint64_t intervals) {
+  std::uint64_t done = 0, sum = 0;
+  constexpr std::size_t place = sizeof magic + sizeof(std::uint32_t) + sizeof done;  // of the intervals done
+  if (checkpoint.size() < place + sizeof done + sizeof sum) throw std::invalid_argument("the checkpoint is cut short");
+  std::memcpy(&done, &checkpoint[place], sizeof done);
+  done += intervals;
+  std::memcpy(&checkpoint[place], &done, sizeof done);
+  const std::size_t end = checkpoint.size() - sizeof sum;
+  sum = checksum(checkpoint.data(), checkpoint.data() + end);
+  std::memcpy(&checkpoint[end], &sum, sizeof sum);
+  return checkpoint;
+}
+
+}  // namespace shakebed::sim::checkpoint_bytes
