@@ -375,12 +375,11 @@ Bins bins_of(const Cleaned& cleaned, const Window& window, int covariance_sample
   // A kernel wider than the bins makes neighbours nearly equal: some eigenvalues are then far below what the samples
   // can tell, and weighing by them would make errors of the model's last digits into thousands of standard errors. So
   // the correlations are first shrunk by what their samples' own noise asks, then, if need be, until they are positive.
-  double shrink = covariance_samples > 0 ? sampling_shrinkage(correlation, covariance_samples) : 0.0;
-  if (shrink > 0.0) {
-    correlation *= 1.0 - shrink;
+  if (covariance_samples > 0) {
+    correlation *= 1.0 - sampling_shrinkage(correlation, covariance_samples);
     correlation.diagonal().setOnes();
-    shrink = 0.0;
   }
+  double shrink = 0.0;
   Eigen::LLT<Eigen::MatrixXd> cholesky(correlation);
   const auto safe = [&] {
     if (cholesky.info() != Eigen::Success) return false;
