@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstring>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "pipelines/files.hpp"
@@ -231,23 +232,55 @@ std::vector<bool> selection(const Plan& plan, const RunOptions& options) {
 
 int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
+// When a file was last touched. Equal stamps mean equal bytes, without reading a film of many GB a second time: writing
+// sets both times, and the second one (ctime) cannot be set back. A clock's tick (2 s at most, on FAT) could hide a
+// change right after another one, so a file touched just before, or in a clock's future, has no stamp.
+struct Stamp {
+  dev_t device;
+  ino_t inode;
+  off_t bytes;
+  std::int64_t modified, changed;  // [ns]
+  bool operator==(const Stamp&) const = default;
+};
+std::optional<Stamp> stamp_of(const fs::path& path) {
+  const auto nanoseconds = [](const timespec& t) { return t.tv_sec * std::int64_t{1'000'000'000} + t.tv_nsec; };
+  timespec now{};
+  struct stat found {};
+  if (::clock_gettime(CLOCK_REALTIME, &now) != 0 || ::stat(path.c_str(), &found) != 0) return std::nullopt;
+  const Stamp stamp{found.st_dev, found.st_ino, found.st_size, nanoseconds(found.st_mtim), nanoseconds(found.st_ctim)};
+  if (std::max(stamp.modified, stamp.changed) > nanoseconds(now) - 3'000'000'000) return std::nullopt;
+  return stamp;
+}
+
+// Stamps of a stage's external files, taken before they are read for their fingerprints.
+using Stamps = std::vector<std::optional<Stamp>>;
+Stamps stamps_of(const PlannedStage& stage) {
+  Stamps stamps;
+  for (const auto& [pointer, path] : stage.input_files) stamps.push_back(stamp_of(path));
+  return stamps;
+}
+
 // What a stage read must be there at its end as it was at its beginning: files that vanish or change meanwhile give a
-// result that belongs to neither, and its record would say that it counts.
-void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, const fs::path& out) {
+// result that belongs to neither, and its record would say that it counts. Results of other stages are read here for
+// the first time (their fingerprints are those of their records), external files only if they were touched.
+void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, const Stamps& stamps,
+                         const fs::path& out) {
   const std::size_t first_external = fresh.inputs.size() - stage.input_files.size();
   for (std::size_t i = 0; i < fresh.inputs.size(); ++i) {
     const Fingerprint& was = fresh.inputs[i];
-    const fs::path path = i < first_external ? out / was.file : stage.input_files[i - first_external].second;
+    const bool external = i >= first_external;
+    const fs::path path = external ? stage.input_files[i - first_external].second : out / was.file;
     std::error_code error;
     const auto bytes = fs::file_size(path, error);
     if (error) throw StageError(fmt::format("{}: vanished while it was read; run again", path.string()));
+    if (external && stamps[i - first_external] && stamp_of(path) == stamps[i - first_external]) continue;
     if (bytes != was.bytes || fast_hash_of_file(path) != was.fast)
       throw StageError(
           fmt::format("{}: changed while it was read, or is not what its record says; run again", path.string()));
   }
 }
 
-StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<Input> inputs,
+StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, const Stamps& stamps, std::vector<Input> inputs,
                       const RunOptions& options, Console* console) {
   const fs::path place = options.out / stage.id;
   const fs::path working = options.out / fmt::format("{}{}-{}", partial_prefix, stage.id, ::getpid());
@@ -272,7 +305,7 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, std::vector<
   StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
   stage.stage->run(context);
   context.check_interrupted();
-  check_inputs_stayed(stage, fresh, options.out);
+  check_inputs_stayed(stage, fresh, stamps, options.out);
   fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
   fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
   fresh.outputs = fingerprint_directory(working, true);
@@ -390,6 +423,7 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
                         std::string(plan.stages[k].row->result)});
     }
     try {
+      const Stamps stamps = stamps_of(stage);
       StageRecord fresh = fresh_record(stage, upstream);
       result.reasons = reasons_to_run(fresh, found, place);
       if (result.reasons.empty() && options.force) result.reasons.push_back("--force asks for it");
@@ -411,7 +445,7 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
                                  : fmt::format("{}: runs", stage.id));
           console->progress(stage.id, 0);
         }
-        result.record = run_stage(stage, std::move(fresh), std::move(inputs), options, console);
+        result.record = run_stage(stage, std::move(fresh), stamps, std::move(inputs), options, console);
         result.state = StageState::ran;
         if (console != nullptr) {
           console->end_progress();
