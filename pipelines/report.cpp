@@ -538,7 +538,10 @@ class Report {
     const Json asked = simulated.value("at", Json::object());
     std::string at;
     for (const auto& [name, place] : asked.items())
-      at += fmt::format("{}{} = {:.4g}", at.empty() ? "" : ", ", name, place.get<double>());
+      at += fmt::format("{}{} = {:.4g}{}", at.empty() ? "" : ", ", name, place.get<double>(),
+                        name == "frequency"        ? " Hz"
+                        : name == "initial_height" ? " D"
+                                                   : "");
     const std::string beds = fmt::format("{} simulated beds", simulated.value("beds", 0));
     const Json* reduced = find_pointer(simulated, "/reduced_temperature");
     const Json* over_mg = find_pointer(simulated, "/temperature_over_mg");
