@@ -697,6 +697,26 @@ void drop_plain_background(std::vector<SolidBorder>& borders, const GrayFrame& f
   });
 }
 
+}  // namespace
+
+// Frames as learned from, flattened, and the beads in them: what the radius is told from in the end.
+struct LearnedBeads {
+  std::vector<GrayFrame> seen, flats;
+  std::vector<std::unique_ptr<JointFit>> fits;  // their residuals
+  std::vector<std::vector<ModelDisk>> disks;
+  double knot = 0.25;                              // px, of the profile
+  double spread = 0.1;                             // of the residuals, contrast units
+  bool hold_radius = false, learn_profile = true;  // as asked for
+  bool told = false;
+  [[nodiscard]] std::size_t total() const {
+    std::size_t sum = 0;
+    for (const auto& one : disks) sum += one.size();
+    return sum;
+  }
+};
+
+namespace {
+
 struct Learned {
   CalibrationResult result;
   double typical = 0;      // share of the contrast that a good bead explains
@@ -713,9 +733,10 @@ struct Allowed {
   bool corrected_background = true;  // see correct_background()
 };
 
-// Learns all there is to learn, starting from a radius and a polarity.
+// Learns all there is to learn but the radius behind the tone curve (see tell_radius), starting from a radius and a
+// polarity, or from what was learned of nearly the same frames.
 Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                   const RadiusEstimate& estimate, Allowed allowed) {
+                   const RadiusEstimate& estimate, Allowed allowed, const FinderCalibration* before = nullptr) {
   Learned all;
   CalibrationResult& result = all.result;
   FinderCalibration& calibration = result.calibration;
@@ -723,7 +744,10 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   calibration.height = frames.front()->height;
   calibration.polarity = estimate.polarity;
   double radius = estimate.radius_px;
-  double edge = std::clamp(0.08 * radius, 0.6, 1.5);
+  double edge = before ? before->edge_width_px : std::clamp(0.08 * radius, 0.6, 1.5);
+  const auto beads = std::make_shared<LearnedBeads>();
+  beads->hold_radius = options.hold_radius;
+  beads->learn_profile = options.learn_profile;
 
   std::vector<const GrayFrame*> used;
   for (const GrayFrame* frame : frames)
@@ -732,7 +756,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   constexpr double usual_edge = 0.75;
   const std::vector<const GrayFrame*> recorded = used;
   std::vector<std::vector<SolidBorder>> borders;
-  std::vector<GrayFrame> seen;
+  std::vector<GrayFrame>& seen = beads->seen;
   for (const GrayFrame* frame : used) {
     borders.push_back(find_solid_borders(*frame));
     drop_plain_background(borders.back(), *frame, calibration.polarity);
@@ -746,13 +770,16 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     used[f] = &seen[f];
     calibration.solid_borders = calibration.solid_borders || !borders[f].empty();
   }
-  BeadProfile profile = ideal_profile(radius, edge, reach_of(radius, edge));
+  BeadProfile profile = before ? before->profile : ideal_profile(radius, edge, reach_of(radius, edge));
 
-  std::vector<GrayFrame> flats(used.size());
-  std::vector<std::unique_ptr<JointFit>> fits(used.size());
-  std::vector<std::vector<ModelDisk>> disks(used.size());
+  std::vector<GrayFrame>& flats = beads->flats;
+  std::vector<std::unique_ptr<JointFit>>& fits = beads->fits;
+  std::vector<std::vector<ModelDisk>>& disks = beads->disks;
+  flats.resize(used.size());
+  fits.resize(used.size());
+  disks.resize(used.size());
   // Votes fall a little outside the rim of a shaded bead: of two radii, the one whose disks fit better.
-  if (!options.hold_radius && !options.radius_px) {
+  if (!options.hold_radius && !options.radius_px && !before) {
     const GrayFrame flat = flatten(*used.front(), light);
     const double noise = noise_of(flat);
     double best_sum = -1, best_radius = radius;
@@ -767,7 +794,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     }
     radius = best_radius;
   }
-  double spread = 0.1;
+  double& spread = beads->spread;
   double typical_explained = 1;
   // Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
   // between the beads passes for a wider rim. So it goes on until the light settles within what noise
@@ -775,10 +802,10 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   constexpr int least_rounds = 5, most_rounds = 12;
   bool settled = false;
   double last_change = 0;
-  double knot = 0.25;
+  double& knot = beads->knot;
   double moved_by = 0;  // px, by the outline
   bool background_looked_at = !allowed.corrected_background;
-  for (int round = 0;; ++round) {
+  for (int round = before ? 1 : 0;; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
     std::size_t total = 0;
@@ -906,8 +933,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
       last_change = change;
     }
   }
-  std::size_t total = 0;
-  for (const auto& one : disks) total += one.size();
+  const std::size_t total = beads->total();
   if (total == 0) {
     result.why_not =
         "no disks seen: circles of " + std::to_string(radius) + " px were suspected, but none is filled like a bead";
@@ -921,12 +947,42 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     return all;
   }
   calibration.radius_px = calibration.rim_radius_px = radius;
+  calibration.edge_width_px = edge;
+  calibration.profile = profile;
+  calibration.light = light;
+  calibration.contrast_level = mean_contrast(light);
+  calibration.noise_level = spread * std::abs(calibration.contrast_level);
+  calibration.radius_std_error_px = radius_error(calibration, spread, static_cast<double>(total), 0);
+  calibration.frames_used = used.size();
+  calibration.disks_used = total;
+  result.beads = beads;
+  if (total < 5)
+    calibration.warnings.push_back("Only " + std::to_string(total) +
+                                   " disks to learn the bead from: its radius is uncertain.");
+  all.unexplained = unexplained_of(*fits.front(), light);
+  all.typical = typical_explained;
+  all.one_sided = profile.asymmetry != nullptr;
+  all.complete = spread < 1.5 * noise_of(flats.front()) + 0.03;
+  result.found = true;
+  return all;
+}
+
+}  // namespace
+
+void tell_radius(CalibrationResult& result) {
+  if (!result.found || !result.beads || result.beads->told) return;
+  FinderCalibration& calibration = result.calibration;
+  LearnedBeads& beads = *result.beads;
+  beads.told = true;
+  const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px, knot = beads.knot,
+               spread = beads.spread, total = static_cast<double>(beads.total());
+  const BeadProfile& profile = calibration.profile;
+  const LightField& light = calibration.light;
   // What the whole bed's rims tell; and where nothing explains them (the camera's tone curve bends, or what lies
   // between packed beads is neither bead nor background) those that face open background.
   double radius_doubt = 0;
-  const RimChoice packed =
-      choose_rim(profile, radius, edge, knot, spread, static_cast<double>(total), mean_background(light),
-                 std::max(0.0, mean_background(light) + mean_contrast(light)));
+  const RimChoice packed = choose_rim(profile, radius, edge, knot, spread, total, mean_background(light),
+                                      std::max(0.0, mean_background(light) + mean_contrast(light)));
   const auto take = [&](const RimChoice& choice) {
     calibration.radius_px = choice.rim.radius_px;
     calibration.tone_exponent = choice.exponent;
@@ -934,14 +990,13 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   };
   // Rims add up where beads touch: in light, or in levels as recorded. The one that makes up the frame is the camera's.
   bool encoded = false, linear = false;
-  if (!options.hold_radius && options.learn_profile && (!packed.rim.good || packed.exponent != 1)) {
+  if (!beads.hold_radius && beads.learn_profile && (!packed.rim.good || packed.exponent != 1)) {
     const ReadingInLight reading =
-        read_in_light(*used.front(), *fits.front(), light, disks.front(), profile, radius, edge, knot);
+        read_in_light(beads.seen.front(), *beads.fits.front(), light, beads.disks.front(), profile, radius, edge, knot);
     constexpr double clearly_less = 0.9, clearly_more = 1.03, fair = 2;
     const double noise = fair * spread * mean_contrast(light), pixels = static_cast<double>(reading.pixels);
     if (pixels > 0 && reading.unexplained < clearly_less * reading.unexplained_as_recorded) {
-      const RimChoice choice =
-          choose_rim(reading.profile, radius, edge, knot, reading.noise, static_cast<double>(total), 0, 1, 0, true);
+      const RimChoice choice = choose_rim(reading.profile, radius, edge, knot, reading.noise, total, 0, 1, 0, true);
       encoded = choice.rim.std_error_px > 0;
       if (encoded) take({choice.rim, display_exponent});
     }
@@ -949,7 +1004,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
              reading.unexplained_as_recorded < noise * noise * pixels;
   }
   const bool as_packed = packed.rim.good && !encoded && !(linear && packed.exponent != 1);
-  if (!options.hold_radius && as_packed) {
+  if (!beads.hold_radius && as_packed) {
     take(packed);
     calibration.radius_of_all_rims = true;
   }
@@ -957,10 +1012,10 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
     constexpr double poorly_known = 0.002;
     radius_doubt = std::hypot(0.5 * (packed.rim.radius_px - radius), poorly_known * radius);
   }
-  if (!options.hold_radius && !as_packed && !encoded) {
+  if (!beads.hold_radius && !as_packed && !encoded) {
     std::vector<const std::vector<ModelDisk>*> disk_pointers;
-    for (const auto& one : disks) disk_pointers.push_back(&one);
-    const FreeRim free_rim = learn_free_rim(flats, disk_pointers, radius, edge);
+    for (const auto& one : beads.disks) disk_pointers.push_back(&one);
+    const FreeRim free_rim = learn_free_rim(beads.flats, disk_pointers, radius, edge);
     if (free_rim.sectors >= 20) {
       const double background = mean_background(light), contrast = mean_contrast(light);
       constexpr double poor_misfit = 0.012;
@@ -1004,26 +1059,8 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
         "Rims fall steeper on their dark side, as in pictures encoded for display: the radius is told in light, " +
         std::to_string(calibration.radius_px) + " px; taken from the recorded levels it would be " +
         std::to_string(radius) + " px.");
-  calibration.edge_width_px = edge;
-  calibration.profile = profile;
-  calibration.light = light;
-  calibration.contrast_level = mean_contrast(light);
-  calibration.noise_level = spread * std::abs(calibration.contrast_level);
-  calibration.radius_std_error_px = radius_error(calibration, spread, static_cast<double>(total), radius_doubt);
-  calibration.frames_used = used.size();
-  calibration.disks_used = total;
-  if (total < 5)
-    calibration.warnings.push_back("Only " + std::to_string(total) +
-                                   " disks to learn the bead from: its radius is uncertain.");
-  all.unexplained = unexplained_of(*fits.front(), light);
-  all.typical = typical_explained;
-  all.one_sided = profile.asymmetry != nullptr;
-  all.complete = spread < 1.5 * noise_of(flats.front()) + 0.03;
-  result.found = true;
-  return all;
+  calibration.radius_std_error_px = radius_error(calibration, spread, total, radius_doubt);
 }
-
-}  // namespace
 
 GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration) {
   if (!calibration.solid_borders) return frame;
@@ -1034,6 +1071,23 @@ GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration
 }
 
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
+  CalibrationResult result = learn_finder(frames, options);
+  tell_radius(result);
+  return result;
+}
+
+CalibrationResult learn_again(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                              const FinderCalibration& before) {
+  if (frames.empty()) throw std::invalid_argument("learn_again: there is no frame to learn from");
+  for (const GrayFrame* frame : frames) require_consistent(*frame);
+  RadiusEstimate estimate;
+  estimate.found = true;
+  estimate.radius_px = before.rim_radius_px;
+  estimate.polarity = before.polarity;
+  return learn_from(frames, options, estimate, {.one_sided = before.profile.asymmetry != nullptr}, &before).result;
+}
+
+CalibrationResult learn_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   CalibrationResult result;
   if (frames.empty()) {
     result.why_not = "there is no frame to learn from";

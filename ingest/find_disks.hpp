@@ -5,6 +5,7 @@
 // bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,12 +73,23 @@ struct FindResult {
 
 // Learns from frames of one film (all of one size; two or three suffice). `found == false` with a reason when the
 // frames show no disks: a blank frame, noise, something else.
+struct LearnedBeads;
 struct CalibrationResult {
   bool found = false;
   FinderCalibration calibration;
   std::string why_not;
+  std::shared_ptr<LearnedBeads> beads;  // for tell_radius()
 };
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+
+// The same in two parts, for who may have to learn again from frames put right: all that finding needs, radius_px being
+// that of the rims as recorded, ...
+CalibrationResult learn_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+// ... the same from frames that differ by less than a hundredth in place from those of `before` ...
+CalibrationResult learn_again(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                              const FinderCalibration& before);
+// ... and the radius behind shading, blur and tone curve, with its error.
+void tell_radius(CalibrationResult& result);
 
 // The frame with floor, walls and lid unseen (see solid_borders.hpp).
 GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration);

@@ -396,7 +396,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       for (const GrayFrame& one : learned_from) pointers.push_back(&one);
     else
       pointers = {&learned_from.back()};
-    CalibrationResult attempt = calibrate_finder(pointers, find);
+    CalibrationResult attempt = learn_finder(pointers, find);
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;
       learned_from.pop_back();
@@ -450,17 +450,21 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     pointers.clear();
     for (const GrayFrame& frame : recorded) learned_from.push_back(straightened(frame));
     for (const GrayFrame& frame : learned_from) pointers.push_back(&frame);
-    CalibrationResult again = calibrate_finder(pointers, find);
+    constexpr double small = 0.01;
+    const bool little =
+        std::abs(lens.pixel_aspect / before.pixel_aspect - 1) < small && std::abs(lens.radial - before.radial) < small;
+    CalibrationResult again =
+        little ? learn_again(pointers, find, calibrated.calibration) : learn_finder(pointers, find);
     if (!again.found) {
       lens = before;
       break;
     }
     calibrated = std::move(again);
     // What a small correction leaves is its square and a share of its own: less than what would be worth it.
-    constexpr double small = 0.01;
-    if (std::abs(lens.pixel_aspect / before.pixel_aspect - 1) < small && std::abs(lens.radial - before.radial) < small)
-      break;
+    if (little) break;
   }
+  tell_radius(calibrated);
+  calibrated.beads.reset();
   if (options.second_diameter_m) {
     const double expected = calibrated.calibration.radius_px * *options.second_diameter_m / options.bead_diameter_m;
     FindOptions find_second_kind = find;

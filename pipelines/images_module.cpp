@@ -21,7 +21,8 @@ const ImagesModule& images_module() {
                                     SHAKEBED_BUILD_MODULE_DIR "/" + std::string(name)};
     for (const fs::path& place : places) {
       if (!fs::is_regular_file(place, error)) continue;
-      void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+      // What the pictures' libraries never call need not be looked up: a tenth of a second.
+      void* handle = ::dlopen(place.c_str(), RTLD_LAZY | RTLD_LOCAL);
       if (handle == nullptr) throw StageError(fmt::format("the images module cannot be loaded: {}", ::dlerror()));
       using Entry = const ImagesModule* (*)(const char* revision);
       const auto entry = reinterpret_cast<Entry>(::dlsym(handle, "shakebed_images"));

@@ -91,7 +91,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 9,
+          .version = 10,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,
