@@ -60,21 +60,23 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
   const double usable = room.periodic_x ? room.width : room.width - d;  // for centres
   std::uint32_t a_row = start.disks_a_row;
   std::uint32_t rows = 0;
+  // Of a box as wide as one likes, so many are more than any row needs.
+  const auto whole = [](double n) { return n >= 1 ? static_cast<std::uint32_t>(std::min(n, 1e9)) : 0U; };
   const auto spacing_of = [&](std::uint32_t n) { return usable / (room.periodic_x ? n : n - (n > 1 ? 0.5 : 0.0)); };
   const auto most_a_row = [&] {
-    std::uint32_t n = std::max(1u, static_cast<std::uint32_t>(usable / d + (room.periodic_x ? 0 : 0.5)));
+    std::uint32_t n = std::max(1u, whole(usable / d + (room.periodic_x ? 0 : 0.5)));
     while (n > 1 && spacing_of(n) < d * (1 + 1e-4)) --n;
     return n;
   };
   if (std::isinf(room.height)) {
-    if (a_row == 0) a_row = start.spacing > 0 ? static_cast<std::uint32_t>(usable / (start.spacing * d)) : most_a_row();
+    if (a_row == 0) a_row = start.spacing > 0 ? whole(usable / (start.spacing * d)) : most_a_row();
     rows = (room.count + a_row - 1) / std::max(a_row, 1u);
   } else {
     // Fill the box evenly: the number a row for which the cells come out closest to regular hexagons.
     const double height = room.periodic_z ? room.height : room.height - d * (1 + margin) - room.floor;
     if (a_row == 0) {
       const double side = std::sqrt(usable * height / room.count * 2 / std::numbers::sqrt3);
-      a_row = std::max(1u, static_cast<std::uint32_t>(std::round(usable / side)));
+      a_row = std::max(1u, whole(std::round(usable / side)));
       if (spacing_of(a_row) < d) a_row = most_a_row();
     }
     rows = (room.count + a_row - 1) / a_row;
@@ -114,9 +116,11 @@ std::vector<Point> random_insertion(const Room& room, const RandomStart& start, 
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t l, std::size_t r) { return diameters[l] > diameters[r]; });
 
-  const double cell = room.diameter;
-  const auto columns = static_cast<std::int64_t>(std::max(1.0, std::floor(room.width / cell)));
-  const auto rows = static_cast<std::int64_t>(std::max(1.0, std::floor((high - low) / cell)));
+  // Cells of a diameter at least; a box with much room must not make many more of them than there are disks.
+  const double cell = room.diameter, most = 16.0 * static_cast<double>(diameters.size()) + 64;
+  const auto columns = static_cast<std::int64_t>(std::clamp(std::floor(room.width / cell), 1.0, most));
+  const auto rows = static_cast<std::int64_t>(
+      std::clamp(std::floor((high - low) / cell), 1.0, std::max(1.0, most / static_cast<double>(columns))));
   std::vector<std::vector<std::size_t>> cells(static_cast<std::size_t>(columns * rows));
   std::vector<Point> points(diameters.size());
   const auto cell_index = [](double value, double range, std::int64_t n) {
