@@ -136,15 +136,28 @@ bool drawable(double cost, double error) {
   return std::isfinite(cost) && std::isfinite(error) && cost > 0 && error > 0;
 }
 
-// A logarithmic axis with at least one power of ten on it, since only those carry a number.
-std::string axis_range(std::string_view axis, double low, double high) {
-  return fmt::format("set {}range [{}:{}]\n", axis, std::min(low, std::pow(10, std::floor(std::log10(high)))), high);
+// A logarithmic axis that carries at least one number: 1, 2 and 5 of each power of ten, over more than three of these
+// the powers alone.
+std::string logarithmic_axis(std::string_view axis, double low, double high) {
+  const bool wide = high / low > 1e3;
+  std::string ticks;
+  double largest = low;
+  for (int power = static_cast<int>(std::floor(std::log10(low))) - 1; power <= std::log10(high); ++power) {
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      const double value = digit * std::pow(10, power);
+      if (value > high || (wide && digit > 1)) continue;
+      ticks += fmt::format("{}'{:g}' {:g}", ticks.empty() ? "" : ", ", value, value);
+      largest = value;
+    }
+  }
+  return fmt::format("set {0}range [{1}:{2}]\nset {0}tics ({3})\n", axis, std::min(low, largest), high, ticks);
 }
 
 void draw(const Figure& figure, const fs::path& directory) {
   // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
-  constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5C00"};
-  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4};
+  constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                                 "#E69F00", "#56B4E9", "#7A5C00", "#6A3D9A"};
+  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8};
   std::string data, plot;
   int index = 0;
   constexpr double largest = std::numeric_limits<double>::max();
@@ -186,8 +199,8 @@ void draw(const Figure& figure, const fs::path& directory) {
       plot += fmt::format("with lines lw 2 dashtype 2 lc rgb '#404040' title {}", gnuplot_text(curve.label));
       continue;
     }
-    plot += fmt::format("with linespoints lw 2 pt {} ps 0.8 lc rgb '{}' title {}", points[method % points.size()],
-                        colors[method % colors.size()], gnuplot_text(curve.label));
+    plot += fmt::format("with {} lw 2 pt {} ps 0.8 lc rgb '{}' title {}", curve.line ? "linespoints" : "points",
+                        points[method % points.size()], colors[method % colors.size()], gnuplot_text(curve.label));
     ++method;
   }
   bool first_standard = true;
@@ -206,10 +219,11 @@ void draw(const Figure& figure, const fs::path& directory) {
       "1.4\n" +
       fmt::format("set output {}\nset xlabel {}\nset ylabel {}\nset title {}\n", gnuplot_text(figure.name + ".svg"),
                   gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label), gnuplot_text(figure.title)) +
-      "set logscale xy\nset format xy '%.0e'\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
+      "set logscale xy\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
       "'#dddddd' "
-      "lt 1 lw 0.6\nset key below horizontal spacing 1.2 samplen 2 font ',12'\n" +
-      axis_range("x", cheapest / 1.3, dearest * 1.3) + axis_range("y", best / 1.6, worst * 1.6) + plot + "\n";
+      "lt 1 lw 0.6\nset key below horizontal maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
+      logarithmic_axis("x", cheapest / 1.3, dearest * 1.3) + logarithmic_axis("y", best / 1.6, worst * 1.6) + plot +
+      "\n";
   write_file(directory / (figure.name + ".gp"), script);
   ProcessResult result;
   try {

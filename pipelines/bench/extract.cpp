@@ -100,8 +100,9 @@ void hard_cases(const Effort& effort, StageResult& result) {
   });
 }
 
-// A hexagonal bed at rest, photographed: width and height in D, 12 pixels a diameter.
-Json photographs(int width, int rows, int frames) {
+// A hexagonal bed at rest, photographed within `seconds`: width and height in D, 12 pixels a diameter. Disks at rest
+// have a contact each contact duration: a large bed must not rest for long.
+Json photographs(int width, int rows, int frames, double seconds) {
   constexpr double diameter = 3e-3;
   return Json{
       {"name", "bench"},
@@ -115,7 +116,7 @@ Json photographs(int width, int rows, int frames) {
                  {"box", {{"width", (width + 0.5) * diameter}, {"sides", "periodic"}}},
                  {"floor", {{"motion", "still"}}},
                  {"start", {{"kind", "hexagonal"}, {"disks_a_row", width}}},
-                 {"measure", 1e-3},
+                 {"measure", seconds},
                  {"frames", {{"count", frames}}}},
             Json{{"stage", "render"}, {"from", "bed"}, {"scale", diameter / 12}},
             Json{{"stage", "extract"}, {"from", "render"}, {"diameter", diameter}, {"overlays", 0}}})}};
@@ -152,11 +153,11 @@ void growth(const Effort& effort, StageResult& result) {
   };
   measure(
       effort.quick ? std::vector<int>{1, 10, 100} : std::vector<int>{1, 10, 100, 1000, 5000}, "frames",
-      [](int frames) { return photographs(12, 8, frames); },
+      [](int frames) { return photographs(12, 8, frames, 1e-3); },
       [](int frames, const RecipeRun&) { return static_cast<double>(frames); });
   measure(
-      effort.quick ? std::vector<int>{24, 48, 96} : std::vector<int>{24, 60, 120, 240}, "pixels",
-      [](int width) { return photographs(width, width, 1); },
+      effort.quick ? std::vector<int>{24, 48, 96} : std::vector<int>{24, 60, 120, 240, 480, 880}, "pixels",
+      [](int width) { return photographs(width, width, 1, 1e-6); },
       [](int, const RecipeRun& run) {
         return run.number("render", "render.json", "/width/value") *
                run.number("render", "render.json", "/height/value");

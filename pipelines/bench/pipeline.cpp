@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <numeric>
 
 #include "pipelines/bench/recipe_run.hpp"
 #include "pipelines/files.hpp"
@@ -196,12 +195,12 @@ void errors_by_dial(const Effort& effort, StageResult& result) {
                 "relative error of T, rms",
                 {}};
   std::array<Curve, way_count> by_way;
-  for (std::size_t k = 0; k < way_count; ++k) by_way[k].label = fmt::format("{}, all dials", ways[k].name);
+  for (std::size_t k = 0; k < way_count; ++k) by_way[k].label = ways[k].name, by_way[k].line = false;
   std::vector<Trial> trials;
   const Settings usual;
   std::optional<Trial> usual_trial;
   for (const Dial& dial : all_dials(effort.quick)) {
-    Curve curve{fmt::format("{}; {}", ways[dial_way].name, dial.name), {}, {}};
+    Curve curve{fmt::format("{} (from {:g} D up)", dial.name, ways[dial_way].low), {}, {}};
     for (const Settings& s : dial.values) {
       const bool is_usual = s == usual;
       if (!is_usual || !usual_trial) {
@@ -227,19 +226,8 @@ void errors_by_dial(const Effort& effort, StageResult& result) {
     }
     figure.curves.push_back(std::move(curve));
   }
-  // By rising cost, so that the lines can be followed; the ring goes along.
-  for (std::size_t way = 0; way < way_count; ++way) {
-    if (way == dial_way) continue;  // drawn dial by dial
-    const Curve& curve = by_way[way];
-    std::vector<std::size_t> order(curve.cost.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return curve.cost[a] < curve.cost[b]; });
-    Curve sorted{curve.label, {}, {}};
-    for (const std::size_t k : order) {
-      if (curve.standard && *curve.standard == k) sorted.standard = sorted.cost.size();
-      sorted.cost.push_back(curve.cost[k]), sorted.error.push_back(curve.error[k]);
-    }
-    figure.curves.push_back(std::move(sorted));
+  for (std::size_t k = 0; k < way_count; ++k) {
+    if (k != dial_way) figure.curves.push_back(std::move(by_way[k]));
   }
   result.metrics.push_back({"usual settings, CPU", "s", usual_trial->cost.all(), false});
   result.metrics.push_back(

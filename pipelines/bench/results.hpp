@@ -25,6 +25,7 @@ struct Curve {
   std::vector<double> cost, error;
   std::optional<std::size_t> standard{};  // the point that is the program's default
   bool limit = false;                     // a theoretical limit rather than a method
+  bool line = true;                       // false: points that lie on no one line
 };
 // A log-log figure. Points that are not positive are left out.
 struct Figure {
