@@ -106,8 +106,8 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
   }
   for (const auto& [pointer, path] : stage.input_files) {
     std::error_code error;
-    record.inputs.push_back({pointer + "=" + path.filename().string(), std::filesystem::file_size(path, error),
-                             fast_hash_of_file(path), ""});
+    record.inputs.push_back({pointer + "=" + std::filesystem::path(path).filename().string(),
+                             std::filesystem::file_size(path, error), fast_hash_of_file(path), ""});
   }
   return record;
 }

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 namespace shakebed::pipelines {
 
@@ -397,20 +398,20 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
     files.texts.push_back(item.text);
     const fs::path path = source_.directory / item.text;  // an absolute path replaces the directory
     const std::string pattern = path.filename().string();
-    std::vector<fs::path> found;
+    std::vector<std::string> found;
     std::error_code error;
     const bool folder = fs::is_directory(path, error);
     const bool wildcards = pattern.find_first_of("*?") != std::string::npos;
     if (fs::is_regular_file(path, error)) {
-      found.push_back(path);
+      found.push_back(path.string());
     } else if (folder || wildcards) {
       for (const fs::directory_entry& entry : fs::directory_iterator(folder ? path : path.parent_path(), error)) {
         const fs::path& name = entry.path().filename();
         if (entry.is_regular_file(error) && fnmatch(folder ? "*" : pattern.c_str(), name.c_str(), FNM_PERIOD) == 0) {
-          found.push_back(entry.path());
+          found.push_back(entry.path().string());
         }
       }
-      std::sort(found.begin(), found.end(), [](const fs::path& a, const fs::path& b) {
+      std::sort(found.begin(), found.end(), [](const std::string& a, const std::string& b) {
         return strverscmp(a.c_str(), b.c_str()) < 0;  // frame2 before frame10
       });
     }
@@ -421,7 +422,7 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
                            : fmt::format("there is no file \"{}\"", item.text),
                fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
     }
-    files.paths.insert(files.paths.end(), found.begin(), found.end());
+    files.paths.insert(files.paths.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
   };
   if (node->is_array()) {
     for (std::size_t i = 0; i < node->items.size(); ++i) expand(node->items[i], fmt::format("{}/{}", key, i));
@@ -429,7 +430,8 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
     expand(*node, std::string(key));
   }
   if (source_.input_files != nullptr) {
-    for (const fs::path& found : files.paths) source_.input_files->emplace_back(pointer_join(pointer_, key), found);
+    source_.input_files->reserve(source_.input_files->size() + files.paths.size());
+    for (const std::string& found : files.paths) source_.input_files->emplace_back(pointer_join(pointer_, key), found);
   }
 }
 

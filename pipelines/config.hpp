@@ -66,8 +66,8 @@ struct About {
 // A file, or several (an array, wildcards * and ? in the last part of a path, all files of a folder), that the user
 // names in a recipe. Paths are relative to the recipe.
 struct InputFiles {
-  std::vector<std::string> texts;            // as written
-  std::vector<std::filesystem::path> paths;  // what they name, in order; filled when a recipe is read
+  std::vector<std::string> texts;  // as written
+  std::vector<std::string> paths;  // what they name, in order; filled when a recipe is read
   bool empty() const { return texts.empty(); }
 };
 
@@ -100,7 +100,7 @@ class Fields {
     std::filesystem::path directory = {};  // relative paths are resolved against it
     std::vector<Problem>* problems = nullptr;
     // Every input file that was named: pointer and file.
-    std::vector<std::pair<std::string, std::filesystem::path>>* input_files = nullptr;
+    std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
     std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
   };
 

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <map>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "ingest/measure_bed.hpp"
@@ -486,13 +487,12 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     paths.push_back((rendered->directory / "frames").string());
   } else {
     // What is named is used; of folders and patterns, what is a picture or a film.
-    const auto named = [&](const std::filesystem::path& path) {
-      return std::any_of(options.images.texts.begin(), options.images.texts.end(), [&](const std::string& text) {
-        return std::filesystem::path(text).filename() == path.filename();
-      });
-    };
-    for (const auto& path : options.images.paths)
-      if (named(path) || ingest::FrameSource::is_frame_file(path)) paths.push_back(path.string());
+    const auto name_of = [](std::string_view path) { return path.substr(path.find_last_of('/') + 1); };
+    std::set<std::string_view> named;
+    for (const std::string& text : options.images.texts) named.insert(name_of(text));
+    paths.reserve(options.images.paths.size());
+    for (const std::string& path : options.images.paths)
+      if (named.contains(name_of(path)) || ingest::FrameSource::is_frame_file(path)) paths.push_back(path);
     if (paths.empty())
       throw InputError(
           fmt::format("{}: holds neither a picture nor a film; name files ending in .png, .tif, .jpg, .bmp, "

@@ -82,7 +82,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
       }
       for (const auto& [pointer, path] : plan.stages[i].input_files) {
         if (!fs::is_regular_file(path, error)) continue;
-        Json external = file_entry(path.string(), fs::file_size(path, error), sha256_of_file(path));
+        Json external = file_entry(path, fs::file_size(path, error), sha256_of_file(path));
         external["external"] = true;
         entry["inputs"].push_back(std::move(external));
       }

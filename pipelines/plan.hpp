@@ -25,8 +25,9 @@ struct PlannedStage {
   std::uint64_t seed = 1;
   std::vector<std::size_t> from;  // indices into Plan::stages, all smaller than its own
   Json options;                   // every option, defaults included; the same options give the same JSON
-  // Files outside the pipeline that it reads: pointer below the stage, path.
-  std::vector<std::pair<std::string, std::filesystem::path>> input_files;
+  // Files outside the pipeline that it reads: pointer below the stage, path (a string: a film can be many thousand
+  // pictures, and fs::path keeps a list of each one's parts).
+  std::vector<std::pair<std::string, std::string>> input_files;
 };
 
 // A number that was published, to stand beside ours in the report.

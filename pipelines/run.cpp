@@ -269,7 +269,7 @@ void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, co
   for (std::size_t i = 0; i < fresh.inputs.size(); ++i) {
     const Fingerprint& was = fresh.inputs[i];
     const bool external = i >= first_external;
-    const fs::path path = external ? stage.input_files[i - first_external].second : out / was.file;
+    const fs::path path = external ? fs::path(stage.input_files[i - first_external].second) : out / was.file;
     std::error_code error;
     const auto bytes = fs::file_size(path, error);
     if (error) throw StageError(fmt::format("{}: vanished while it was read; run again", path.string()));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "fit/hydrostatic_profile.hpp"
 #include "pipelines/bed.hpp"
@@ -445,9 +446,9 @@ void Figure::run(RunContext& context) const {
       comparisons.push_back(comparison("simulation", "published fit", simulated, published, 0.0));
   }
   int color = green;
-  for (const auto& path : data_.paths) {
+  for (const std::string& path : data_.paths) {
     const Curve data = curve_of(read_profile_csv(path));
-    const std::string label = path.filename().string();
+    const std::string label = std::filesystem::path(path).filename().string();
     picture.series.push_back({label, Series::Style::points, color, data.x, data.y, data.error});
     color = color == green ? purple : color == purple ? orange : green;
     for (const double x : data.x) end = std::max(end, x);

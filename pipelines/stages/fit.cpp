@@ -369,7 +369,8 @@ void Fit::run(RunContext& context) const {
   std::optional<double> diameter = diameter_;
   // What goes into the fit: our own file, else the first stage of "from".
   const Input* source = context.inputs().empty() ? nullptr : &context.inputs().front();
-  const std::filesystem::path path = !profile_.empty() ? profile_.paths.front() : source->file("profile.csv");
+  const std::filesystem::path path =
+      !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : source->file("profile.csv");
   const ProfileTable table = read_profile_csv(path);
   if (!table.note.empty()) context.warning(table.note);
   for (const Input& input : context.inputs()) {

@@ -125,7 +125,8 @@ class Map : public Stage {
       throw InputError("the floor of this bed does not shake: there is no Gamma to map");
     Json json = map_json(question);
     if (const Input* study = context.find_input("study"); study != nullptr || !table_.empty()) {
-      const StudyTable table = read_study_table(table_.empty() ? study->file("table.csv") : table_.paths.front());
+      const StudyTable table =
+          read_study_table(table_.empty() ? study->file("table.csv") : std::filesystem::path(table_.paths.front()));
       json["simulated"] = simulated(context, table, question, bead_restitution, bead_friction, json);
     }
     write_file(context.output("map.json"), dump(json));
