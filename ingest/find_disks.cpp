@@ -799,13 +799,15 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   // Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
   // between the beads passes for a wider rim. So it goes on until the light settles within what noise
   // allows, or does not settle: then there is more in the frame than beads and light.
-  constexpr int least_rounds = 5, most_rounds = 12;
+  const int first_round = before ? 1 : 0;
+  const int least_rounds = first_round + 5;
+  constexpr int most_rounds = 12;
   bool settled = false;
   double last_change = 0;
   double& knot = beads->knot;
   double moved_by = 0;  // px, by the outline
   bool background_looked_at = !allowed.corrected_background;
-  for (int round = before ? 1 : 0;; ++round) {
+  for (int round = first_round;; ++round) {
     const bool search = round <= 1 || (round == 2 && edge > strong_blur * radius);
     const ProfileTable table(profile, radius, edge, round <= 2 ? softening_for(edge) : softening_for(edge) * 0.6);
     std::size_t total = 0;
