@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -45,7 +46,9 @@ ProcessResult run_process(const std::vector<std::string>& arguments, const std::
   }
   ::close(ends[0]);
   int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+  rusage used{};
+  while (::wait4(child, &status, 0, &used) < 0 && errno == EINTR) {}
+  result.peak_bytes = 1024 * static_cast<double>(used.ru_maxrss);
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
 }

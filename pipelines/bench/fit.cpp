@@ -106,6 +106,25 @@ void room_benchmark(const Effort& effort, StageResult& result) {
   if (!exponents.rows.empty()) result.tables.push_back(std::move(exponents));
 }
 
+// What a fit keeps, by its bins.
+void memory_growth(const Effort& effort, StageResult& result) {
+  effort.step("fit: memory by bins");
+  const fit::Kernel kernel{fit::KernelKind::gaussian, 0.5};
+  Table table{"Memory of a fit by the number of bins",
+              "resident, at its peak, the profile included; 0: no new page of memory was needed",
+              {"bins", "memory [MB]"},
+              {}};
+  std::vector<double> bins, memory;
+  for (const int count : {100, 1'000, 10'000, 100'000}) {
+    effort.check_interrupted();
+    const auto peak = peak_memory_of([&] { fit::fit_profile(exact_profile(count, kernel), plain_options(kernel)); });
+    table.rows.push_back({count, peak ? Json(*peak / 1e6) : Json()});
+    if (peak) bins.push_back(count), memory.push_back(*peak);
+  }
+  if (const auto p = exponent(bins, memory)) table.note += fmt::format("; memory grows as bins^{:.2f}", *p);
+  result.tables.push_back(std::move(table));
+}
+
 // Knobs turned one at a time: error against time, the default marked.
 void trade_offs(const Effort& effort, StageResult& result) {
   effort.step("fit: iterations, size of the table, bins");
@@ -341,6 +360,7 @@ StageResult bench_fit(const Effort& effort) {
   result.name = "fit", result.title = "fit: equations of state and fits of profiles";
   result.cpu_seconds = cpu_seconds_of([&] {
     room_benchmark(effort, result);
+    memory_growth(effort, result);
     trade_offs(effort, result);
     statistics(effort, result);
     hard_cases(effort, result);

@@ -349,9 +349,9 @@ double children_cpu() {
 void sweep_growth(const Effort& effort, StageResult& result) {
   Table table{"Growth of a sweep with its points",
               "a small bed and its fit at each point; the program's own process",
-              {"points", "CPU s", "ms a point", "ms a point, all up to date"},
+              {"points", "CPU s", "ms a point", "ms a point, all up to date", "memory [MB]"},
               {}};
-  std::vector<double> points, cost, kept;
+  std::vector<double> points, cost, kept, memory;
   for (const int count : effort.quick ? std::vector<int>{2, 20, 200} : std::vector<int>{2, 20, 200, 2000}) {
     effort.step(fmt::format("pipeline: a sweep of {} points", count));
     const fs::path folder = fs::path(effort.scratch) / "sweep";
@@ -373,6 +373,7 @@ void sweep_growth(const Effort& effort, StageResult& result) {
     recipe["sweep"] =
         Json{{"over", {{"/stages/bed/disks/restitution", {{"from", 0.5}, {"to", 0.95}, {"count", count}}}}}};
     write_file(folder / "sweep.json", dump(recipe));
+    double peak = 0;
     const auto run = [&] {
       const double start = children_cpu();
       const ProcessResult done = run_process(
@@ -381,21 +382,25 @@ void sweep_growth(const Effort& effort, StageResult& result) {
       if (done.exit_code != exit_ok && done.exit_code != exit_stage_failed && done.exit_code != exit_check_failed)
         throw StageError(
             fmt::format("bench: a sweep of {} points ended with {}: {}", count, done.exit_code, done.output));
+      peak = std::max(peak, done.peak_bytes);
       return children_cpu() - start;
     };
     const double first = run(), second = run();
-    table.rows.push_back({count, first, 1e3 * first / count, 1e3 * second / count});
-    points.push_back(count), cost.push_back(first), kept.push_back(second);
+    table.rows.push_back({count, first, 1e3 * first / count, 1e3 * second / count, peak / 1e6});
+    points.push_back(count), cost.push_back(first), kept.push_back(second), memory.push_back(peak / 1e9);
   }
-  table.note += fmt::format("; cost grows as points^{:.2f}, when all is up to date as points^{:.2f}",
-                            exponent(points, cost).value_or(0), exponent(points, kept).value_or(0));
+  table.note += fmt::format(
+      "; cost grows as points^{:.2f}, when all is up to date as points^{:.2f}, "
+      "memory as points^{:.2f}",
+      exponent(points, cost).value_or(0), exponent(points, kept).value_or(0), exponent(points, memory).value_or(0));
   result.metrics.push_back({"a sweep's point", "s", cost.back() / points.back(), false});
-  result.figures.push_back({"growth-sweep",
-                            "CPU seconds of a sweep against its points",
-                            "points",
-                            "CPU seconds",
-                            {{"first run", points, cost}, {"all up to date", points, kept}},
-                            false});
+  result.figures.push_back(
+      {"growth-sweep",
+       "Cost and memory of a sweep against its points",
+       "points",
+       "CPU seconds; GB",
+       {{"first run", points, cost}, {"all up to date", points, kept}, {"memory [GB]", points, memory}},
+       false});
   result.tables.push_back(std::move(table));
 }
 
