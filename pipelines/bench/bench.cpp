@@ -56,10 +56,11 @@ int command_bench(const Arguments& arguments) {
   for (const Row& row : rows) {
     if (wanted != "all" && wanted != row.name) continue;
     document.stages.push_back(row.measure(effort));
+    // After each stage, so that what took an hour is not lost by what comes after it.
+    write_file_atomically(out / "bench.json", dump(bench::document_json(document)));
   }
   const std::string page = bench::document_html(document, out);
   const Json json = bench::document_json(document);
-  write_file_atomically(out / "bench.json", dump(json));
   write_file_atomically(out / "bench.html", page);
   const std::string text =
       arguments.common.json
