@@ -339,6 +339,9 @@ class Film {
  public:
   Film(std::string path, const FrameSourceOptions& options) : path_(std::move(path)), options_(options) { reopen(); }
 
+  // As the film tells it.
+  double rate_hz() const { return capture_.get(cv::CAP_PROP_FPS); }
+
   // Goes past the picture at `index` without decoding it into memory; false when the film ends before.
   bool step_over(std::size_t index) {
     for (; next_ <= index; ++next_)
@@ -585,6 +588,17 @@ void FrameSource::rewind() {
   state_->page = 0;
   state_->index = 0;
   state_->film.reset();
+}
+
+std::optional<double> FrameSource::film_rate_hz() const {
+  if (state_->entries.size() != 1 || state_->entries.front().kind != Kind::film) return std::nullopt;
+  try {
+    const double rate = Film(state_->entries.front().path, state_->options).rate_hz();
+    if (std::isfinite(rate) && rate > 0) return rate / static_cast<double>(state_->options.stride);
+  } catch (const InputError&) {
+    // Who reads the film is told.
+  }
+  return std::nullopt;
 }
 
 std::optional<std::size_t> FrameSource::count_if_known() const {

@@ -95,6 +95,8 @@ class FrameSource {
   void rewind();
   // Frames in the stream if known without decoding films; TIFF files are counted by page.
   [[nodiscard]] std::optional<std::size_t> count_if_known() const;
+  // Frames a second of the stream as the film itself tells them; nothing unless the stream is one film that does.
+  [[nodiscard]] std::optional<double> film_rate_hz() const;
 
  private:
   struct State;

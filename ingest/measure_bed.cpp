@@ -12,6 +12,7 @@
 
 #include "ingest/atomic_file.hpp"
 #include "ingest/nearby.hpp"
+#include "ingest/shaking_frequency.hpp"
 #include "ingest/smooth_field.hpp"
 #include "ingest/solid_borders.hpp"
 
@@ -287,31 +288,47 @@ Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, in
 struct FloorMotion {
   bool known = false;
   double middle = 0, amplitude = 0, phase = 0;
+  std::size_t touching = 0;  // beads
 };
+// The lowest bottom in each column of a frame, a tilt taken out; columns without a bead are left out.
+struct LowestBottoms {
+  std::size_t frame = 0;
+  std::vector<double> y;
+};
+LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double diameter_px, int width) {
+  const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
+  LowestBottoms bottoms{frame.report.index, std::vector<double>(columns, -1e9)};
+  for (const FoundDisk& disk : frame.disks) {
+    const auto column = std::min(
+        columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
+    bottoms.y[column] = std::max(bottoms.y[column], disk.y_px + disk.radius_px - slope * disk.x_px);
+  }
+  std::erase_if(bottoms.y, [](double y) { return y < -1e8; });
+  return bottoms;
+}
+
+// Where the bed's bottom is in a frame: what lies lowest follows the floor, or at least its period.
+std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms) {
+  constexpr double low = 0.75;
+  if (bottoms.y.empty()) return std::nullopt;
+  return PlaceInFrame{bottoms.frame, quantile(bottoms.y, low)};
+}
+
 // A bottom counts in full while it is below the floor or no more than a tolerance above; the tolerance shrinks, so that
 // what is left in the end are the beads that touch. Known only if such beads are seen all around the period.
-FloorMotion find_floor_motion(const std::vector<FrameFindings>& frames, double slope, double diameter_px, int width,
-                              double turns_per_frame) {
+FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double diameter_px, double turns_per_frame) {
   struct Bottom {
     double y, sine, cosine;
     std::size_t part;  // of the period
   };
   constexpr std::size_t parts = 12;
-  const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
   std::vector<Bottom> bottoms;
-  for (const FrameFindings& frame : frames) {
-    const double turns = static_cast<double>(frame.report.index) * turns_per_frame;
+  for (const LowestBottoms& frame : frames) {
+    const double turns = static_cast<double>(frame.frame) * turns_per_frame;
     const double phase = turns - std::floor(turns);
-    std::vector<double> lowest(columns, -1e9);
-    for (const FoundDisk& disk : frame.disks) {
-      const auto column = std::min(
-          columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
-      lowest[column] = std::max(lowest[column], disk.y_px + disk.radius_px - slope * disk.x_px);
-    }
-    for (const double y : lowest)
-      if (y > -1e8)
-        bottoms.push_back({y, std::sin(2 * std::numbers::pi * phase), std::cos(2 * std::numbers::pi * phase),
-                           std::min(parts - 1, static_cast<std::size_t>((phase + 1e-9) * parts))});
+    for (const double y : frame.y)
+      bottoms.push_back({y, std::sin(2 * std::numbers::pi * phase), std::cos(2 * std::numbers::pi * phase),
+                         std::min(parts - 1, static_cast<std::size_t>((phase + 1e-9) * parts))});
   }
   FloorMotion motion;
   if (bottoms.size() < 30) return motion;
@@ -339,7 +356,11 @@ FloorMotion find_floor_motion(const std::vector<FrameFindings>& frames, double s
     fit = right;
   }
   std::vector<std::size_t> touching(parts, 0);
-  for (const Bottom& bottom : bottoms) touching[bottom.part] += gap(bottom) < 2 * tolerance;
+  for (const Bottom& bottom : bottoms) {
+    const bool touches = gap(bottom) < 2 * tolerance;
+    touching[bottom.part] += touches;
+    motion.touching += touches;
+  }
   // The longest stretch of the period without a touching bead: beyond half a period nothing bounds the fit there.
   std::size_t longest = 0, empty = 0;
   for (std::size_t k = 0; k < 2 * parts; ++k) {
@@ -561,6 +582,13 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     if (!(top > bins.lowest)) return std::size_t{0};
     return static_cast<std::size_t>(std::clamp(std::ceil((top - bins.lowest) / bins.width - 1e-9), 1.0, 1e5));
   };
+  // The shaker's motion, as far as a film of known frame rate shows it.
+  constexpr double resting = 0.02;           // D: what touching beads scatter
+  std::optional<double> turns_per_frame;     // of the shaker
+  FoundFrequency in_film;                    // of the bed's bottom
+  double bed_repeats_every = 1;              // periods of the shaker
+  std::vector<LowestBottoms> first_bottoms;  // of the frames that tell the geometry
+  std::vector<PlaceInFrame> all_bottoms;
   FinderCalibration refined = finder;
   const auto settle_geometry = [&] {
     RadiusFromFrames radius;
@@ -593,10 +621,38 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       if (options.floor_slope) {  // keep the line through the middle of the frame
         bed.floor_px = floor.offset + (floor.slope - bed.floor_slope) * 0.5 * finder.width;
       }
-      if (options.shaking_frequency_hz && options.frame_rate_hz) {
-        const double turns_per_frame = *options.shaking_frequency_hz / *options.frame_rate_hz;
-        const FloorMotion motion = find_floor_motion(held, bed.floor_slope, diameter_px, finder.width, turns_per_frame);
-        constexpr double resting = 0.02;  // D: what touching beads scatter
+    }
+    if (options.frame_rate_hz) {
+      std::vector<PlaceInFrame> bottoms;
+      for (const FrameFindings& frame : held) {
+        first_bottoms.push_back(lowest_bottoms(frame, bed.floor_slope, diameter_px, finder.width));
+        if (const auto bottom = bottom_of(first_bottoms.back())) bottoms.push_back(*bottom);
+      }
+      in_film = find_frequency(bottoms);
+      if (in_film.known && in_film.amplitude < resting * diameter_px) {
+        in_film.known = false;
+        in_film.why_not = "the lowest beads move by less than two hundredths of a diameter";
+      }
+      bed.frequency_given = options.shaking_frequency_hz.has_value();
+      if (bed.frequency_given) {
+        turns_per_frame = *options.shaking_frequency_hz / *options.frame_rate_hz;
+      } else if (in_film.known) {
+        // A bed that is thrown up in every second period repeats at half the floor's frequency, but does not lie on a
+        // floor that moves so.
+        const double twice = 2 * in_film.cycles_per_frame;
+        constexpr double clearly_more = 1.5;
+        if (twice < 0.5) {
+          const FloorMotion once = find_floor_motion(first_bottoms, diameter_px, in_film.cycles_per_frame);
+          const FloorMotion as_twice = find_floor_motion(first_bottoms, diameter_px, twice);
+          bed_repeats_every = as_twice.known && static_cast<double>(as_twice.touching) >
+                                                    clearly_more * static_cast<double>(once.touching)
+                                  ? 2
+                                  : 1;
+        }
+        turns_per_frame = bed_repeats_every * in_film.cycles_per_frame;
+      }
+      if (!bed.floor_given && turns_per_frame) {
+        const FloorMotion motion = find_floor_motion(first_bottoms, diameter_px, *turns_per_frame);
         if (!motion.known) {
           measurement.warnings.push_back(
               "The floor's motion could not be told: beads touch it in too small a part of the shaker's period. "
@@ -648,6 +704,50 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       measurement.warnings.push_back("The bed goes on beyond the frame: the profile is that of the part in view.");
     bins.count = bins_up_to(options.highest.value_or(
         (bed.floor_px + std::max(0.0, bed.floor_slope * finder.width) + refined.radius_px) / diameter_px + 1));
+  };
+
+  // The frequency from the whole film.
+  const auto tell_shaking = [&] {
+    const double rate = *options.frame_rate_hz;
+    in_film = refine_frequency(all_bottoms, in_film);
+    const double frequency = bed_repeats_every * in_film.cycles_per_frame,
+                 std_error = bed_repeats_every * in_film.std_error;
+    char text[400];
+    if (!bed.frequency_given) {
+      bed.why_no_frequency = in_film.why_not;
+      if (!in_film.known) return;
+      turns_per_frame = frequency;
+      bed.shaking_frequency_hz = frequency * rate;
+      bed.shaking_frequency_std_error_hz = std_error * rate;
+      bed.frequency_false_alarm = in_film.false_alarm;
+      if (bed.floor_amplitude_px > 0) {  // its phase goes with the frequency
+        const FloorMotion motion = find_floor_motion(first_bottoms, diameter_px, frequency);
+        if (motion.known) bed.floor_amplitude_px = motion.amplitude, bed.floor_phase = motion.phase;
+      }
+      std::snprintf(text, sizeof text,
+                    "The shaking's frequency was not given; the lowest beads move at %.6g +- %.2g Hz, taken for it. A "
+                    "shaker faster than half the frame rate would look slower: %.6g Hz would look the same.",
+                    bed.shaking_frequency_hz, bed.shaking_frequency_std_error_hz, rate - bed.shaking_frequency_hz);
+      measurement.warnings.emplace_back(text);
+      return;
+    }
+    bed.shaking_frequency_hz = *options.shaking_frequency_hz;
+    if (!in_film.known || all_bottoms.empty()) return;
+    // As the film shows them, and a bed may need several periods.
+    const auto seen_as = [](double turns) { return std::abs(turns - std::round(turns)); };
+    constexpr double doubted = 5, smeared = 0.1;  // standard errors; turns over the film
+    const double length = static_cast<double>(all_bottoms.back().frame - all_bottoms.front().frame) + 1;
+    double nearest = 1;
+    for (const int periods : {1, 2, 3})
+      nearest = std::min(nearest,
+                         std::abs(seen_as(periods * in_film.cycles_per_frame) - seen_as(*turns_per_frame)) / periods);
+    if (nearest < doubted * in_film.std_error || nearest * length < smeared) return;
+    std::snprintf(
+        text, sizeof text,
+        "The lowest beads move at %.6g +- %.2g Hz, not at the %.6g Hz given, which are used all the same: are "
+        "frequency and frame rate right?",
+        in_film.cycles_per_frame * rate, in_film.std_error * rate, *options.shaking_frequency_hz);
+    measurement.warnings.emplace_back(text);
   };
 
   // A frame's disks in heights, its densities.
@@ -711,6 +811,9 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       ++good;
       counts.push_back(static_cast<double>(frame.disks.size()));
     }
+    if (options.frame_rate_hz)
+      if (const auto bottom = bottom_of(lowest_bottoms(frame, bed.floor_slope, diameter_px, finder.width)))
+        all_bottoms.push_back(*bottom);
     std::vector<double> heights, second_heights;
     std::vector<MeasuredDisk> disks;
     const auto add = [&](const FoundDisk& disk, int species) {
@@ -822,6 +925,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   place_held();
   measurement.finder.radius_px = refined.radius_px;
   measurement.finder.radius_std_error_px = refined.radius_std_error_px;
+  if (options.frame_rate_hz) tell_shaking();
 
   // Profiles.
   bins.count = std::min(bins.count, bins_up_to(options.highest.value_or(highest + 1)));
@@ -860,10 +964,10 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     measurement.coverage_profile = std::move(coverage);
   }
 
-  if (options.shaking_frequency_hz && options.frame_rate_hz) {
+  if (turns_per_frame) {
     std::vector<std::vector<std::vector<double>>> by_phase(options.phase_bins);
     for (std::size_t k = 0; k < densities.size(); ++k) {
-      const double turns = static_cast<double>(frame_of[k]) / *options.frame_rate_hz * *options.shaking_frequency_hz;
+      const double turns = static_cast<double>(frame_of[k]) * *turns_per_frame;
       const double phase = turns - std::floor(turns);
       const auto bin = std::min(options.phase_bins - 1,
                                 static_cast<std::size_t>((phase + 1e-9) * static_cast<double>(options.phase_bins)));

@@ -58,8 +58,8 @@ struct MeasureOptions {
   double bin_width = 0.25;                     // D
   std::optional<double> highest;               // D; else just above the highest centre
   std::optional<double> lowest;                // D; else 0
-  std::optional<double> shaking_frequency_hz;  // with frame_rate_hz: phase-resolved profiles
-  std::optional<double> frame_rate_hz;
+  std::optional<double> shaking_frequency_hz;  // needs frame_rate_hz; found from the film if left out and it shakes
+  std::optional<double> frame_rate_hz;         // of the stream: then profiles are told by the shaker's phase
   std::size_t phase_bins = 8;
   std::size_t calibration_frames = 3;                     // taken evenly from the first calibration_window frames
   bool profile_from_coverage = true;                      // also measure covered area, independently
@@ -89,8 +89,14 @@ struct BedCalibration {
   double floor_slope = 0;                   // px down per px right
   double floor_tilt_degrees = 0;            // 0 unless beyond its error
   double floor_tilt_std_error_degrees = 0;  // 0 when given
+  // Of the shaking: given, or found in the motion of the lowest beads; 0 when neither. What is found is the slowest
+  // shaking that looks so: f frame rates - this, f = 1, 2, ... or + this, would look the same.
+  double shaking_frequency_hz = 0, shaking_frequency_std_error_hz = 0;
+  bool frequency_given = false;
+  double frequency_false_alarm = 0;  // of what was found
+  std::string why_no_frequency;      // when a frame rate was given
   // The floor moves in the frame as floor_px - floor_amplitude_px sin(2 pi (t f + floor_phase)), t from the first
-  // frame, upwards positive. Fitted when shaking frequency and frame rate are given and the floor is not; 0 when it
+  // frame, upwards positive. Fitted when the shaking's frequency is known and the floor is not given; 0 when it
   // rests.
   double floor_amplitude_px = 0;
   double floor_phase = 0;  // turns, 0 .. 1

@@ -55,7 +55,7 @@ struct ExtractOptions {
   double kernel_width = 0.5;                    // sigma, full width or diameter [D]
   double spacing = 0.25;                        // of the profile's heights [D]
   std::optional<double> lowest, highest;        // of the profile [D]
-  std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles
+  std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles; the first is found
   std::optional<std::uint64_t> bead_number;     // how many beads there are in view, if known
   std::uint64_t stride = 1;                     // every so many frames
   std::uint64_t overlays = 1;                   // frames drawn with what was found

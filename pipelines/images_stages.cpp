@@ -466,7 +466,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
                     options.kernel_width};
   measure.bin_width = options.spacing;
   measure.lowest = options.lowest, measure.highest = options.highest;
-  measure.shaking_frequency_hz = options.frequency, measure.frame_rate_hz = options.frame_rate;
+  measure.shaking_frequency_hz = options.frequency;
   measure.threads = static_cast<unsigned>(context.jobs());
 
   std::vector<std::string> paths;
@@ -502,6 +502,9 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   ingest::FrameSourceOptions source_options;
   source_options.stride = options.stride;
   ingest::FrameSource source = ingest::FrameSource::open(paths, source_options);
+  // A film's own frame rate serves for the shaker's phase only: fast cameras write films to be watched slowly.
+  measure.frame_rate_hz =
+      options.frame_rate ? *options.frame_rate / static_cast<double>(options.stride) : source.film_rate_hz();
   const std::optional<std::size_t> total = source.count_if_known();
   measure.progress = [&](std::size_t done) {
     context.check_interrupted();
@@ -530,10 +533,14 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   const std::string kernel = options.kernel == DensityKernel::gaussian  ? "gaussian"
                              : options.kernel == DensityKernel::top_hat ? "top_hat"
                                                                         : "disk_chord";
-  if (options.frame_rate && !options.frequency)
+  if (options.frame_rate && !(bed.shaking_frequency_hz > 0))
+    context.warning("No shaking is seen in the film (" + bed.why_no_frequency +
+                    "): there are no profiles by phase. Give frequency (--frequency) if the bed is shaken.");
+  if (bed.shaking_frequency_hz > 0 && !options.frame_rate)
     context.warning(
-        "Profiles by phase need the shaking's frequency, which is not told from the film: give frequency "
-        "(--frequency) if the bed is shaken.");
+        fmt::format("Times are by the film's own {:g} frames/s; if it was recorded faster, give frame_rate "
+                    "(--frame-rate): the shaking's frequency grows with it, its phases stay.",
+                    *measure.frame_rate_hz * static_cast<double>(options.stride)));
   if (options.bead_number && std::abs(found.disk_count_mean / static_cast<double>(*options.bead_number) - 1) > 1e-3)
     context.warning(fmt::format("On average {:.2f} beads were found of the {} there are: {}", found.disk_count_mean,
                                 *options.bead_number,
@@ -611,6 +618,13 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["floor"] = quantity_json(bed.floor_px, "px");
   result["floor_given"] = bed.floor_given;
   result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
+  if (bed.shaking_frequency_hz > 0) {
+    result["frequency"] = quantity_json(bed.shaking_frequency_hz, "Hz", bed.shaking_frequency_std_error_hz);
+    result["frequency_given"] = bed.frequency_given;
+    if (!bed.frequency_given) result["frequency_false_alarm"] = bed.frequency_false_alarm;
+    result["floor_amplitude"] = quantity_json(bed.floor_amplitude_px * bed.scale_m_per_px, "m");
+    result["floor_phase"] = bed.floor_phase;
+  }
   result["left_wall"] = quantity_json(bed.left_wall_px, "px");
   result["right_wall"] = quantity_json(bed.right_wall_px, "px");
   result["walls_given"] = bed.walls_given;

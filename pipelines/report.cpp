@@ -482,7 +482,7 @@ class Report {
       const Json& result = results_.at(stage.id);
       out += "<div class=\"scroll\"><table>\n<tr><th>from the frames</th><th></th></tr>\n";
       for (const char* key : {"frames_used", "disks_per_frame", "scale", "radius", "width", "column_number", "noise",
-                              "contrast", "coverage_disagreement"}) {
+                              "contrast", "frequency", "floor_amplitude", "coverage_disagreement"}) {
         if (result.contains(key))
           out += fmt::format("<tr><td>{}</td><td class=\"number\">{}</td></tr>\n", words(key), shown(result[key]));
       }

@@ -57,7 +57,8 @@ class Extract : public Stage {
     fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
     fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
     fields.quantity("frequency", o.frequency, dimension::frequency,
-                    {.help = "of the shaking, for profiles by phase (needs frame_rate)", .range = positive});
+                    {.help = "of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
+                     .range = positive});
     fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
                     {.help = "of the film as recorded; given, velocities are measured", .range = positive});
     fields.integer("bead_number", o.bead_number,
@@ -91,7 +92,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 10,
+          .version = 11,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,

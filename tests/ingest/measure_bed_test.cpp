@@ -241,7 +241,29 @@ TEST(MeasureBed, PhasesAreSortedByTheShakersClock) {
   for (const PhaseProfile& phase : measured.phases) EXPECT_EQ(phase.profile.samples, 1U);
 }
 
-// A bed that rides the floor for part of the period and flies for the rest.
+// A bed that rides the floor and, where that falls faster than it does, flies: heights above the mean, by the floor's
+// turns, at 1.4 times the acceleration of gravity.
+std::vector<double> ridden_heights(double amplitude_px, double phase, std::size_t count, double turns_per_frame) {
+  constexpr double gamma = 1.4, turn = 2 * std::numbers::pi;
+  constexpr int steps = 2000;  // a frame
+  const double gravity = amplitude_px * turn * turn / gamma, dt = turns_per_frame / steps;
+  const auto floor_at = [&](double t) { return amplitude_px * std::sin(turn * (t + phase)); };
+  const auto floor_speed = [&](double t) { return turn * amplitude_px * std::cos(turn * (t + phase)); };
+  double t = -2, z = floor_at(t), v = floor_speed(t);
+  std::vector<double> heights;
+  for (std::size_t k = 0; k < count; ++k) {
+    for (const double frame = static_cast<double>(k) * turns_per_frame; t < frame; t += dt) {
+      v -= gravity * dt;
+      z += v * dt;
+      if (z > floor_at(t + dt)) continue;
+      z = floor_at(t + dt);
+      v = floor_speed(t + dt);
+    }
+    heights.push_back(z);
+  }
+  return heights;
+}
+
 std::vector<GrayFrame> shaken_film(double amplitude_px, double phase, std::size_t count, double turns_per_frame) {
   Camera camera;
   camera.width = 340;
@@ -249,14 +271,13 @@ std::vector<GrayFrame> shaken_film(double amplitude_px, double phase, std::size_
   camera.blur_px = 0.8;
   camera.read_noise = 4;
   const FrameRenderer renderer(camera);
+  const std::vector<double> heights = ridden_heights(amplitude_px, phase, count, turns_per_frame);
   std::vector<GrayFrame> frames;
   for (std::size_t k = 0; k < count; ++k) {
-    const double angle = 2 * std::numbers::pi * (static_cast<double>(k) * turns_per_frame + phase);
-    const double flight = amplitude_px * std::max(0.0, std::sin(angle - 1.2));  // above the floor, half of the period
     SyntheticBed bed;
     bed.left_wall_px = 20;
     bed.right_wall_px = 320;
-    bed.floor_px = 270 - amplitude_px * std::sin(angle) - flight;
+    bed.floor_px = 270 - heights[k];
     bed.rows = 6;
     bed.gas_count = 15;
     bed.gas_height_px = 30;
@@ -281,6 +302,55 @@ TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
   const BedCalibration resting = measure_bed(still, options).calibration;
   EXPECT_EQ(resting.floor_amplitude_px, 0);
   EXPECT_NEAR(resting.floor_px, 270, 0.1);
+}
+
+TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
+  const std::vector<GrayFrame> frames = shaken_film(9, 0.3, 100, 1 / 13.7);
+  const auto warned = [](const Measurement& measured, const char* what) {
+    return std::any_of(measured.warnings.begin(), measured.warnings.end(),
+                       [&](const std::string& warning) { return warning.find(what) != std::string::npos; });
+  };
+  MeasureOptions options = options_of();
+  options.frame_rate_hz = 20 * 13.7;
+  options.profile_from_coverage = false;
+  FrameSource source = FrameSource::from_frames(frames);
+  const Measurement found = measure_bed(source, options);
+  const BedCalibration& bed = found.calibration;
+  EXPECT_FALSE(bed.frequency_given);
+  ASSERT_GT(bed.shaking_frequency_hz, 0) << bed.why_no_frequency;
+  EXPECT_NEAR(bed.shaking_frequency_hz, 20, 4 * bed.shaking_frequency_std_error_hz);
+  EXPECT_LT(bed.shaking_frequency_std_error_hz, 0.1);
+  EXPECT_LT(bed.frequency_false_alarm, 1e-4);
+  EXPECT_NEAR(bed.floor_px, 270, 0.5);
+  EXPECT_NEAR(bed.floor_amplitude_px, 9, 0.5);
+  EXPECT_EQ(found.phases.size(), options.phase_bins);
+  EXPECT_TRUE(warned(found, "was not given"));
+
+  // With a sink the geometry comes from the film's beginning, the frequency from all of it.
+  options.disk_sink = [](const FrameReport&, const std::vector<MeasuredDisk>&) {};
+  options.geometry_frames = 70;
+  source.rewind();
+  const BedCalibration streamed = measure_bed(source, options).calibration;
+  EXPECT_NEAR(streamed.shaking_frequency_hz, bed.shaking_frequency_hz, 1e-3);
+  EXPECT_NEAR(streamed.floor_phase, 0.3, 0.02);
+  options.disk_sink = nullptr;
+
+  options.shaking_frequency_hz = 21;
+  source.rewind();
+  const Measurement given = measure_bed(source, options);
+  EXPECT_TRUE(given.calibration.frequency_given);
+  EXPECT_EQ(given.calibration.shaking_frequency_hz, 21);
+  EXPECT_TRUE(warned(given, "not at the 21 Hz given"));
+  options.shaking_frequency_hz = 20;
+  source.rewind();
+  EXPECT_FALSE(warned(measure_bed(source, options), "given, which"));
+
+  options.shaking_frequency_hz.reset();
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 40, 1 / 13.7));
+  const Measurement resting = measure_bed(still, options);
+  EXPECT_EQ(resting.calibration.shaking_frequency_hz, 0);
+  EXPECT_FALSE(resting.calibration.why_no_frequency.empty());
+  EXPECT_TRUE(resting.phases.empty());
 }
 
 TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {
