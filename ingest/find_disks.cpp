@@ -328,6 +328,70 @@ double mean_background(const LightField& light) {
   return static_cast<double>(light.background[middle]);
 }
 
+std::vector<float> level_deciles(const GrayFrame& frame) {
+  std::vector<float> levels, deciles;
+  const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 20000);
+  for (std::size_t k = 0; k < frame.pixels.size(); k += step)
+    if (!unseen(frame.pixels[k])) levels.push_back(frame.pixels[k]);
+  if (levels.empty()) return deciles;
+  std::sort(levels.begin(), levels.end());
+  for (std::size_t k = 1; k < 10; ++k) deciles.push_back(levels[k * (levels.size() - 1) / 10]);
+  return deciles;
+}
+
+// At first sight: all levels are so many times those of the film. None unless clearly so.
+FrameLight light_at_first_sight(const GrayFrame& frame, const FinderCalibration& calibration) {
+  constexpr double small = 0.05, well_lit = 0.2, agreeing = 0.5;
+  const std::vector<float> deciles = level_deciles(frame);
+  if (deciles.empty() || calibration.level_deciles.empty()) return {};
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < deciles.size(); ++k)
+    if (static_cast<double>(calibration.level_deciles[k]) > well_lit * calibration.level_deciles.back())
+      ratios.push_back(static_cast<double>(deciles[k] / calibration.level_deciles[k]));
+  if (ratios.empty()) return {};
+  const double gain = median_of(ratios);
+  const auto [least, most] = std::minmax_element(ratios.begin(), ratios.end());
+  if (!(gain > 0.2 && gain < 5) || std::abs(gain - 1) < small || *most - *least > agreeing * std::abs(gain - 1))
+    return {};
+  return {(gain - 1) * mean_background(calibration.light) / mean_contrast(calibration.light), gain};
+}
+
+// The light of one frame against the film's: flat = shift + gain model over what beads and background explain roughly.
+// Differences below a few thousandths are none.
+FrameLight light_of_frame(const GrayFrame& flat, const JointFit& fit, double noise) {
+  constexpr double negligible = 0.002, most_shift = 0.5, least_gain = 0.4, most_gain = 2.5;
+  FrameLight own;
+  for (const double bound : {0.5, std::max(0.1, 4 * noise)}) {
+    const auto shift = static_cast<float>(own.shift), gain = static_cast<float>(own.gain),
+               most = static_cast<float>(bound);
+    double n = 0, m = 0, mm = 0, f = 0, fm = 0;
+    for (int row = 0; row < flat.height; row += 2) {
+      const float* residual = fit.residual_row(row);
+      const float* level = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(flat.width);
+      float row_n = 0, row_m = 0, row_mm = 0, row_f = 0, row_fm = 0;
+      for (int column = 0; column < flat.width; ++column) {
+        const float model = level[column] - residual[column];
+        const float use = std::abs(level[column] - shift - gain * model) < most ? 1.0F : 0.0F;
+        const float used = use * model, seen = use > 0 ? level[column] : 0.0F;
+        row_n += use;
+        row_m += used;
+        row_mm += used * model;
+        row_f += seen;
+        row_fm += used * level[column];
+      }
+      n += static_cast<double>(row_n), m += static_cast<double>(row_m), mm += static_cast<double>(row_mm);
+      f += static_cast<double>(row_f), fm += static_cast<double>(row_fm);
+    }
+    const double determinant = n * mm - m * m;
+    if (!(determinant > 1e-3 * n * n)) return {};  // all background, or all beads
+    own.gain = (n * fm - m * f) / determinant;
+    own.shift = (mm * f - m * fm) / determinant;
+    if (!(std::abs(own.shift) < most_shift && own.gain > least_gain && own.gain < most_gain)) return {};
+  }
+  if (std::abs(own.shift) < negligible && std::abs(own.gain - 1) < negligible) return {};
+  return own;
+}
+
 // Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.
 double noise_of(const GrayFrame& flat) {
   std::vector<float> sizes;
@@ -955,6 +1019,7 @@ Learned learn_from(const std::vector<const GrayFrame*>& frames, const FindOption
   calibration.contrast_level = mean_contrast(light);
   calibration.noise_level = spread * std::abs(calibration.contrast_level);
   calibration.radius_std_error_px = radius_error(calibration, spread, static_cast<double>(total), 0);
+  calibration.level_deciles = level_deciles(*used.front());
   calibration.frames_used = used.size();
   calibration.disks_used = total;
   result.beads = beads;
@@ -1207,7 +1272,9 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     return result;
   }
   const double radius = calibration.rim_radius_px, edge = calibration.edge_width_px;
-  const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light);
+  const GrayFrame seen = seen_part(frame, calibration);
+  result.light = light_at_first_sight(seen, calibration);
+  GrayFrame flat = flatten(seen, calibration.light, result.light);
   const double noise = std::max(1e-3, calibration.noise_level / std::max(1e-6, std::abs(calibration.contrast_level)));
   std::vector<ModelDisk> disks = disks_at(candidates_by(calibration.profile, flat, radius, edge, noise, least_score));
   const double contrast = std::abs(calibration.contrast_level);
@@ -1233,6 +1300,14 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
       fit.sweep(disks, sweep == 0 ? 0.3 * radius : 0.5, tolerance, bound);
     } else {
       converged = step_all(fit, flat, disks, tolerance, bound, options.joint_fit_sweeps - sweep - 1);
+    }
+    if (sweep == 1) {
+      const FrameLight own = light_of_frame(flat, fit, noise);
+      if (!own.plain()) {
+        result.light = {result.light.shift + result.light.gain * own.shift, result.light.gain * own.gain};
+        flat = flatten(seen, calibration.light, result.light);
+        fit.reset(flat, disks);
+      }
     }
     if (sweep == 1 || (sweep == 4 && repaired)) {
       fit.judge(disks, radius + 1);
@@ -1359,7 +1434,8 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   });
   result.rejected = dropped;
   if (residual_count)
-    result.residual_level = contrast * std::sqrt(std::max(0.0, residual_sum / static_cast<double>(residual_count)));
+    result.residual_level =
+        contrast * result.light.gain * std::sqrt(std::max(0.0, residual_sum / static_cast<double>(residual_count)));
   if (result.disks.empty())
     result.why_nothing = std::to_string(dropped) + " places were tried, but none is filled like a bead of radius " +
                          std::to_string(radius) + " px";
@@ -1410,14 +1486,14 @@ GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const 
   require_consistent(frame);
   if (frame.width != calibration.width || frame.height != calibration.height)
     throw std::invalid_argument("residual_frame: the frame has not the size of the film's frames");
-  const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light);
+  const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light, found.light);
   const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
   JointFit fit(flat);
   fit.set_table(&table);
   for (const FoundDisk& disk : found.disks) fit.subtract(disk.x_px, disk.y_px, 1.0F);
   GrayFrame residual = fit.residual_image();
   for (float& level : residual.pixels)
-    level = unseen(level) ? 0.0F : level * static_cast<float>(calibration.contrast_level);
+    level = unseen(level) ? 0.0F : level * static_cast<float>(found.light.gain * calibration.contrast_level);
   return residual;
 }
 

@@ -56,6 +56,7 @@ struct FinderCalibration {
   int width = 0, height = 0;        // of the frames it was learned from
   BeadProfile profile;
   LightField light;
+  std::vector<float> level_deciles;  // of the first of its frames: 10 %, 20 % .. 90 %
   std::size_t frames_used = 0;
   std::size_t disks_used = 0;
   std::vector<std::string> warnings;  // plain sentences
@@ -65,6 +66,7 @@ struct FindResult {
   std::vector<FoundDisk> disks;  // from top to bottom, then left to right
   std::size_t rejected = 0;      // disks of another size or clarity seen and not reported
   double residual_level = 0;     // rms of frame - model over the beads, grey levels
+  FrameLight light;              // of this frame
   std::string why_nothing;       // a sentence when disks is empty
   BeadProfile profile;           // learned from this frame's beads, if asked for
   std::size_t profile_beads = 0;

@@ -270,7 +270,7 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
   return light;
 }
 
-GrayFrame flatten(const GrayFrame& frame, const LightField& light) {
+GrayFrame flatten(const GrayFrame& frame, const LightField& light, const FrameLight& own) {
   GrayFrame flat;
   flat.width = frame.width;
   flat.height = frame.height;
@@ -285,8 +285,10 @@ GrayFrame flatten(const GrayFrame& frame, const LightField& light) {
     const float part = static_cast<float>(place - static_cast<double>(cell));
     for (std::size_t k = 0; k < columns; ++k) {
       const std::size_t at = cell * columns + k;
-      background[k] = light.background[at] * (1 - part) + light.background[at + columns] * part;
-      inverse[k] = light.contrast[at] * (1 - part) + light.contrast[at + columns] * part;
+      const float contrast = light.contrast[at] * (1 - part) + light.contrast[at + columns] * part;
+      background[k] = light.background[at] * (1 - part) + light.background[at + columns] * part +
+                      static_cast<float>(own.shift) * contrast;
+      inverse[k] = static_cast<float>(own.gain) * contrast;
     }
     for (std::size_t k = 0; k + 1 < columns; ++k) {
       const std::size_t from = static_cast<std::size_t>(std::ceil(static_cast<double>(k) * light.spacing_px));

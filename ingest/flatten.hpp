@@ -19,7 +19,14 @@ struct LightField {
 // First estimate, from the levels' envelopes over blocks of several diameters (needs the radius to a factor of 2).
 LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity polarity);
 
+// How the light of one frame differs from the film's: background + contrast * shift instead of background, and
+// contrast * gain. A lamp that flickers changes both, a bright door the first alone.
+struct FrameLight {
+  double shift = 0, gain = 1;  // contrast units
+  [[nodiscard]] bool plain() const { return shift == 0 && gain == 1; }
+};
+
 // (frame - background) / contrast at every pixel: 0 background, 1 bead. Same size as the frame.
-GrayFrame flatten(const GrayFrame& frame, const LightField& light);
+GrayFrame flatten(const GrayFrame& frame, const LightField& light, const FrameLight& own = {});
 
 }  // namespace shakebed::ingest

@@ -179,12 +179,13 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
   findings.report.disks = found.disks.size();
   findings.report.rejected = found.rejected;
   findings.report.residual_level = found.residual_level;
+  findings.report.light = found.light;
   if (found.empty()) {
     findings.report.status = FrameStatus::nothing_found;
     findings.report.why = found.why_nothing;
   }
   if (options.profile_from_coverage) {
-    const GrayFrame flat = flatten(seen_part(frame, finder), finder.light);
+    const GrayFrame flat = flatten(seen_part(frame, finder), finder.light, found.light);
     int left = 0, right = frame.width;
     if (options.left_wall_px)
       left = std::clamp(static_cast<int>(std::lround(*options.left_wall_px + 0.5)), 0, frame.width);
@@ -980,6 +981,22 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       phase.profile = average_profile(by_phase[bin], bins, options.kernel, bed.scale_relative_std_error);
       measurement.phases.push_back(std::move(phase));
     }
+  }
+
+  double gain = 0, gain_squares = 0, lit = 0;
+  for (const FrameReport& report : measurement.frames) {
+    if (report.status != FrameStatus::good) continue;
+    gain += report.light.gain, gain_squares += report.light.gain * report.light.gain, ++lit;
+  }
+  if (lit > 0) bed.flicker = std::sqrt(std::max(0.0, gain_squares / lit - gain / lit * gain / lit));
+  constexpr double plain_to_see = 0.02;
+  if (bed.flicker > plain_to_see) {
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "The light flickers: contrast varies by %.1f %% from frame to frame, which is taken out frame by frame.",
+        100 * bed.flicker);
+    measurement.warnings.emplace_back(text);
   }
 
   // Bead number against time, and what else deserves a word.

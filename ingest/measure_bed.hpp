@@ -36,6 +36,7 @@ struct FrameReport {
   std::size_t second = 0;  // disks of the second species
   std::size_t rejected = 0;
   double residual_level = 0;  // grey levels
+  FrameLight light;           // against the film's
 };
 
 // Only the diameter is needed; each other member overrides something that is otherwise found. Places are those of the
@@ -84,6 +85,7 @@ struct BedCalibration {
   double edge_width_px = 0;
   double noise_level = 0;     // grey levels
   double contrast_level = 0;  // grey levels
+  double flicker = 0;         // scatter of the frames' contrast
   Polarity polarity = Polarity::automatic;
   double floor_px = 0;                      // at x_px = 0; its mean position when it moves
   double floor_slope = 0;                   // px down per px right

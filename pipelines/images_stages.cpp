@@ -421,6 +421,7 @@ void draw_overlays(const ExtractOptions& options, RunContext& context, const std
     const ingest::LensMap lens(bed.lens, frame.width, frame.height);
     if (!bed.lens.plain()) frame = lens.corrected(frame);
     ingest::FindResult shown;
+    shown.light = found.frames.at(item->index).light;
     for (const ingest::MeasuredDisk& disk : at->second) {
       ingest::FoundDisk circle;
       const ingest::PixelPlace place = lens.to_true({disk.x_px, disk.y_px});
@@ -588,13 +589,13 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     write_file(context.output("covariance.csv"), text);
   }
   {
-    std::string text = "frame,file,page,status,disks,second,rejected,residual_level\n";
+    std::string text = "frame,file,page,status,disks,second,rejected,residual_level,contrast_gain\n";
     constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
     for (const ingest::FrameReport& frame : found.frames) {
-      text += fmt::format("{},{},{},{},{},{},{},{}\n", frame.index,
+      text += fmt::format("{},{},{},{},{},{},{},{},{}\n", frame.index,
                           std::filesystem::path(frame.origin.path).filename().string(), frame.origin.page,
                           names[static_cast<std::size_t>(frame.status)], frame.disks, frame.second, frame.rejected,
-                          number_text(frame.residual_level));
+                          number_text(frame.residual_level), number_text(frame.light.gain));
     }
     write_file(context.output("frames.csv"), text);
   }
@@ -614,6 +615,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["edge_width"] = quantity_json(bed.edge_width_px, "px");
   result["noise"] = quantity_json(bed.noise_level, "grey levels");
   result["contrast"] = quantity_json(bed.contrast_level, "grey levels");
+  result["flicker"] = quantity_json(bed.flicker, "1");
   result["polarity"] = bed.polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
   result["floor"] = quantity_json(bed.floor_px, "px");
   result["floor_given"] = bed.floor_given;

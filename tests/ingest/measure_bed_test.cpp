@@ -94,6 +94,39 @@ TEST(MeasureBed, DensityOfRenderedBedWithKnownGeometryIsTheTrueOne) {
   EXPECT_LT(measured.coverage_disagreement, 0.006);
 }
 
+// A lamp that flickers by 10 % from frame to frame, and by 30 % once.
+TEST(MeasureBed, FlickerIsTakenOutOfCentresAndCoveredArea) {
+  const Film film = film_of(8);
+  const MeasureOptions options = options_of();
+  FrameSource steady_source = FrameSource::from_frames(film.frames);
+  const Measurement steady = measure_bed(steady_source, options);
+  std::vector<GrayFrame> frames = film.frames;
+  const std::array<float, 8> brightness = {1.0F, 0.9F, 1.1F, 0.93F, 1.04F, 0.88F, 0.7F, 1.1F};
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    for (float& level : frames[k].pixels) level *= brightness[k];
+  FrameSource source = FrameSource::from_frames(frames);
+  const Measurement measured = measure_bed(source, options);
+  ASSERT_EQ(measured.disks.size(), steady.disks.size());
+  double square = 0;
+  for (const MeasuredDisk& disk : measured.disks) {
+    double nearest = 100;
+    for (const MeasuredDisk& one : steady.disks)
+      if (one.frame == disk.frame)
+        nearest = std::min(nearest, std::pow(disk.x_px - one.x_px, 2) + std::pow(disk.y_px - one.y_px, 2));
+    square += nearest;
+  }
+  EXPECT_LT(std::sqrt(square / 2 / static_cast<double>(measured.disks.size())), 0.002);
+  EXPECT_LT(measured.coverage_disagreement, 0.006);
+  ASSERT_TRUE(measured.coverage_profile && steady.coverage_profile);
+  for (std::size_t bin = 0; bin < steady.profile.bins.count; ++bin)
+    EXPECT_NEAR(measured.coverage_profile->number_density[bin], steady.coverage_profile->number_density[bin], 0.003);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_NEAR(measured.frames[k].light.gain / measured.frames[0].light.gain, static_cast<double>(brightness[k]),
+                0.003);
+  EXPECT_NEAR(measured.calibration.flicker, 0.125, 0.003);
+  EXPECT_EQ(steady.calibration.flicker, 0);
+}
+
 TEST(MeasureBed, GeometryIsFoundWhenNotGiven) {
   const Film film = film_of(4);
   FrameSource source = FrameSource::from_frames(film.frames);
