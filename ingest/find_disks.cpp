@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -1057,19 +1058,22 @@ void tell_radius(CalibrationResult& result) {
   };
   // Rims add up where beads touch: in light, or in levels as recorded. The one that makes up the frame is the camera's.
   bool encoded = false, linear = false;
+  std::optional<RimFit> in_light;  // the radius if the camera encodes, while that is not settled
   if (!beads.hold_radius && beads.learn_profile && (!packed.rim.good || packed.exponent != 1)) {
     const ReadingInLight reading =
         read_in_light(beads.seen.front(), *beads.fits.front(), light, beads.disks.front(), profile, radius, edge, knot);
     constexpr double clearly_less = 0.9, clearly_more = 1.03, fair = 2;
     const double noise = fair * spread * mean_contrast(light), pixels = static_cast<double>(reading.pixels);
-    if (pixels > 0 && reading.unexplained < clearly_less * reading.unexplained_as_recorded) {
-      const RimChoice choice = choose_rim(reading.profile, radius, edge, knot, reading.noise, total, 0, 1, 0, true);
-      encoded = choice.rim.std_error_px > 0;
-      if (encoded) take({choice.rim, display_exponent});
-    }
     linear = pixels > 0 && reading.unexplained > clearly_more * reading.unexplained_as_recorded &&
              reading.unexplained_as_recorded < noise * noise * pixels;
+    if (pixels > 0 && reading.unexplained < clearly_more * reading.unexplained_as_recorded) {
+      const RimChoice choice = choose_rim(reading.profile, radius, edge, knot, reading.noise, total, 0, 1, 0, true);
+      if (choice.rim.std_error_px > 0) in_light = choice.rim;
+      encoded = in_light && reading.unexplained < clearly_less * reading.unexplained_as_recorded;
+      if (encoded) take({choice.rim, display_exponent});
+    }
   }
+  bool between_readings = false;
   const bool as_packed = packed.rim.good && !encoded && !(linear && packed.exponent != 1);
   if (!beads.hold_radius && as_packed) {
     take(packed);
@@ -1102,13 +1106,17 @@ void tell_radius(CalibrationResult& result) {
       const double doubt = radius_doubt;
       if (open.rim.good) {
         take(open);
-        radius_doubt = std::hypot(doubt, radius_doubt);
+        // Rims that face background and all rims should tell the same.
+        const double apart = open.exponent == packed.exponent ? 0.5 * (open.rim.radius_px - packed.rim.radius_px) : 0;
+        radius_doubt = std::hypot(doubt, radius_doubt, apart);
       } else if (tone.linear.good && ((tone.open && !linear) || fit_rim(profile, radius, edge).misfit > poor_misfit)) {
         constexpr double believed = 0.9;
         const double weight = linear ? 0 : tone.encoded_weight;
         calibration.tone_exponent = weight > believed ? display_exponent : 1;
         calibration.radius_px = linear ? tone.linear.radius_px : tone.radius_px;
-        if (!linear) radius_doubt = std::hypot(doubt, tone.std_error_px);
+        radius_doubt = linear ? std::hypot(doubt, 0.5 * (tone.linear.radius_px - packed.rim.radius_px))
+                              : std::hypot(doubt, tone.std_error_px);
+        between_readings = tone.open && !linear;
         if (weight > 1 - believed && weight < believed) {
           char text[400];
           std::snprintf(text, sizeof text,
@@ -1120,6 +1128,13 @@ void tell_radius(CalibrationResult& result) {
         }
       }
     }
+  }
+  // Rims as recorded and in light may do as well, or as badly, where hardly any touch: the radius lies between the two.
+  if (!beads.hold_radius && !encoded && in_light && !between_readings &&
+      (as_packed ? packed.exponent != 1 : calibration.tone_exponent == 1)) {
+    const double half = 0.5 * (in_light->radius_px - calibration.radius_px);
+    calibration.radius_px += half;
+    radius_doubt = std::hypot(radius_doubt, half, 0.5 * in_light->std_error_px);
   }
   if (calibration.tone_exponent != 1)
     calibration.warnings.push_back(
