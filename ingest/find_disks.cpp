@@ -1448,6 +1448,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     return a.x_px < b.x_px;
   });
   result.rejected = dropped;
+  result.steps = fit.steps();
   if (residual_count)
     result.residual_level =
         contrast * result.light.gain * std::sqrt(std::max(0.0, residual_sum / static_cast<double>(residual_count)));

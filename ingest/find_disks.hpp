@@ -67,6 +67,7 @@ struct FindResult {
   std::size_t rejected = 0;      // disks of another size or clarity seen and not reported
   double residual_level = 0;     // rms of frame - model over the beads, grey levels
   FrameLight light;              // of this frame
+  std::size_t steps = 0;         // of single beads, in fitting them
   std::string why_nothing;       // a sentence when disks is empty
   BeadProfile profile;           // learned from this frame's beads, if asked for
   std::size_t profile_beads = 0;

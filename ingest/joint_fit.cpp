@@ -222,7 +222,8 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
   }
 }
 
-JointFit::Descent JointFit::descent_of(ModelDisk& disk, float bound) const {
+JointFit::Descent JointFit::descent_of(ModelDisk& disk, float bound) {
+  ++steps_;
   const ProfileTable& table = *table_;
   const double reach = table.reach_;
   const float inverse = table.inverse_step_;

@@ -88,6 +88,8 @@ class JointFit {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] GrayFrame residual_image() const;
+  // How often a bead's pull was worked out: what fitting costs, on any machine.
+  [[nodiscard]] std::size_t steps() const { return steps_; }
   // Number of pixels whose residual, averaged over 2 x 2, exceeds `level`.
   [[nodiscard]] double strong_pixels(float level) const;
 
@@ -96,11 +98,12 @@ class JointFit {
   struct Descent {
     double x = 0, y = 0;
   };
-  Descent descent_of(ModelDisk& disk, float bound) const;
+  Descent descent_of(ModelDisk& disk, float bound);
   void move(double old_x, double old_y, double new_x, double new_y);
   int width_, height_;
   std::size_t stride_;
   std::vector<float> residual_;
+  std::size_t steps_ = 0;
   const ProfileTable* table_ = nullptr;
 };
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <ctime>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -215,6 +214,23 @@ TEST(Finder, ResultDoesNotDependOnOrderOrRepetition) {
   }
 }
 
+// Nine times the pixels and the beads: as many steps a bead. (How long they take is for the benchmark.)
+TEST(Finder, StepsABeadDoNotGrowWithTheFrame) {
+  const auto steps_a_bead = [](int times) {
+    Camera camera;
+    camera.width = camera.height = 400 * times;
+    camera.blur_px = 2;
+    camera.read_noise = 5;
+    const auto truth = bed_of(10, camera.width, camera.height, 7 * times, 60 * times * times);
+    const FindResult result = find_disks(render_frame(truth, camera));
+    EXPECT_GE(test::score(result.disks, truth, camera.width, camera.height).recall(), 0.999);
+    return static_cast<double>(result.steps) / static_cast<double>(result.disks.size());
+  };
+  const double small = steps_a_bead(1), large = steps_a_bead(3);
+  EXPECT_LT(small, 12);
+  EXPECT_LT(large, 1.2 * small);
+}
+
 TEST(Finder, ResidualOfAFoundFrameIsItsNoise) {
   Camera camera;
   camera.width = 400;
@@ -243,13 +259,13 @@ TEST(RealFrames, BlackBeadsAllFoundNoneFalseScaleFromTheDiameter) {
     if (bead.black) truth[bead.frame].push_back({bead.x_px, bead.y_px, 14.6, 0, 0});
   }
   FrameSource source = FrameSource::open({folder.string() + "/*.tif"});
-  const std::clock_t start = std::clock();
   CalibrationResult calibrated;
-  std::size_t truths = 0, hits = 0, false_ones = 0, frames = 0;
+  std::size_t truths = 0, hits = 0, false_ones = 0, frames = 0, disks = 0, steps = 0;
   while (auto frame = source.next()) {
     if (!calibrated.found) calibrated = calibrate_finder({&*frame});
     ASSERT_TRUE(calibrated.found) << calibrated.why_not;
     const FindResult result = find_disks(*frame, calibrated.calibration);
+    disks += result.disks.size(), steps += result.steps;
     // The truth stops at y = 305 and holds no bead cut by the sides; those it does hold within a radius of a side
     // are left out on both hands.
     const auto judged = [&](double x, double y, double margin) {
@@ -275,7 +291,6 @@ TEST(RealFrames, BlackBeadsAllFoundNoneFalseScaleFromTheDiameter) {
     }
     ++frames;
   }
-  const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   EXPECT_EQ(frames, 8U);
   EXPECT_GT(truths, 2400U);
   EXPECT_EQ(hits, truths);
@@ -285,11 +300,9 @@ TEST(RealFrames, BlackBeadsAllFoundNoneFalseScaleFromTheDiameter) {
   const FinderCalibration& found = calibrated.calibration;
   EXPECT_NEAR(found.radius_px, 3.0 / 0.2056, 2 * found.radius_std_error_px);
   EXPECT_LT(found.radius_std_error_px, 0.025 * found.radius_px);
-#ifdef NDEBUG
-  EXPECT_LT(seconds, 1.0);
-#else
-  (void)seconds;
-#endif
+  // Transparent beads and cut ones, which settle late, are a minority: what finding costs stays a few steps a bead.
+  RecordProperty("steps_a_bead", static_cast<int>(steps / disks));
+  EXPECT_LT(steps, 16 * disks);
 }
 
 TEST(RealFrames, FiveRingsOnAnEmptyFieldAndNothingElse) {

@@ -77,29 +77,5 @@ TEST(FinderBenchmark, HardCasesAllPassAndFillTheirTable) {
   }
 }
 
-// Sixteen times the pixels and the disks, at the same look: sixteen times the time, and a half more for caches.
-TEST(FinderBenchmark, CostGrowsNoFasterThanPixelsAndDisks) {
-  const auto cost = [](int times) {
-    FinderBenchmarkOptions options;
-    options.width = 413 * times;
-    options.height = 500 * times;
-    options.rows = 7 * times;
-    options.gas_count = 100 * times * times;
-    options.frames = 1;
-    options.blurs = {2};
-    options.noises = {5};
-    options.with_hough = options.with_bound = false;
-    double sum = 0;
-    for (const FinderBenchmarkRow& row : benchmark_finder(options))
-      if (row.method == "joint fit") {
-        EXPECT_GE(row.recall, 0.999);
-        sum += row.cpu_ms;
-      }
-    return sum;
-  };
-  const double small = std::min(cost(1), cost(1)), large = cost(4);
-  EXPECT_LT(large, 1.5 * 16 * small);
-}
-
 }  // namespace
 }  // namespace shakebed::ingest
