@@ -175,7 +175,7 @@ std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int f
     for (int column = 0; column < small.width; ++column)
       to[column] = unseen(from[column]) ? 0.0F : std::min(1.6F, std::max(-0.6F, from[column]));
   }
-  // The bead as the reduced frame shows it, centred on pixel (0, 0) of the periodic field.
+  // The bead as the reduced frame shows it, centred on pixel (reach, reach): few rows hold anything.
   const auto level_at = [&](double r) {
     const auto cell = static_cast<std::size_t>(r / profile.step_px);
     return cell < profile.level.size() ? static_cast<double>(profile.level[cell]) : 0.0;
@@ -186,10 +186,10 @@ std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int f
       for (int j = 0; j < factor; ++j)
         for (int i = 0; i < factor; ++i)
           sum += level_at(std::hypot(dx * factor + i - 0.5 * (factor - 1), dy * factor + j - 0.5 * (factor - 1)));
-      bead.at<float>((dy + high) % high, (dx + wide) % wide) = static_cast<float>(sum / (factor * factor));
+      bead.at<float>(dy + reach, dx + reach) = static_cast<float>(sum / (factor * factor));
     }
-  cv::dft(frame, frame, cv::DFT_COMPLEX_OUTPUT);
-  cv::dft(bead, bead, cv::DFT_COMPLEX_OUTPUT);
+  cv::dft(frame, frame, cv::DFT_COMPLEX_OUTPUT, margin + small.height);
+  cv::dft(bead, bead, cv::DFT_COMPLEX_OUTPUT, 2 * reach + 1);
   // W = conj(P)/(|P|^2 + sigma^2/n) for centres strewn at density n, drawn as Gaussians of `spot` px.
   constexpr double spot = 0.9, model_error = 0.03;
   const double sigma = std::max(noise / factor, model_error), density = 0.25 / (radius * radius);
@@ -221,9 +221,9 @@ std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int f
   std::vector<float> map(static_cast<std::size_t>(map_width) * static_cast<std::size_t>(map_height));
   const float scale = static_cast<float>(1 / lone_peak);
   for (int row = 0; row < map_height; ++row) {
-    const float* from = centres.ptr<float>(row);
+    const float* from = centres.ptr<float>((row - reach + high) % high);
     float* to = map.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(map_width);
-    for (int column = 0; column < map_width; ++column) to[column] = scale * from[column];
+    for (int column = 0; column < map_width; ++column) to[column] = scale * from[(column - reach + wide) % wide];
   }
   return maxima_of(map, map_width, map_height, margin, factor, least_score, least_distance_px);
 }

@@ -331,7 +331,7 @@ double mean_background(const LightField& light) {
 
 std::vector<float> level_deciles(const GrayFrame& frame) {
   std::vector<float> levels, deciles;
-  const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 20000);
+  const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 5000);
   for (std::size_t k = 0; k < frame.pixels.size(); k += step)
     if (!unseen(frame.pixels[k])) levels.push_back(frame.pixels[k]);
   if (levels.empty()) return deciles;
@@ -361,12 +361,13 @@ FrameLight light_at_first_sight(const GrayFrame& frame, const FinderCalibration&
 // Differences below a few thousandths are none.
 FrameLight light_of_frame(const GrayFrame& flat, const JointFit& fit, double noise) {
   constexpr double negligible = 0.002, most_shift = 0.5, least_gain = 0.4, most_gain = 2.5;
+  const int rows_apart = std::max(1, flat.height / 250);
   FrameLight own;
   for (const double bound : {0.5, std::max(0.1, 4 * noise)}) {
     const auto shift = static_cast<float>(own.shift), gain = static_cast<float>(own.gain),
                most = static_cast<float>(bound);
     double n = 0, m = 0, mm = 0, f = 0, fm = 0;
-    for (int row = 0; row < flat.height; row += 2) {
+    for (int row = 0; row < flat.height; row += rows_apart) {
       const float* residual = fit.residual_row(row);
       const float* level = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(flat.width);
       float row_n = 0, row_m = 0, row_mm = 0, row_f = 0, row_fm = 0;

@@ -278,7 +278,6 @@ GrayFrame flatten(const GrayFrame& frame, const LightField& light, const FrameLi
   const std::size_t columns = static_cast<std::size_t>(light.columns);
   const std::size_t width = static_cast<std::size_t>(frame.width);
   std::vector<float> background(columns), inverse(columns);
-  std::vector<float> background_line(width), inverse_line(width);
   for (int row = 0; row < frame.height; ++row) {
     const double place = row / light.spacing_px;
     const std::size_t cell = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(light.rows - 2));
@@ -290,24 +289,23 @@ GrayFrame flatten(const GrayFrame& frame, const LightField& light, const FrameLi
                       static_cast<float>(own.shift) * contrast;
       inverse[k] = static_cast<float>(own.gain) * contrast;
     }
-    for (std::size_t k = 0; k + 1 < columns; ++k) {
-      const std::size_t from = static_cast<std::size_t>(std::ceil(static_cast<double>(k) * light.spacing_px));
-      const std::size_t to =
-          std::min(width, static_cast<std::size_t>(std::ceil(static_cast<double>(k + 1) * light.spacing_px)));
-      const float step = static_cast<float>(1 / light.spacing_px);
-      const float shift = static_cast<float>(static_cast<double>(k) * light.spacing_px);
-      const float b0 = background[k], b1 = (background[k + 1] - b0) * step;
-      const float c0 = inverse[k], c1 = (inverse[k + 1] - c0) * step;
-      for (std::size_t x = from; x < to; ++x) {
-        const float t = static_cast<float>(static_cast<int>(x)) - shift;
-        background_line[x] = b0 + b1 * t;
-        inverse_line[x] = c0 + c1 * t;
-      }
-    }
     const float* from = frame.pixels.data() + static_cast<std::size_t>(row) * width;
     float* to = flat.pixels.data() + static_cast<std::size_t>(row) * width;
-    for (std::size_t x = 0; x < width; ++x)
-      to[x] = unseen(from[x]) ? unseen_level : (from[x] - background_line[x]) / inverse_line[x];
+    const auto step = static_cast<float>(1 / light.spacing_px);
+    for (std::size_t k = 0; k + 1 < columns; ++k) {
+      const double start = static_cast<double>(k) * light.spacing_px;
+      const int first = static_cast<int>(std::ceil(start)),
+                end = std::min(frame.width, static_cast<int>(std::ceil(start + light.spacing_px)));
+      const auto shift = static_cast<float>(start);
+      const float b0 = background[k], b1 = (background[k + 1] - b0) * step;
+      const float c0 = inverse[k], c1 = (inverse[k + 1] - c0) * step;
+      for (int x = first; x < end; ++x) {
+        const float t = static_cast<float>(x) - shift;
+        to[x] = (from[x] - (b0 + b1 * t)) / (c0 + c1 * t);
+      }
+    }
+    for (int x = 0; x < frame.width; ++x)
+      if (unseen(from[x])) to[x] = unseen_level;
   }
   return flat;
 }
