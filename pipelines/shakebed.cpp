@@ -115,10 +115,11 @@ int run_program(int argc, char** argv) {
       ->expected(4);
   images->add_option("--polarity", image.polarity, "automatic, dark or bright beads")
       ->check(CLI::IsMember({"automatic", "dark", "bright"}));
-  images->add_option("--frequency", image.frequency, "of the shaking: \"20 Hz\"; with --amplitude also Gamma → T");
+  images->add_option("--frequency", image.frequency,
+                     "of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
   images->add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
   images->add_option("--frame-rate", image.frame_rate,
-                     "of a film: \"500 Hz\": velocities; with --frequency profiles by phase");
+                     "of a film: \"500 Hz\": velocities; and profiles by phase if the bed shakes");
   images->add_option("--second-diameter", image.second_diameter, "of beads of another size, to be found too");
   images->add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
   images->add_option("--lens", image.lens,
