@@ -105,8 +105,8 @@ class Engine final : public Simulation {
   // --- contacts
   template <bool watched>
   void process_until(double until);
-  void process(std::uint32_t i);
-  void process_and_tell(std::uint32_t i);
+  void process(std::uint32_t i, std::uint32_t k);
+  void process_and_tell(std::uint32_t i, std::uint32_t k);
   void tell(std::uint32_t i) const;
   void tell_all() const;
   bool is_mutual(std::uint32_t i, std::uint32_t j) const {

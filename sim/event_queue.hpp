@@ -4,8 +4,9 @@
 // disk's next event stands in its own record (Disk::event_time); an entry of
 // which neither disk has an event at its time any more is worthless, so nothing
 // is ever deleted. A bucket is sorted when it becomes the current one. The
-// order is exact: by time, then by the order of insertion. Events beyond the
-// ring wait in a list of their own, which is looked through once a turn.
+// order is exact: by time, then by the order of insertion. Events of a later
+// turn of the ring are not written down at all: the disks' records know them,
+// and are looked through when that turn begins.
 #pragma once
 
 #include <algorithm>
@@ -26,6 +27,10 @@ inline constexpr std::size_t fits_cache = 8'000;  // that many disks and their l
 
 class EventQueue {
  public:
+  EventQueue() = default;
+  EventQueue(const EventQueue&) = delete;  // it points into itself
+  EventQueue& operator=(const EventQueue&) = delete;
+
   // Forgets everything. disks: the records that the entries refer to;
   // events_a_time: the expected rate of events.
   void reset(const Disk* disks, std::size_t count, double start, double events_a_time) {
@@ -43,34 +48,43 @@ class EventQueue {
   // The event of disk a (with b; a itself when alone) now stands at `time`,
   // which both records say already.
   void push(double time, std::uint32_t a, std::uint32_t b) {
-    const Entry entry{time, pair_of(a, b)};
     const double place = time * buckets_a_time_;
-    if (place < static_cast<double>(current_ + 1)) [[unlikely]] {
-      insert_into_run(entry);
-    } else if (place >= static_cast<double>(current_ + size_)) [[unlikely]] {
-      if (far_.size() == far_limit_) [[unlikely]]
-        tidy_far();
-      far_.push_back(entry);
-    } else {
-      const std::size_t index = index_of(static_cast<std::int64_t>(place));
-      if (!beyond_cache_ || held_[index] == entries_a_bucket) {
-        put(index, entry);
-        return;
-      }
-      // The place is far from the cache: it is sent for, and written to some pushes later.
-      Entry* const place_of = &ring_[index].entries[held_[index]++];
-      __builtin_prefetch(place_of, 1);
-      const std::size_t turn_of = pushed_++ % most_waiting;
-      if (pushed_ > most_waiting) *waiting_[turn_of].place = waiting_[turn_of].entry;
-      waiting_[turn_of] = {place_of, entry};
+    if (place < run_ends_) [[unlikely]] {
+      insert_into_run({time, pair_of(a, b)});
+      return;
     }
+    // A later turn's is left to that turn. Without a branch, which would often be mistaken: it is written where nothing
+    // is yet, and not counted.
+    const auto bucket = static_cast<std::int64_t>(std::min(place, turn_ends_));
+    const bool counted = place < turn_ends_;
+    const std::size_t index = index_of(bucket);
+    const std::uint32_t held = held_[index];
+    if (held == entries_a_bucket) [[unlikely]] {
+      if (counted) put_further(further_[index], {time, pair_of(a, b)});
+      return;
+    }
+    held_[index] = static_cast<std::uint8_t>(held + counted);
+    Entry* place_of = &ring_[index].entries[held];
+    if (!beyond_cache_) {
+      place_of->time = time;
+      place_of->pair = pair_of(a, b);
+      return;
+    }
+    // The place is far from the cache: it is sent for, and written to some pushes later.
+    if (!counted) place_of = &nowhere_;
+    __builtin_prefetch(place_of, 1);
+    Waiting& waiting = waiting_[pushed_++ % most_waiting];
+    *waiting.place = waiting.entry;
+    waiting.place = place_of;
+    waiting.entry.time = time;
+    waiting.entry.pair = pair_of(a, b);
   }
 
-  // The earliest valid event at or before `until`: its disk, and its time in
-  // disks[disk].event_time. False if none. will_need(disk) is called some time
+  // The earliest valid event at or before `until`: its disk, that with which it was pushed (itself when alone), and its
+  // time in disks[disk].event_time. False if none. will_need(disk) is called some time
   // before a disk comes up, to fetch its record into the cache.
   template <class WillNeed>
-  bool pop(double until, std::uint32_t& disk, WillNeed will_need) {
+  bool pop(double until, std::uint32_t& disk, std::uint32_t& with, WillNeed will_need) {
     for (;;) {
       if (next_ + looks_ahead >= end_) [[unlikely]] {
         if (!lengthen_run(until)) return false;
@@ -97,9 +111,11 @@ class EventQueue {
       // same time, and its former partner must still have its turn.
       const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
       disk = first;
+      with = second;
       if (stands(first, second, time)) [[likely]]
         return true;
       disk = second;
+      with = first;
       if (stands(second, first, time)) return true;
     }
   }
@@ -114,13 +130,13 @@ class EventQueue {
 
   std::size_t bytes() const {
     return ring_.capacity() * (sizeof(Bucket) + 5) + blocks_.capacity() * sizeof(Further) +
-           far_.capacity() * sizeof(Entry) +
            2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
   static constexpr double events_a_bucket = 8,
-                          turn = 1.2;  // the ring spans as many mean times between two events of a disk
+                          usual_fullness = 11,  // entries, of which some are dead when they come up
+      turn = 1.2;                               // the ring spans as many mean times between two events of a disk
   static constexpr std::uint32_t entries_a_bucket = 16;
 
   struct Entry {
@@ -155,14 +171,7 @@ class EventQueue {
            static_cast<unsigned>(second.event_time == entry.time);
   }
 
-  void put(std::size_t index, const Entry& entry) {
-    if (held_[index] < entries_a_bucket) [[likely]] {
-      ring_[index].entries[held_[index]++] = entry;
-    } else {
-      put_further(further_[index], entry);
-    }
-  }
-  [[gnu::noinline]] void put_further(std::uint32_t& first, const Entry& entry) {
+  [[gnu::noinline]] void put_further(std::uint32_t& first, Entry entry) {
     if (first == 0 || blocks_[first].held == blocks_[first].entries.size()) {
       std::uint32_t place = free_;
       if (place != 0) {
@@ -179,9 +188,11 @@ class EventQueue {
     block.entries[block.held++] = entry;
   }
   void put_waiting() {
-    const std::size_t first = pushed_ > most_waiting ? pushed_ - most_waiting : 0;
-    for (std::size_t k = first; k < pushed_; ++k) *waiting_[k % most_waiting].place = waiting_[k % most_waiting].entry;
-    pushed_ = 0;
+    for (std::size_t k = 0; k < most_waiting; ++k) {  // the oldest first
+      Waiting& waiting = waiting_[pushed_++ % most_waiting];
+      *waiting.place = waiting.entry;
+      waiting.place = &nowhere_;
+    }
   }
 
   void grow(std::size_t size) {
@@ -201,32 +212,55 @@ class EventQueue {
     std::fill(further_.begin(), further_.end(), 0u);
     blocks_.resize(1);
     free_ = 0;
-    far_.clear();
-    far_limit_ = 256 + 2 * static_cast<std::size_t>(count_);
-    pushed_ = 0;
-    current_ = static_cast<std::int64_t>(start * buckets_a_time_) - 1;
+    for (Waiting& waiting : waiting_) waiting.place = &nowhere_;
+    set_current(static_cast<std::int64_t>(start * buckets_a_time_) - 1);
     here_ = 0;
-    look_far_at_ = current_ + size_;
+    set_turn();
     coming_ = sent_for_ = 0;
     next_ = end_ = 0;
     taken_up_ = moved_ = 0;
   }
 
-  // Where events come in bursts the buckets can become far too wide or too narrow: everything is queued anew, from the
-  // disks' records.
+  // Where buckets have become too wide or too narrow, everything is queued anew from the disks' records.
   [[gnu::noinline]] void rebuild(double buckets_a_time) {
     clear(now_, buckets_a_time);
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      const Disk& disk = disks_[i];
-      if (!(disk.event_time < never)) continue;
-      const std::uint32_t other = disk.partner < 0 ? i : static_cast<std::uint32_t>(disk.partner);
-      const bool pushed_by_other = other < i && stands(other, i, disk.event_time);
-      if (!pushed_by_other) push(disk.event_time, i, other);
-    }
+    push_this_turn(-never);
   }
 
-  [[gnu::noinline]] void insert_into_run(const Entry& entry) {
+  // Queues every event of the turn from place `first` on, from the disks' records: a pair's common event once.
+  void push_this_turn(double first) {
+    std::array<Entry, 64> batch;
+    std::size_t found = 0;
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const double time = disks_[i].event_time, place = time * buckets_a_time_;
+      const auto me = static_cast<std::int32_t>(i), other = choose(disks_[i].partner < 0, me, disks_[i].partner);
+      const Disk& partner = disks_[static_cast<std::uint32_t>(other)];
+      const bool pushed_by_other = (other < me) & (partner.event_time == time) & (partner.partner == me);
+      batch[found] = {time, pair_of(i, static_cast<std::uint32_t>(other))};
+      found += (place >= first) & (place < turn_ends_) & !pushed_by_other;
+      if (found == batch.size() || i + 1 == count_) {
+        for (std::size_t k = 0; k < found; ++k)
+          push(batch[k].time, static_cast<std::uint32_t>(batch[k].pair),
+               static_cast<std::uint32_t>(batch[k].pair >> 32));
+        found = 0;
+      }
+    }
+    put_waiting();
+  }
+
+  void set_current(std::int64_t bucket) {
+    current_ = bucket;
+    run_ends_ = static_cast<double>(bucket + 1);
+  }
+  // The turn that begins with the current bucket: as long as the ring.
+  void set_turn() {
+    next_turn_ = current_ + size_;
+    turn_ends_ = static_cast<double>(next_turn_);
+  }
+
+  [[gnu::noinline]] void insert_into_run(Entry entry) {
     grow(end_ + 1);
+    ++taken_up_;
     std::size_t place = end_++;
     while (place > next_ && times_[place - 1] > entry.time) {
       times_[place] = times_[place - 1];
@@ -245,7 +279,7 @@ class EventQueue {
   // that holds a valid event. False when every bucket up to `until` is empty.
   [[gnu::noinline]] bool lengthen_run(double until) {
     if (beyond_cache_) put_waiting();
-    const std::size_t left = end_ - next_;
+    std::size_t left = end_ - next_;
     for (std::size_t k = 0; k < left; ++k) {
       times_[k] = times_[next_ + k];
       pairs_[k] = pairs_[next_ + k];
@@ -254,46 +288,31 @@ class EventQueue {
     end_ = left;
     do {
       if (left == 0 && static_cast<double>(current_ + 1) > until * buckets_a_time_) return false;
-      ++current_;
+      set_current(current_ + 1);
       if (++here_ == size_) here_ = 0;
-      if (current_ == look_far_at_) [[unlikely]] {
-        if (left == 0 && is_too_fine()) {
-          rebuild(buckets_a_time_ / 8);
+      if (current_ == next_turn_) [[unlikely]] {
+        const double fullness = static_cast<double>(taken_up_) / (usual_fullness * static_cast<double>(size_));
+        const bool fits = fullness > 0.6 && fullness < 1.6;
+        const double other = buckets_a_time_ * std::clamp(fullness, 0.125, 8.0);
+        if (!fits && other > coarsest && other < finest) {
+          rebuild(other);
+          left = 0;
           continue;
         }
-        look_far();
+        begin_turn();
       }
       if (held_[static_cast<std::size_t>(here_)] != 0) sort_into_run(collect(static_cast<std::size_t>(here_)));
     } while (end_ == 0);
     return true;
   }
 
-  bool is_too_fine() const {
-    return 32 * static_cast<double>(taken_up_) < events_a_bucket * static_cast<double>(size_) &&
-           buckets_a_time_ > coarsest;
-  }
-
-  // Puts what has come near into the ring; forgets what is worthless.
-  [[gnu::noinline]] void look_far() {
-    look_far_at_ = current_ + size_;
+  [[gnu::noinline]] void begin_turn() {
     taken_up_ = moved_ = 0;
-    const auto end = static_cast<double>(current_ + size_);
-    std::size_t kept = 0;
-    for (const Entry& entry : far_) {
-      if (counts(entry) == 0) continue;
-      if (entry.time * buckets_a_time_ >= end) {
-        far_[kept++] = entry;
-        continue;
-      }
-      put(index_of(static_cast<std::int64_t>(entry.time * buckets_a_time_)), entry);
-    }
-    far_.resize(kept);
-  }
-
-  // Forgets what is worthless, lest it pile up.
-  [[gnu::noinline]] void tidy_far() {
-    std::erase_if(far_, [this](const Entry& entry) { return counts(entry) == 0; });
-    far_limit_ = std::max(far_limit_, 2 * far_.size());
+    set_turn();
+    // What comes before the current bucket is in the run already.
+    run_ends_ = static_cast<double>(current_);
+    push_this_turn(run_ends_);
+    set_current(current_);
   }
 
   // Empties a bucket: what still counts is collected unsorted, in the order in which it came, and counted.
@@ -326,33 +345,25 @@ class EventQueue {
     return count;
   }
 
-  // Sorts what collect() found and puts it behind the run. Small ones by rank:
-  // an entry's place is the number of entries before it, counted without a
-  // branch. Equal times keep their order.
+  // Sorts what collect() found and puts it behind the run. A bucket of the usual size by rank: an entry's place is the
+  // number of entries before it, counted without a branch. Equal times keep their order.
   void sort_into_run(std::size_t count) {
-    grow(end_ + count);
+    grow(end_ + std::max(count, entries_ranked));
     double* const times = times_.data() + end_;
     std::uint64_t* const pairs = pairs_.data() + end_;
     end_ += count;
-    if (count <= largest_ranked) {
-      std::array<std::int64_t, largest_ranked> ranks;
-      for (std::size_t i = count; i % 4 != 0; ++i) unsorted_times_[i] = never;
-      for (std::size_t i = 0; i < count; i += 4) {
-        Lanes mine;
-        std::memcpy(&mine, &unsorted_times_[i], sizeof mine);
-        LaneMask before{};
-        for (std::size_t j = 0; j < count; ++j) before -= all_lanes(unsorted_times_[j]) < mine;
-        std::memcpy(&ranks[i], &before, sizeof before);
+    if (count <= entries_ranked) [[likely]] {
+      std::fill_n(&unsorted_times_[count], entries_ranked - count, never);
+      alignas(32) std::array<std::int64_t, entries_ranked> ranks;
+      count <= 8 ? rank_times<8>(unsorted_times_.data(), ranks.data())
+                 : rank_times<16>(unsorted_times_.data(), ranks.data());
+      const std::size_t ranked = count <= 8 ? 8 : 16;
+      for (std::size_t k = 0; k < ranked; ++k) {
+        const auto rank = static_cast<std::size_t>(ranks[k]);
+        times[rank] = unsorted_times_[k];
+        pairs[rank] = unsorted_pairs_[k];
       }
-      for (std::size_t i = 0; i < count; ++i) times[i] = -1;
-      for (std::size_t i = 0; i < count; ++i) {
-        const auto rank = static_cast<std::size_t>(ranks[i]);
-        times[rank] = unsorted_times_[i];
-        pairs[rank] = unsorted_pairs_[i];
-      }
-      bool tied = false;  // two of one rank leave a place empty
-      for (std::size_t i = 0; i < count; ++i) tied |= times[i] < 0;
-      if (!tied) return;
+      return;
     }
     order_.resize(count);
     for (std::uint32_t i = 0; i < count; ++i) order_[i] = i;
@@ -364,7 +375,7 @@ class EventQueue {
     }
   }
 
-  static constexpr std::size_t largest_ranked = 64, most_waiting = 8, looks_ahead = 4;
+  static constexpr std::size_t entries_ranked = 16, most_waiting = 8, looks_ahead = 4;
   static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
     Entry* place;
@@ -379,17 +390,17 @@ class EventQueue {
   std::vector<std::uint32_t> further_;  // where in blocks_ the rest of it is, 0 for nowhere
   std::vector<Further> blocks_;         // the first is not used
   std::uint32_t free_ = 0;
-  std::vector<Entry> far_;
-  std::size_t far_limit_ = 0;
   std::int64_t size_ = 0;
   std::int64_t current_ = -1,
-               here_ = 0;  // the current bucket and its place in the ring
-  std::int64_t look_far_at_ = 0;
+               here_ = 0;                 // the current bucket and its place in the ring
+  std::int64_t next_turn_ = 0;            // the bucket with which it begins
+  double run_ends_ = 0, turn_ends_ = 0;   // the buckets behind the current one and the turn's last one
   std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
   bool beyond_cache_ = false;
   std::size_t coming_ = 0, sent_for_ = 0;      // the next bucket's place, and how many of its disks have been sent for
-  std::array<Waiting, most_waiting> waiting_;  // pushed_ of them, the latest ones
+  std::array<Waiting, most_waiting> waiting_;  // the latest ones, one after another, from pushed_ on
   std::size_t pushed_ = 0;
+  Entry nowhere_{};
   // The current bucket's events from next_ to end_, in order.
   std::vector<double> times_, unsorted_times_;
   std::vector<std::uint64_t> pairs_, unsorted_pairs_;

@@ -4,6 +4,8 @@
 // correctly rounded).
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +15,18 @@
 #endif
 
 namespace shakebed::sim {
+
+// One of two without a branch, where a branch would be a coin toss. (A conditional expression is what the compiler
+// makes of it.)
+inline std::int32_t choose(bool which, std::int32_t if_true, std::int32_t if_false) {
+  const std::int32_t mask = -static_cast<std::int32_t>(which);
+  return (if_true & mask) | (if_false & ~mask);
+}
+inline double choose(bool which, double if_true, double if_false) {
+  const std::int64_t mask = -static_cast<std::int64_t>(which);
+  return std::bit_cast<double>((std::bit_cast<std::int64_t>(if_true) & mask) |
+                               (std::bit_cast<std::int64_t>(if_false) & ~mask));
+}
 
 using Lanes = double __attribute__((vector_size(32)));
 using LaneMask = std::int64_t __attribute__((vector_size(32)));
@@ -78,6 +92,30 @@ inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
   for (unsigned k = 0; k < 8; ++k) mask |= static_cast<unsigned>(words[k] == value) << k;
   return mask;
 #endif
+}
+
+// ranks[k]: how many of the 4, 8, 12 or 16 times come before times[k]; of equal ones the one that stands first.
+template <int count>
+void rank_times(const double* times, std::int64_t* ranks) {
+  std::array<Lanes, count / 4> mine;
+  std::array<LaneMask, count / 4> before{};
+  std::memcpy(mine.data(), times, sizeof mine);
+  constexpr LaneMask lane = {0, 1, 2, 3};
+#pragma GCC unroll 16
+  for (int k = 0; k < count; ++k) {
+    const Lanes other = all_lanes(times[k]);
+#pragma GCC unroll 4
+    for (int block = 0; block < count / 4; ++block) {
+      if (block < k / 4) {
+        before[block] -= other < mine[block];
+      } else if (block > k / 4) {
+        before[block] -= other <= mine[block];
+      } else {
+        before[block] -= (other < mine[block]) | ((other == mine[block]) & (lane > k % 4));
+      }
+    }
+  }
+  std::memcpy(ranks, before.data(), sizeof before);
 }
 
 // Eight floats or 32-bit words at a time.
@@ -148,25 +186,37 @@ inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std
 #endif
 }
 
-struct EarliestLane {
+// The earliest of eight times and the id that goes with it. Of equal times the one wins that does so in a knock-out:
+// the first four against the last four, of these the first two against the last two, then the first.
+struct Earliest {
   double time;
-  unsigned lane;  // 0 to 7: the first that has this time
+  std::int32_t id;
 };
-inline EarliestLane earliest_of_eight(Lanes first, Lanes second) {
-#if defined(__AVX__)
-  Lanes least = _mm256_min_pd(first, second);
-  least = _mm256_min_pd(least, _mm256_permute2f128_pd(least, least, 1));
-  least = _mm256_min_pd(least, _mm256_permute_pd(least, 5));
-  const auto equal_first = static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(least, first, _CMP_EQ_OQ)));
-  const auto equal_second = static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(least, second, _CMP_EQ_OQ)));
-  return {least[0], static_cast<unsigned>(__builtin_ctz(equal_first | equal_second << 4))};
+inline Earliest earliest_of_eight(Lanes first, Lanes second, const std::uint32_t* ids) {
+#if defined(__AVX2__)
+  // The ids travel with their times: quicker at hand than looking up where the least time stood.
+  const __m128i* const halves = reinterpret_cast<const __m128i*>(ids);
+  const __m256i first_ids = _mm256_cvtepu32_epi64(_mm_load_si128(halves)),
+                second_ids = _mm256_cvtepu32_epi64(_mm_load_si128(halves + 1));
+  const auto pick = [](auto mask, auto if_false, auto if_true) {
+    return _mm256_blendv_pd(reinterpret_cast<__m256d>(if_false), reinterpret_cast<__m256d>(if_true), mask);
+  };
+  const __m256d id4 = pick(_mm256_cmp_pd(second, first, _CMP_LT_OQ), first_ids, second_ids);
+  const __m256d time4 = _mm256_min_pd(second, first);
+  const __m128d low = _mm256_castpd256_pd128(time4), high = _mm256_extractf128_pd(time4, 1);
+  const __m128d id2 =
+      _mm_blendv_pd(_mm256_castpd256_pd128(id4), _mm256_extractf128_pd(id4, 1), _mm_cmplt_pd(high, low));
+  const __m128d time2 = _mm_min_pd(high, low);
+  const __m128d other = _mm_permute_pd(time2, 1);
+  const __m128d id = _mm_blendv_pd(id2, _mm_permute_pd(id2, 1), _mm_cmplt_pd(other, time2));
+  return {_mm_cvtsd_f64(_mm_min_pd(other, time2)), _mm_cvtsi128_si32(_mm_castpd_si128(id))};
 #else
-  EarliestLane best{first[0], 0};
-  for (unsigned lane = 1; lane < 8; ++lane) {
-    const double time = lane < 4 ? first[lane] : second[lane - 4];
-    if (time < best.time) best = {time, lane};
-  }
-  return best;
+  const auto earlier = [](Earliest l, Earliest r) { return r.time < l.time ? r : l; };
+  std::array<Earliest, 4> four;
+  for (unsigned k = 0; k < 4; ++k)
+    four[k] =
+        earlier({first[k], static_cast<std::int32_t>(ids[k])}, {second[k], static_cast<std::int32_t>(ids[k + 4])});
+  return earlier(earlier(four[0], four[2]), earlier(four[1], four[3]));
 #endif
 }
 

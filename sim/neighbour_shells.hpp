@@ -119,9 +119,14 @@ class NeighbourShells {
     return count;
   }
 
-  // Gives i the neighbours `found`; the others' lists are not touched.
+  // Makes neighbours of i and those `found` whose number is lower, in both their lists: by rounding the two might not
+  // agree whether they reach each other, so the higher one decides for both.
   void list(std::uint32_t i, const std::vector<std::uint32_t>& found) {
-    for (std::uint32_t k : found) append(i, k);
+    for (std::uint32_t k : found) {
+      if (k > i) continue;
+      append(i, k);
+      append(k, i);
+    }
   }
   // Gives i exactly the neighbours `found`, and mends the lists of those that
   // it lost or won.

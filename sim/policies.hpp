@@ -33,7 +33,9 @@ struct PeriodicSidesBox {
 struct Period {
   double length = 0, minus_length = 0, inverse = 0;
   explicit Period(double period = 0) : length(period), minus_length(-period), inverse(period > 0 ? 1 / period : 0) {}
-  double nearest(double difference) const { return difference - length * std::nearbyint(difference * inverse); }
+  double nearest(double difference) const {
+    return std::fma(minus_length, std::nearbyint(difference * inverse), difference);
+  }
   Lanes nearest(Lanes difference) const {
     return fused(all_lanes(minus_length), nearest_integer(difference * all_lanes(inverse)), difference);
   }

@@ -253,7 +253,10 @@ void Simulate::describe(Fields& fields) {
   fields.require(period == 0 || measure_ >= period, "measure",
                  "the bed must be measured over at least one period of the floor",
                  "Give " + quantity_text(period, dimension::time) + " or more");
-  if (frames_.count > 0) {
+  const bool countable = period == 0 || measure_ / period <= 1e12;
+  fields.require(countable, "measure", "the floor would shake more than 1e12 times, which no run lives to see",
+                 "Measure shorter, or shake more slowly");
+  if (frames_.count > 0 && countable) {
     const Schedule plan = schedule();
     fields.require(plan.frame_stride > 0, "frames/count",
                    std::to_string(frames_.count) + " frames do not fit into the " +
@@ -789,7 +792,7 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 12,
+          .version = 13,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,

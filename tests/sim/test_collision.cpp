@@ -23,7 +23,7 @@ TEST(SmoothImpulse, KeepsMomentumAndLosesTheEnergyItSays) {
     const double e = random.uniform(), m1 = std::exp(random.normal_pair().first), m2 = 1;
     const double dvx = v2.first - v1.first, dvz = v2.second - v1.second;
     if (nx * dvx + nz * dvz >= 0) continue;
-    const NormalImpulse j = smooth_impulse(nx, nz, dvx, dvz, e);
+    const NormalImpulse j = smooth_impulse(nx, nz, dvx, dvz, 1, e);
     const double m12 = m1 * m2 / (m1 + m2);
     const Body a{v1.first, v1.second, 0, m1, 0.5}, b{v2.first, v2.second, 0, m2, 0.5};
     const Body a2{a.vx - m12 / m1 * j.jx, a.vz - m12 / m1 * j.jz, 0, m1, 0.5};

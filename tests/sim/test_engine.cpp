@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sim/neighbour_shells.hpp"
 #include "sim/simulation.hpp"
 
 namespace shakebed::sim {
@@ -206,9 +207,30 @@ TEST(Engine, SaysWhereDisksCollapse) {
   }
   scene.disks.contact_duration = 1e-4;
   const auto soft = simulate(scene);
-  soft->advance_to(10);
+  soft->advance_to(20);
   EXPECT_LT(soft->energy().kinetic, 0.1);  // hops of a contact's duration are all that is left
   EXPECT_LE(soft->largest_overlap(), 1e-12);
+}
+
+// Two disks at the very edge of each other's reach, of which by rounding one sees the other and is not seen by it.
+TEST(NeighbourShells, AreAlwaysMutual) {
+  std::vector<Disk> disks(4);
+  NeighbourShells shells;
+  shells.reset(disks.data(), 3, 1.5, 30, 30);
+  for (std::uint32_t i = 0; i < 3; ++i) shells.file(i);
+  const auto neighbours = [&](std::uint32_t i) {
+    std::vector<std::uint32_t> found;
+    shells.each_neighbour(i, [&](std::uint32_t k) { found.push_back(k); });
+    return found;
+  };
+  shells.list(0, {2});
+  shells.list(1, {0});
+  shells.list(2, {});
+  EXPECT_THAT(neighbours(0), testing::ElementsAre(1));
+  EXPECT_THAT(neighbours(1), testing::ElementsAre(0));
+  EXPECT_THAT(neighbours(2), testing::IsEmpty());
+  shells.relist(0, {});
+  EXPECT_THAT(neighbours(1), testing::IsEmpty());
 }
 
 // The queue's buckets follow a rate of events that changes a million times over.
