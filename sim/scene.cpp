@@ -75,6 +75,10 @@ class Check {
     for (const Species& s : scene_.disks.species) largest = std::max(largest, s.diameter);
     require(b.width >= largest && std::isfinite(b.width), "/box/width",
             "the box is " + number(b.width) + " D wide, narrower than a disk of " + number(largest) + " D");
+    // Beyond it a place is known to no better than 1e-7 D, and cells are more than can be counted.
+    constexpr double most = 1e9;
+    require(!(b.width > most) && !(std::isfinite(height()) && height() > most), "/box",
+            "the box is larger than 1e9 D: places so far apart cannot be told to 1e-7 D");
     const bool periodic = std::holds_alternative<PeriodicSides>(b.sides);
     const double least = 2 * largest + 3;  // a disk must never meet two images of one neighbour
     require(!periodic || b.width >= least, "/box/width",
@@ -118,6 +122,7 @@ class Check {
     } else {
       return;
     }
+    require(!(amplitude > 1e9), "/floor", "the floor moves farther than 1e9 D");
     require(!periodic_upwards(), "/floor/motion", "a box that is periodic upwards has no floor that could move");
     double largest = 0;
     for (const Species& s : scene_.disks.species) largest = std::max(largest, s.diameter);
