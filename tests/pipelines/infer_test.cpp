@@ -82,7 +82,7 @@ TEST_F(Infer, GoesOnWithTheBedsThatWereFinishedWhenItWasKilled) {
     return count;
   };
   const int process = start_shakebed(arguments, folder_.path());
-  for (int i = 0; i < 3000 && finished_beds() < 5; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  for (int i = 0; i < 60'000 && finished_beds() < 5; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   ::kill(process, SIGKILL);
   ASSERT_EQ(wait_for(process), 128 + SIGKILL) << "it was over before it was killed";
   const int kept = finished_beds();
