@@ -21,6 +21,7 @@ struct Case {
   int beds, disks;            // 118 or 462, on 10.1 or 20.2 D: 10 or 20 rows
   std::string model, window;  // of the fit, as a recipe says them
   double photographs;         // what they may add to T, relative
+  double frozen = 0;          // scatter of T between beds that no run tells of itself, relative
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.temperature << " T_c, " << c.disks << " disks"; }
 
@@ -74,7 +75,7 @@ TEST_P(ThermometerByFrames, FindsTheBathsTemperature) {
                  own = simulated["value"].get<double>() / truth;
     std::printf("  T over the bath's by frames %.4f +- %.4f, by the simulated profile %.4f +- %.4f\n", seen, error, own,
                 simulated["std_error"].get<double>() / truth);
-    EXPECT_NEAR(seen, 1, 3.5 * error) << "bed " << k;  // of 36 beds: one false alarm in 60
+    EXPECT_NEAR(seen, 1, 3.5 * std::hypot(error, c.frozen)) << "bed " << k;  // of 36 beds: one false alarm in 60
     EXPECT_LT(error, 0.03);
     sum += seen - own, squares += (seen - own) * (seen - own);
     seen_sum += seen, seen_squares += seen * seen;
@@ -96,8 +97,11 @@ INSTANTIATE_TEST_SUITE_P(Fluid, ThermometerByFrames,
                                          Case{20, 6, 118, "enskog-rectangle", fluid, 0.01},
                                          Case{40, 6, 118, "enskog-rectangle", high_fluid, 0.01}),
                          name_of);
+// A crystal close to T_c keeps what it froze with. 12 other beds at 3 T_c scatter by 0.0162(33) where each states
+// 0.0076 of itself, measured four times as long still by 0.0143(29) where each states 0.0063; the same beds are high
+// and low.
 INSTANTIATE_TEST_SUITE_P(Crystal, ThermometerByFrames,
-                         testing::Values(Case{3, 4, 462, "hydrostatic:best-of", rule, 0.02},
+                         testing::Values(Case{3, 4, 462, "hydrostatic:best-of", rule, 0.02, 0.015},
                                          Case{6, 4, 462, "hydrostatic:best-of", rule, 0.02},
                                          Case{10, 4, 462, "hydrostatic:best-of", rule, 0.02}),
                          name_of);
