@@ -5,7 +5,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,11 +20,6 @@ namespace shakebed::sim {
 inline std::int32_t choose(bool which, std::int32_t if_true, std::int32_t if_false) {
   const std::int32_t mask = -static_cast<std::int32_t>(which);
   return (if_true & mask) | (if_false & ~mask);
-}
-inline double choose(bool which, double if_true, double if_false) {
-  const std::int64_t mask = -static_cast<std::int64_t>(which);
-  return std::bit_cast<double>((std::bit_cast<std::int64_t>(if_true) & mask) |
-                               (std::bit_cast<std::int64_t>(if_false) & ~mask));
 }
 
 using Lanes = double __attribute__((vector_size(32)));

@@ -6,6 +6,7 @@
 
 #include "ingest/find_disks.hpp"
 #include "ingest/frames.hpp"
+#include "sim/checkpoint_bytes.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::ingest;
@@ -38,8 +39,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       return text == nullptr ? std::size_t{32} : std::max<std::size_t>(1, std::strtoull(text, nullptr, 10));
     }();
     // Chosen by a hash of all bytes: what is made of a chosen picture is not chosen for that.
-    std::uint64_t hash = 14695981039346656037U;
-    for (std::size_t i = 0; i < size; ++i) hash = (hash ^ data[i]) * 1099511628211U;
+    const std::uint64_t hash = shakebed::sim::checkpoint_bytes::checksum(data, data + size);
     if (frame.pixels.size() > 20'000 || (hash >> 32U) % every != 0) return 0;
     for (const FoundDisk& disk : find_disks(frame).disks) {
       if (!std::isfinite(disk.x_px) || !std::isfinite(disk.y_px) || !(disk.radius_px > 0))
