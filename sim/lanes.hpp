@@ -89,23 +89,23 @@ inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
 }
 
 // ranks[k]: how many of the 4, 8, 12 or 16 times come before times[k]; of equal ones the one that stands first.
-template <int count>
+template <std::size_t count>
 void rank_times(const double* times, std::int64_t* ranks) {
   std::array<Lanes, count / 4> mine;
   std::array<LaneMask, count / 4> before{};
   std::memcpy(mine.data(), times, sizeof mine);
   constexpr LaneMask lane = {0, 1, 2, 3};
 #pragma GCC unroll 16
-  for (int k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < count; ++k) {
     const Lanes other = all_lanes(times[k]);
 #pragma GCC unroll 4
-    for (int block = 0; block < count / 4; ++block) {
+    for (std::size_t block = 0; block < count / 4; ++block) {
       if (block < k / 4) {
         before[block] -= other < mine[block];
       } else if (block > k / 4) {
         before[block] -= other <= mine[block];
       } else {
-        before[block] -= (other < mine[block]) | ((other == mine[block]) & (lane > k % 4));
+        before[block] -= (other < mine[block]) | ((other == mine[block]) & (lane > static_cast<std::int64_t>(k % 4)));
       }
     }
   }
