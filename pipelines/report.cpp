@@ -38,6 +38,7 @@ tr:first-child th { border-top: 0; background: var(--card); } td.number { white-
 .tag { display: inline-block; border: 1px solid currentColor; border-radius: 4px; padding: 0 6px; font-size: 0.8rem; color: var(--bad); }
 figure { margin: 14px 0; } figure > svg, figure img { max-width: 100%; height: auto; display: block; border-radius: 6px; }
 figure > svg.plot { background: #ffffff; width: 100%; } figcaption { color: var(--soft); font-size: 0.9rem; margin-top: 4px; }
+figure.wide { overflow-x: auto; } figure.wide > svg.plot { min-width: 620px; }
 details { margin: 10px 0; } summary { cursor: pointer; color: var(--accent); } pre { overflow-x: auto; background: var(--card); padding: 12px; border-radius: 6px; font-size: 0.82rem; }
 #bed-in-motion { --disk-a: #2f7fb8; --disk-b: #c98a2b; } #bed-in-motion canvas { display: none; width: 100%; max-width: 720px; }
 #bed-in-motion .still { max-width: 720px; } #bed-in-motion .controls { display: none; gap: 10px; align-items: center; flex-wrap: wrap; max-width: 720px; margin-top: 6px; }

@@ -136,28 +136,44 @@ bool drawable(double cost, double error) {
   return std::isfinite(cost) && std::isfinite(error) && cost > 0 && error > 0;
 }
 
-// A logarithmic axis that carries at least one number: 1, 2 and 5 of each power of ten, over more than three of these
-// the powers alone.
+// A logarithmic axis with three to nine numbers on it: powers of ten, every so many of them, or round numbers between
+// them, as many as the range needs.
 std::string logarithmic_axis(std::string_view axis, double low, double high) {
-  const bool wide = high / low > 1e3;
-  std::string ticks;
-  double largest = low;
-  for (int power = static_cast<int>(std::floor(std::log10(low))) - 1; power <= std::log10(high); ++power) {
-    for (const double digit : {1.0, 2.0, 5.0}) {
-      const double value = digit * std::pow(10, power);
-      if (value > high || (wide && digit > 1)) continue;
-      ticks += fmt::format("{}'{:g}' {:g}", ticks.empty() ? "" : ", ", value, value);
-      largest = value;
+  const int first = static_cast<int>(std::floor(std::log10(low))),
+            last = static_cast<int>(std::floor(std::log10(high)));
+  const auto numbers = [&](const std::vector<double>& digits, int every) {
+    std::vector<double> all;
+    for (int power = first; power <= last; ++power) {
+      if (power % every != 0) continue;
+      for (const double digit : digits) {
+        const double value = digit * std::pow(10, power);
+        if (value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9)) all.push_back(value);
+      }
     }
+    return all;
+  };
+  std::vector<double> ticks;
+  for (const auto& digits : {std::vector<double>{1}, {1, 2, 5}, {1, 1.5, 2, 3, 4, 5, 6, 8}}) {
+    ticks = numbers(digits, 1);
+    if (ticks.size() >= 3) break;
   }
-  return fmt::format("set {0}range [{1}:{2}]\nset {0}tics ({3})\n", axis, std::min(low, largest), high, ticks);
+  if (ticks.size() < 3) {  // less than a third of a decade: even steps
+    const double step = std::pow(10, std::floor(std::log10((high - low) / 3)));
+    ticks.clear();
+    const double wide = (high - low) / step > 8 ? 2 * step : step;
+    for (double value = std::ceil(low / wide) * wide; value <= high; value += wide) ticks.push_back(value);
+  }
+  for (int every = 2; ticks.size() > 9 && every < 50; ++every) ticks = numbers({1}, every);
+  std::string text;
+  for (const double value : ticks) text += fmt::format("{}'{:.4g}' {}", text.empty() ? "" : ", ", value, value);
+  return fmt::format("set {0}range [{1}:{2}]\nset {0}tics ({3})\n", axis, low, high, text);
 }
 
 void draw(const Figure& figure, const fs::path& directory) {
   // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
-  constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7",
-                                 "#E69F00", "#56B4E9", "#7A5C00", "#6A3D9A"};
-  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8};
+  constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
+                                 "#56B4E9", "#7A5C00", "#6A3D9A", "#000000"};
+  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8, 3};
   std::string data, plot;
   int index = 0;
   constexpr double largest = std::numeric_limits<double>::max();
@@ -217,8 +233,9 @@ void draw(const Figure& figure, const fs::path& directory) {
   const std::string script =
       "set encoding utf8\nset terminal svg size 860,620 noenhanced font 'Helvetica,16' background '#ffffff' linewidth "
       "1.4\n" +
-      fmt::format("set output {}\nset xlabel {}\nset ylabel {}\nset title {}\n", gnuplot_text(figure.name + ".svg"),
-                  gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label), gnuplot_text(figure.title)) +
+      fmt::format("set output {}\nset xlabel {} offset 0,0.6\nset ylabel {}\nset title {} font ',15'\n",
+                  gnuplot_text(figure.name + ".svg"), gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label),
+                  gnuplot_text(figure.title)) +
       "set logscale xy\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
       "'#dddddd' "
       "lt 1 lw 0.6\nset key below horizontal maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
@@ -391,9 +408,16 @@ std::string document_html(const Document& document, const fs::path& directory) {
   }
   out +=
       "<p>Times are CPU seconds of all threads. In the figures lower is more accurate and left is cheaper; the grey "
-      "staircase is the best to be had at each cost, the ring is what the program does when nothing is asked, the "
-      "dashed "
-      "line what no method can pass.</p>\n";
+      "staircase is the best to be had at each cost, the ring is what the program does when nothing is asked. Dashed "
+      "lines are for comparison: the limit that no method can pass, or what their name says.</p>\n";
+  if (document.stages.size() > 1) {
+    out += "<p>";
+    for (const StageResult& stage : document.stages)
+      out += fmt::format("{}<a href=\"#{}\">{}</a>", &stage == document.stages.data() ? "" : " · ", stage.name,
+                         escape_markup(stage.title));
+    if (!document.digits.is_null()) out += " · <a href=\"#digits\">numerical stability</a>";
+    out += "</p>\n";
+  }
   if (!document.against.is_null())
     out += html_table(comparison(document.stages, document.against, document.against_name));
   int number = 0;
@@ -402,13 +426,14 @@ std::string document_html(const Document& document, const fs::path& directory) {
     for (const std::string& sentence : stage.sentences) out += fmt::format("<p>{}</p>\n", escape_markup(sentence));
     for (const Figure& figure : stage.figures) {
       draw(figure, directory);
-      out += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n",
-                         inline_svg(directory / (figure.name + ".svg"), number++), escape_markup(figure.title));
+      out +=
+          fmt::format("<figure class=\"wide\">{}</figure>\n", inline_svg(directory / (figure.name + ".svg"), number++));
     }
     for (const Table& table : stage.tables) out += html_table(table);
     if (!stage.hard_cases.empty()) out += html_table(hard_case_table(stage.hard_cases));
   }
-  if (!document.digits.is_null()) out += "<h2>Numerical stability</h2>\n" + html_table(digits_table(document.digits));
+  if (!document.digits.is_null())
+    out += "<h2 id=\"digits\">Numerical stability</h2>\n" + html_table(digits_table(document.digits));
   return out + "</main>\n</body>\n</html>\n";
 }
 

@@ -89,7 +89,7 @@ void room_benchmark(const Effort& effort, StageResult& result) {
     result.figures.push_back(std::move(inverse));
   }
   if (!fits.curves.empty()) {
-    fits.title += " (30, 100, 1,000, 10,000 bins from left to right)";
+    fits.title += " (30 to 10,000 bins, left to right)";
     result.figures.push_back(std::move(fits));
   }
   Table exponents{"Growth of a fit with the number of bins",
