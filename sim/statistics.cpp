@@ -76,43 +76,78 @@ double inefficiency(std::vector<double> series) {
   return sum;
 }
 
+// What the square of a window's sum counts in the variance of the mean of `count` values: exact where they are
+// independent.
+double window_weight(std::size_t count, std::size_t window) {
+  const auto n = static_cast<double>(count), w = static_cast<double>(window);
+  return 1 / (w * (n - w) * (n - w + 1));
+}
+
+// The variance of a series' mean from means over overlapping windows.
+double variance_of_mean(const std::vector<double>& series, std::size_t window) {
+  double mean = 0, sum = 0, squares = 0;
+  for (const double x : series) mean += x / static_cast<double>(series.size());
+  for (std::size_t b = 0; b < series.size(); ++b) {
+    sum += series[b] - mean;
+    if (b + 1 < window) continue;
+    squares += sum * sum;
+    sum -= series[b + 1 - window] - mean;
+  }
+  return squares * window_weight(series.size(), window);
+}
+
 }  // namespace
 
-std::size_t BlockedCovariance::joined() const {
-  const std::size_t usual = std::max<std::size_t>(1, blocks_.size() / 128);
-  if (blocks_.size() < 16) return usual;
-  std::vector<double> sum(blocks_.size()), moment(blocks_.size());
+std::vector<double> BlockedCovariance::first_moment() const {
+  std::vector<double> moment(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    for (std::size_t i = 0; i < size_; ++i) {
-      sum[b] += blocks_[b][i];
-      moment[b] += static_cast<double>(i) * blocks_[b][i];
-    }
+    for (std::size_t i = 0; i < size_; ++i) moment[b] += static_cast<double>(i) * blocks_[b][i];
   }
-  const double memory = std::max(inefficiency(std::move(sum)), inefficiency(std::move(moment)));
-  if (memory < 1.2) return usual;
-  const auto asked = static_cast<std::size_t>(std::ceil(4 * std::min(memory, static_cast<double>(blocks_.size()))));
-  return std::max(usual, std::min(asked, blocks_.size() / 8));
+  return moment;
+}
+
+std::size_t BlockedCovariance::window() const {
+  constexpr std::size_t least_windows = 6;
+  if (blocks_.size() < 16) return 1;
+  std::vector<double> sum(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (const double x : blocks_[b]) sum[b] += x;
+  }
+  const double memory = std::max(inefficiency(std::move(sum)), inefficiency(first_moment()));
+  if (memory < 1.2) return 2;
+  const double asked = std::min(1.5 * memory, static_cast<double>(blocks_.size()));
+  return 2 * std::min(static_cast<std::size_t>(std::ceil(asked)), blocks_.size() / (2 * least_windows));
+}
+
+std::size_t BlockedCovariance::independent_blocks() const {
+  const std::size_t window = this->window();
+  return window == 1 ? blocks_.size() : (3 * blocks_.size() + 2 * window) / (4 * window);
 }
 
 std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t last) const {
-  const std::size_t joined = this->joined(), count = blocks_.size() / joined;
-  const std::size_t n = last - first;
-  std::vector<double> covariance(n * n, 0.0), mean(n, 0.0);
+  const std::size_t count = blocks_.size(), n = last - first;
+  std::vector<double> covariance(n * n, 0.0), mean(n, 0.0), sum(n, 0.0);
   if (count < 2) return covariance;
-  std::vector<std::vector<double>> deviations(count, std::vector<double>(n, 0.0));
-  for (std::size_t b = 0; b < count; ++b) {
-    for (std::size_t j = 0; j < joined; ++j) {
-      for (std::size_t i = 0; i < n; ++i)
-        deviations[b][i] += blocks_[b * joined + j][first + i] / static_cast<double>(joined);
-    }
-    for (std::size_t i = 0; i < n; ++i) mean[i] += deviations[b][i] / static_cast<double>(count);
+  const std::size_t window = this->window();
+  for (const std::vector<double>& block : blocks_) {
+    for (std::size_t i = 0; i < n; ++i) mean[i] += block[first + i] / static_cast<double>(count);
   }
-  const double divisor = static_cast<double>(count) * static_cast<double>(count - 1);
-  for (std::vector<double>& deviation : deviations) {
-    for (std::size_t i = 0; i < n; ++i) deviation[i] -= mean[i];
+  double weight = window_weight(count, window);
+  if (window > 1) {
+    const std::vector<double> moment = first_moment();
+    const double whole = variance_of_mean(moment, window), halves = variance_of_mean(moment, window / 2);
+    if (whole > halves) weight *= 2 - halves / whole;
+  }
+  for (std::size_t b = 0; b < count; ++b) {
+    for (std::size_t i = 0; i < n; ++i) sum[i] += blocks_[b][first + i] - mean[i];
+    if (b + 1 < window) continue;
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k < n; ++k) covariance[i * n + k] += deviation[i] * deviation[k] / divisor;
+      for (std::size_t k = i; k < n; ++k) covariance[i * n + k] += weight * sum[i] * sum[k];
     }
+    for (std::size_t i = 0; i < n; ++i) sum[i] -= blocks_[b + 1 - window][first + i] - mean[i];
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < i; ++k) covariance[i * n + k] = covariance[k * n + i];
   }
   return covariance;
 }

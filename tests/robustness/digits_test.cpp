@@ -202,7 +202,7 @@ Row expansion_k() {
 
 // A covariance of means with a large common offset, as densities and heights have them.
 Row covariance() {
-  Row row{"covariance of block means", "3 quantities, 1,000 samples, offsets 1 to 1e6 of the scatter", "the variances"};
+  Row row{"covariance of block means", "3 quantities, 500 samples, offsets 1 to 1e6 of the scatter", "the variances"};
   sim::Random random(6);
   for (int trial = 0; trial < 60; ++trial) {
     const double offset = std::pow(10, 6 * random.uniform());
@@ -214,26 +214,35 @@ Row covariance() {
       found.add(samples.back());
     }
     const std::vector<double> matrix = found.of_means(0, 3);
-    // What of_means() says it does: blocks joined until about 128 are left.
-    const std::size_t blocks = found.independent_blocks(), length = samples.size() / blocks;
-    std::vector<std::array<Real, 3>> means(blocks);
+    // What of_means() says it does: means over overlapping windows, larger by what the halves of the windows say of the
+    // first moment.
+    const std::size_t n = samples.size(), window = found.window();
     std::array<Real, 3> mean{};
-    for (std::size_t b = 0; b < blocks; ++b) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        for (std::size_t i = b * length; i < (b + 1) * length; ++i) means[b][k] += samples[i][k];
-        means[b][k] /= length;
-        mean[k] += means[b][k] / blocks;
-      }
+    for (const auto& sample : samples) {
+      for (std::size_t k = 0; k < 3; ++k) mean[k] += Real(sample[k]) / n;
     }
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        Real truth = 0, vi = 0, vj = 0;
-        for (const auto& m : means) {
-          truth += (m[i] - mean[i]) * (m[j] - mean[j]);
-          vi += (m[i] - mean[i]) * (m[i] - mean[i]), vj += (m[j] - mean[j]) * (m[j] - mean[j]);
+    const auto of_windows = [&](std::size_t length) {
+      std::array<std::array<Real, 3>, 4> result{};  // the last row: of the first moment, in its first column
+      for (std::size_t b = 0; b + length <= n; ++b) {
+        std::array<Real, 3> sum{};
+        for (std::size_t i = b; i < b + length; ++i) {
+          for (std::size_t k = 0; k < 3; ++k) sum[k] += samples[i][k] - mean[k];
         }
-        const Real scale = Real(blocks) * (blocks - 1);
-        row.add((matrix[i * 3 + j] - truth / scale) / (sqrt(vi * vj) / scale),
+        for (std::size_t i = 0; i < 3; ++i) {
+          for (std::size_t k = 0; k < 3; ++k) result[i][k] += sum[i] * sum[k];
+        }
+        result[3][0] += (sum[1] + 2 * sum[2]) * (sum[1] + 2 * sum[2]);
+      }
+      for (auto& r : result) {
+        for (Real& value : r) value /= Real(length) * (n - length) * (n - length + 1);
+      }
+      return result;
+    };
+    const auto whole = of_windows(window), halves = of_windows(window / 2);
+    const Real correction = 2 - halves[3][0] / whole[3][0], factor = correction > 1 ? correction : Real(1);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        row.add((matrix[i * 3 + k] - factor * whole[i][k]) / (factor * sqrt(whole[i][i] * whole[k][k])),
                 [&] { return text("offset %.3g", offset); });
       }
     }

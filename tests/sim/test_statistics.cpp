@@ -67,35 +67,47 @@ TEST(BlockedCovariance, KnowsTheCovarianceOfCorrelatedMeans) {
     yy += c[3] / runs;
   }
   const double of_x = (1 + r) / (1 - r) / n, of_noise = 9.0 / n;
-  // 40 runs of about 128 blocks: each mean is good to 2 %; 4 standard errors.
+  // 40 runs as good as about 110 samples: each mean is good to 2 %; 4 standard errors.
   EXPECT_NEAR(xx, of_x, 0.08 * of_x);
   EXPECT_NEAR(xy, of_x, 0.12 * of_x);
   EXPECT_NEAR(yy, of_x + of_noise, 0.08 * (of_x + of_noise));
 }
 
-// Of a series as short as 15 of its memories, too: blocks that only make 128 of it would miss four fifths of it.
+// Of a series as short as 15 of its memories, too, and of longer ones: windows as long as a few memories miss a tenth
+// to a third of the variance and what their halves miss says so. And as much as the stated number of independent
+// samples lets expect, these variances scatter: with Student's factor for so many, 95 % intervals hold the truth.
 TEST(BlockedCovariance, KnowsThatOfAShortSeriesWithALongMemory) {
   Random random(45);
   const double r = 9.0 / 11.0;  // a memory of 10 samples
-  const int n = 150, runs = 400;
-  double xx = 0, blocks = 0;
-  for (int run = 0; run < runs; ++run) {
-    BlockedCovariance covariance(2);
-    double x = random.normal_pair().first;
-    for (int i = 0; i < n; ++i) {
-      const Random::Pair draw = random.normal_pair();
-      x = r * x + std::sqrt(1 - r * r) * draw.first;
-      const double sample[2] = {draw.second, x};
-      covariance.add(sample);
+  // Student's factors of 95 %, from 3 degrees of freedom up.
+  const double student[] = {3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160};
+  for (const int n : {150, 600, 4800}) {
+    const int runs = n > 1000 ? 400 : 1600;
+    const double truth = (1 + r) / (1 - r) / n;
+    double xx = 0, blocks = 0, held = 0;
+    for (int run = 0; run < runs; ++run) {
+      BlockedCovariance covariance(2);
+      double x = random.normal_pair().first, sum = 0;
+      for (int i = 0; i < n; ++i) {
+        const Random::Pair draw = random.normal_pair();
+        x = r * x + std::sqrt(1 - r * r) * draw.first;
+        sum += x;
+        const double sample[2] = {draw.second, x};
+        covariance.add(sample);
+      }
+      const double variance = covariance.of_means(1, 2)[0];
+      const std::size_t independent = covariance.independent_blocks();
+      xx += variance / runs;
+      blocks += static_cast<double>(independent) / runs;
+      held += std::abs(sum / n) < (independent < 15 ? student[independent - 4] : 2.0) * std::sqrt(variance);
     }
-    xx += covariance.of_means(1, 2)[0] / runs;
-    blocks += static_cast<double>(covariance.independent_blocks()) / runs;
+    std::printf("  %4d samples: variance of the mean %.3f of the true one, as by %.1f independent ones; %.1f %% held\n",
+                n, xx / truth, blocks, 100 * held / runs);
+    // One run's variance is good to sqrt(2/blocks), 1,600 runs' mean to 2 %.
+    EXPECT_NEAR(xx / truth, 1, 0.12) << n;
+    EXPECT_GT(held / runs, 0.93) << n;  // 4 standard errors below 95 %, of 1,600
+    EXPECT_LT(held / runs, 0.985) << n;
   }
-  const double truth = (1 + r) / (1 - r) / n;
-  std::printf("  variance of the mean %.4f of the true one, from %.1f blocks\n", xx / truth, blocks);
-  EXPECT_GT(xx, 0.7 * truth);
-  EXPECT_LT(xx, 1.1 * truth);
-  EXPECT_LT(blocks, 30);
 }
 
 // Whatever the kernel, the area under the density is the number of disks over the width.
