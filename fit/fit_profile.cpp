@@ -613,10 +613,11 @@ Goodness goodness(const Solution& solution, const Bins& bins, int parameters, bo
   g.chi2_per_dof = g.dof > 0 ? chi2 / dof : 0.0;
   const double k = parameters;
   if (errors_known) {
-    // Errors that come from few samples make of chi2/dof a variance over another: Snedecor's F.
+    // With errors that come from few samples chi2/dof is a variance over another, itself a mean over dof of them:
+    // Snedecor's F.
     const bool few = bins.correlation.size() > 0 && bins.samples > 1;
     g.p_value = g.dof <= 0 ? 1.0
-                : few      ? gsl_cdf_fdist_Q(chi2 / dof, dof, bins.samples - 1.0)
+                : few      ? gsl_cdf_fdist_Q(chi2 / dof, dof, dof * (bins.samples - 1.0))
                            : gsl_cdf_chisq_Q(chi2, dof);
     g.aic = chi2 + 2.0 * k;
     g.bic = chi2 + k * std::log(n);

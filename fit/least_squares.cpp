@@ -287,7 +287,9 @@ class Solver {
   // Weights that are not the inverse of the bins' covariance: the covariance of the estimate is B J^T R J B with B the
   // inverse of J^T J and R the bins' correlations; chi2 is no longer a chi-squared number, but its mean and variance
   // are known: tr(P R) and 2 tr(P R P R), P projecting off the tangent plane. The latter is freed of what the few
-  // samples behind R add to it [Srivastava2005].
+  // samples behind R add to it [Srivastava2005]. Where they are too few to weigh by, as if they were twice as many: a
+  // covariance from overlapping windows (sim/statistics.hpp) is that much better known than its size, and what is left
+  // of their noise only makes chi2 look less certain.
   void through_correlations(const Vector& unit, Matrix& inverse, Solution& solution) const {
     const double naive = inverse(0, 0);
     Matrix weighted = jacobian_ * unit.asDiagonal();
@@ -304,7 +306,7 @@ class Solver {
     projected = (projected - (projected * q) * q.transpose()).eval();
     const double trace = projected.trace();
     double trace2 = projected.squaredNorm();
-    const double v = static_cast<double>(bins_.samples) - 1.0;
+    const double v = (bins_.whitening.size() > 0 ? 1.0 : 2.0) * static_cast<double>(bins_.samples) - 1.0;
     if (v > 1.0) trace2 = v * v / ((v + 2.0) * (v - 1.0)) * (trace2 - trace * trace / v);
     // At least that of as many equal and independent parts as there are bins.
     trace2 = std::max(trace2, trace * trace / static_cast<double>(residual_.size()));
