@@ -80,10 +80,11 @@ TEST_P(StatedErrors, AreWhatTScattersBy) {
               samples, mean, 1e4 * std::sqrt(squares / beds), std::sqrt(squares), 1e4 * std::sqrt(squares / (2 * beds)),
               std::sqrt(stated), ratio, 100 * ratio * std::sqrt(2.0 / beds), 100.0 * held / beds,
               100.0 * held_mean / beds);
-  // Beds tell ratio to 11 % (each row's own stated variances scatter, too): three standard errors. Of 160 intervals 152
-  // hold, to 2.8: three standard errors, and not all of them.
-  EXPECT_GT(ratio, 0.7);
-  EXPECT_LT(ratio, 1.4);
+  // 160 beds tell the ratio to 12 %, and windows chosen by the samples they are laid over cost up to 10 % of it
+  // (tests/sim/test_statistics.cpp): three standard errors about 1 to 1.1. Of 160 intervals 152 hold, to 2.8: three
+  // standard errors, and not all of them.
+  EXPECT_GT(ratio, 0.65);
+  EXPECT_LT(ratio, 1.5);
   EXPECT_GE(held_mean, 144);
   EXPECT_LT(held_mean, 160);
 }
