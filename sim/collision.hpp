@@ -19,22 +19,23 @@ struct Surface {
 
 // Two smooth disks. (dx, dz), (dvx, dvz): position and velocity of the second from the first, which approach
 // (dx dvx + dz dvz < 0); contact_squared: (R1 + R2)^2, which their distance is but for rounding. The change of their
-// relative velocity: -(1+e) (g.n) n. The first disk takes -m2/(m1+m2) of it, the second m1/(m1+m2).
+// relative velocity is -(1+e) (g.n) n. Of it the first disk takes -m2/(m1+m2), the second m1/(m1+m2).
 struct NormalImpulse {
-  double jx, jz;      // change of the relative velocity
+  double x, z;        // n / d; at hand before the approach is
+  double approach;    // d (g.n) = dx dvx + dz dvz
   double dissipated;  // energy lost, for reduced mass 1
 };
 inline NormalImpulse smooth_impulse(double dx, double dz, double dvx, double dvz, double contact_squared,
                                     double restitution) {
-  const double b = std::fma(dx, dvx, dz * dvz);
+  const double approach = std::fma(dx, dvx, dz * dvz);
   // 1 / d^2 by its first step from 1 / (R1 + R2)^2: wrong by beyond^2 only, and need not wait for a division.
   const double inverse_contact = 1 / contact_squared;
   const double beyond = std::fma(dx, dx, std::fma(dz, dz, -contact_squared)) * inverse_contact;
-  double inverse_distance = std::fma(-beyond, inverse_contact, inverse_contact);
+  double inverse_distance = (1 - beyond) * inverse_contact;
   if (!(std::abs(beyond) < 1e-9)) [[unlikely]]
     inverse_distance = inverse_contact / (1 + beyond);
-  const double factor = (1 + restitution) * inverse_distance * b;
-  return {-factor * dx, -factor * dz, 0.5 * (1 - restitution * restitution) * b * b * inverse_distance};
+  return {inverse_distance * dx, inverse_distance * dz, approach,
+          0.5 * (1 - restitution * restitution) * approach * approach * inverse_distance};
 }
 
 // The Walton rule for rough disks [Walton1993, Luding1998]. (nx, nz) points from the first to the second (or to the

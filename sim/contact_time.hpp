@@ -60,12 +60,12 @@ inline double time_to_fall(double gap, double vz, double gravity) {
 // is inside while |o + v t| <= radius - g t^2 / 2, squared: c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0. Without its last term
 // this ends earlier, and has one square root.
 inline double time_to_leave_shell(double ox, double oz, double vx, double vz, double radius, double gravity) {
-  const double a = std::fma(vx, vx, std::fma(vz, vz, gravity * radius));
+  const double a = std::fma(vx, vx, gravity > 0 ? std::fma(vz, vz, gravity * radius) : vz * vz);
   if (!(a > 0)) [[unlikely]]
     return never;
   const double b = std::fma(ox, vx, oz * vz);
   const double beyond = std::fma(ox, ox, std::fma(oz, oz, -(radius * radius)));
-  const double c = beyond < 0 ? beyond : 0.0;
+  const double c = std::min(beyond, 0.0);
   const double root = std::sqrt(std::fma(b, b, -(a * c)));
   // Close to the edge this loses digits, but of a length that is then below 1e-15 of the shell's; and it has no branch.
   return (root - b) / a;

@@ -142,9 +142,10 @@ template <class Space, class Rule, class Sizes>
   const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), all_lanes(0));
   const Lanes a = fused(dvx, dvx, dvz * dvz);
   const Lanes root = sqrt_lanes(fused(b, b, -(a * c)));
-  const Lanes contact = fused(-b - root, all_lanes(1) / a, time);
+  const Lanes contact = fused(-(b + root), all_lanes(1) / a, time);
   const LaneMask meets = (b < all_lanes(-slowest_approach)) & (contact < event_time);
-  return select(meets, contact, all_lanes(never));
+  // The larger of the contact and 0 or, where there is none, `never`: quicker than a selection.
+  return larger(contact, reinterpret_cast<Lanes>(~meets & reinterpret_cast<LaneMask>(all_lanes(never))));
 }
 
 // The earliest contact with the eight of a block.
@@ -538,8 +539,10 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second) {
   double dx = second.x - first.x, dz = second.z - first.z;
-  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
-  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+  // Which images meet is told from the records, which are at hand before the flights are: both disks are in their
+  // shells there as now.
+  if constexpr (Space::wraps_x) dx += period_x_.to_nearest(disks_[j].x - disks_[i].x);
+  if constexpr (Space::wraps_z) dz += period_z_.to_nearest(disks_[j].z - disks_[i].z);
   const double dvx = second.vx - first.vx, dvz = second.vz - first.vz;
 
   double restitution = 1;
@@ -571,12 +574,13 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   double contact_squared = 1;
   if constexpr (!Sizes::equal) contact_squared = sizes_.contact_distance(i, j) * sizes_.contact_distance(i, j);
   const NormalImpulse impulse = smooth_impulse(dx, dz, dvx, dvz, contact_squared, restitution);
-  const double share_first = reduced_mass * inverse_first, share_second = reduced_mass * inverse_second;
-  first.vx -= share_first * impulse.jx;
-  first.vz -= share_first * impulse.jz;
-  second.vx += share_second * impulse.jx;
-  second.vz += share_second * impulse.jz;
-  counters_.virial += reduced_mass * (impulse.jx * dx + impulse.jz * dz);
+  const double momentum = reduced_mass * (1 + restitution);
+  const double to_first = momentum * inverse_first, to_second = momentum * inverse_second;
+  first.vx = std::fma(to_first * impulse.x, impulse.approach, first.vx);
+  first.vz = std::fma(to_first * impulse.z, impulse.approach, first.vz);
+  second.vx = std::fma(-to_second * impulse.x, impulse.approach, second.vx);
+  second.vz = std::fma(-to_second * impulse.z, impulse.approach, second.vz);
+  counters_.virial -= momentum * impulse.approach;
   if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
 }
 

@@ -38,9 +38,11 @@ class EventQueue {
     count_ = static_cast<std::uint32_t>(count);
     beyond_cache_ = count > fits_cache;
     size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
-    ring_.resize(static_cast<std::size_t>(size_));
-    held_.resize(static_cast<std::size_t>(size_));
-    further_.resize(static_cast<std::size_t>(size_));
+    // Behind the ring's last bucket stand two more, which stay empty: of the next turn nothing is written down.
+    const auto places = static_cast<std::size_t>(size_ + 2);
+    ring_.resize(places);
+    held_.resize(places);
+    further_.resize(places);
     grow(256);
     clear(start, events_a_time / events_a_bucket);
   }
@@ -153,10 +155,8 @@ class EventQueue {
   };
 
   static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
-  std::size_t index_of(std::int64_t bucket) const {
-    const std::int64_t index = here_ + (bucket - current_);
-    return static_cast<std::size_t>(index >= size_ ? index - size_ : index);
-  }
+  // Where in the ring one of this turn's buckets is.
+  std::size_t index_of(std::int64_t bucket) const { return static_cast<std::size_t>(bucket - this_turn_); }
 
   // Is a's next event still that with b (alone: a == b) at this time?
   bool stands(std::uint32_t a, std::uint32_t b, double time) const {
@@ -214,7 +214,6 @@ class EventQueue {
     free_ = 0;
     for (Waiting& waiting : waiting_) waiting.place = &nowhere_;
     set_current(static_cast<std::int64_t>(start * buckets_a_time_) - 1);
-    here_ = 0;
     set_turn();
     coming_ = sent_for_ = 0;
     next_ = end_ = 0;
@@ -254,8 +253,8 @@ class EventQueue {
   }
   // The turn that begins with the current bucket: as long as the ring.
   void set_turn() {
-    next_turn_ = current_ + size_;
-    turn_ends_ = static_cast<double>(next_turn_);
+    this_turn_ = current_;
+    turn_ends_ = static_cast<double>(this_turn_ + size_);
   }
 
   [[gnu::noinline]] void insert_into_run(Entry entry) {
@@ -289,8 +288,7 @@ class EventQueue {
     do {
       if (left == 0 && static_cast<double>(current_ + 1) > until * buckets_a_time_) return false;
       set_current(current_ + 1);
-      if (++here_ == size_) here_ = 0;
-      if (current_ == next_turn_) [[unlikely]] {
+      if (current_ == this_turn_ + size_) [[unlikely]] {
         const double fullness = static_cast<double>(taken_up_) / (usual_fullness * static_cast<double>(size_));
         const bool fits = fullness > 0.6 && fullness < 1.6;
         const double other = buckets_a_time_ * std::clamp(fullness, 0.125, 8.0);
@@ -301,7 +299,8 @@ class EventQueue {
         }
         begin_turn();
       }
-      if (held_[static_cast<std::size_t>(here_)] != 0) sort_into_run(collect(static_cast<std::size_t>(here_)));
+      const std::size_t here = index_of(current_);
+      if (held_[here] != 0) sort_into_run(collect(here));
     } while (end_ == 0);
     return true;
   }
@@ -355,9 +354,14 @@ class EventQueue {
     if (count <= entries_ranked) [[likely]] {
       std::fill_n(&unsorted_times_[count], entries_ranked - count, never);
       alignas(32) std::array<std::int64_t, entries_ranked> ranks;
-      count <= 8 ? rank_times<8>(unsorted_times_.data(), ranks.data())
-                 : rank_times<16>(unsorted_times_.data(), ranks.data());
-      const std::size_t ranked = count <= 8 ? 8 : 16;
+      const std::size_t ranked = count <= 8 ? 8 : count <= 16 ? 16 : 24;
+      if (ranked == 8) {
+        rank_times<8>(unsorted_times_.data(), ranks.data());
+      } else if (ranked == 16) {
+        rank_times<16>(unsorted_times_.data(), ranks.data());
+      } else {
+        rank_times<24>(unsorted_times_.data(), ranks.data());
+      }
       for (std::size_t k = 0; k < ranked; ++k) {
         const auto rank = static_cast<std::size_t>(ranks[k]);
         times[rank] = unsorted_times_[k];
@@ -375,7 +379,7 @@ class EventQueue {
     }
   }
 
-  static constexpr std::size_t entries_ranked = 16, most_waiting = 8, looks_ahead = 4;
+  static constexpr std::size_t entries_ranked = 24, most_waiting = 8, looks_ahead = 4;
   static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
     Entry* place;
@@ -391,9 +395,8 @@ class EventQueue {
   std::vector<Further> blocks_;         // the first is not used
   std::uint32_t free_ = 0;
   std::int64_t size_ = 0;
-  std::int64_t current_ = -1,
-               here_ = 0;                 // the current bucket and its place in the ring
-  std::int64_t next_turn_ = 0;            // the bucket with which it begins
+  std::int64_t current_ = -1;             // the current bucket
+  std::int64_t this_turn_ = 0;            // the bucket with which the ring's turn began
   double run_ends_ = 0, turn_ends_ = 0;   // the buckets behind the current one and the turn's last one
   std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
   bool beyond_cache_ = false;

@@ -51,13 +51,6 @@ inline Lanes sqrt_lanes(Lanes value) {
   return Lanes{std::sqrt(value[0]), std::sqrt(value[1]), std::sqrt(value[2]), std::sqrt(value[3])};
 #endif
 }
-inline Lanes nearest_integer(Lanes value) {
-#if defined(__AVX__)
-  return _mm256_round_pd(value, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
-#else
-  return Lanes{std::nearbyint(value[0]), std::nearbyint(value[1]), std::nearbyint(value[2]), std::nearbyint(value[3])};
-#endif
-}
 // a b + c, rounded once; the same bytes by instruction or by library.
 inline Lanes fused(Lanes a, Lanes b, Lanes c) {
 #if defined(__FMA__)
@@ -88,14 +81,14 @@ inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
 #endif
 }
 
-// ranks[k]: how many of the 4, 8, 12 or 16 times come before times[k]; of equal ones the one that stands first.
+// ranks[k]: how many of the times, a multiple of four, come before times[k]; of equal ones the one that stands first.
 template <std::size_t count>
 void rank_times(const double* times, std::int64_t* ranks) {
   std::array<Lanes, count / 4> mine;
   std::array<LaneMask, count / 4> before{};
   std::memcpy(mine.data(), times, sizeof mine);
   constexpr LaneMask lane = {0, 1, 2, 3};
-#pragma GCC unroll 16
+#pragma GCC unroll 24
   for (std::size_t k = 0; k < count; ++k) {
     const Lanes other = all_lanes(times[k]);
 #pragma GCC unroll 4
@@ -122,14 +115,6 @@ inline FloatLanes sqrt_floats(FloatLanes value) {
   return _mm256_sqrt_ps(value);
 #else
   for (int k = 0; k < 8; ++k) value[k] = std::sqrt(value[k]);
-  return value;
-#endif
-}
-inline FloatLanes nearest_integer(FloatLanes value) {
-#if defined(__AVX__)
-  return _mm256_round_ps(value, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
-#else
-  for (int k = 0; k < 8; ++k) value[k] = std::nearbyint(value[k]);
   return value;
 #endif
 }
@@ -180,37 +165,28 @@ inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std
 #endif
 }
 
-// The earliest of eight times and the id that goes with it. Of equal times the one wins that does so in a knock-out:
-// the first four against the last four, of these the first two against the last two, then the first.
+// The earliest of eight times, none of them NaN, and the id that goes with it; of equal times the first one's.
 struct Earliest {
   double time;
   std::int32_t id;
 };
 inline Earliest earliest_of_eight(Lanes first, Lanes second, const std::uint32_t* ids) {
-#if defined(__AVX2__)
-  // The ids travel with their times: quicker at hand than looking up where the least time stood.
-  const __m128i* const halves = reinterpret_cast<const __m128i*>(ids);
-  const __m256i first_ids = _mm256_cvtepu32_epi64(_mm_load_si128(halves)),
-                second_ids = _mm256_cvtepu32_epi64(_mm_load_si128(halves + 1));
-  const auto pick = [](auto mask, auto if_false, auto if_true) {
-    return _mm256_blendv_pd(reinterpret_cast<__m256d>(if_false), reinterpret_cast<__m256d>(if_true), mask);
+#if defined(__AVX__)
+  // The time is found before where it stands: it is wanted sooner.
+  const __m256d of_four = _mm256_min_pd(second, first);
+  const __m128d of_two = _mm_min_pd(_mm256_extractf128_pd(of_four, 1), _mm256_castpd256_pd128(of_four));
+  const double time = _mm_cvtsd_f64(_mm_min_pd(_mm_permute_pd(of_two, 1), of_two));
+  const auto equal = [time](Lanes times) {
+    return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(times, all_lanes(time), _CMP_EQ_OQ)));
   };
-  const __m256d id4 = pick(_mm256_cmp_pd(second, first, _CMP_LT_OQ), first_ids, second_ids);
-  const __m256d time4 = _mm256_min_pd(second, first);
-  const __m128d low = _mm256_castpd256_pd128(time4), high = _mm256_extractf128_pd(time4, 1);
-  const __m128d id2 =
-      _mm_blendv_pd(_mm256_castpd256_pd128(id4), _mm256_extractf128_pd(id4, 1), _mm_cmplt_pd(high, low));
-  const __m128d time2 = _mm_min_pd(high, low);
-  const __m128d other = _mm_permute_pd(time2, 1);
-  const __m128d id = _mm_blendv_pd(id2, _mm_permute_pd(id2, 1), _mm_cmplt_pd(other, time2));
-  return {_mm_cvtsd_f64(_mm_min_pd(other, time2)), _mm_cvtsi128_si32(_mm_castpd_si128(id))};
+  return {time, static_cast<std::int32_t>(ids[__builtin_ctz(equal(first) | equal(second) << 4)])};
 #else
-  const auto earlier = [](Earliest l, Earliest r) { return r.time < l.time ? r : l; };
-  std::array<Earliest, 4> four;
-  for (unsigned k = 0; k < 4; ++k)
-    four[k] =
-        earlier({first[k], static_cast<std::int32_t>(ids[k])}, {second[k], static_cast<std::int32_t>(ids[k + 4])});
-  return earlier(earlier(four[0], four[2]), earlier(four[1], four[3]));
+  Earliest earliest = {first[0], static_cast<std::int32_t>(ids[0])};
+  for (int k = 1; k < 8; ++k) {
+    const double time = k < 4 ? first[k] : second[k - 4];
+    if (time < earliest.time) earliest = {time, static_cast<std::int32_t>(ids[k])};
+  }
+  return earliest;
 #endif
 }
 

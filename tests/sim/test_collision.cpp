@@ -26,8 +26,9 @@ TEST(SmoothImpulse, KeepsMomentumAndLosesTheEnergyItSays) {
     const NormalImpulse j = smooth_impulse(nx, nz, dvx, dvz, 1, e);
     const double m12 = m1 * m2 / (m1 + m2);
     const Body a{v1.first, v1.second, 0, m1, 0.5}, b{v2.first, v2.second, 0, m2, 0.5};
-    const Body a2{a.vx - m12 / m1 * j.jx, a.vz - m12 / m1 * j.jz, 0, m1, 0.5};
-    const Body b2{b.vx + m12 / m2 * j.jx, b.vz + m12 / m2 * j.jz, 0, m2, 0.5};
+    const double jx = -(1 + e) * j.x * j.approach, jz = -(1 + e) * j.z * j.approach;
+    const Body a2{a.vx - m12 / m1 * jx, a.vz - m12 / m1 * jz, 0, m1, 0.5};
+    const Body b2{b.vx + m12 / m2 * jx, b.vz + m12 / m2 * jz, 0, m2, 0.5};
     const double before = energy(a, 0.5) + energy(b, 0.5), after = energy(a2, 0.5) + energy(b2, 0.5);
     EXPECT_NEAR(after + m12 * j.dissipated, before, 1e-14 * before);
     EXPECT_NEAR(m1 * a2.vx + m2 * b2.vx, m1 * a.vx + m2 * b.vx, 1e-14 * (m1 + m2) * 4);
