@@ -224,6 +224,12 @@ void settings_for_goals(const std::vector<Trial>& trials, const Effort& effort, 
   for (const Trial& trial : trials) known.push_back(trial.measured(trial.best_way()));
   std::map<std::size_t, Trial> measured_again;
   for (const double goal : {0.05, 0.02, 0.01}) {
+    if (effort.quick && goal < 0.02) {
+      result.sentences.push_back(
+          fmt::format("For {:g} % in T: what keeps it takes longer than a quick run; `shakebed bench pipeline` tells.",
+                      100 * goal));
+      continue;
+    }
     const auto measure_again = [&](std::size_t setting) {
       auto found = measured_again.find(setting);
       if (found == measured_again.end()) {
