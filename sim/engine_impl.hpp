@@ -285,8 +285,7 @@ void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
   WordLanes place = {0, 1, 2, 3, 4, 5, 6, 7};
   nearby_count_ = 0;
   for (std::size_t q = 0; q < count; q += inline_neighbours, place += inline_neighbours) {
-    WordLanes ids;
-    std::memcpy(&ids, &round_[q], sizeof ids);
+    WordLanes ids = eight_words(&round_[q]);
     const WordLanes here = place < end;
     ids &= here;  // what stands behind the last has no meaning
     const WordLanes xs = gather_lines(&disks_[0].shell_x, ids), zs = gather_lines(&disks_[0].shell_z, ids);
@@ -318,15 +317,17 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
   float skin = static_cast<float>(largest_skin_);
   if (nearby_count_ > inline_neighbours) {
-    for (std::size_t q = nearby_count_; q % inline_neighbours != 0; ++q) reached_by_[q] = skin;
-    for (std::size_t q = 0; q < nearby_count_; q += inline_neighbours) {
+    std::size_t count = nearby_count_;
+    for (; count % inline_neighbours != 0; ++count) reached_by_[count] = skin;
+    FloatLanes least = all_floats(skin);
+    for (std::size_t q = 0; q < count; q += inline_neighbours) {
       FloatLanes mine;
       std::memcpy(&mine, &reached_by_[q], sizeof mine);
       WordLanes nearer{};
-      for (std::size_t k = 0; k < nearby_count_; ++k) nearer -= all_floats(reached_by_[k]) < mine;
-      for (int k = 0; k < 8; ++k)
-        skin = nearer[k] >= static_cast<std::int32_t>(inline_neighbours) ? std::min(skin, mine[k]) : skin;
+      for (std::size_t k = 0; k < count; ++k) nearer -= all_floats(reached_by_[k]) < mine;
+      least = smaller(least, select(nearer < static_cast<std::int32_t>(inline_neighbours), least, mine));
     }
+    for (int k = 0; k < 8; ++k) skin = std::min(skin, least[k]);
     skin = std::max(skin, static_cast<float>(smallest_skin_));
   }
   disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit));
@@ -335,11 +336,18 @@ void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
 // Fills found_ with those of nearby_ that i's shell reaches.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
-  const auto skin = static_cast<float>(disks_[i].skin * skin_unit);
-  found_.clear();
-  for (std::size_t k = 0; k < nearby_count_; ++k) {
-    if (reached_by_[k] < skin) found_.push_back(nearby_[k]);
+  const FloatLanes skin = all_floats(static_cast<float>(disks_[i].skin * skin_unit));
+  const auto end = static_cast<std::int32_t>(nearby_count_);
+  found_.resize(nearby_count_ + inline_neighbours);
+  WordLanes place = {0, 1, 2, 3, 4, 5, 6, 7};
+  std::size_t found = 0;
+  for (std::size_t q = 0; q < nearby_count_; q += inline_neighbours, place += inline_neighbours) {
+    FloatLanes mine;
+    std::memcpy(&mine, &reached_by_[q], sizeof mine);
+    const WordLanes near = (mine < skin) & (place < end);
+    found += compress(near, eight_words(&nearby_[q]), mine, &found_[found], &reached_by_[found]);
   }
+  found_.resize(found);
 }
 
 // Notes which walls the disk could touch from its shell.
@@ -349,10 +357,11 @@ void Engine<Space, Rule, Sizes>::mark_near_walls(std::uint32_t i) {
     Disk& disk = disks_[i];
     const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
     unsigned near = 0;
-    if (hard_sides_ && disk.shell_x < reach) near |= near_left_wall;
-    if (hard_sides_ && disk.shell_x > width_ - reach) near |= near_right_wall;
-    if (disk.shell_z < floor_.highest() + reach) near |= near_floor;
-    if (disk.shell_z > lid_height_ - reach) near |= near_lid;
+    const auto note = [&near](bool it_is, unsigned bit) { near |= bit & -static_cast<unsigned>(it_is); };
+    note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
+    note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
+    note(disk.shell_z < floor_.highest() + reach, near_floor);
+    note(disk.shell_z > lid_height_ - reach, near_lid);
     disk.near = static_cast<std::uint8_t>(near);
   }
 }

@@ -68,19 +68,6 @@ inline Lanes larger(Lanes a, Lanes b) {
 #endif
 }
 
-// Bit k set where words[k] == value, k = 0 to 7. words: 32-byte aligned.
-inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
-#if defined(__AVX2__)
-  const __m256i all = _mm256_load_si256(reinterpret_cast<const __m256i*>(words));
-  const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(static_cast<int>(value)));
-  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
-#else
-  unsigned mask = 0;
-  for (unsigned k = 0; k < 8; ++k) mask |= static_cast<unsigned>(words[k] == value) << k;
-  return mask;
-#endif
-}
-
 // ranks[k]: how many of the times, a multiple of four, come before times[k]; of equal ones the one that stands first.
 template <std::size_t count>
 void rank_times(const double* times, std::int64_t* ranks) {
@@ -109,7 +96,46 @@ void rank_times(const double* times, std::int64_t* ranks) {
 using FloatLanes = float __attribute__((vector_size(32)));
 using WordLanes = std::int32_t __attribute__((vector_size(32)));
 
+// Bit k is the mask's lane k.
+inline unsigned bits_of(WordLanes mask) {
+#if defined(__AVX__)
+  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+#else
+  unsigned bits = 0;
+  for (unsigned k = 0; k < 8; ++k) bits |= static_cast<unsigned>(mask[k] != 0) << k;
+  return bits;
+#endif
+}
+inline WordLanes eight_words(const std::uint32_t* words) {
+  WordLanes lanes;
+  std::memcpy(&lanes, words, sizeof lanes);
+  return lanes;
+}
+// Bit k set where words[k] == value, k = 0 to 7.
+inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
+  return bits_of(eight_words(words) == static_cast<std::int32_t>(value));
+}
+// Bit k set where words[k] is one of the eight `among`.
+inline unsigned words_among(const std::uint32_t* words, const std::uint32_t* among) {
+  const WordLanes mine = eight_words(words);
+  WordLanes found{};
+#pragma GCC unroll 8
+  for (int k = 0; k < 8; ++k) found |= mine == static_cast<std::int32_t>(among[k]);
+  return bits_of(found);
+}
+
 inline FloatLanes all_floats(float value) { return FloatLanes{value, value, value, value, value, value, value, value}; }
+inline FloatLanes select(WordLanes mask, FloatLanes if_true, FloatLanes if_false) {
+  return reinterpret_cast<FloatLanes>((reinterpret_cast<WordLanes>(if_true) & mask) |
+                                      (reinterpret_cast<WordLanes>(if_false) & ~mask));
+}
+inline FloatLanes smaller(FloatLanes a, FloatLanes b) {
+#if defined(__AVX__)
+  return _mm256_min_ps(a, b);
+#else
+  return select(a < b, a, b);
+#endif
+}
 inline FloatLanes sqrt_floats(FloatLanes value) {
 #if defined(__AVX__)
   return _mm256_sqrt_ps(value);

@@ -135,6 +135,16 @@ class NeighbourShells {
     first.fill(sentinel_);
     std::copy_n(found.begin(), std::min<std::size_t>(found.size(), inline_neighbours), first.begin());
     const std::uint32_t old_count = disks_[i].neighbours;
+    if (std::max<std::size_t>(old_count, found.size()) <= inline_neighbours) [[likely]] {
+      const NeighbourBlock old = lists_[i];
+      unsigned lost = ~words_among(old.disk.data(), first.data()) & ((1u << old_count) - 1);
+      unsigned won = ~words_among(first.data(), old.disk.data()) & ((1u << found.size()) - 1);
+      for (; lost != 0; lost &= lost - 1) remove(old.disk[static_cast<unsigned>(__builtin_ctz(lost))], i);
+      for (; won != 0; won &= won - 1) append(first[static_cast<unsigned>(__builtin_ctz(won))], i);
+      lists_[i].disk = first;
+      disks_[i].neighbours = static_cast<std::uint16_t>(found.size());
+      return;
+    }
     for (std::uint32_t place = 0; place < old_count; ++place) {
       const std::uint32_t k = *slot(i, place);
       if (equal_words(first.data(), k) != 0) continue;
