@@ -111,10 +111,13 @@ void expect_bias(const Bias& row, double limit) {
 
 // --- fluid everywhere: true disks freeze at about 12 T_c
 
+// Beds twice as wide as the others, half as many: a fixed number of disks makes a bed of 462 0.1 to 0.2 % cold there
+// (tests/physics/results/README.md), too near to the limit.
 void expect_fluid(double reduced, double from) {
   BedRun run;
+  run.bed = {924, 40.4};
   run.settle = 80, run.interval = 2, run.frames = 1000;
-  const auto table = measure(reduced, run, reduced > 30 ? 40 : 32, from,
+  const auto table = measure(reduced, run, reduced > 30 ? 20 : 16, from,
                              {{"enskog-rectangle", "above"},
                               {"hydrostatic:enskog", "above"},
                               {"hydrostatic:best-of", "above"},
