@@ -96,24 +96,35 @@ class NeighbourShells {
   // stand seven more words or so of no meaning.
   std::size_t search(std::uint32_t i, LargeVector<std::uint32_t>& found) const {
     const Disk& disk = disks_[i];
-    const int column = static_cast<int>(std::floor(disk.shell_x * per_x_));
-    const int row = static_cast<int>(std::floor(disk.shell_z * per_z_));
-    // A grid of few columns or rows would meet the same cell twice.
-    const int left = columns_ >= 3 ? -1 : 0, right = columns_ >= 3 ? 1 : columns_ - 1;
-    const int down = rows_ >= 3 ? -1 : 0, up = rows_ >= 3 ? 1 : rows_ - 1;
+    const int column = wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_);
+    const int row = wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_);
     if (found.size() < 16 * disks_a_cell) found.resize(16 * disks_a_cell);
     std::size_t count = 0;
-    for (int dr = down; dr <= up; ++dr) {
-      const Cell* cells = &cells_[static_cast<std::size_t>(wrap(row + dr, rows_)) * static_cast<std::size_t>(columns_)];
-      for (int dc = left; dc <= right; ++dc) {
-        const Cell& cell = cells[wrap(column + dc, columns_)];
-        std::memcpy(&found[count], cell.disk.data(), sizeof cell.disk);
-        count += cell.held;
-        for (std::uint32_t next = cell.next; next != 0; next = crowded_[next].next) {
-          if (found.size() < count + 12 * disks_a_cell) found.resize(2 * found.size());
-          std::memcpy(&found[count], crowded_[next].disk.data(), sizeof cell.disk);
-          count += crowded_[next].held;
-        }
+    const auto take = [&](int r, int c) {
+      const Cell& cell =
+          cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
+      std::memcpy(&found[count], cell.disk.data(), sizeof cell.disk);
+      count += cell.held;
+      for (std::uint32_t next = cell.next; next != 0; next = crowded_[next].next) {
+        if (found.size() < count + 12 * disks_a_cell) found.resize(2 * found.size());
+        std::memcpy(&found[count], crowded_[next].disk.data(), sizeof cell.disk);
+        count += crowded_[next].held;
+      }
+    };
+    if (columns_ >= 3 && rows_ >= 3) [[likely]] {
+      const std::array<int, 3> rows = {row == 0 ? rows_ - 1 : row - 1, row, row + 1 == rows_ ? 0 : row + 1};
+      const std::array<int, 3> columns = {column == 0 ? columns_ - 1 : column - 1, column,
+                                          column + 1 == columns_ ? 0 : column + 1};
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) {
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) take(rows[static_cast<std::size_t>(r)], columns[static_cast<std::size_t>(c)]);
+      }
+    } else {  // the same cell must not be met twice
+      const int across = std::min(columns_, 3), along = std::min(rows_, 3);
+      for (int r = 0; r < along; ++r) {
+        for (int c = 0; c < across; ++c)
+          take(rows_ >= 3 ? wrap(row + r - 1, rows_) : r, columns_ >= 3 ? wrap(column + c - 1, columns_) : c);
       }
     }
     return count;
