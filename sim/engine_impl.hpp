@@ -190,8 +190,15 @@ auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion
   if (near & near_left_wall) consider(time_to_wall(motion.x - radius, -motion.vx), left_wall);
   if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x, motion.vx), right_wall);
   if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z, motion.vz, gravity_), lid_above);
-  if (near & near_floor)
-    consider(floor_.time_to_contact(motion.z - radius, motion.vz, gravity_, now_, best.time - now_), floor_below);
+  if (near & near_floor) {
+    // By then the disk is out of its shell, sideways or downwards: the floor need not be looked for any later.
+    const Disk& disk = disks_[i];
+    const double skin = disk.skin * skin_unit + shell_slack, ox = motion.x - static_cast<double>(disk.shell_x);
+    const double aside = (skin - std::copysign(ox, ox * motion.vx)) / std::abs(motion.vx);
+    const double down = time_to_fall(skin + motion.z - static_cast<double>(disk.shell_z), motion.vz, gravity_);
+    const double horizon = std::min(std::min(best.time - now_, aside), down);
+    consider(floor_.time_to_contact(motion.z - radius, motion.vz, gravity_, now_, horizon), floor_below);
+  }
   return best;
 }
 
