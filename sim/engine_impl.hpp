@@ -145,7 +145,7 @@ template <class Space, class Rule, class Sizes>
   const Lanes contact = fused(-(b + root), all_lanes(1) / a, time);
   const LaneMask meets = (b < all_lanes(-slowest_approach)) & (contact < event_time);
   // The larger of the contact and 0 or, where there is none, `never`: quicker than a selection.
-  return larger(contact, reinterpret_cast<Lanes>(~meets & reinterpret_cast<LaneMask>(all_lanes(never))));
+  return larger(contact, unless(meets, all_lanes(never)));
 }
 
 // The earliest contact with the eight of a block.

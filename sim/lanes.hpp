@@ -44,6 +44,14 @@ inline Lanes select(LaneMask mask, Lanes if_true, Lanes if_false) {
                                  (reinterpret_cast<LaneMask>(if_false) & ~mask));
 #endif
 }
+// value where the mask is not set, 0 where it is.
+inline Lanes unless(LaneMask mask, Lanes value) {
+#if defined(__AVX__)
+  return _mm256_andnot_pd(reinterpret_cast<Lanes>(mask), value);
+#else
+  return reinterpret_cast<Lanes>(~mask & reinterpret_cast<LaneMask>(value));
+#endif
+}
 inline Lanes sqrt_lanes(Lanes value) {
 #if defined(__AVX__)
   return _mm256_sqrt_pd(value);
