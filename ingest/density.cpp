@@ -93,6 +93,39 @@ Plateau find_plateau(const std::vector<std::vector<double>>& series_by_bin, cons
   return plateau;
 }
 
+// The variance of the mean of a series that remembers, from means over overlapping windows [MeketonSchmeiser1984]:
+// three memories long, by which six must fit in, and made larger by what such windows still share, as their halves tell
+// [VatsFlegal2022].
+double variance_of_mean(std::vector<double> series) {
+  const double n = static_cast<double>(series.size());
+  double mean = 0, variance = 0;
+  for (const double value : series) mean += value / n;
+  for (double& value : series) value -= mean, variance += value * value;
+  if (series.size() < 24 || !(variance > 0)) return variance / (n - 1) / n;
+  double memory = 1;  // 1 + 2 sum of the correlations, summed to five times itself [Sokal1997]
+  for (std::size_t lag = 1; lag < series.size() / 4; ++lag) {
+    double correlation = 0;
+    for (std::size_t f = 0; f + lag < series.size(); ++f) correlation += series[f] * series[f + lag];
+    memory += 2 * correlation / variance;
+    if (static_cast<double>(lag) >= 5 * memory) break;
+  }
+  if (memory < 1.2) return variance / (n - 1) / n;
+  const auto by_windows = [&](std::size_t window) {
+    const double w = static_cast<double>(window);
+    double sum = 0, squares = 0;
+    for (std::size_t f = 0; f < series.size(); ++f) {
+      sum += series[f];
+      if (f + 1 < window) continue;
+      squares += sum * sum;
+      sum -= series[f + 1 - window];
+    }
+    return squares / (w * (n - w) * (n - w + 1));
+  };
+  const std::size_t half = std::min(static_cast<std::size_t>(std::ceil(1.5 * memory)), series.size() / 12);
+  const double whole = by_windows(2 * half), halves = by_windows(half);
+  return whole * std::max(1.0, 2 - halves / whole);
+}
+
 }  // namespace
 
 std::vector<double> density_of_frame(std::span<const double> heights, double bed_width, const HeightBins& bins,
@@ -182,11 +215,25 @@ DensityProfile average_profile(const std::vector<std::vector<double>>& densities
     for (std::size_t b = 0; b <= a; ++b) {
       const double scale = std::sqrt(single[a * bins.count + a] * single[b * bins.count + b]);
       const double correlation = a == b ? 1.0 : scale > 0 ? single[a * bins.count + b] / scale : 0.0;
-      const double shared = 4 * scale_relative_std_error * scale_relative_std_error * profile.number_density[a] *
-                            profile.number_density[b];
-      const double covariance = correlation * profile.std_error[a] * profile.std_error[b] + shared;
+      const double covariance = correlation * profile.std_error[a] * profile.std_error[b];
       profile.covariance[a * bins.count + b] = profile.covariance[b * bins.count + a] = covariance;
     }
+  // The bed's height, which breathes, remembers longer than most bins do, and a temperature hangs on it: where its mean
+  // is known worse than the bins say, what moves together with it is made larger to fit.
+  std::vector<double> height(frames, 0.0), with_height(bins.count, 0.0);
+  double known = 0;
+  for (std::size_t a = 0; a < bins.count; ++a) {
+    for (std::size_t f = 0; f < frames; ++f) height[f] += bins.middle(a) * series[a][f];
+    for (std::size_t b = 0; b < bins.count; ++b)
+      with_height[a] += profile.covariance[a * bins.count + b] * bins.middle(b);
+    known += bins.middle(a) * with_height[a];
+  }
+  const double missing = frames > 1 && known > 0 ? std::max(variance_of_mean(height) / known - 1, 0.0) / known : 0.0;
+  for (std::size_t a = 0; a < bins.count; ++a)
+    for (std::size_t b = 0; b < bins.count; ++b)
+      profile.covariance[a * bins.count + b] +=
+          missing * with_height[a] * with_height[b] + 4 * scale_relative_std_error * scale_relative_std_error *
+                                                          profile.number_density[a] * profile.number_density[b];
   for (std::size_t bin = 0; bin < bins.count; ++bin)
     profile.std_error[bin] = std::sqrt(profile.covariance[bin * bins.count + bin]);
   return profile;

@@ -51,8 +51,9 @@ struct DensityProfile {
 };
 
 // Mean, errors and covariance of per-frame densities that follow one another in time (frames x bins). Errors are found
-// by doubling blocks until they stop growing [FlyvbjergPetersen1989]; `scale_std_error` is the relative error of D in
-// px, added to the covariance as a common factor (density goes as D^2).
+// by doubling blocks until they stop growing [FlyvbjergPetersen1989]; where the mean height of the disks remembers
+// longer than that, the covariance is made larger along what moves with it. `scale_std_error` is the relative error of
+// D in px, added to the covariance as a common factor (density goes as D^2).
 DensityProfile average_profile(const std::vector<std::vector<double>>& densities, const HeightBins& bins,
                                const Kernel& kernel, double scale_relative_std_error = 0);
 

@@ -34,7 +34,7 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 class ThermometerByFrames : public testing::TestWithParam<Case> {};
 
 TEST_P(ThermometerByFrames, FindsTheBathsTemperature) {
-  // T_c = N D/W/mu_0, mu_0 = 111.311297. 150 frames, 4 sqrt(D/g) apart, 8 at 40 T_c, where the bed remembers longer;
+  // T_c = N D/W/mu_0, mu_0 = 111.311297. 300 frames, 4 sqrt(D/g) apart, 8 at 40 T_c, where the bed remembers longer;
   // half as many of the larger beds.
   const Case& c = GetParam();
   const double width = c.disks > 200 ? 20.2 : 10.1;
@@ -55,7 +55,7 @@ TEST_P(ThermometerByFrames, FindsTheBathsTemperature) {
             {{ "stage": "fit", "id": "seen{0}", "from": "found{0}", {5} }},
             {{ "stage": "fit", "id": "simulated{0}", "from": "bed{0}", {5} }})",
         k, k + 1, truth * 1e3, c.temperature < 12 ? "5.25 s" : "2.1 s", c.temperature > 30 ? 140 : 80, fit,
-        c.temperature > 30 ? "21 s" : "10.5 s", c.disks, 3 * width, c.disks > 200 ? 75 : 150);
+        c.temperature > 30 ? "42 s" : "21 s", c.disks, 3 * width, c.disks > 200 ? 150 : 300);
     if (k + 1 < c.beds) stages += ",\n";
   }
   ScratchFolder folder;
