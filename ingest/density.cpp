@@ -94,8 +94,9 @@ Plateau find_plateau(const std::vector<std::vector<double>>& series_by_bin, cons
 }
 
 // The variance of the mean of a series that remembers, from means over overlapping windows [MeketonSchmeiser1984]:
-// three memories long, by which six must fit in, and made larger by what such windows still share, as their halves tell
-// [VatsFlegal2022].
+// three memories long, of which six must fit in, and made larger by what such windows still share, as their halves tell
+// [VatsFlegal2022]. What BlockedCovariance of sim/statistics.hpp does for simulated profiles, which ingest does not
+// see.
 double variance_of_mean(std::vector<double> series) {
   const double n = static_cast<double>(series.size());
   double mean = 0, variance = 0;
