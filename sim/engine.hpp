@@ -25,6 +25,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -96,9 +97,11 @@ class Engine final : public Simulation {
   // --- shells
   void centre_shell(std::uint32_t i);
   void look_round(std::uint32_t i);
-  FloatLanes skins_and_radii(WordLanes ids) const;
+  float reach(std::uint32_t i) const {
+    return static_cast<float>(disks_[i].skin) * static_cast<float>(skin_unit) + static_cast<float>(sizes_.radius(i));
+  }
   void choose_skin(std::uint32_t i);
-  void find_neighbours(std::uint32_t i);
+  std::span<const std::uint32_t> find_neighbours(std::uint32_t i);
   void mark_near_walls(std::uint32_t i);
   void leave_shell(std::uint32_t i);
 
@@ -178,11 +181,10 @@ class Engine final : public Simulation {
   // Of the disk that look_round() was called for: those nearby, and the radius
   // of a shell of its own that would just reach theirs. The arrays are longer
   // than their counts, see compress().
-  LargeVector<std::uint32_t> round_, nearby_;
+  LargeVector<std::uint32_t> nearby_, found_;
   LargeVector<float> reached_by_;
   std::size_t nearby_count_ = 0;
   float shell_slack_ = 0;  // covers the rounding of shells' centres, distances and exit times
-  std::vector<std::uint32_t> found_;
 };
 
 }  // namespace shakebed::sim

@@ -280,81 +280,76 @@ void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
 // just reach theirs.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
-  const std::size_t count = shells_.search(i, round_);
-  if (nearby_.size() < count + inline_neighbours) {
-    nearby_.resize(2 * (count + inline_neighbours));
-    reached_by_.resize(2 * (count + inline_neighbours));
+  const std::size_t most = inline_neighbours * (shells_.most_cells_round() + 1);
+  if (nearby_.size() < most) [[unlikely]] {
+    nearby_.resize(2 * most);
+    reached_by_.resize(2 * most);
   }
   const FloatLanes x = all_floats(disks_[i].shell_x), z = all_floats(disks_[i].shell_z);
   const FloatLanes mine = all_floats(static_cast<float>(sizes_.radius(i)) + shell_slack_);
   const FloatLanes largest = all_floats(static_cast<float>(largest_skin_));
-  const auto me = static_cast<std::int32_t>(i), end = static_cast<std::int32_t>(count);
-  WordLanes place = {0, 1, 2, 3, 4, 5, 6, 7};
-  nearby_count_ = 0;
-  for (std::size_t q = 0; q < count; q += inline_neighbours, place += inline_neighbours) {
-    WordLanes ids = eight_words(&round_[q]);
-    const WordLanes here = place < end;
-    ids &= here;  // what stands behind the last has no meaning
-    const WordLanes xs = gather_lines(&disks_[0].shell_x, ids), zs = gather_lines(&disks_[0].shell_z, ids);
-    FloatLanes dx = reinterpret_cast<FloatLanes>(xs) - x, dz = reinterpret_cast<FloatLanes>(zs) - z;
-    if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
-    if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-    const FloatLanes others = skins_and_radii(ids);
-    const FloatLanes reached_by = sqrt_floats(fused(dx, dx, dz * dz)) - others - mine;
-    const WordLanes near = (reached_by < largest) & (ids != me) & here;
-    nearby_count_ += compress(near, ids, reached_by, &nearby_[nearby_count_], &reached_by_[nearby_count_]);
-  }
-}
-
-// Radius and skin of eight disks, each its sum.
-template <class Space, class Rule, class Sizes>
-FloatLanes Engine<Space, Rule, Sizes>::skins_and_radii(WordLanes ids) const {
-  static_assert(offsetof(Disk, skin) == offsetof(Disk, neighbours) + 3);
-  const WordLanes skins = gather_lines(&disks_[0].neighbours, ids) >> 24 & 255;
-  FloatLanes radii = all_floats(static_cast<float>(sizes_.radius(0)));
-  if constexpr (!Sizes::equal) {
-    for (int k = 0; k < 8; ++k) radii[k] = static_cast<float>(sizes_.radius(static_cast<std::uint32_t>(ids[k])));
-  }
-  return __builtin_convertvector(skins, FloatLanes) * all_floats(static_cast<float>(skin_unit)) + radii;
+  const WordLanes me = all_words(i);
+  const Period across = period_x_, up = period_z_;
+  std::uint32_t* const nearby = nearby_.data();
+  float* const reached = reached_by_.data();
+  std::size_t count = 0;
+  shells_.each_cell_round(i, [&](const Cell& cell) {
+    FloatLanes dx = eight_floats(cell.x.data()) - x, dz = eight_floats(cell.z.data()) - z;
+    if constexpr (Space::wraps_x) dx = across.nearest(dx);
+    if constexpr (Space::wraps_z) dz = up.nearest(dz);
+    const WordLanes ids = eight_words(cell.disk.data());
+    const FloatLanes reached_by = sqrt_floats(fused(dx, dx, dz * dz)) - eight_floats(cell.reach.data()) - mine;
+    const WordLanes near = (reached_by < largest) & (ids != me);
+    count += compress(near, ids, reached_by, nearby + count, reached + count);
+  });
+  nearby_count_ = count;
 }
 
 // The largest shell with which i would have no more than eight neighbours,
-// within bounds.
+// within bounds: it stops short of the ninth nearest.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
-  float skin = static_cast<float>(largest_skin_);
+  constexpr std::size_t usual = 2 * inline_neighbours;
+  const auto most = static_cast<float>(largest_skin_);
+  float skin = most;
   if (nearby_count_ > inline_neighbours) {
-    std::size_t count = nearby_count_;
-    for (; count % inline_neighbours != 0; ++count) reached_by_[count] = skin;
-    FloatLanes least = all_floats(skin);
-    for (std::size_t q = 0; q < count; q += inline_neighbours) {
-      FloatLanes mine;
-      std::memcpy(&mine, &reached_by_[q], sizeof mine);
+    float* const reached = reached_by_.data();
+    const std::size_t blocks = (nearby_count_ + inline_neighbours - 1) / inline_neighbours;
+    for (std::size_t k = nearby_count_; k < usual || k < blocks * inline_neighbours; ++k) reached[k] = most;
+    // Of those before which fewer than eight stand none is the ninth; the nearest of the others is.
+    FloatLanes ninth = all_floats(most);
+    const auto nearest_but_eight = [&](std::size_t q, std::size_t count) {
+      const FloatLanes mine = eight_floats(reached + q);
       WordLanes nearer{};
-      for (std::size_t k = 0; k < count; ++k) nearer -= all_floats(reached_by_[k]) < mine;
-      least = smaller(least, select(nearer < static_cast<std::int32_t>(inline_neighbours), least, mine));
+#pragma GCC unroll 16
+      for (std::size_t k = 0; k < count; ++k) nearer -= all_floats(reached[k]) < mine;
+      ninth = smaller(ninth, select(nearer < static_cast<std::int32_t>(inline_neighbours), ninth, mine));
+    };
+    if (blocks == 2) [[likely]] {
+      nearest_but_eight(0, usual);
+      nearest_but_eight(inline_neighbours, usual);
+    } else {
+      for (std::size_t q = 0; q < blocks; ++q) nearest_but_eight(q * inline_neighbours, blocks * inline_neighbours);
     }
-    for (int k = 0; k < 8; ++k) skin = std::min(skin, least[k]);
-    skin = std::max(skin, static_cast<float>(smallest_skin_));
+    skin = std::max(smallest_of(ninth), static_cast<float>(smallest_skin_));
   }
   disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit));
 }
 
-// Fills found_ with those of nearby_ that i's shell reaches.
+// Those of nearby_ that i's shell reaches.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
+std::span<const std::uint32_t> Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
   const FloatLanes skin = all_floats(static_cast<float>(disks_[i].skin * skin_unit));
+  if (found_.size() < nearby_.size()) found_.resize(nearby_.size());
   const auto end = static_cast<std::int32_t>(nearby_count_);
-  found_.resize(nearby_count_ + inline_neighbours);
   WordLanes place = {0, 1, 2, 3, 4, 5, 6, 7};
   std::size_t found = 0;
   for (std::size_t q = 0; q < nearby_count_; q += inline_neighbours, place += inline_neighbours) {
-    FloatLanes mine;
-    std::memcpy(&mine, &reached_by_[q], sizeof mine);
+    const FloatLanes mine = eight_floats(&reached_by_[q]);
     const WordLanes near = (mine < skin) & (place < end);
     found += compress(near, eight_words(&nearby_[q]), mine, &found_[found], &reached_by_[found]);
   }
-  found_.resize(found);
+  return {found_.data(), found};
 }
 
 // Notes which walls the disk could touch from its shell.
@@ -377,12 +372,11 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
   shells_.unfile(i);
   centre_shell(i);
-  shells_.file(i);
   look_round(i);
   choose_skin(i);
+  shells_.file(i, reach(i));
   mark_near_walls(i);
-  find_neighbours(i);
-  shells_.relist(i, found_);
+  shells_.relist(i, find_neighbours(i));
 }
 
 // ------------------------------------------------------------------------------------------------
@@ -888,11 +882,10 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average; a bed under gravity
-  // has a gas above it, where larger ones save work.
-  const double density = count_ / (width_ * height);
-  largest_skin_ = std::clamp(0.5 * (std::sqrt(8.3 / (std::numbers::pi * density)) - 1), 0.25, 1.5);
-  if constexpr (Space::falls) largest_skin_ = std::max(largest_skin_, 0.5);
+  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average. A bed under gravity
+  // is denser where most of its contacts are than on the average; with as large ones its lists overflow there.
+  const double density = count_ / (width_ * height), neighbours = Space::falls ? 6.2 : 8.3;
+  largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
   // Two disks that stay in their shells must not come near a second image of each other.
   if constexpr (Space::wraps_x) {
     if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact) / 4);
@@ -905,17 +898,17 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   for (std::uint32_t i = 0; i < count_; ++i) {
     centre_shell(i);
     disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
-    shells_.file(i);
+    shells_.file(i, reach(i));
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     look_round(i);
     choose_skin(i);
+    shells_.set_reach(i, reach(i));
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     mark_near_walls(i);
     look_round(i);
-    find_neighbours(i);
-    shells_.list(i, found_);
+    shells_.list(i, find_neighbours(i));
   }
   predict_all();
 }

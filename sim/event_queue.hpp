@@ -43,7 +43,7 @@ class EventQueue {
     ring_.resize(places);
     held_.resize(places);
     further_.resize(places);
-    grow(256);
+    grow(128);
     clear(start, events_a_time / events_a_bucket);
   }
 

@@ -1,6 +1,7 @@
 #include "sim/floor.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -88,7 +89,9 @@ FloorMotion::FloorMotion(const SinusoidalFloor& floor)
       highest_(std::abs(floor.amplitude)),
       lowest_(-std::abs(floor.amplitude)),
       largest_acceleration_(std::abs(floor.amplitude) * angular_frequency_ * angular_frequency_),
-      largest_jerk_(largest_acceleration_ * angular_frequency_) {}
+      largest_jerk_(largest_acceleration_ * angular_frequency_) {
+  note_ceilings(largest_acceleration_);
+}
 
 FloorMotion::FloorMotion(const TabulatedFloor& floor)
     : kind_(Kind::tabulated),
@@ -108,6 +111,33 @@ FloorMotion::FloorMotion(const TabulatedFloor& floor)
     const double change = curvatures_[(i + 1) % curvatures_.size()] - curvatures_[i];
     largest_jerk_ = std::max(largest_jerk_, std::abs(change) / spacing_);
   }
+  note_ceilings(curvature);
+}
+
+void FloorMotion::note_ceilings(double largest_curvature) {
+  const double part = period_ / parts;
+  const double bulge = part * part / 8 * largest_curvature;  // out of the span of its ends, at most
+  parts_a_time_ = parts / period_;
+  ceilings_.resize(static_cast<std::size_t>(levels * parts));
+  const auto at = [&](std::int64_t level, std::int64_t k) -> double& {
+    return ceilings_[static_cast<std::size_t>(level * parts + k % parts)];
+  };
+  for (std::int64_t k = 0; k < parts; ++k)
+    at(0, k) = std::max(position(part * static_cast<double>(k)), position(part * static_cast<double>(k + 1))) + bulge;
+  for (std::int64_t level = 1; level < levels; ++level) {
+    for (std::int64_t k = 0; k < parts; ++k)
+      at(level, k) = std::max(at(level - 1, k), at(level - 1, k + (std::int64_t{1} << (level - 1))));
+  }
+}
+
+double FloorMotion::ceiling(double now, double horizon) const {
+  constexpr double rounding = 1e-6;  // of a part
+  if (!(horizon * parts_a_time_ < 14)) return highest_;
+  const auto first = static_cast<std::int64_t>(std::floor(now * parts_a_time_ - rounding));
+  const auto last = static_cast<std::int64_t>(std::floor((now + horizon) * parts_a_time_ + rounding));
+  const std::int64_t level = std::bit_width(static_cast<std::uint64_t>(last - first + 1)) - 1;
+  const auto at = [&](std::int64_t k) { return ceilings_[static_cast<std::size_t>(level * parts + k % parts)]; };
+  return std::max(at(first + parts), at(last - (std::int64_t{1} << level) + 1 + parts));
 }
 
 FloorMotion::Motion FloorMotion::motion(double now, double later) const {
@@ -143,6 +173,8 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
     return t <= horizon ? t : never;
   }
   if (gravity == 0 && bottom > highest_ && vz >= 0) return never;
+  // Most points are far from the floor all the while, as far as it can rise until then. A flight is lowest at an end.
+  if (std::min(bottom, bottom + (vz - 0.5 * gravity * horizon) * horizon) > ceiling(now, horizon)) return never;
   double t = bottom > highest_ ? time_to_fall(bottom - highest_, vz, gravity) : 0;
   const double largest_bend = gravity + largest_acceleration_;
   while (t <= horizon) {

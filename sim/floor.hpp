@@ -2,6 +2,7 @@
 // a disk in free flight next meets it. Reduced units.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 namespace shakebed::sim {
@@ -51,12 +52,18 @@ class FloorMotion {
     double position, velocity, acceleration;
   };
   Motion motion(double now, double later) const;  // at now + later, whose rounding does not count
+  void note_ceilings(double largest_curvature);
+  double ceiling(double now, double horizon) const;  // no position from now to now + horizon lies above
 
   Kind kind_ = Kind::still;
   double amplitude_ = 0, frequency_ = 0, angular_frequency_ = 0, period_ = 1;
   double highest_ = 0, lowest_ = 0, largest_acceleration_ = 0, largest_jerk_ = 0;
   std::vector<double> heights_, curvatures_;  // spline knots: value and second derivative
   double spacing_ = 0;
+  // No position in 2^level of the parts of a period, from part k on, lies above ceilings_[level * parts + k].
+  static constexpr std::int64_t parts = 64, levels = 5;
+  std::vector<double> ceilings_;
+  double parts_a_time_ = 0;
 };
 
 }  // namespace shakebed::sim

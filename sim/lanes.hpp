@@ -114,9 +114,15 @@ inline unsigned bits_of(WordLanes mask) {
   return bits;
 #endif
 }
+inline WordLanes all_words(std::uint32_t value) { return WordLanes{} + static_cast<std::int32_t>(value); }
 inline WordLanes eight_words(const std::uint32_t* words) {
   WordLanes lanes;
   std::memcpy(&lanes, words, sizeof lanes);
+  return lanes;
+}
+inline FloatLanes eight_floats(const float* floats) {
+  FloatLanes lanes;
+  std::memcpy(&lanes, floats, sizeof lanes);
   return lanes;
 }
 // Bit k set where words[k] == value, k = 0 to 7.
@@ -137,12 +143,21 @@ inline FloatLanes select(WordLanes mask, FloatLanes if_true, FloatLanes if_false
   return reinterpret_cast<FloatLanes>((reinterpret_cast<WordLanes>(if_true) & mask) |
                                       (reinterpret_cast<WordLanes>(if_false) & ~mask));
 }
+inline WordLanes select(WordLanes mask, WordLanes if_true, WordLanes if_false) {
+  return (if_true & mask) | (if_false & ~mask);
+}
 inline FloatLanes smaller(FloatLanes a, FloatLanes b) {
 #if defined(__AVX__)
   return _mm256_min_ps(a, b);
 #else
   return select(a < b, a, b);
 #endif
+}
+inline float smallest_of(FloatLanes a) {
+  a = smaller(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
+  a = smaller(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
+  a = smaller(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
+  return a[0];
 }
 inline FloatLanes sqrt_floats(FloatLanes value) {
 #if defined(__AVX__)
@@ -158,21 +173,6 @@ inline FloatLanes fused(FloatLanes a, FloatLanes b, FloatLanes c) {
 #else
   for (int k = 0; k < 8; ++k) c[k] = std::fma(a[k], b[k], c[k]);
   return c;
-#endif
-}
-// The words at base + 64 place[k] bytes, k = 0 to 7.
-inline WordLanes gather_lines(const void* base, WordLanes place) {
-#if defined(__AVX2__)
-  const __m256i index = _mm256_slli_epi32(reinterpret_cast<__m256i>(place), 3);
-  return reinterpret_cast<WordLanes>(_mm256_i32gather_epi32(static_cast<const int*>(base), index, 8));
-#else
-  WordLanes words;
-  for (int k = 0; k < 8; ++k) {
-    std::int32_t word;
-    std::memcpy(&word, static_cast<const char*>(base) + 64 * static_cast<std::ptrdiff_t>(place[k]), sizeof word);
-    words[k] = word;
-  }
-  return words;
 #endif
 }
 // Writes the lanes whose mask is set, in order, to the start of out; all eight

@@ -16,6 +16,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <span>
 #include <vector>
 
 #include "sim/disk.hpp"
@@ -29,6 +31,37 @@ inline constexpr std::uint32_t inline_neighbours = 8;
 struct alignas(32) NeighbourBlock {
   std::array<std::uint32_t, inline_neighbours> disk;
 };
+
+// One cell of the grid: shells whose centres are in it, all that a search asks of them.
+inline constexpr std::uint32_t nobody_here = 0xffffffff;
+struct alignas(64) Cell {
+  static constexpr unsigned places = 7, all_places = (1u << places) - 1;
+  alignas(32) std::array<float, 8> x{}, z{};  // the shells' centres
+  std::array<float, 8> reach;                 // radius of shell and disk together; of an empty place -infinity
+  std::array<std::uint32_t, 8> disk;          // whose they are; the last word is next()
+
+  Cell() {
+    reach.fill(-std::numeric_limits<float>::infinity());
+    disk.fill(nobody_here);
+    next() = 0;
+  }
+  // Where the shells are that had no room here, 0 for nowhere.
+  std::uint32_t& next() { return disk[places]; }
+  std::uint32_t next() const { return disk[places]; }
+  // Bit k is set where disk[k] == i.
+  unsigned places_of(std::uint32_t i) const { return equal_words(disk.data(), i) & all_places; }
+  void put(unsigned place, std::uint32_t i, const Disk& record, float reach_of_i) {
+    x[place] = record.shell_x;
+    z[place] = record.shell_z;
+    reach[place] = reach_of_i;
+    disk[place] = i;
+  }
+  void clear(unsigned place) {
+    reach[place] = -std::numeric_limits<float>::infinity();
+    disk[place] = nobody_here;
+  }
+};
+static_assert(sizeof(Cell) == 128);
 
 class NeighbourShells {
  public:
@@ -70,69 +103,62 @@ class NeighbourShells {
     for (std::uint32_t place = 0; place < neighbours; ++place) visit(*slot(i, place));
   }
 
-  void file(std::uint32_t i) {
-    Cell& cell = cells_[cell_of(disks_[i])];
-    if (cell.held == disks_a_cell) [[unlikely]]
-      make_room(cell);
-    cell.disk[cell.held++] = i;
+  // Files i's shell; reach: the shell's radius and the disk's own.
+  void file(std::uint32_t i, float reach) {
+    Cell* cell = &cells_[cell_of(disks_[i])];
+    unsigned empty = cell->places_of(nobody_here);
+    if (empty == 0) [[unlikely]] {
+      make_room(*cell);
+      empty = cell->places_of(nobody_here);
+    }
+    cell->put(static_cast<unsigned>(__builtin_ctz(empty)), i, disks_[i], reach);
   }
   // To be called while the record still holds the old centre.
   void unfile(std::uint32_t i) {
-    Cell& cell = cells_[cell_of(disks_[i])];
-    std::uint32_t* here = find(cell, i);
-    for (std::uint32_t next = cell.next; here == nullptr; next = crowded_[next].next) here = find(crowded_[next], i);
-    *here = cell.disk[--cell.held];
-    if (cell.held == 0 && cell.next != 0) [[unlikely]]
+    const std::size_t home = cell_of(disks_[i]);
+    Cell& cell = *holder(home, i);
+    cell.clear(static_cast<unsigned>(__builtin_ctz(cell.places_of(i))));
+    if (cell.next() != 0 && cell.places_of(nobody_here) == Cell::all_places) [[unlikely]]
       take_back(cell);
   }
-  std::size_t cell_of(const Disk& disk) const {
-    const int column = wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_);
-    const int row = wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_);
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
+  void set_reach(std::uint32_t i, float reach) {
+    Cell& cell = *holder(cell_of(disks_[i]), i);
+    cell.reach[static_cast<unsigned>(__builtin_ctz(cell.places_of(i)))] = reach;
   }
-
-  // Writes down every disk, itself too, whose shell's centre may be within
-  // reach of i's, and how many they are. found grows as needed; behind the last
-  // stand seven more words or so of no meaning.
-  std::size_t search(std::uint32_t i, LargeVector<std::uint32_t>& found) const {
-    const Disk& disk = disks_[i];
-    const int column = wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_);
-    const int row = wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_);
-    if (found.size() < 16 * disks_a_cell) found.resize(16 * disks_a_cell);
-    std::size_t count = 0;
-    const auto take = [&](int r, int c) {
-      const Cell& cell =
-          cells_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c)];
-      std::memcpy(&found[count], cell.disk.data(), sizeof cell.disk);
-      count += cell.held;
-      for (std::uint32_t next = cell.next; next != 0; next = crowded_[next].next) {
-        if (found.size() < count + 12 * disks_a_cell) found.resize(2 * found.size());
-        std::memcpy(&found[count], crowded_[next].disk.data(), sizeof cell.disk);
-        count += crowded_[next].held;
-      }
-    };
-    if (columns_ >= 3 && rows_ >= 3) [[likely]] {
-      const std::array<int, 3> rows = {row == 0 ? rows_ - 1 : row - 1, row, row + 1 == rows_ ? 0 : row + 1};
-      const std::array<int, 3> columns = {column == 0 ? columns_ - 1 : column - 1, column,
-                                          column + 1 == columns_ ? 0 : column + 1};
-#pragma GCC unroll 3
-      for (int r = 0; r < 3; ++r) {
-#pragma GCC unroll 3
-        for (int c = 0; c < 3; ++c) take(rows[static_cast<std::size_t>(r)], columns[static_cast<std::size_t>(c)]);
-      }
-    } else {  // the same cell must not be met twice
-      const int across = std::min(columns_, 3), along = std::min(rows_, 3);
-      for (int r = 0; r < along; ++r) {
-        for (int c = 0; c < across; ++c)
-          take(rows_ >= 3 ? wrap(row + r - 1, rows_) : r, columns_ >= 3 ? wrap(column + c - 1, columns_) : c);
+  // Calls visit(cell) for the cells that hold every shell whose centre may be within reach of i's, i's own too if
+  // filed.
+  template <class Visit>
+  [[gnu::always_inline]] void each_cell_round(std::uint32_t i, Visit visit) const {
+    const int column = column_of(disks_[i]), row = row_of(disks_[i]);
+    std::array<int, 3> rows = {row == 0 ? rows_ - 1 : row - 1, row, row + 1 == rows_ ? 0 : row + 1};
+    std::array<int, 3> columns = {column == 0 ? columns_ - 1 : column - 1, column,
+                                  column + 1 == columns_ ? 0 : column + 1};
+    std::size_t along = 3, across = 3;
+    if (columns_ < 3 || rows_ < 3) [[unlikely]] {  // the same cell must not be met twice
+      if (rows_ < 3) rows = {0, 1, 2};
+      if (columns_ < 3) columns = {0, 1, 2};
+      along = static_cast<std::size_t>(std::min(rows_, 3));
+      across = static_cast<std::size_t>(std::min(columns_, 3));
+    }
+    for (std::size_t r = 0; r < along; ++r) {
+      const Cell* first = &cells_[static_cast<std::size_t>(rows[r]) * static_cast<std::size_t>(columns_)];
+      for (std::size_t c = 0; c < across; ++c) {
+        const Cell* cell = first + columns[c];
+        for (;;) {
+          visit(*cell);
+          if (cell->next() == 0) [[likely]]
+            break;
+          cell = &crowded_[cell->next()];
+        }
       }
     }
-    return count;
   }
+  // No more cells than that are visited.
+  std::size_t most_cells_round() const { return 9 + crowded_.size(); }
 
   // Makes neighbours of i and those `found` whose number is lower, in both their lists: by rounding the two might not
   // agree whether they reach each other, so the higher one decides for both.
-  void list(std::uint32_t i, const std::vector<std::uint32_t>& found) {
+  void list(std::uint32_t i, std::span<const std::uint32_t> found) {
     for (std::uint32_t k : found) {
       if (k > i) continue;
       append(i, k);
@@ -140,11 +166,13 @@ class NeighbourShells {
     }
   }
   // Gives i exactly the neighbours `found`, and mends the lists of those that
-  // it lost or won.
-  void relist(std::uint32_t i, const std::vector<std::uint32_t>& found) {
+  // it lost or won. Behind the last of `found` stand words that may be read.
+  void relist(std::uint32_t i, std::span<const std::uint32_t> found) {
     alignas(32) std::array<std::uint32_t, inline_neighbours> first;
-    first.fill(sentinel_);
-    std::copy_n(found.begin(), std::min<std::size_t>(found.size(), inline_neighbours), first.begin());
+    const WordLanes places = {0, 1, 2, 3, 4, 5, 6, 7};
+    const WordLanes filled =
+        select(places < static_cast<std::int32_t>(found.size()), eight_words(found.data()), all_words(sentinel_));
+    std::memcpy(first.data(), &filled, sizeof first);
     const std::uint32_t old_count = disks_[i].neighbours;
     if (std::max<std::size_t>(old_count, found.size()) <= inline_neighbours) [[likely]] {
       const NeighbourBlock old = lists_[i];
@@ -183,35 +211,34 @@ class NeighbourShells {
   }
 
  private:
-  static constexpr std::uint32_t disks_a_cell = 6;
-  struct alignas(32) Cell {
-    std::array<std::uint32_t, disks_a_cell> disk{};
-    std::uint32_t held = 0,
-                  next = 0;  // disks here; where in crowded_ the others are, 0 for nowhere
-  };
-
-  static std::uint32_t* find(Cell& cell, std::uint32_t i) {
-    for (std::uint32_t k = 0; k < cell.held; ++k) {
-      if (cell.disk[k] == i) return &cell.disk[k];
-    }
-    return nullptr;
+  int column_of(const Disk& disk) const { return wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_); }
+  int row_of(const Disk& disk) const { return wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_); }
+  std::size_t cell_of(const Disk& disk) const {
+    return static_cast<std::size_t>(row_of(disk)) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column_of(disk));
+  }
+  // The cell, among those that share a place in the grid, where i stands.
+  Cell* holder(std::size_t home, std::uint32_t i) {
+    Cell* cell = &cells_[home];
+    while (cell->places_of(i) == 0) cell = &crowded_[cell->next()];
+    return cell;
   }
   [[gnu::noinline]] void make_room(Cell& cell) {
     std::uint32_t place = free_cell_;
     if (place != 0) {
-      free_cell_ = crowded_[place].next;
+      free_cell_ = crowded_[place].next();
     } else {
       place = static_cast<std::uint32_t>(crowded_.size());
       crowded_.emplace_back();
     }
     crowded_[place] = cell;
-    cell.held = 0;
-    cell.next = place;
+    cell = Cell{};
+    cell.next() = place;
   }
   [[gnu::noinline]] void take_back(Cell& cell) {
-    const std::uint32_t place = cell.next;
+    const std::uint32_t place = cell.next();
     cell = crowded_[place];
-    crowded_[place].next = free_cell_;
+    crowded_[place].next() = free_cell_;
     free_cell_ = place;
   }
 

@@ -1,13 +1,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "sim/neighbour_shells.hpp"
+#include "sim/random.hpp"
 #include "sim/simulation.hpp"
 
 namespace shakebed::sim {
@@ -217,20 +221,59 @@ TEST(NeighbourShells, AreAlwaysMutual) {
   std::vector<Disk> disks(4);
   NeighbourShells shells;
   shells.reset(disks.data(), 3, 1.5, 30, 30);
-  for (std::uint32_t i = 0; i < 3; ++i) shells.file(i);
+  for (std::uint32_t i = 0; i < 3; ++i) shells.file(i, 0.75f);
   const auto neighbours = [&](std::uint32_t i) {
     std::vector<std::uint32_t> found;
     shells.each_neighbour(i, [&](std::uint32_t k) { found.push_back(k); });
     return found;
   };
-  shells.list(0, {2});
-  shells.list(1, {0});
+  const std::array<std::uint32_t, inline_neighbours> two = {2}, zero = {0};
+  shells.list(0, {two.data(), 1});
+  shells.list(1, {zero.data(), 1});
   shells.list(2, {});
   EXPECT_THAT(neighbours(0), testing::ElementsAre(1));
   EXPECT_THAT(neighbours(1), testing::ElementsAre(0));
   EXPECT_THAT(neighbours(2), testing::IsEmpty());
-  shells.relist(0, {});
+  shells.relist(0, {zero.data(), 0});
   EXPECT_THAT(neighbours(1), testing::IsEmpty());
+}
+
+// A hundred shells with one centre: their cell has no room for all, and lends and takes back further ones.
+TEST(NeighbourShells, FindsWhatACellHasNoRoomFor) {
+  constexpr std::uint32_t count = 100;
+  std::vector<Disk> disks(count + 1);
+  NeighbourShells shells;
+  shells.reset(disks.data(), count, 1.5, 30, 30);
+  const auto found = [&] {
+    std::vector<std::uint32_t> ids;
+    shells.each_cell_round(0, [&](const Cell& cell) {
+      for (unsigned place = 0; place < Cell::places; ++place) {
+        EXPECT_EQ(std::isfinite(cell.reach[place]), cell.disk[place] != nobody_here);
+        if (cell.disk[place] != nobody_here) ids.push_back(cell.disk[place]);
+      }
+    });
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  };
+  std::vector<std::uint32_t> filed;
+  const auto file = [&](std::uint32_t i) {
+    shells.file(i, 0.75f);
+    filed.insert(std::lower_bound(filed.begin(), filed.end(), i), i);
+  };
+  const auto unfile = [&](std::uint32_t i) {
+    shells.unfile(i);
+    filed.erase(std::lower_bound(filed.begin(), filed.end(), i));
+  };
+  for (std::uint32_t i = 0; i < count; ++i) file(i);
+  EXPECT_EQ(found(), filed);
+  Random random(5);
+  for (int round = 0; round < 2000; ++round) {
+    const std::uint32_t i = random.below(count);
+    std::binary_search(filed.begin(), filed.end(), i) ? unfile(i) : file(i);
+    ASSERT_EQ(found(), filed) << round;
+  }
+  while (!filed.empty()) unfile(filed.front());
+  EXPECT_THAT(found(), testing::IsEmpty());
 }
 
 // The queue's buckets follow a rate of events that changes a million times over.

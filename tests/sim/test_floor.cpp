@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "sim/contact_time.hpp"
@@ -96,6 +97,32 @@ TEST(MovingFloor, TellsAGrazingHitFromAMiss) {
     }
     EXPECT_EQ(first(high + lift), never);
     EXPECT_LT(first(high - lift), 0.3);
+  }
+}
+
+// Searches that end early, because the floor cannot rise so far until then, find what the endless one finds.
+TEST(MovingFloor, IsMetWithinAnyHorizonThatHoldsTheContact) {
+  TabulatedFloor table{1.7, {}};
+  Random random(11);
+  for (int k = 0; k < 24; ++k) table.heights.push_back(random.uniform());
+  for (const FloorMotion& floor : {FloorMotion(SinusoidalFloor{0.84, 0.35}), FloorMotion(table)}) {
+    int within = 0, beyond = 0;
+    for (int flight = 0; flight < 100'000; ++flight) {
+      const double now = 64 * random.uniform(), bottom = floor.position(now) + 0.3 * random.uniform(),
+                   vz = floor.velocity(now) + 4 * (random.uniform() - 0.5);
+      const double contact = floor.time_to_contact(bottom, vz, 1, now, never);
+      ASSERT_LT(contact, never);
+      const double horizon = floor.period() * std::exp(-6 * random.uniform());
+      if (contact <= horizon) {
+        ++within;
+        ASSERT_EQ(floor.time_to_contact(bottom, vz, 1, now, horizon), contact) << "horizon " << horizon;
+      } else {
+        ++beyond;
+        ASSERT_EQ(floor.time_to_contact(bottom, vz, 1, now, horizon), never) << "horizon " << horizon;
+      }
+    }
+    EXPECT_GT(within, 10'000);
+    EXPECT_GT(beyond, 10'000);
   }
 }
 
