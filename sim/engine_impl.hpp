@@ -382,13 +382,21 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
 // ------------------------------------------------------------------------------------------------
 // the loop
 
-// Fetches the neighbours of disks that will collide soon. To be inlined: of a function that only fetches, the compiler
-// would think that it does nothing, and leave out the call.
+// Fetches what will be asked for soon: the neighbours of disks that will collide, the cells round one that leaves its
+// shell. To be inlined: of a function that only fetches, the compiler would think that it does nothing, and leave out
+// the call.
 template <class Space, class Rule, class Sizes>
 [[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_neighbours_of_upcoming() const {
   std::uint32_t a, b;
   if (!queue_.upcoming(a, b)) return;
   for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
+  if (a == b) [[unlikely]] {
+    shells_.each_place_round(a, [](const Cell& cell) {
+      __builtin_prefetch(&cell);
+      __builtin_prefetch(&cell.reach);
+    });
+    return;
+  }
   for (std::uint32_t neighbour : shells_.first_block(b).disk) __builtin_prefetch(&disks_[neighbour]);
 }
 

@@ -135,7 +135,7 @@ double FloorMotion::ceiling(double now, double horizon) const {
   if (!(horizon * parts_a_time_ < 14)) return highest_;
   const auto first = static_cast<std::int64_t>(std::floor(now * parts_a_time_ - rounding));
   const auto last = static_cast<std::int64_t>(std::floor((now + horizon) * parts_a_time_ + rounding));
-  const std::int64_t level = std::bit_width(static_cast<std::uint64_t>(last - first + 1)) - 1;
+  const auto level = static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(last - first + 1))) - 1;
   const auto at = [&](std::int64_t k) { return ceilings_[static_cast<std::size_t>(level * parts + k % parts)]; };
   return std::max(at(first + parts), at(last - (std::int64_t{1} << level) + 1 + parts));
 }

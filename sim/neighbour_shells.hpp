@@ -125,10 +125,10 @@ class NeighbourShells {
     Cell& cell = *holder(cell_of(disks_[i]), i);
     cell.reach[static_cast<unsigned>(__builtin_ctz(cell.places_of(i)))] = reach;
   }
-  // Calls visit(cell) for the cells that hold every shell whose centre may be within reach of i's, i's own too if
-  // filed.
+  // Calls visit(cell) for the places of the grid where every shell stands whose centre may be within reach of i's, i's
+  // own too if filed.
   template <class Visit>
-  [[gnu::always_inline]] void each_cell_round(std::uint32_t i, Visit visit) const {
+  [[gnu::always_inline]] void each_place_round(std::uint32_t i, Visit visit) const {
     const int column = column_of(disks_[i]), row = row_of(disks_[i]);
     std::array<int, 3> rows = {row == 0 ? rows_ - 1 : row - 1, row, row + 1 == rows_ ? 0 : row + 1};
     std::array<int, 3> columns = {column == 0 ? columns_ - 1 : column - 1, column,
@@ -142,16 +142,19 @@ class NeighbourShells {
     }
     for (std::size_t r = 0; r < along; ++r) {
       const Cell* first = &cells_[static_cast<std::size_t>(rows[r]) * static_cast<std::size_t>(columns_)];
-      for (std::size_t c = 0; c < across; ++c) {
-        const Cell* cell = first + columns[c];
-        for (;;) {
-          visit(*cell);
-          if (cell->next() == 0) [[likely]]
-            break;
-          cell = &crowded_[cell->next()];
-        }
-      }
+      for (std::size_t c = 0; c < across; ++c) visit(first[columns[c]]);
     }
+  }
+  // The same for those that had no room there, too.
+  template <class Visit>
+  [[gnu::always_inline]] void each_cell_round(std::uint32_t i, Visit visit) const {
+    each_place_round(i, [&](const Cell& place) {
+      for (const Cell* cell = &place;; cell = &crowded_[cell->next()]) {
+        visit(*cell);
+        if (cell->next() == 0) [[likely]]
+          break;
+      }
+    });
   }
   // No more cells than that are visited.
   std::size_t most_cells_round() const { return 9 + crowded_.size(); }
