@@ -221,7 +221,9 @@ FrameAverage average_frames(const ProfileFrames& frames, int block = 1);
 // [Sokal1997] of the area-weighted height (errors of the mean are then some 6 % too small at most), at least 1.
 int independent_block(const ProfileFrames& frames);
 
-// Bootstrap over blocks of frames: refits resampled means (diagonal errors of the whole sample).
+// Bootstrap over blocks of frames: refits resampled means (diagonal errors of the whole sample). They are spread as
+// means of other films would be, not as blocks that share some memory are, and intervals are those of few blocks
+// (Student).
 struct BootstrapOptions {
   int resamples = 200;
   int block = 0;  // 0: independent_block
@@ -234,7 +236,7 @@ struct BootstrapResult {
   int block = 1;
   int succeeded = 0;  // of the resamples
   Estimate temperature, shift;
-  Interval temperature_interval, shift_interval;  // percentiles
+  Interval temperature_interval, shift_interval;  // from percentiles
   std::vector<double> temperatures;               // sorted
 };
 BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& options,

@@ -1,3 +1,5 @@
+#include <gsl/gsl_cdf.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -51,6 +53,79 @@ Eigen::MatrixXd block_means(const ProfileFrames& frames, int block) {
   return means;
 }
 
+// The area-weighted height of each frame, from its mean.
+std::vector<double> heights_of(const ProfileFrames& frames) {
+  const std::size_t bins = frames.height.size(), count = frames.frames();
+  std::vector<double> series(count, 0.0);
+  double mean = 0.0;
+  for (std::size_t f = 0; f < count; ++f) {
+    for (std::size_t i = 0; i < bins; ++i) series[f] += frames.height[i] * frames.number_density[f * bins + i];
+    mean += series[f] / static_cast<double>(count);
+  }
+  for (double& x : series) x -= mean;
+  return series;
+}
+
+// 1 + 2 sum of the correlations, summed to five times itself [Sokal1997]; 1 where there is too little to tell.
+double memory_of(const std::vector<double>& series) {
+  double variance = 0.0;
+  for (const double x : series) variance += x * x;
+  if (series.size() < 8 || !(variance > 0.0)) return 1.0;
+  double inefficiency = 1.0;
+  for (std::size_t lag = 1; lag < series.size() / 4; ++lag) {
+    double correlation = 0.0;
+    for (std::size_t f = 0; f + lag < series.size(); ++f) correlation += series[f] * series[f + lag];
+    inefficiency += 2.0 * correlation / variance;
+    if (static_cast<double>(lag) >= 5.0 * inefficiency) break;
+  }
+  return inefficiency;
+}
+
+// How much further from the whole sample's mean than means of resampled blocks are, the means of other films would be.
+// Blocks with memory share some of it and are few; means over overlapping windows three memories long
+// [MeketonSchmeiser1984], with what such windows still share, as their halves tell [VatsFlegal2022], miss less.
+// degrees: of freedom of that, about.
+struct Widening {
+  double factor = 1.0, degrees = 1e6;
+};
+Widening widening_of(const std::vector<double>& series, int block) {
+  const std::size_t blocks = series.size() / static_cast<std::size_t>(block);
+  const auto m = static_cast<double>(blocks), n = static_cast<double>(series.size());
+  double resampled = 0.0, centre = 0.0;  // variance of a mean of as many blocks drawn with replacement
+  std::vector<double> means(blocks, 0.0);
+  for (std::size_t b = 0; b < blocks; ++b) {
+    for (std::size_t f = 0; f < static_cast<std::size_t>(block); ++f)
+      means[b] += series[b * static_cast<std::size_t>(block) + f] / block;
+    centre += means[b] / m;
+  }
+  for (const double mean : means) resampled += (mean - centre) * (mean - centre) / (m * m);
+  if (!(resampled > 0.0)) return {};
+  Widening widening;
+  widening.degrees = m - 1.0;
+  double variance = resampled * m / (m - 1.0);
+  const double memory = memory_of(series);
+  if (block > 1 && memory >= 1.2 && series.size() >= 24) {
+    const auto by_windows = [&](std::size_t window) {
+      const auto w = static_cast<double>(window);
+      double sum = 0.0, squares = 0.0;
+      for (std::size_t f = 0; f < series.size(); ++f) {
+        sum += series[f];
+        if (f + 1 < window) continue;
+        squares += sum * sum;
+        sum -= series[f + 1 - window];
+      }
+      return squares / (w * (n - w) * (n - w + 1.0));
+    };
+    const std::size_t half = std::min(static_cast<std::size_t>(std::ceil(1.5 * memory)), series.size() / 12);
+    const double whole = by_windows(2 * half), halves = by_windows(half);
+    variance = whole * std::max(1.0, 2.0 - halves / whole);
+    // Overlapping windows tell half as much again as those side by side; the correction costs as much as it mends.
+    widening.degrees = 1.5 * (n / static_cast<double>(2 * half) - 1.0) / 2.0;
+  }
+  widening.factor = std::sqrt(std::max(variance / resampled, 1.0));
+  return widening;
+}
+
 // An even number below `count` from a 64-bit generator, the same on every platform.
 std::size_t below(std::mt19937_64& generator, std::size_t count) {
   const std::uint64_t limit = (~std::uint64_t{0}) - (~std::uint64_t{0}) % count;
@@ -94,33 +169,11 @@ FrameAverage average_frames(const ProfileFrames& frames, int block) {
 int independent_block(const ProfileFrames& frames) {
   std::string message;
   if (!shape_is_good(frames, message)) return 1;
-  const std::size_t bins = frames.height.size();
-  const std::size_t count = frames.frames();
-  if (count < 8) return 1;
-  std::vector<double> series(count, 0.0);
-  for (std::size_t f = 0; f < count; ++f) {
-    for (std::size_t i = 0; i < bins; ++i) series[f] += frames.height[i] * frames.number_density[f * bins + i];
-  }
-  double mean = 0.0;
-  for (const double x : series) mean += x / static_cast<double>(count);
-  double variance = 0.0;
-  for (double& x : series) {
-    x -= mean;
-    variance += x * x;
-  }
-  if (!(variance > 0.0)) return 1;
-  // 1 + 2 sum of the correlations, summed to five times itself [Sokal1997].
-  double inefficiency = 1.0;
-  for (std::size_t lag = 1; lag < count / 4; ++lag) {
-    double correlation = 0.0;
-    for (std::size_t f = 0; f + lag < count; ++f) correlation += series[f] * series[f + lag];
-    inefficiency += 2.0 * correlation / variance;
-    if (static_cast<double>(lag) >= 5.0 * inefficiency) break;
-  }
+  const double inefficiency = memory_of(heights_of(frames));
   if (inefficiency < 1.2) return 1;
   // A block of b frames with memory misses about 2 x memory/b of the variance of the mean.
   const int block = static_cast<int>(std::ceil(4.0 * inefficiency));
-  return std::clamp(block, 1, static_cast<int>(count / 4));
+  return std::clamp(block, 1, static_cast<int>(frames.frames() / 4));
 }
 
 BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& options,
@@ -149,6 +202,7 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
     result.message = whole.message;
     return result;
   }
+  const Eigen::RowVectorXd average_mean = means.colwise().mean();
   // Every resample is fitted on the window of the whole sample.
   plain.window.low = whole.window_low;
   plain.window.high = whole.window_high;
@@ -156,10 +210,11 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
   std::vector<double> temperatures;
   std::vector<double> shifts;
   const auto blocks = static_cast<std::size_t>(means.rows());
+  const Widening widening = widening_of(heights_of(frames), block);
   for (int resample = 0; resample < bootstrap.resamples; ++resample) {
     Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(means.cols());
     for (std::size_t b = 0; b < blocks; ++b) mean += means.row(static_cast<Eigen::Index>(below(generator, blocks)));
-    mean /= static_cast<double>(blocks);
+    mean = average_mean + widening.factor * (mean / static_cast<double>(blocks) - average_mean);
     profile.number_density.assign(mean.data(), mean.data() + mean.size());
     const FitResult fit = fit_profile(profile, plain);
     if (!fit.ok()) continue;
@@ -188,8 +243,11 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
     };
     interval.status = FitStatus::ok;
     interval.confidence = bootstrap.confidence;
-    interval.low = quantile(0.5 * (1.0 - bootstrap.confidence));
-    interval.high = quantile(0.5 * (1.0 + bootstrap.confidence));
+    // Percentiles, moved apart as Student's are from the normal ones: the blocks are few.
+    const double upper = 0.5 * (1.0 + bootstrap.confidence);
+    const double apart = gsl_cdf_tdist_Pinv(upper, widening.degrees) / gsl_cdf_ugaussian_Pinv(upper);
+    interval.low = centre + apart * (quantile(1.0 - upper) - centre);
+    interval.high = centre + apart * (quantile(upper) - centre);
   };
   summarise(temperatures, whole.temperature.value, result.temperature, result.temperature_interval);
   summarise(shifts, whole.shift.value, result.shift, result.shift_interval);

@@ -87,6 +87,29 @@ TEST(Frames, BootstrapAgreesWithTheFittedError) {
   EXPECT_EQ(again.temperatures, bootstrap.temperatures);
 }
 
+// Of 300 films of 1,000 frames that remember 19 (some 13 blocks), 95 % intervals hold the truth as often as they say,
+// and the error squared is the variance of what is found.
+TEST(Frames, BootstrapStatesErrorsThatMeanWhatTheySay) {
+  constexpr int films = 300;
+  int held = 0;
+  double stated = 0.0, found = 0.0;
+  for (int film = 0; film < films; ++film) {
+    const ProfileFrames frames = make_frames(1000, 0.9, 0.3, 1000 + static_cast<std::uint64_t>(film));
+    const BootstrapResult result = bootstrap_fit(frames, plain_options(), {.resamples = 150, .seed = 3});
+    ASSERT_EQ(result.status, FitStatus::ok) << result.message;
+    held += result.temperature_interval.low <= 0.5 && 0.5 <= result.temperature_interval.high;
+    stated += std::pow(result.temperature.std_error, 2) / films;
+    found += std::pow(result.temperature.value - 0.5, 2) / films;
+  }
+  RecordProperty("held", held);
+  RecordProperty("stated_over_found", std::to_string(stated / found));
+  // 95 % of 300: 285 +- 3.8, three of them. (Without widening 88 % hold.)
+  EXPECT_GE(held, 274);
+  EXPECT_LE(held, 296);
+  // The variance of 300 is known to 8 %, two of them. (Without widening .80.)
+  EXPECT_NEAR(stated / found, 1.0, 0.16);
+}
+
 TEST(Frames, FullCovarianceOfFramesFits) {
   const FrameAverage average = average_frames(make_frames(1000, 0.0, 0.3, 6));
   const FitResult fit = fit_profile(average.profile, plain_options());

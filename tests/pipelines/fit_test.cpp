@@ -168,7 +168,7 @@ TEST_F(FitStage, ResamplesFrames) {
   std::printf(
       "  error of T by resampled frames over that by the covariance: %.2f; difference of both T over it: %.2f\n",
       std::sqrt(by_frames / own), std::sqrt(difference / own));
-  // 24 such beds: 0.74, so eight tell it to some 15 %.
+  // These eight: 0.82, which they tell to some 15 %.
   EXPECT_GT(by_frames, 0.25 * own);
   EXPECT_LT(by_frames, 2 * own);
   EXPECT_LT(difference, by_frames);
