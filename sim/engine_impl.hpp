@@ -309,7 +309,7 @@ void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
 // within bounds: it stops short of the ninth nearest.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
-  constexpr std::size_t usual = 2 * inline_neighbours;
+  constexpr std::size_t usual = std::size_t{2} * inline_neighbours;
   const auto most = static_cast<float>(largest_skin_);
   float skin = most;
   if (nearby_count_ > inline_neighbours) {
@@ -387,7 +387,7 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
 // the call.
 template <class Space, class Rule, class Sizes>
 [[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_neighbours_of_upcoming() const {
-  std::uint32_t a, b;
+  std::uint32_t a = 0, b = 0;
   if (!queue_.upcoming(a, b)) return;
   for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
@@ -403,7 +403,7 @@ template <class Space, class Rule, class Sizes>
 template <class Space, class Rule, class Sizes>
 template <bool watched>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
-  std::uint32_t i, with;
+  std::uint32_t i = 0, with = 0;
   const auto will_need = [this](std::uint32_t k) {
     if (!beyond_cache_) return;
     __builtin_prefetch(&disks_[k]);
