@@ -328,7 +328,7 @@ class EventQueue {
   [[gnu::noinline]] std::size_t collect_further(std::uint32_t place, std::size_t count) {
     Further& block = blocks_[place];
     if (block.next != 0) count = collect_further(block.next, count);
-    grow(count + 4 * entries_a_bucket);
+    grow(count + std::size_t{4} * entries_a_bucket);
     count = take_up(block.entries.data(), block.held, count);
     block.next = free_;
     free_ = place;
