@@ -88,17 +88,11 @@ double memory_of(const std::vector<double>& series) {
 struct Widening {
   double factor = 1.0, degrees = 1e6;
 };
-Widening widening_of(const std::vector<double>& series, int block) {
-  const std::size_t blocks = series.size() / static_cast<std::size_t>(block);
-  const auto m = static_cast<double>(blocks), n = static_cast<double>(series.size());
-  double resampled = 0.0, centre = 0.0;  // variance of a mean of as many blocks drawn with replacement
-  std::vector<double> means(blocks, 0.0);
-  for (std::size_t b = 0; b < blocks; ++b) {
-    for (std::size_t f = 0; f < static_cast<std::size_t>(block); ++f)
-      means[b] += series[b * static_cast<std::size_t>(block) + f] / block;
-    centre += means[b] / m;
-  }
-  for (const double mean : means) resampled += (mean - centre) * (mean - centre) / (m * m);
+// series: the height of each frame, from its mean; of_blocks: its means over blocks of `block` frames.
+Widening widening_of(const std::vector<double>& series, const Eigen::VectorXd& of_blocks, int block) {
+  const auto m = static_cast<double>(of_blocks.size()), n = static_cast<double>(series.size());
+  // The variance of a mean of as many blocks drawn with replacement.
+  const double resampled = (of_blocks.array() - of_blocks.mean()).square().sum() / (m * m);
   if (!(resampled > 0.0)) return {};
   Widening widening;
   widening.degrees = m - 1.0;
@@ -119,7 +113,7 @@ Widening widening_of(const std::vector<double>& series, int block) {
     const std::size_t half = std::min(static_cast<std::size_t>(std::ceil(1.5 * memory)), series.size() / 12);
     const double whole = by_windows(2 * half), halves = by_windows(half);
     variance = whole * std::max(1.0, 2.0 - halves / whole);
-    // Overlapping windows tell half as much again as those side by side; the correction costs as much as it mends.
+    // Overlapping windows tell half as much again as those side by side; the correction doubles the variance of that.
     widening.degrees = 1.5 * (n / static_cast<double>(2 * half) - 1.0) / 2.0;
   }
   widening.factor = std::sqrt(std::max(variance / resampled, 1.0));
@@ -202,7 +196,7 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
     result.message = whole.message;
     return result;
   }
-  const Eigen::RowVectorXd average_mean = means.colwise().mean();
+  const Eigen::Map<const Eigen::RowVectorXd> average_mean(average.profile.number_density.data(), means.cols());
   // Every resample is fitted on the window of the whole sample.
   plain.window.low = whole.window_low;
   plain.window.high = whole.window_high;
@@ -210,7 +204,8 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
   std::vector<double> temperatures;
   std::vector<double> shifts;
   const auto blocks = static_cast<std::size_t>(means.rows());
-  const Widening widening = widening_of(heights_of(frames), block);
+  const Eigen::Map<const Eigen::VectorXd> height(frames.height.data(), means.cols());
+  const Widening widening = widening_of(heights_of(frames), means * height, block);
   for (int resample = 0; resample < bootstrap.resamples; ++resample) {
     Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(means.cols());
     for (std::size_t b = 0; b < blocks; ++b) mean += means.row(static_cast<Eigen::Index>(below(generator, blocks)));

@@ -97,6 +97,7 @@ class Engine final : public Simulation {
   // --- shells
   void centre_shell(std::uint32_t i);
   void look_round(std::uint32_t i);
+  // Radius of the disk and of its shell together [D].
   float reach(std::uint32_t i) const {
     return static_cast<float>(disks_[i].skin) * static_cast<float>(skin_unit) + static_cast<float>(sizes_.radius(i));
   }

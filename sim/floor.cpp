@@ -132,7 +132,8 @@ void FloorMotion::note_ceilings(double largest_curvature) {
 
 double FloorMotion::ceiling(double now, double horizon) const {
   constexpr double rounding = 1e-6;  // of a part
-  if (!(horizon * parts_a_time_ < 14)) return highest_;
+  constexpr std::int64_t most_parts = std::int64_t{1} << (levels - 1);
+  if (!(horizon * parts_a_time_ < most_parts - 2)) return highest_;  // it may begin and end within a part
   const auto first = static_cast<std::int64_t>(std::floor(now * parts_a_time_ - rounding));
   const auto last = static_cast<std::int64_t>(std::floor((now + horizon) * parts_a_time_ + rounding));
   const auto level = static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(last - first + 1))) - 1;
