@@ -136,9 +136,11 @@ double FloorMotion::ceiling(double now, double horizon) const {
   if (!(horizon * parts_a_time_ < most_parts - 2)) return highest_;  // it may begin and end within a part
   const auto first = static_cast<std::int64_t>(std::floor(now * parts_a_time_ - rounding));
   const auto last = static_cast<std::int64_t>(std::floor((now + horizon) * parts_a_time_ + rounding));
-  const auto level = static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(last - first + 1))) - 1;
+  // Two spans of as many parts as the largest power of two that fits in cover them all.
+  const std::uint64_t span = std::bit_floor(static_cast<std::uint64_t>(last - first + 1));
+  const auto level = static_cast<std::int64_t>(std::countr_zero(span));
   const auto at = [&](std::int64_t k) { return ceilings_[static_cast<std::size_t>(level * parts + k % parts)]; };
-  return std::max(at(first + parts), at(last - (std::int64_t{1} << level) + 1 + parts));
+  return std::max(at(first + parts), at(last - static_cast<std::int64_t>(span) + 1 + parts));
 }
 
 FloorMotion::Motion FloorMotion::motion(double now, double later) const {
