@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/lanes.hpp"
+
 namespace shakebed::sim {
 
 // Restitution and friction of one kind of contact (disk-disk, disk-wall, disk-floor).
@@ -17,24 +19,23 @@ struct Surface {
   double tangential_restitution = 0;  // b0, largest tangential restitution [-1, 1], reached by sticking contacts
 };
 
-// Two smooth disks. (dx, dz), (dvx, dvz): position and velocity of the second from the first, which approach
-// (dx dvx + dz dvz < 0); contact_squared: (R1 + R2)^2, which their distance is but for rounding. The change of their
-// relative velocity is -(1+e) (g.n) n. Of it the first disk takes -m2/(m1+m2), the second m1/(m1+m2).
+// Two smooth disks. d, dv: position and velocity {x, z} of the second from the first, which approach (d.dv < 0);
+// contact_squared: (R1 + R2)^2, which their distance is but for rounding. The change of their relative velocity is
+// -(1+e) (g.n) n. Of it the first disk takes -m2/(m1+m2), the second m1/(m1+m2).
 struct NormalImpulse {
-  double x, z;        // n / d; at hand before the approach is
-  double approach;    // d (g.n) = dx dvx + dz dvz
+  TwoLanes normal;    // n / |d|; at hand before the approach is
+  double approach;    // |d| (g.n) = d.dv
   double dissipated;  // energy lost, for reduced mass 1
 };
-inline NormalImpulse smooth_impulse(double dx, double dz, double dvx, double dvz, double contact_squared,
-                                    double restitution) {
-  const double approach = std::fma(dx, dvx, dz * dvz);
+inline NormalImpulse smooth_impulse(TwoLanes d, TwoLanes dv, double contact_squared, double restitution) {
+  const double approach = fused(d[0], dv[0], d[1] * dv[1]);
   // 1 / d^2 by its first step from 1 / (R1 + R2)^2: wrong by beyond^2 only, and need not wait for a division.
   const double inverse_contact = 1 / contact_squared;
-  const double beyond = std::fma(dx, dx, std::fma(dz, dz, -contact_squared)) * inverse_contact;
+  const double beyond = fused(d[0], d[0], fused(d[1], d[1], -contact_squared)) * inverse_contact;
   double inverse_distance = (1 - beyond) * inverse_contact;
   if (!(std::abs(beyond) < 1e-9)) [[unlikely]]
     inverse_distance = inverse_contact / (1 + beyond);
-  return {inverse_distance * dx, inverse_distance * dz, approach,
+  return {inverse_distance * d, approach,
           0.5 * (1 - restitution * restitution) * approach * approach * inverse_distance};
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "sim/disk.hpp"
+#include "sim/lanes.hpp"
 
 namespace shakebed::sim {
 
@@ -55,20 +56,20 @@ inline double time_to_fall(double gap, double vz, double gravity) {
   return vz < 0 ? gap / -vz : never;
 }
 
-// When a disk may leave its shell: a time that is never later than the true exit. (ox, oz): offset from the shell's
-// centre, inside it; (vx, vz): velocity in the shell's frame. Gravity bends the path by at most g t^2 / 2, so the disk
-// is inside while |o + v t| <= radius - g t^2 / 2, squared: c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0. Without its last term
-// this ends earlier, and has one square root.
-inline double time_to_leave_shell(double ox, double oz, double vx, double vz, double radius, double gravity) {
-  const double a = std::fma(vx, vx, gravity > 0 ? std::fma(vz, vz, gravity * radius) : vz * vz);
-  if (!(a > 0)) [[unlikely]]
-    return never;
-  const double b = std::fma(ox, vx, oz * vz);
-  const double beyond = std::fma(ox, ox, std::fma(oz, oz, -(radius * radius)));
-  const double c = std::min(beyond, 0.0);
-  const double root = std::sqrt(std::fma(b, b, -(a * c)));
-  // Close to the edge this loses digits, but of a length that is then below 1e-15 of the shell's; and it has no branch.
-  return (root - b) / a;
+// When a disk may leave its shell: a time that is never later than the true exit but for rounding. (ox, oz): offset
+// from the shell's centre, inside it; (vx, vz): velocity in the shell's frame. Gravity bends the path by at most g t^2
+// / 2, so the disk is inside while |o + v t| <= radius - g t^2 / 2, squared: c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0.
+// Without its last term this ends earlier, and has one square root. NaN, which is before nothing, for a disk at rest
+// without gravity. Number: double, or TwoLanes for two disks side by side.
+template <class Number>
+Number time_to_leave_shell(Number ox, Number oz, Number vx, Number vz, Number radius, double gravity) {
+  const Number a = fused(vx, vx, gravity > 0 ? fused(vz, vz, gravity * radius) : vz * vz);
+  const Number b = fused(ox, vx, oz * vz);
+  const Number c = not_above_zero(fused(ox, ox, fused(oz, oz, -(radius * radius))));
+  const Number root = sqrt_lanes(fused(b, b, -(a * c)));
+  // Close to the edge this loses digits, but of a length that is then below 1e-15 of the shell's; and it has no branch,
+  // and a division that need not wait for the root.
+  return (root - b) * (1 / a);
 }
 
 }  // namespace shakebed::sim

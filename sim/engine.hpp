@@ -75,7 +75,11 @@ class Engine final : public Simulation {
   // A disk's state at one moment, in registers: what is predicted from it must
   // not wait for the record to be written.
   struct Motion {
-    double x, z, vx, vz;
+    TwoLanes place, velocity;  // {x, z} each
+    double x() const { return place[0]; }
+    double z() const { return place[1]; }
+    double vx() const { return velocity[0]; }
+    double vz() const { return velocity[1]; }
   };
 
   // --- flight
@@ -90,8 +94,10 @@ class Engine final : public Simulation {
   Candidate next_contact(std::uint32_t i, const Motion& motion) const;
   Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best) const;
   Candidate next_event(std::uint32_t i, const Motion& motion) const;
-  void commit(std::uint32_t i, const Motion& motion, const Candidate& next);
-  void predict(std::uint32_t i, const Motion& motion) { commit(i, motion, next_event(i, motion)); }
+  double shell_exit_of(std::uint32_t i, const Motion& motion) const;
+  TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
+  void commit(std::uint32_t i, const Candidate& next, double exit);
+  void predict(std::uint32_t i, const Motion& motion) { commit(i, next_event(i, motion), shell_exit_of(i, motion)); }
   void predict_all();
 
   // --- shells

@@ -74,23 +74,21 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
 
 template <class Space, class Rule, class Sizes>
 auto Engine<Space, Rule, Sizes>::motion_at(const Disk& disk, double time) const -> Motion {
-  const double dt = time - disk.own_time;
+  const TwoLanes place = pair_at(&disk.x), velocity = pair_at(&disk.vx);
+  const TwoLanes dt = both(time - disk.own_time);
   if constexpr (Space::falls) {
-    const double fall = gravity_ * dt;
-    return {std::fma(disk.vx, dt, disk.x), std::fma(std::fma(-0.5, fall, disk.vz), dt, disk.z), disk.vx,
-            disk.vz - fall};
+    const TwoLanes fall = TwoLanes{0, gravity_} * dt;
+    return {fused(fused(both(-0.5), fall, velocity), dt, place), velocity - fall};
   } else {
-    return {std::fma(disk.vx, dt, disk.x), std::fma(disk.vz, dt, disk.z), disk.vx, disk.vz};
+    return {fused(velocity, dt, place), velocity};
   }
 }
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motion) {
   Disk& disk = disks_[i];
-  disk.x = motion.x;
-  disk.z = motion.z;
-  disk.vx = motion.vx;
-  disk.vz = motion.vz;
+  put_pair(&disk.x, motion.place);
+  put_pair(&disk.vx, motion.velocity);
   disk.own_time = now_;
 }
 
@@ -116,18 +114,18 @@ template <class Space, class Rule, class Sizes>
 
   const Lanes time = all_lanes(now_);
   const Lanes dt = time - own_time;
-  Lanes dx = fused(vx, dt, x) - all_lanes(motion.x);
+  Lanes dx = fused(vx, dt, x) - all_lanes(motion.x());
   Lanes dz;
   if constexpr (Space::falls) {
     const Lanes fall = all_lanes(gravity_) * dt;
-    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(motion.z);
+    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(motion.z());
     vz = vz - fall;
   } else {
-    dz = fused(vz, dt, z) - all_lanes(motion.z);
+    dz = fused(vz, dt, z) - all_lanes(motion.z());
   }
   if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-  const Lanes dvx = vx - all_lanes(motion.vx), dvz = vz - all_lanes(motion.vz);
+  const Lanes dvx = vx - all_lanes(motion.vx()), dvz = vz - all_lanes(motion.vz());
 
   Lanes contact_squared = all_lanes(1);
   if constexpr (!Sizes::equal) {
@@ -187,17 +185,17 @@ auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion
   const auto consider = [&](double wait, std::int32_t wall) {
     if (now_ + wait < best.time) best = {now_ + wait, wall};
   };
-  if (near & near_left_wall) consider(time_to_wall(motion.x - radius, -motion.vx), left_wall);
-  if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x, motion.vx), right_wall);
-  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z, motion.vz, gravity_), lid_above);
+  if (near & near_left_wall) consider(time_to_wall(motion.x() - radius, -motion.vx()), left_wall);
+  if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x(), motion.vx()), right_wall);
+  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z(), motion.vz(), gravity_), lid_above);
   if (near & near_floor) {
     // By then the disk is out of its shell, sideways or downwards: the floor need not be looked for any later.
     const Disk& disk = disks_[i];
-    const double skin = disk.skin * skin_unit + shell_slack, ox = motion.x - static_cast<double>(disk.shell_x);
-    const double aside = (skin - std::copysign(ox, ox * motion.vx)) / std::abs(motion.vx);
-    const double down = time_to_fall(skin + motion.z - static_cast<double>(disk.shell_z), motion.vz, gravity_);
+    const double skin = disk.skin * skin_unit + shell_slack, ox = motion.x() - static_cast<double>(disk.shell_x);
+    const double aside = (skin - std::copysign(ox, ox * motion.vx())) / std::abs(motion.vx());
+    const double down = time_to_fall(skin + motion.z() - static_cast<double>(disk.shell_z), motion.vz(), gravity_);
     const double horizon = std::min(std::min(best.time - now_, aside), down);
-    consider(floor_.time_to_contact(motion.z - radius, motion.vz, gravity_, now_, horizon), floor_below);
+    consider(floor_.time_to_contact(motion.z() - radius, motion.vz(), gravity_, now_, horizon), floor_below);
   }
   return best;
 }
@@ -212,29 +210,41 @@ template <class Space, class Rule, class Sizes>
   return next;
 }
 
-// Writes down what comes next for disk i, whose state now is `motion`, unless
-// it leaves its shell before. Which of the two is a coin toss that no processor foresees: there is no branch on it.
+// When the disk, whose state now is `motion`, leaves its shell.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Motion& motion, const Candidate& next) {
+double Engine<Space, Rule, Sizes>::shell_exit_of(std::uint32_t i, const Motion& motion) const {
+  const Disk& disk = disks_[i];
+  const double ox = motion.x() - static_cast<double>(disk.shell_x), oz = motion.z() - static_cast<double>(disk.shell_z);
+  return now_ + time_to_leave_shell(ox, oz, motion.vx(), motion.vz(), disk.skin * skin_unit, gravity_);
+}
+// The same of two disks side by side.
+template <class Space, class Rule, class Sizes>
+[[gnu::always_inline]] inline TwoLanes Engine<Space, Rule, Sizes>::shell_exits_of(std::uint32_t i, std::uint32_t j,
+                                                                                  const Motion& first,
+                                                                                  const Motion& second) const {
+  const Disk &a = disks_[i], &b = disks_[j];
+  const TwoLanes x = __builtin_shufflevector(first.place, second.place, 0, 2),
+                 z = __builtin_shufflevector(first.place, second.place, 1, 3);
+  const TwoLanes vx = __builtin_shufflevector(first.velocity, second.velocity, 0, 2),
+                 vz = __builtin_shufflevector(first.velocity, second.velocity, 1, 3);
+  const TwoLanes shell_x = {a.shell_x, b.shell_x}, shell_z = {a.shell_z, b.shell_z};
+  const TwoLanes skin = TwoLanes{static_cast<double>(a.skin), static_cast<double>(b.skin)} * skin_unit;
+  return now_ + time_to_leave_shell(x - shell_x, z - shell_z, vx, vz, skin, Space::falls ? gravity_ : 0);
+}
+
+// Writes down what comes next for disk i, unless it leaves its shell before. Which of the two is a coin toss that no
+// processor foresees: there is no branch on it.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, double exit) {
   Disk& disk = disks_[i];
-  const double ox = motion.x - static_cast<double>(disk.shell_x), oz = motion.z - static_cast<double>(disk.shell_z);
-  const double skin = disk.skin * skin_unit;
-  double exit = never;
-  bool stays = false;
-  if constexpr (Space::falls) {  // a flight that is seen to stay inside is spared the root; gravity bends its path away
-    const double dt = next.time - now_, sag = gravity_ * dt * dt;  // from its chord by at most g dt^2 / 8
-    const double limit = skin - 0.125 * sag;
-    const double ex = std::fma(motion.vx, dt, ox), ez = std::fma(motion.vz, dt, oz) - 0.5 * sag;
-    stays = limit > 0 && ex * ex + ez * ez <= limit * limit;
-  }
-  if (!stays) exit = now_ + time_to_leave_shell(ox, oz, motion.vx, motion.vz, skin, Space::falls ? gravity_ : 0);
-  const double time = std::min(exit, next.time);
+  const bool leaves = exit < next.time;
+  const double time = leaves ? exit : next.time;
   if (!(time < never)) [[unlikely]] {
     disk.event_time = never;
     disk.partner = nobody;
     return;
   }
-  const std::int32_t partner = choose(exit < next.time, static_cast<std::int32_t>(shell_exit), next.partner);
+  const std::int32_t partner = choose(leaves, static_cast<std::int32_t>(shell_exit), next.partner);
   const auto other = static_cast<std::uint32_t>(choose(partner < 0, static_cast<std::int32_t>(i), partner));
   disks_[other].event_time = time;
   disks_[other].partner = static_cast<std::int32_t>(i);
@@ -258,8 +268,7 @@ void Engine<Space, Rule, Sizes>::predict_all() {
     Candidate next = next_event(i, motion);
     const Disk& disk = disks_[i];
     if (disk.partner >= 0 && next.time >= disk.event_time) next = {disk.event_time, disk.partner};
-    commit(i, motion, next);  // also where it stands already: the disk may leave
-                              // its shell before
+    commit(i, next, shell_exit_of(i, motion));  // also where it stands already: the disk may leave its shell before
   }
 }
 
@@ -441,9 +450,10 @@ template <class Space, class Rule, class Sizes>
     } else {  // the partner was hit by another disk first
       ++counters_.predictions_renewed;
       const Motion motion = motion_at(disk, now_);
+      const double exit = shell_exit_of(i, motion);
       const Candidate next = next_event(i, motion);
       write_down(i, motion);
-      commit(i, motion, next);
+      commit(i, next, exit);
     }
   } else if (disk.partner == shell_exit) {
     ++counters_.shell_exits;
@@ -470,18 +480,18 @@ template <class Space, class Rule, class Sizes>
   process(i, k);
   const double time = base_ + now_;
   if (touches) {
-    double dx = second.x - first.x, dz = second.z - first.z;
+    double dx = second.x() - first.x(), dz = second.z() - first.z();
     if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
     if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
     const double mass = sizes_.mass(b);
-    watcher_->touched(time, first.x, first.z, dx, dz, mass * (disks_[b].vx - second.vx),
-                      mass * (disks_[b].vz - second.vz));
+    watcher_->touched(time, first.x(), first.z(), dx, dz, mass * (disks_[b].vx - second.vx()),
+                      mass * (disks_[b].vz - second.vz()));
     tell(a);
     tell(b);
   } else if (before.partner < 0 && before.partner != shell_exit) {
     const double mass = sizes_.mass(i);
-    watcher_->touched_wall(time, labels_[i], before.partner == floor_below, first.z, mass * (disks_[i].vx - first.vx),
-                           mass * (disks_[i].vz - first.vz));
+    watcher_->touched_wall(time, labels_[i], before.partner == floor_below, first.z(),
+                           mass * (disks_[i].vx - first.vx()), mass * (disks_[i].vz - first.vz()));
     tell(i);
   }
 }
@@ -490,7 +500,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::tell(std::uint32_t i) const {
   if (watcher_ == nullptr) return;
   const Motion motion = motion_at(disks_[i], now_);
-  watcher_->flies(time(), labels_[i], motion.x, motion.z, motion.vx, motion.vz);
+  watcher_->flies(time(), labels_[i], motion.x(), motion.z(), motion.vx(), motion.vz());
 }
 
 template <class Space, class Rule, class Sizes>
@@ -539,29 +549,30 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   // Both are predicted before either record changes, so that the two
   // predictions overlap in the processor. Neither sees the other: they
   // separate.
+  const TwoLanes exits = shell_exits_of(i, j, first, second);
   const Candidate next_first = next_event(i, first);
   Candidate next_second = next_event(j, second);
   write_down(i, first);
   write_down(j, second);
-  commit(i, first, next_first);
+  commit(i, next_first, exits[0]);
   // Between prediction and now only the first's new partner has got another event.
   if (next_second.partner == next_first.partner) [[unlikely]] {
     const bool taken = next_second.partner >= 0 && next_second.time < never &&
                        !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
     if (taken) next_second = next_event(j, second);
   }
-  commit(j, second, next_second);
+  commit(j, next_second, exits[1]);
 }
 
 // The contact itself: changes the velocities, the spins and the ledger.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second) {
-  double dx = second.x - first.x, dz = second.z - first.z;
+  TwoLanes d = second.place - first.place;
   // Which images meet is told from the records, which are at hand before the flights are: both disks are in their
   // shells there as now.
-  if constexpr (Space::wraps_x) dx += period_x_.to_nearest(disks_[j].x - disks_[i].x);
-  if constexpr (Space::wraps_z) dz += period_z_.to_nearest(disks_[j].z - disks_[i].z);
-  const double dvx = second.vx - first.vx, dvz = second.vz - first.vz;
+  if constexpr (Space::wraps_x || Space::wraps_z)
+    d += Period::to_nearest(period_x_, period_z_, pair_at(&disks_[j].x) - pair_at(&disks_[i].x));
+  const TwoLanes dv = second.velocity - first.velocity;
 
   double restitution = 1;
   bool elastic = true;
@@ -573,15 +584,14 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   const double reduced_mass = 1 / (inverse_first + inverse_second);
   if constexpr (Rule::spins) {
     if (!elastic) {
+      const double dx = d[0], dz = d[1], dvx = dv[0], dvz = dv[1];
       const double distance = std::sqrt(dx * dx + dz * dz), nx = dx / distance, nz = dz / distance;
       const double ri = sizes_.radius(i), rj = sizes_.radius(j);
       const double gn = -(dvx * nx + dvz * nz);
       const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
       const RoughImpulse p = walton_impulse(nx, nz, gn, gt, reduced_mass, disk_surface_, inverse_inertia_ratio_);
-      first.vx += p.px * inverse_first;
-      first.vz += p.pz * inverse_first;
-      second.vx -= p.px * inverse_second;
-      second.vz -= p.pz * inverse_second;
+      first.velocity += TwoLanes{p.px, p.pz} * inverse_first;
+      second.velocity -= TwoLanes{p.px, p.pz} * inverse_second;
       spins_[i] += inverse_inertia_ratio_ * p.tangential * inverse_first / ri;
       spins_[j] += inverse_inertia_ratio_ * p.tangential * inverse_second / rj;
       counters_.virial -= p.px * dx + p.pz * dz;
@@ -591,13 +601,11 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   }
   double contact_squared = 1;
   if constexpr (!Sizes::equal) contact_squared = sizes_.contact_distance(i, j) * sizes_.contact_distance(i, j);
-  const NormalImpulse impulse = smooth_impulse(dx, dz, dvx, dvz, contact_squared, restitution);
+  const NormalImpulse impulse = smooth_impulse(d, dv, contact_squared, restitution);
   const double momentum = reduced_mass * (1 + restitution);
   const double to_first = momentum * inverse_first, to_second = momentum * inverse_second;
-  first.vx = std::fma(to_first * impulse.x, impulse.approach, first.vx);
-  first.vz = std::fma(to_first * impulse.z, impulse.approach, first.vz);
-  second.vx = std::fma(-to_second * impulse.x, impulse.approach, second.vx);
-  second.vz = std::fma(-to_second * impulse.z, impulse.approach, second.vz);
+  first.velocity = fused(to_first * impulse.normal, both(impulse.approach), first.velocity);
+  second.velocity = fused(-to_second * impulse.normal, both(impulse.approach), second.velocity);
   counters_.virial -= momentum * impulse.approach;
   if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
 }
@@ -620,9 +628,10 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
+  const double exit = shell_exit_of(i, motion);
   const Candidate next = next_event(i, motion);
   write_down(i, motion);
-  commit(i, motion, next);
+  commit(i, next, exit);
 }
 
 template <class Space, class Rule, class Sizes>
@@ -630,25 +639,25 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   const double mass = sizes_.mass(i);
   const double floor_velocity = floor_.velocity(now_);
   if (const auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
-    const double before = motion.vx * motion.vx + motion.vz * motion.vz;
+    const double before = motion.vx() * motion.vx() + motion.vz() * motion.vz();
     const double speed = std::sqrt(thermal->temperature / mass);
-    motion.vx = speed * random_.normal_pair().first;
-    motion.vz = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
-    floor_work_ += 0.5 * mass * (motion.vx * motion.vx + motion.vz * motion.vz - before);
+    motion.velocity[0] = speed * random_.normal_pair().first;
+    motion.velocity[1] = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
+    floor_work_ += 0.5 * mass * (motion.vx() * motion.vx() + motion.vz() * motion.vz() - before);
     return;
   }
-  const double vz_before = motion.vz;
+  const double vz_before = motion.vz();
   bounce(i, motion, 0, -1, floor_velocity, floor_surface_);
-  floor_work_ += mass * (motion.vz - vz_before) * floor_velocity;
+  floor_work_ += mass * (motion.vz() - vz_before) * floor_velocity;
   // A disk that lies still on the floor is carried in small hops: a contact has
   // to end before the next can begin.
   const double pressing = gravity_ + floor_.acceleration(now_);
   const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
   const double slowest = 0.5 * pressing * hop;
-  if (motion.vz - floor_velocity < 1e-3 * slowest) {
-    const double slow = motion.vz;
-    motion.vz = floor_velocity + slowest;
-    floor_work_ += 0.5 * mass * (motion.vz - slow) * (motion.vz + slow);
+  if (motion.vz() - floor_velocity < 1e-3 * slowest) {
+    const double slow = motion.vz();
+    motion.velocity[1] = floor_velocity + slowest;
+    floor_work_ += 0.5 * mass * (motion.vz() - slow) * (motion.vz() + slow);
   }
 }
 
@@ -658,7 +667,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz,
                                         const Surface& surface) {
   const double mass = sizes_.mass(i);
-  const double gx = motion.vx, gz = motion.vz - wall_vz;
+  const double gx = motion.vx(), gz = motion.vz() - wall_vz;
   const double gn = gx * nx + gz * nz;
   if (!(gn > 0)) return;  // grazed, by rounding
   Surface contact = surface;
@@ -669,13 +678,11 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
     const double radius = sizes_.radius(i);
     const double gt = -gx * nz + gz * nx + radius * spins_[i];
     const RoughImpulse impulse = walton_impulse(nx, nz, gn, gt, mass, contact, inverse_inertia_ratio_);
-    motion.vx += impulse.px / mass;
-    motion.vz += impulse.pz / mass;
+    motion.velocity += TwoLanes{impulse.px, impulse.pz} / mass;
     spins_[i] += inverse_inertia_ratio_ * impulse.tangential / (mass * radius);
     dissipated_ += impulse.dissipated;
   } else {
-    motion.vx -= (1 + contact.restitution) * gn * nx;
-    motion.vz -= (1 + contact.restitution) * gn * nz;
+    motion.velocity -= (1 + contact.restitution) * gn * TwoLanes{nx, nz};
     dissipated_ += 0.5 * mass * (1 - contact.restitution * contact.restitution) * gn * gn;
   }
 }
@@ -1033,10 +1040,10 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
     const std::uint32_t label = labels_[i];
-    out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x) : motion.x;
-    out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z) : motion.z;
-    out.vx[label] = motion.vx;
-    out.vz[label] = motion.vz;
+    out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x()) : motion.x();
+    out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
+    out.vx[label] = motion.vx();
+    out.vz[label] = motion.vz();
     if constexpr (Rule::spins) out.spin[label] = spins_[i];
   }
 }
@@ -1058,7 +1065,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
-    const long double vx = motion.vx, vz = motion.vz;
+    const long double vx = motion.vx(), vz = motion.vz();
     sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
     if constexpr (Rule::spins) {
       const long double surface_speed = sizes_.radius(i) * spins_[i];
@@ -1071,7 +1078,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
 template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
-  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z;
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z();
   return static_cast<double>(sum);
 }
 

@@ -39,6 +39,11 @@ struct Period {
     constexpr double large = 0x1.8p52;
     return minus_length * (std::fma(difference, inverse, large) - large);
   }
+  static TwoLanes to_nearest(const Period& x, const Period& z, TwoLanes difference) {
+    const TwoLanes large = both(0x1.8p52);
+    return TwoLanes{x.minus_length, z.minus_length} *
+           (fused(difference, TwoLanes{x.inverse, z.inverse}, large) - large);
+  }
   double nearest(double difference) const { return difference + to_nearest(difference); }
   Lanes nearest(Lanes difference) const {
     const Lanes large = all_lanes(0x1.8p52);

@@ -23,10 +23,10 @@ TEST(SmoothImpulse, KeepsMomentumAndLosesTheEnergyItSays) {
     const double e = random.uniform(), m1 = std::exp(random.normal_pair().first), m2 = 1;
     const double dvx = v2.first - v1.first, dvz = v2.second - v1.second;
     if (nx * dvx + nz * dvz >= 0) continue;
-    const NormalImpulse j = smooth_impulse(nx, nz, dvx, dvz, 1, e);
+    const NormalImpulse j = smooth_impulse(TwoLanes{nx, nz}, TwoLanes{dvx, dvz}, 1, e);
     const double m12 = m1 * m2 / (m1 + m2);
     const Body a{v1.first, v1.second, 0, m1, 0.5}, b{v2.first, v2.second, 0, m2, 0.5};
-    const double jx = -(1 + e) * j.x * j.approach, jz = -(1 + e) * j.z * j.approach;
+    const double jx = -(1 + e) * j.normal[0] * j.approach, jz = -(1 + e) * j.normal[1] * j.approach;
     const Body a2{a.vx - m12 / m1 * jx, a.vz - m12 / m1 * jz, 0, m1, 0.5};
     const Body b2{b.vx + m12 / m2 * jx, b.vz + m12 / m2 * jz, 0, m2, 0.5};
     const double before = energy(a, 0.5) + energy(b, 0.5), after = energy(a2, 0.5) + energy(b2, 0.5);

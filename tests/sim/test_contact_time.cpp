@@ -51,6 +51,9 @@ TEST(ShellExit, IsNeverLaterThanTheTrueExit) {
     const double gravity = trial % 2;
     const double t = time_to_leave_shell(ox, oz, vx, vz, radius, gravity);
     ASSERT_GE(t, 0);
+    const TwoLanes side_by_side = time_to_leave_shell(TwoLanes{oz, ox}, TwoLanes{ox, oz}, TwoLanes{vz, vx},
+                                                      TwoLanes{vx, vz}, both(radius), gravity);
+    ASSERT_EQ(side_by_side[1], t);
     const auto distance = [&](double s) { return std::hypot(ox + vx * s, oz + vz * s - 0.5 * gravity * s * s); };
     for (int step = 0; step <= 20; ++step) ASSERT_LE(distance(t * step / 20), radius * (1 + 1e-12));
     if (gravity == 0) {
@@ -65,6 +68,10 @@ TEST(ShellExit, IsNeverLaterThanTheTrueExit) {
   // At thermal speed 1, straight up: 0.311 by the bound (0.36 = t + t^2/2) of 0.471 (0.36 = t - t^2/2), a share of
   // 0.66.
   EXPECT_GT(worst_share, 0.65);
+}
+
+TEST(ShellExit, OfADiskAtRestWithoutGravityIsBeforeNothing) {
+  EXPECT_FALSE(time_to_leave_shell(0.1, 0.2, 0.0, 0.0, 0.36, 0) < never);
 }
 
 }  // namespace
