@@ -35,6 +35,7 @@
 #include "sim/contact_time.hpp"
 #include "sim/disk.hpp"
 #include "sim/event_queue.hpp"
+#include "sim/fetch.hpp"
 #include "sim/floor.hpp"
 #include "sim/lanes.hpp"
 #include "sim/large_vector.hpp"
@@ -122,7 +123,7 @@ class Engine final : public Simulation {
   bool is_mutual(std::uint32_t i, std::uint32_t j) const {
     return disks_[j].event_time == now_ && disks_[j].partner == static_cast<std::int32_t>(i);
   }
-  void fetch_neighbours_of_upcoming() const;
+  void fetch_for_upcoming() const;
   void collide(std::uint32_t i, std::uint32_t j);
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);

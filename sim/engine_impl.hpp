@@ -391,35 +391,36 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
 // ------------------------------------------------------------------------------------------------
 // the loop
 
-// Fetches what will be asked for soon: the neighbours of disks that will collide, the cells round one that leaves its
-// shell. To be inlined: of a function that only fetches, the compiler would think that it does nothing, and leave out
-// the call.
+// Sends for what will be asked for soon: first the neighbour lists of disks that will collide, some events later the
+// neighbours' records, and the cells round a disk that will leave its shell. (The records of disks that come up at all
+// are sent for by the queue, a bucket ahead; half of those events will be dead before their turn, so no more than
+// that.)
 template <class Space, class Rule, class Sizes>
-[[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_neighbours_of_upcoming() const {
+[[gnu::noinline]] void Engine<Space, Rule, Sizes>::fetch_for_upcoming() const {
+  constexpr std::size_t neighbours_ahead = 4;
   std::uint32_t a = 0, b = 0;
-  if (!queue_.upcoming(a, b)) return;
-  for (std::uint32_t neighbour : shells_.first_block(a).disk) __builtin_prefetch(&disks_[neighbour]);
+  if (queue_.upcoming(EventQueue::looks_ahead, a, b)) {
+    fetch(&shells_.first_block(a));
+    fetch(&shells_.first_block(b));
+  }
+  if (!queue_.upcoming(neighbours_ahead, a, b)) return;
+  for (std::uint32_t neighbour : shells_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
     shells_.each_place_round(a, [](const Cell& cell) {
-      __builtin_prefetch(&cell);
-      __builtin_prefetch(&cell.reach);
+      fetch(&cell);
+      fetch(&cell.reach);
     });
     return;
   }
-  for (std::uint32_t neighbour : shells_.first_block(b).disk) __builtin_prefetch(&disks_[neighbour]);
+  for (std::uint32_t neighbour : shells_.first_block(b).disk) fetch(&disks_[neighbour]);
 }
 
 template <class Space, class Rule, class Sizes>
 template <bool watched>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i = 0, with = 0;
-  const auto will_need = [this](std::uint32_t k) {
-    if (!beyond_cache_) return;
-    __builtin_prefetch(&disks_[k]);
-    __builtin_prefetch(&shells_.first_block(k));
-  };
-  while (queue_.pop(until, i, with, will_need)) {
-    if (beyond_cache_) fetch_neighbours_of_upcoming();
+  while (queue_.pop(until, i, with)) {
+    if (beyond_cache_) fetch_for_upcoming();
     now_ = disks_[i].event_time;
     if (--events_to_check_ == 0) [[unlikely]] {
       if (locked()) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "sim/disk.hpp"
+#include "sim/fetch.hpp"
 #include "sim/lanes.hpp"
 #include "sim/large_vector.hpp"
 
@@ -27,6 +28,8 @@ inline constexpr std::size_t fits_cache = 8'000;  // that many disks and their l
 
 class EventQueue {
  public:
+  static constexpr std::size_t looks_ahead = 8;  // that many events are known in their order
+
   EventQueue() = default;
   EventQueue(const EventQueue&) = delete;  // it points into itself
   EventQueue& operator=(const EventQueue&) = delete;
@@ -74,7 +77,7 @@ class EventQueue {
     }
     // The place is far from the cache: it is sent for, and written to some pushes later.
     if (!counted) place_of = &nowhere_;
-    __builtin_prefetch(place_of, 1);
+    fetch(place_of);
     Waiting& waiting = waiting_[pushed_++ % most_waiting];
     *waiting.place = waiting.entry;
     waiting.place = place_of;
@@ -83,15 +86,13 @@ class EventQueue {
   }
 
   // The earliest valid event at or before `until`: its disk, that with which it was pushed (itself when alone), and its
-  // time in disks[disk].event_time. False if none. will_need(disk) is called some time
-  // before a disk comes up, to fetch its record into the cache.
-  template <class WillNeed>
-  bool pop(double until, std::uint32_t& disk, std::uint32_t& with, WillNeed will_need) {
+  // time in disks[disk].event_time. False if none.
+  bool pop(double until, std::uint32_t& disk, std::uint32_t& with) {
     for (;;) {
       if (next_ + looks_ahead >= end_) [[unlikely]] {
         if (!lengthen_run(until)) return false;
         const std::size_t later = index_of(current_ + 2);
-        for (std::size_t k = 0; k < held_[later]; k += 4) __builtin_prefetch(&ring_[later].entries[k]);
+        for (std::size_t k = 0; k < held_[later]; k += 4) fetch(&ring_[later].entries[k]);
         coming_ = index_of(current_ + 1);
         sent_for_ = 0;
       }
@@ -99,8 +100,8 @@ class EventQueue {
       if (beyond_cache_) {
         for (int k = 0; k < 2 && sent_for_ < held_[coming_]; ++k, ++sent_for_) {
           const std::uint64_t pair = ring_[coming_].entries[sent_for_].pair;
-          will_need(static_cast<std::uint32_t>(pair));
-          will_need(static_cast<std::uint32_t>(pair >> 32));
+          fetch(&disks_[static_cast<std::uint32_t>(pair)]);
+          fetch(&disks_[pair >> 32]);
         }
       }
       const double time = times_[next_];
@@ -122,11 +123,11 @@ class EventQueue {
     }
   }
 
-  // The pair of disks that comes up some events from now.
-  bool upcoming(std::uint32_t& a, std::uint32_t& b) const {
-    if (next_ + looks_ahead > end_) return false;
-    a = static_cast<std::uint32_t>(pairs_[next_ + looks_ahead - 1]);
-    b = static_cast<std::uint32_t>(pairs_[next_ + looks_ahead - 1] >> 32);
+  // The pair of disks that comes up `ahead` events from now, looks_ahead at most; false if there is none.
+  bool upcoming(std::size_t ahead, std::uint32_t& a, std::uint32_t& b) const {
+    if (next_ + ahead > end_) return false;
+    a = static_cast<std::uint32_t>(pairs_[next_ + ahead - 1]);
+    b = static_cast<std::uint32_t>(pairs_[next_ + ahead - 1] >> 32);
     return true;
   }
 
@@ -379,7 +380,7 @@ class EventQueue {
     }
   }
 
-  static constexpr std::size_t entries_ranked = 24, most_waiting = 8, looks_ahead = 4;
+  static constexpr std::size_t entries_ranked = 24, most_waiting = 8;
   static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
     Entry* place;
