@@ -215,7 +215,8 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::shell_exit_of(std::uint32_t i, const Motion& motion) const {
   const Disk& disk = disks_[i];
   const double ox = motion.x() - static_cast<double>(disk.shell_x), oz = motion.z() - static_cast<double>(disk.shell_z);
-  return now_ + time_to_leave_shell(ox, oz, motion.vx(), motion.vz(), disk.skin * skin_unit, gravity_);
+  return now_ +
+         time_to_leave_shell(ox, oz, motion.vx(), motion.vz(), disk.skin * skin_unit, Space::falls ? gravity_ : 0);
 }
 // The same of two disks side by side.
 template <class Space, class Rule, class Sizes>

@@ -26,8 +26,6 @@ inline std::int32_t choose(bool which, std::int32_t if_true, std::int32_t if_fal
 using TwoLanes = double __attribute__((vector_size(16)));
 
 inline TwoLanes both(double value) { return TwoLanes{value, value}; }
-// {lanes[1], lanes[1]}
-inline TwoLanes second_of(TwoLanes lanes) { return __builtin_shufflevector(lanes, lanes, 1, 1); }
 // Two doubles that stand side by side, 16-byte aligned.
 inline TwoLanes pair_at(const double* doubles) {
 #if defined(__SSE2__)
