@@ -45,8 +45,8 @@ int wait_for(int process) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-int start_shakebed(const std::vector<std::string>& arguments, const fs::path& directory) {
-  return spawn(arguments, directory, "/dev/null", "/dev/null");
+int start_shakebed(const std::vector<std::string>& arguments, const fs::path& directory, const fs::path& err) {
+  return spawn(arguments, directory, "/dev/null", err);
 }
 
 ProgramResult run_shakebed(const std::vector<std::string>& arguments, const fs::path& directory) {

@@ -16,8 +16,9 @@ struct ProgramResult {
 };
 // Runs it in `directory` with these arguments.
 ProgramResult run_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory);
-// Starts it and returns its process id; its messages go nowhere.
-int start_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory);
+// Starts it and returns its process id; what it says on standard error goes into a file.
+int start_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory,
+                   const std::filesystem::path& err = "/dev/null");
 // Waits for it; the exit code, 128 + signal when killed by one.
 int wait_for(int process);
 

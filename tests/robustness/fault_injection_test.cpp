@@ -334,7 +334,7 @@ TEST_F(Faults, SignalsAtAnyMoment) {
   int stopped = 0;
   for (int i = 0; i < 18; ++i) {
     const int signal = i % 3 == 0 ? SIGINT : i % 3 == 1 ? SIGTERM : SIGKILL;
-    const int process = start_shakebed({"run", "r.json", "--out", "o"}, folder_.path());
+    const int process = start_shakebed({"run", "r.json", "--out", "o"}, folder_.path(), folder_ / "err");
     std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
     ::kill(process, signal);
     const auto sent = std::chrono::steady_clock::now();
@@ -342,7 +342,8 @@ TEST_F(Faults, SignalsAtAnyMoment) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - sent).count();
     // Before the handler is there, a signal ends the program as it ends any other.
     EXPECT_TRUE(code == 0 || code == 128 + signal || (signal != SIGKILL && code == 130))
-        << "signal " << signal << ": " << code;
+        << "signal " << signal << ": " << code << "\n"
+        << read_text(folder_ / "err");
     EXPECT_LT(seconds, 60) << "did not stop";
     stopped += code != 0;
     if (i % 6 == 5) expect_goes_on();
