@@ -9,15 +9,9 @@
 #include <cmath>
 
 #include "sim/lanes.hpp"
+#include "sim/surface.hpp"
 
 namespace shakebed::sim {
-
-// Restitution and friction of one kind of contact (disk-disk, disk-wall, disk-floor).
-struct Surface {
-  double restitution = 1;             // e, normal
-  double friction = 0;                // mu_f, Coulomb
-  double tangential_restitution = 0;  // b0, largest tangential restitution [-1, 1], reached by sticking contacts
-};
 
 // Two smooth disks. d, dv: position and velocity {x, z} of the second from the first, which approach (d.dv < 0);
 // contact_squared: (R1 + R2)^2, which their distance is but for rounding. The change of their relative velocity is

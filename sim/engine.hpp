@@ -98,6 +98,7 @@ class Engine final : public Simulation {
   double shell_exit_of(std::uint32_t i, const Motion& motion) const;
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
   void commit(std::uint32_t i, const Candidate& next, double exit);
+  void fly_on(std::uint32_t i, const Motion& motion);
   void predict(std::uint32_t i, const Motion& motion) { commit(i, next_event(i, motion), shell_exit_of(i, motion)); }
   void predict_all();
 

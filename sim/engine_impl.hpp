@@ -254,6 +254,15 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, 
   queue_.push(time, i, other);
 }
 
+// The disk's state is `motion` from now on: written down, with what comes next.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::fly_on(std::uint32_t i, const Motion& motion) {
+  const double exit = shell_exit_of(i, motion);
+  const Candidate next = next_event(i, motion);
+  write_down(i, motion);
+  commit(i, next, exit);
+}
+
 // Everything anew. Every disk must be predicted, even one that another has
 // already claimed: its own best event may be an earlier one with a third, or
 // the edge of its shell.
@@ -451,11 +460,7 @@ template <class Space, class Rule, class Sizes>
       collide(i ^ swap, j ^ swap);
     } else {  // the partner was hit by another disk first
       ++counters_.predictions_renewed;
-      const Motion motion = motion_at(disk, now_);
-      const double exit = shell_exit_of(i, motion);
-      const Candidate next = next_event(i, motion);
-      write_down(i, motion);
-      commit(i, next, exit);
+      fly_on(i, motion_at(disk, now_));
     }
   } else if (disk.partner == shell_exit) {
     ++counters_.shell_exits;
@@ -630,10 +635,7 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
-  const double exit = shell_exit_of(i, motion);
-  const Candidate next = next_event(i, motion);
-  write_down(i, motion);
-  commit(i, next, exit);
+  fly_on(i, motion);
 }
 
 template <class Space, class Rule, class Sizes>

@@ -91,10 +91,12 @@ class EventQueue {
     for (;;) {
       if (next_ + looks_ahead >= end_) [[unlikely]] {
         if (!lengthen_run(until)) return false;
-        const std::size_t later = index_of(current_ + 2);
-        for (std::size_t k = 0; k < held_[later]; k += 4) fetch(&ring_[later].entries[k]);
-        coming_ = index_of(current_ + 1);
-        sent_for_ = 0;
+        if (beyond_cache_) {
+          const std::size_t later = index_of(current_ + 2);
+          for (std::size_t k = 0; k < held_[later]; k += 4) fetch(&ring_[later].entries[k]);
+          coming_ = index_of(current_ + 1);
+          sent_for_ = 0;
+        }
       }
       // Two of the next bucket at a time: sent for all at once they would wait for each other.
       if (beyond_cache_) {

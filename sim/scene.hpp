@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
-#include "sim/collision.hpp"
 #include "sim/floor.hpp"
+#include "sim/surface.hpp"
 
 namespace shakebed::sim {
 
