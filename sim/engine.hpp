@@ -93,13 +93,16 @@ class Engine final : public Simulation {
   Candidate earliest_in(const NeighbourBlock& block, const Motion& motion, double radius) const;
   Candidate next_of_many(std::uint32_t i, const Motion& motion, Candidate best) const;
   Candidate next_contact(std::uint32_t i, const Motion& motion) const;
-  Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best) const;
-  Candidate next_event(std::uint32_t i, const Motion& motion) const;
+  Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best, double exit) const;
+  Candidate next_event(std::uint32_t i, const Motion& motion, double exit) const;
   double shell_exit_of(std::uint32_t i, const Motion& motion) const;
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
   void commit(std::uint32_t i, const Candidate& next, double exit);
   void fly_on(std::uint32_t i, const Motion& motion);
-  void predict(std::uint32_t i, const Motion& motion) { commit(i, next_event(i, motion), shell_exit_of(i, motion)); }
+  void predict(std::uint32_t i, const Motion& motion) {
+    const double exit = shell_exit_of(i, motion);
+    commit(i, next_event(i, motion, exit), exit);
+  }
   void predict_all();
 
   // --- shells

@@ -160,10 +160,17 @@ template <class Space, class Rule, class Sizes>
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_of_many(std::uint32_t i, const Motion& motion,
                                                                 Candidate best) const -> Candidate {
-  shells_.further_blocks(i, [&](const NeighbourBlock& block) {
-    const Candidate other = earliest_in(block, motion, sizes_.radius(i));
+  const double radius = sizes_.radius(i);
+  const auto consider = [&](const Candidate& other) {
     if (other.time < best.time) best = other;
-  });
+  };
+  if (disks_[i].neighbours <= inline_neighbours + 4) [[likely]] {
+    const std::uint32_t* const four = shells_.second_block(i).disk.data();
+    const Earliest earliest = earliest_of_four(contact_times(four, motion, radius), four);
+    consider({earliest.time, earliest.id});
+  } else {
+    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in(block, motion, radius)); });
+  }
   return best;
 }
 
@@ -177,9 +184,10 @@ template <class Space, class Rule, class Sizes>
   return best;
 }
 
-// The next wall that the disk meets, if it comes before `best`; else `best`.
+// The next wall that the disk meets, if it comes before `best`; else `best`. The floor is not looked for beyond `exit`.
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best) const -> Candidate {
+auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best, double exit) const
+    -> Candidate {
   const double radius = sizes_.radius(i);
   const unsigned near = disks_[i].near;
   const auto consider = [&](double wait, std::int32_t wall) {
@@ -189,23 +197,19 @@ auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion
   if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x(), motion.vx()), right_wall);
   if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z(), motion.vz(), gravity_), lid_above);
   if (near & near_floor) {
-    // By then the disk is out of its shell, sideways or downwards: the floor need not be looked for any later.
-    const Disk& disk = disks_[i];
-    const double skin = disk.skin * skin_unit + shell_slack, ox = motion.x() - static_cast<double>(disk.shell_x);
-    const double aside = (skin - std::copysign(ox, ox * motion.vx())) / std::abs(motion.vx());
-    const double down = time_to_fall(skin + motion.z() - static_cast<double>(disk.shell_z), motion.vz(), gravity_);
-    const double horizon = std::min(std::min(best.time - now_, aside), down);
+    const double horizon = std::min(best.time, exit) - now_;
     consider(floor_.time_to_contact(motion.z() - radius, motion.vz(), gravity_, now_, horizon), floor_below);
   }
   return best;
 }
 
+// What the disk meets next, if it comes before `exit`.
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion) const
-    -> Candidate {
+[[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion,
+                                                                     [[maybe_unused]] double exit) const -> Candidate {
   const Candidate next = next_contact(i, motion);
   if constexpr (Space::has_walls) {
-    if (disks_[i].near != 0) return next_wall(i, motion, next);
+    if (disks_[i].near != 0) return next_wall(i, motion, next, exit);
   }
   return next;
 }
@@ -258,7 +262,7 @@ void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::fly_on(std::uint32_t i, const Motion& motion) {
   const double exit = shell_exit_of(i, motion);
-  const Candidate next = next_event(i, motion);
+  const Candidate next = next_event(i, motion, exit);
   write_down(i, motion);
   commit(i, next, exit);
 }
@@ -275,10 +279,11 @@ void Engine<Space, Rule, Sizes>::predict_all() {
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
-    Candidate next = next_event(i, motion);
+    const double exit = shell_exit_of(i, motion);
+    Candidate next = next_event(i, motion, exit);
     const Disk& disk = disks_[i];
     if (disk.partner >= 0 && next.time >= disk.event_time) next = {disk.event_time, disk.partner};
-    commit(i, next, shell_exit_of(i, motion));  // also where it stands already: the disk may leave its shell before
+    commit(i, next, exit);  // also where it stands already: the disk may leave its shell before
   }
 }
 
@@ -557,8 +562,8 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   // predictions overlap in the processor. Neither sees the other: they
   // separate.
   const TwoLanes exits = shell_exits_of(i, j, first, second);
-  const Candidate next_first = next_event(i, first);
-  Candidate next_second = next_event(j, second);
+  const Candidate next_first = next_event(i, first, exits[0]);
+  Candidate next_second = next_event(j, second, exits[1]);
   write_down(i, first);
   write_down(j, second);
   commit(i, next_first, exits[0]);
@@ -566,7 +571,7 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   if (next_second.partner == next_first.partner) [[unlikely]] {
     const bool taken = next_second.partner >= 0 && next_second.time < never &&
                        !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
-    if (taken) next_second = next_event(j, second);
+    if (taken) next_second = next_event(j, second, exits[1]);
   }
   commit(j, next_second, exits[1]);
 }
@@ -641,26 +646,26 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   const double mass = sizes_.mass(i);
-  const double floor_velocity = floor_.velocity(now_);
+  const FloorMotion::Motion floor = floor_.motion(now_);
   if (const auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
     const double before = motion.vx() * motion.vx() + motion.vz() * motion.vz();
     const double speed = std::sqrt(thermal->temperature / mass);
     motion.velocity[0] = speed * random_.normal_pair().first;
-    motion.velocity[1] = floor_velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
+    motion.velocity[1] = floor.velocity + speed * std::sqrt(-2 * std::log(random_.uniform_positive()));
     floor_work_ += 0.5 * mass * (motion.vx() * motion.vx() + motion.vz() * motion.vz() - before);
     return;
   }
   const double vz_before = motion.vz();
-  bounce(i, motion, 0, -1, floor_velocity, floor_surface_);
-  floor_work_ += mass * (motion.vz() - vz_before) * floor_velocity;
+  bounce(i, motion, 0, -1, floor.velocity, floor_surface_);
+  floor_work_ += mass * (motion.vz() - vz_before) * floor.velocity;
   // A disk that lies still on the floor is carried in small hops: a contact has
   // to end before the next can begin.
-  const double pressing = gravity_ + floor_.acceleration(now_);
+  const double pressing = gravity_ + floor.acceleration;
   const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
   const double slowest = 0.5 * pressing * hop;
-  if (motion.vz() - floor_velocity < 1e-3 * slowest) {
+  if (motion.vz() - floor.velocity < 1e-3 * slowest) {
     const double slow = motion.vz();
-    motion.velocity[1] = floor_velocity + slowest;
+    motion.velocity[1] = floor.velocity + slowest;
     floor_work_ += 0.5 * mass * (motion.vz() - slow) * (motion.vz() + slow);
   }
 }

@@ -54,15 +54,17 @@ SineCosine sine_cosine(double frequency, double now, double later) {
   const double x_rest = std::fma(two_pi, part, -x) + (two_pi_rest * part + two_pi * part_rest);
   // The series to x^17 and x^18: their remainders are below 1e-18 at pi/4.
   const double y = x * x;
-  double s = 1 / 355687428096000.0, c = -1 / 6402373705728000.0;
-  for (const double term :
-       {-1 / 1307674368000.0, 1 / 6227020800.0, -1 / 39916800.0, 1 / 362880.0, -1 / 5040.0, 1 / 120.0, -1 / 6.0})
-    s = std::fma(s, y, term);
-  for (const double term :
-       {1 / 20922789888000.0, -1 / 87178291200.0, 1 / 479001600.0, -1 / 3628800.0, 1 / 40320.0, -1 / 720.0, 1 / 24.0})
-    c = std::fma(c, y, term);
+  // Taken in pairs: half as many steps wait for one another.
+  const double yy = y * y, y4 = yy * yy;
+  const auto pair = [y](double first, double second) { return std::fma(second, y, first); };
+  const double s = std::fma(
+      y4, std::fma(yy, pair(-1 / 1307674368000.0, 1 / 355687428096000.0), pair(-1 / 39916800.0, 1 / 6227020800.0)),
+      std::fma(yy, pair(-1 / 5040.0, 1 / 362880.0), pair(-1 / 6.0, 1 / 120.0)));
+  const double c = std::fma(
+      y4, std::fma(yy, pair(1 / 20922789888000.0, -1 / 6402373705728000.0), pair(1 / 479001600.0, -1 / 87178291200.0)),
+      std::fma(yy, pair(1 / 40320.0, -1 / 3628800.0), pair(1 / 24.0, -1 / 720.0)));
   const double half = 0.5 * y, one_less = 1 - half;
-  const double cosine_of_x = one_less + (((1 - one_less) - half) + std::fma(y * y, c, -x * x_rest));
+  const double cosine_of_x = one_less + (((1 - one_less) - half) + std::fma(yy, c, -x * x_rest));
   const double sine_of_x = x + std::fma(x * y, s, x_rest * one_less);
   switch (static_cast<std::int64_t>(quarters) & 3) {
     case 0:
@@ -165,9 +167,13 @@ FloorMotion::Motion FloorMotion::motion(double now, double later) const {
           (heights_[j] - heights_[i]) / h + (-(3 * a * a - 1) * ci + (3 * b * b - 1) * cj) * h / 6, a * ci + b * cj};
 }
 
-double FloorMotion::position(double time) const { return motion(time, 0).position; }
-double FloorMotion::velocity(double time) const { return motion(time, 0).velocity; }
-double FloorMotion::acceleration(double time) const { return motion(time, 0).acceleration; }
+// By how much the floor's acceleration can grow, at most, within `later`, which is shorter than half a period.
+double FloorMotion::growth(const Motion& floor, double later) const {
+  if (kind_ != Kind::sinusoidal) return largest_jerk_ * later;
+  // -a w^2 sin(p), while its phase p advances by d: by a w^2 (d max(-cos p, 0) + d^2/2).
+  const double d = angular_frequency_ * later;
+  return std::max(-floor.velocity * angular_frequency_, 0.0) * d + 0.5 * largest_acceleration_ * d * d;
+}
 
 double FloorMotion::time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const {
   if (!moves()) {
@@ -179,7 +185,8 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
   // Most points are far from the floor all the while, as far as it can rise until then. A flight is lowest at an end.
   if (std::min(bottom, bottom + (vz - 0.5 * gravity * horizon) * horizon) > ceiling(now, horizon)) return never;
   double t = bottom > highest_ ? time_to_fall(bottom - highest_, vz, gravity) : 0;
-  const double largest_bend = gravity + largest_acceleration_;
+  constexpr double rounding = 1e-16;  // of a disk's diameter
+  const double largest_bend = gravity + largest_acceleration_, longest_step = period_ / 6;
   while (t <= horizon) {
     const Motion floor = motion(now, t);
     const double gap = bottom + (vz - 0.5 * gravity * t) * t - floor.position;
@@ -187,17 +194,10 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
     if (gap <= 0 && gap_rate < 0) return t;
     if (gravity == 0 && gap + floor.position > highest_ && vz >= 0) return never;
     const double touching = std::max(gap, 0.0);
-    double step = step_to_root(touching, gap_rate, largest_bend);
-    if (kind_ == Kind::sinusoidal) {
-      // A closer bound, good for twice that step: the floor's acceleration -a w^2 sin(p) can grow by a w^2 (d |cos p| +
-      // d^2/2) at most while its phase p advances by d.
-      const double reach = 2 * step, d = angular_frequency_ * reach;
-      const double peak = amplitude_ * angular_frequency_ * angular_frequency_;
-      const double growth = std::max(-floor.velocity * angular_frequency_, 0.0) * d + peak * d * d / 2;
-      const double bend = gravity + std::min(floor.acceleration + growth, largest_acceleration_);
-      step = bend > 0 ? std::min(step_to_root(touching, gap_rate, bend), reach)
-                      : (gap_rate < 0 ? std::min(touching / -gap_rate, reach) : reach);
-    }
+    // The bend is bound for somewhat longer than a straight line takes.
+    const double far = gap_rate < 0 ? std::min(1.25 * touching / -gap_rate, longest_step) : longest_step;
+    const double bend = gravity + std::min(floor.acceleration + growth(floor, far), largest_acceleration_);
+    double step = bend > 0 || gap_rate < 0 ? std::min(far, step_to_root(touching, gap_rate, bend)) : far;
     if (gap <= 0) {
       // It touches and does not approach. Where the floor falls away faster than the point, the gap opens as c h^2/2, c
       // = -F'' here, and changes its bend by J h at most, so that nothing happens before h = 3 c/J. The least step is
@@ -206,7 +206,9 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
       const double reach = opening / largest_jerk_ + 1e-9 * period_;
       if (reach > step) step = reach;
     }
-    if (!(t + step > t)) return t;
+    // The bend and its bound are as good as constant by now: the gap at the root is no more than this product.
+    const bool there = largest_jerk_ * step * step * step < rounding && gap_rate + largest_bend * step < 0;
+    if (there || !(t + step > t)) return t + step <= horizon ? t + step : never;
     t += step;
   }
   return never;

@@ -25,10 +25,13 @@ class FloorMotion {
   explicit FloorMotion(const SinusoidalFloor& floor);
   explicit FloorMotion(const TabulatedFloor& floor);
 
-  // At a time counted from a whole number of periods.
-  double position(double time) const;
-  double velocity(double time) const;
-  double acceleration(double time) const;
+  struct Motion {
+    double position, velocity, acceleration;
+  };
+  // At now + later, counted from a whole number of periods; the rounding of that sum does not count.
+  Motion motion(double now, double later = 0) const;
+  double position(double time) const { return motion(time).position; }
+  double velocity(double time) const { return motion(time).velocity; }
 
   bool moves() const { return kind_ != Kind::still; }
   double period() const { return period_; }    // 1 for a floor that stands still
@@ -40,18 +43,16 @@ class FloorMotion {
   // velocity vz meets the floor from above; `never` if none. A point at the floor or, by rounding, just below it counts
   // as touching: it meets the floor at 0 if it approaches, else at its next fall.
   //
-  // The gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max floor''. From any t with F >= 0 the
-  // parabola F + F' h - M h^2/2 lies below the gap, so its root can never step over a crossing; near a simple root
-  // the steps converge quadratically, and near a tangent one they crawl past it on the safe side. A point that touches
-  // the floor while this falls faster than the point does leaves it: that is no contact.
+  // The gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max floor'' over the step. From any t with
+  // F >= 0 the parabola F + F' h - M h^2/2 lies below the gap, so its root can never step over a crossing; near a
+  // simple root the steps converge like Newton's or better, as M nears F'', and near a tangent one they crawl past it
+  // on the safe side. The gap in place of 0 at the answer is within 1e-16 and what rounding leaves. A point that
+  // touches the floor while this falls faster than the point does leaves it: that is no contact.
   double time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const;
 
  private:
   enum class Kind { still, sinusoidal, tabulated };
-  struct Motion {
-    double position, velocity, acceleration;
-  };
-  Motion motion(double now, double later) const;  // at now + later, whose rounding does not count
+  double growth(const Motion& floor, double later) const;
   void note_ceilings(double largest_curvature);
   double ceiling(double now, double horizon) const;  // no position from now to now + horizon lies above
 

@@ -244,28 +244,46 @@ inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std
 #endif
 }
 
-// The earliest of eight times, none of them NaN, and the id that goes with it; of equal times the first one's.
+// The earliest of some times, none of them NaN, and the id that goes with it; of equal times the first one's.
 struct Earliest {
   double time;
   std::int32_t id;
 };
-inline Earliest earliest_of_eight(Lanes first, Lanes second, const std::uint32_t* ids) {
 #if defined(__AVX__)
-  // The time is found, in every lane at once, before where it stands: it is wanted sooner.
-  const __m256d of_four = _mm256_min_pd(second, first);
-  const __m256d of_two = _mm256_min_pd(_mm256_permute2f128_pd(of_four, of_four, 1), of_four);
-  const __m256d of_one = _mm256_min_pd(_mm256_permute_pd(of_two, 5), of_two);
-  const auto equal = [of_one](Lanes times) {
-    return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(times, of_one, _CMP_EQ_OQ)));
-  };
-  return {_mm256_cvtsd_f64(of_one), static_cast<std::int32_t>(ids[__builtin_ctz(equal(first) | equal(second) << 4)])};
+// In every lane at once, before it is known where it stands: it is wanted sooner.
+inline __m256d smallest_of(Lanes times) {
+  const __m256d of_two = _mm256_min_pd(_mm256_permute2f128_pd(times, times, 1), times);
+  return _mm256_min_pd(_mm256_permute_pd(of_two, 5), of_two);
+}
+// Bit k is set where times[k] is that.
+inline unsigned equal_times(Lanes times, __m256d time) {
+  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(times, time, _CMP_EQ_OQ)));
+}
 #else
-  Earliest earliest = {first[0], static_cast<std::int32_t>(ids[0])};
-  for (int k = 1; k < 8; ++k) {
-    const double time = k < 4 ? first[k] : second[k - 4];
-    if (time < earliest.time) earliest = {time, static_cast<std::int32_t>(ids[k])};
+inline Earliest earliest_of(const double* times, const std::uint32_t* ids, int count) {
+  Earliest earliest = {times[0], static_cast<std::int32_t>(ids[0])};
+  for (int k = 1; k < count; ++k) {
+    if (times[k] < earliest.time) earliest = {times[k], static_cast<std::int32_t>(ids[k])};
   }
   return earliest;
+}
+#endif
+inline Earliest earliest_of_four(Lanes times, const std::uint32_t* ids) {
+#if defined(__AVX__)
+  const __m256d earliest = smallest_of(times);
+  return {_mm256_cvtsd_f64(earliest), static_cast<std::int32_t>(ids[__builtin_ctz(equal_times(times, earliest))])};
+#else
+  return earliest_of(&times[0], ids, 4);
+#endif
+}
+inline Earliest earliest_of_eight(Lanes first, Lanes second, const std::uint32_t* ids) {
+#if defined(__AVX__)
+  const __m256d earliest = smallest_of(_mm256_min_pd(second, first));
+  const unsigned equal = equal_times(first, earliest) | equal_times(second, earliest) << 4;
+  return {_mm256_cvtsd_f64(earliest), static_cast<std::int32_t>(ids[__builtin_ctz(equal)])};
+#else
+  const Lanes all[2] = {first, second};
+  return earliest_of(&all[0][0], ids, 8);
 #endif
 }
 

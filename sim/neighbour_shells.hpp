@@ -89,6 +89,8 @@ class NeighbourShells {
   }
 
   const NeighbourBlock& first_block(std::uint32_t i) const { return lists_[i]; }
+  // The one behind it, of a disk with more than eight.
+  const NeighbourBlock& second_block(std::uint32_t i) const { return blocks_[overflow_[i]]; }
   // Calls visit(block) for the blocks that hold the neighbours beyond the first
   // eight.
   template <class Visit>

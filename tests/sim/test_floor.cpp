@@ -140,10 +140,10 @@ TEST(TabulatedFloor, FollowsASineThroughItsSamples) {
   for (double t = -3; t < 5; t += 0.0137) {
     EXPECT_NEAR(spline.position(t), sine.position(t), 2e-6);
     EXPECT_NEAR(spline.velocity(t), sine.velocity(t), 2e-4);
-    EXPECT_NEAR(spline.acceleration(t), sine.acceleration(t), 2e-2);
+    EXPECT_NEAR(spline.motion(t).acceleration, sine.motion(t).acceleration, 2e-2);
     EXPECT_LE(spline.position(t), spline.highest());
     EXPECT_GE(spline.position(t), spline.lowest());
-    EXPECT_LE(spline.acceleration(t), spline.largest_upward_acceleration() * (1 + 1e-12));
+    EXPECT_LE(spline.motion(t).acceleration, spline.largest_upward_acceleration() * (1 + 1e-12));
   }
 }
 
