@@ -141,6 +141,7 @@ class Engine final : public Simulation {
 
   // --- synchronisation
   void synchronise();
+  double density_round_disks() const;  // disks a unit of area
   void begin_interval();
   void renumber();
   template <class Self, class Visit>

@@ -893,6 +893,25 @@ void Engine<Space, Rule, Sizes>::renumber() {
   }
 }
 
+// The density in layers across the box, mean over the disks: a bed under gravity is denser where its disks are than the
+// space that it takes up.
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::density_round_disks() const {
+  constexpr double usual_thickness = 3;  // some rows of a crystal
+  constexpr std::size_t most_layers = 4096;
+  double low = never, high = -never;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    low = std::min(low, disks_[i].z);
+    high = std::max(high, disks_[i].z);
+  }
+  const double thickness = std::max(usual_thickness, (high - low) / (most_layers - 1));
+  std::vector<double> layers(most_layers);
+  for (std::uint32_t i = 0; i < count_; ++i) layers[static_cast<std::size_t>((disks_[i].z - low) / thickness)] += 1;
+  double squares = 0;
+  for (const double disks : layers) squares += disks * disks;
+  return squares / (count_ * width_ * thickness);
+}
+
 // From positions, velocities, spins and clocks at now_ = 0 alone.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
@@ -906,9 +925,10 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  // Bounds of the shells: in a uniform fluid the radius that gives eight neighbours on the average. A bed under gravity
-  // is denser where most of its contacts are than on the average; with as large ones its lists overflow there.
-  const double density = count_ / (width_ * height), neighbours = Space::falls ? 6.2 : 8.3;
+  // Bounds of the shells: the radius that gives eight neighbours on the average where it is as dense as round the
+  // disks. Many a bed is denser than that for a part of its period.
+  const double neighbours = Space::falls ? 7.5 : 8.3;
+  const double density = Space::wraps_z ? count_ / (width_ * height) : density_round_disks();
   largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
   // Two disks that stay in their shells must not come near a second image of each other.
   if constexpr (Space::wraps_x) {
