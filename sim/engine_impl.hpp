@@ -186,8 +186,8 @@ template <class Space, class Rule, class Sizes>
 
 // The next wall that the disk meets, if it comes before `best`; else `best`. The floor is not looked for beyond `exit`.
 template <class Space, class Rule, class Sizes>
-auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best, double exit) const
-    -> Candidate {
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best,
+                                                             double exit) const -> Candidate {
   const double radius = sizes_.radius(i);
   const unsigned near = disks_[i].near;
   const auto consider = [&](double wait, std::int32_t wall) {
