@@ -6,6 +6,7 @@
 #include <random>
 
 #include "fit/fit_profile.hpp"
+#include "statistics/correlated_series.hpp"
 
 namespace shakebed::fit {
 
@@ -66,24 +67,8 @@ std::vector<double> heights_of(const ProfileFrames& frames) {
   return series;
 }
 
-// 1 + 2 sum of the correlations, summed to five times itself [Sokal1997]; 1 where there is too little to tell.
-double memory_of(const std::vector<double>& series) {
-  double variance = 0.0;
-  for (const double x : series) variance += x * x;
-  if (series.size() < 8 || !(variance > 0.0)) return 1.0;
-  double inefficiency = 1.0;
-  for (std::size_t lag = 1; lag < series.size() / 4; ++lag) {
-    double correlation = 0.0;
-    for (std::size_t f = 0; f + lag < series.size(); ++f) correlation += series[f] * series[f + lag];
-    inefficiency += 2.0 * correlation / variance;
-    if (static_cast<double>(lag) >= 5.0 * inefficiency) break;
-  }
-  return inefficiency;
-}
-
 // How much further from the whole sample's mean than means of resampled blocks are, the means of other films would be.
-// Blocks with memory share some of it and are few; means over overlapping windows three memories long
-// [MeketonSchmeiser1984], with what such windows still share, as their halves tell [VatsFlegal2022], miss less.
+// Blocks with memory share some of it and are few; overlapping windows miss less.
 // degrees: of freedom of that, about.
 struct Widening {
   double factor = 1.0, degrees = 1e6;
@@ -97,22 +82,11 @@ Widening widening_of(const std::vector<double>& series, const Eigen::VectorXd& o
   Widening widening;
   widening.degrees = m - 1.0;
   double variance = resampled * m / (m - 1.0);
-  const double memory = memory_of(series);
-  if (block > 1 && memory >= 1.2 && series.size() >= 24) {
-    const auto by_windows = [&](std::size_t window) {
-      const auto w = static_cast<double>(window);
-      double sum = 0.0, squares = 0.0;
-      for (std::size_t f = 0; f < series.size(); ++f) {
-        sum += series[f];
-        if (f + 1 < window) continue;
-        squares += sum * sum;
-        sum -= series[f + 1 - window];
-      }
-      return squares / (w * (n - w) * (n - w + 1.0));
-    };
-    const std::size_t half = std::min(static_cast<std::size_t>(std::ceil(1.5 * memory)), series.size() / 12);
-    const double whole = by_windows(2 * half), halves = by_windows(half);
-    variance = whole * std::max(1.0, 2.0 - halves / whole);
+  const double memory = statistics::memory_of(series);
+  if (block > 1 && memory >= statistics::least_memory && series.size() >= 24) {
+    const std::size_t half = statistics::half_window(memory, series.size());
+    const statistics::WindowVariance found = statistics::corrected_variance(series, half);
+    variance = found.variance * found.correction;
     // Overlapping windows tell half as much again as those side by side; the correction doubles the variance of that.
     widening.degrees = 1.5 * (n / static_cast<double>(2 * half) - 1.0) / 2.0;
   }
@@ -163,7 +137,7 @@ FrameAverage average_frames(const ProfileFrames& frames, int block) {
 int independent_block(const ProfileFrames& frames) {
   std::string message;
   if (!shape_is_good(frames, message)) return 1;
-  const double inefficiency = memory_of(heights_of(frames));
+  const double inefficiency = statistics::memory_of(heights_of(frames));
   if (inefficiency < 1.2) return 1;
   // A block of b frames with memory misses about 2 x memory/b of the variance of the mean.
   const int block = static_cast<int>(std::ceil(4.0 * inefficiency));

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "ingest/atomic_file.hpp"
+#include "statistics/correlated_series.hpp"
 
 namespace shakebed::ingest {
 
@@ -93,38 +94,18 @@ Plateau find_plateau(const std::vector<std::vector<double>>& series_by_bin, cons
   return plateau;
 }
 
-// The variance of the mean of a series that remembers, from means over overlapping windows [MeketonSchmeiser1984]:
-// three memories long, of which six must fit in, and made larger by what such windows still share, as their halves tell
-// [VatsFlegal2022]. What BlockedCovariance of sim/statistics.hpp does for simulated profiles, which ingest does not
-// see.
+// The variance of the mean of a series that remembers.
 double variance_of_mean(std::vector<double> series) {
   const double n = static_cast<double>(series.size());
   double mean = 0, variance = 0;
   for (const double value : series) mean += value / n;
   for (double& value : series) value -= mean, variance += value * value;
-  if (series.size() < 24 || !(variance > 0)) return variance / (n - 1) / n;
-  double memory = 1;  // 1 + 2 sum of the correlations, summed to five times itself [Sokal1997]
-  for (std::size_t lag = 1; lag < series.size() / 4; ++lag) {
-    double correlation = 0;
-    for (std::size_t f = 0; f + lag < series.size(); ++f) correlation += series[f] * series[f + lag];
-    memory += 2 * correlation / variance;
-    if (static_cast<double>(lag) >= 5 * memory) break;
-  }
-  if (memory < 1.2) return variance / (n - 1) / n;
-  const auto by_windows = [&](std::size_t window) {
-    const double w = static_cast<double>(window);
-    double sum = 0, squares = 0;
-    for (std::size_t f = 0; f < series.size(); ++f) {
-      sum += series[f];
-      if (f + 1 < window) continue;
-      squares += sum * sum;
-      sum -= series[f + 1 - window];
-    }
-    return squares / (w * (n - w) * (n - w + 1));
-  };
-  const std::size_t half = std::min(static_cast<std::size_t>(std::ceil(1.5 * memory)), series.size() / 12);
-  const double whole = by_windows(2 * half), halves = by_windows(half);
-  return whole * std::max(1.0, 2 - halves / whole);
+  const double independent = variance / (n - 1) / n;
+  if (series.size() < 24 || !(variance > 0)) return independent;
+  const double memory = statistics::memory_of(series);
+  if (memory < statistics::least_memory) return independent;
+  const auto found = statistics::corrected_variance(series, statistics::half_window(memory, series.size()));
+  return found.variance * found.correction;
 }
 
 }  // namespace

@@ -185,7 +185,7 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
   // Most points are far from the floor all the while, as far as it can rise until then. A flight is lowest at an end.
   if (std::min(bottom, bottom + (vz - 0.5 * gravity * horizon) * horizon) > ceiling(now, horizon)) return never;
   double t = bottom > highest_ ? time_to_fall(bottom - highest_, vz, gravity) : 0;
-  constexpr double rounding = 1e-16;  // of a disk's diameter
+  const double rounding = 1e-17 * (highest_ - lowest_);
   const double largest_bend = gravity + largest_acceleration_, longest_step = period_ / 6;
   while (t <= horizon) {
     const Motion floor = motion(now, t);
@@ -206,8 +206,9 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
       const double reach = opening / largest_jerk_ + 1e-9 * period_;
       if (reach > step) step = reach;
     }
-    // The bend and its bound are as good as constant by now: the gap at the root is no more than this product.
-    const bool there = largest_jerk_ * step * step * step < rounding && gap_rate + largest_bend * step < 0;
+    // Near a root that is not tangent bend and bound are as good as constant: the gap there is no more than the
+    // product.
+    const bool there = largest_jerk_ * step * step * step < rounding && gap_rate + 4 * largest_bend * step < 0;
     if (there || !(t + step > t)) return t + step <= horizon ? t + step : never;
     t += step;
   }

@@ -46,8 +46,8 @@ class FloorMotion {
   // The gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max floor'' over the step. From any t with
   // F >= 0 the parabola F + F' h - M h^2/2 lies below the gap, so its root can never step over a crossing; near a
   // simple root the steps converge like Newton's or better, as M nears F'', and near a tangent one they crawl past it
-  // on the safe side. The gap in place of 0 at the answer is within 1e-16 and what rounding leaves. A point that
-  // touches the floor while this falls faster than the point does leaves it: that is no contact.
+  // on the safe side. At the answer the gap is 0 but for rounding. A point that touches the floor while this falls
+  // faster than the point does leaves it: that is no contact.
   double time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const;
 
  private:

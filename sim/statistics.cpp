@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "statistics/correlated_series.hpp"
 
 namespace shakebed::sim {
 
@@ -61,19 +64,12 @@ void BlockedCovariance::add(std::span<const double> sample) {
 
 namespace {
 
-// 1 + 2 sum of the correlations of a series, summed to five times itself [Sokal1997].
-double inefficiency(std::vector<double> series) {
-  double mean = 0, variance = 0;
+// The series from its mean.
+std::vector<double> from_mean(std::vector<double> series) {
+  double mean = 0;
   for (const double x : series) mean += x / static_cast<double>(series.size());
-  for (double& x : series) x -= mean, variance += x * x;
-  double sum = 1;
-  for (std::size_t lag = 1; lag < series.size() / 4 && variance > 0; ++lag) {
-    double correlation = 0;
-    for (std::size_t b = 0; b + lag < series.size(); ++b) correlation += series[b] * series[b + lag];
-    sum += 2 * correlation / variance;
-    if (static_cast<double>(lag) >= 5 * sum) break;
-  }
-  return sum;
+  for (double& x : series) x -= mean;
+  return series;
 }
 
 // What the square of a window's sum counts in the variance of the mean of `count` values: exact where they are
@@ -83,19 +79,6 @@ double window_weight(std::size_t count, std::size_t window) {
   return 1 / (w * (n - w) * (n - w + 1));
 }
 
-// The variance of a series' mean from means over overlapping windows.
-double variance_of_mean(const std::vector<double>& series, std::size_t window) {
-  double mean = 0, sum = 0, squares = 0;
-  for (const double x : series) mean += x / static_cast<double>(series.size());
-  for (std::size_t b = 0; b < series.size(); ++b) {
-    sum += series[b] - mean;
-    if (b + 1 < window) continue;
-    squares += sum * sum;
-    sum -= series[b + 1 - window] - mean;
-  }
-  return squares * window_weight(series.size(), window);
-}
-
 }  // namespace
 
 std::vector<double> BlockedCovariance::first_moment() const {
@@ -103,20 +86,18 @@ std::vector<double> BlockedCovariance::first_moment() const {
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     for (std::size_t i = 0; i < size_; ++i) moment[b] += static_cast<double>(i) * blocks_[b][i];
   }
-  return moment;
+  return from_mean(std::move(moment));
 }
 
 std::size_t BlockedCovariance::window() const {
-  constexpr std::size_t least_windows = 6;
   if (blocks_.size() < 16) return 1;
   std::vector<double> sum(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     for (const double x : blocks_[b]) sum[b] += x;
   }
-  const double memory = std::max(inefficiency(std::move(sum)), inefficiency(first_moment()));
-  if (memory < 1.2) return 2;
-  const double asked = std::min(1.5 * memory, static_cast<double>(blocks_.size()));
-  return 2 * std::min(static_cast<std::size_t>(std::ceil(asked)), blocks_.size() / (2 * least_windows));
+  const double memory =
+      std::max(statistics::memory_of(from_mean(std::move(sum))), statistics::memory_of(first_moment()));
+  return memory < statistics::least_memory ? 2 : 2 * statistics::half_window(memory, blocks_.size());
 }
 
 std::size_t BlockedCovariance::independent_blocks() const {
@@ -133,11 +114,7 @@ std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t l
     for (std::size_t i = 0; i < n; ++i) mean[i] += block[first + i] / static_cast<double>(count);
   }
   double weight = window_weight(count, window);
-  if (window > 1) {
-    const std::vector<double> moment = first_moment();
-    const double whole = variance_of_mean(moment, window), halves = variance_of_mean(moment, window / 2);
-    if (whole > halves) weight *= 2 - halves / whole;
-  }
+  if (window > 1) weight *= statistics::corrected_variance(first_moment(), window / 2).correction;
   for (std::size_t b = 0; b < count; ++b) {
     for (std::size_t i = 0; i < n; ++i) sum[i] += blocks_[b][first + i] - mean[i];
     if (b + 1 < window) continue;

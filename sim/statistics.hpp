@@ -71,7 +71,7 @@ class BlockedCovariance {
   }
 
  private:
-  std::vector<double> first_moment() const;  // of every block
+  std::vector<double> first_moment() const;  // of every block, from its mean
 
   std::size_t size_;
   std::size_t block_length_ = 1, in_block_ = 0;
