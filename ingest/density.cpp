@@ -127,10 +127,9 @@ std::vector<double> density_of_frame(std::span<const double> heights, double bed
       if (place >= 0 && place <= last) density[static_cast<std::size_t>(place)] += 1 / bins.width;
       continue;
     }
-    for (double bin = std::max(0.0, low); bin <= std::min(last, high); ++bin) {
-      const auto at = static_cast<std::size_t>(bin);
-      density[at] += kernel_value(kernel, bins.middle(at) - height);
-    }
+    const auto first = static_cast<std::size_t>(std::max(0.0, low)),
+               end = static_cast<std::size_t>(std::min(last, high)) + 1;
+    for (std::size_t bin = first; bin < end; ++bin) density[bin] += kernel_value(kernel, bins.middle(bin) - height);
   }
   for (double& value : density) value /= bed_width;
   return density;

@@ -29,6 +29,7 @@ int spawn(const std::vector<std::string>& arguments, const fs::path& directory, 
   std::vector<std::string> all{SHAKEBED_PROGRAM};
   all.insert(all.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(all.size() + 1);
   for (std::string& argument : all) argv.push_back(argument.data());
   argv.push_back(nullptr);
   pid_t child = 0;

@@ -21,7 +21,7 @@ struct Case {
   int beds, disks;            // 118 or 462, on 10.1 or 20.2 D: 10 or 20 rows
   std::string model, window;  // of the fit, as a recipe says them
   double photographs;         // what they may add to T, relative
-  double frozen = 0;          // scatter of T between beds that no run tells of itself, relative
+  double untold = 0;          // scatter of T round the bath's that no run tells of itself, relative
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.temperature << " T_c, " << c.disks << " disks"; }
 
@@ -75,7 +75,7 @@ TEST_P(ThermometerByFrames, FindsTheBathsTemperature) {
                  own = simulated["value"].get<double>() / truth;
     std::printf("  T over the bath's by frames %.4f +- %.4f, by the simulated profile %.4f +- %.4f\n", seen, error, own,
                 simulated["std_error"].get<double>() / truth);
-    EXPECT_NEAR(seen, 1, 3.5 * std::hypot(error, c.frozen)) << "bed " << k;  // of 36 beds: one false alarm in 60
+    EXPECT_NEAR(seen, 1, 3.5 * std::hypot(error, c.untold)) << "bed " << k;  // of 36 beds: one false alarm in 60
     EXPECT_LT(error, 0.03);
     sum += seen - own, squares += (seen - own) * (seen - own);
     seen_sum += seen, seen_squares += seen * seen;
@@ -92,9 +92,12 @@ TEST_P(ThermometerByFrames, FindsTheBathsTemperature) {
 
 const std::string fluid = R"({ "low": 8 })", high_fluid = R"({ "low": 5 })", rule = "{}";
 
+// Other beds than these are off by 0.0145(15) rms at 15 T_c (48 of them) and by 0.0115(17) at 20 T_c (24) where each
+// states 0.0096 and 0.0087: their mean is 0.6 % low, and they scatter by more than they state. At 40 T_c (24) by 0.0066
+// where each states 0.0074.
 INSTANTIATE_TEST_SUITE_P(Fluid, ThermometerByFrames,
-                         testing::Values(Case{15, 6, 118, "enskog-rectangle", fluid, 0.01},
-                                         Case{20, 6, 118, "enskog-rectangle", fluid, 0.01},
+                         testing::Values(Case{15, 6, 118, "enskog-rectangle", fluid, 0.01, 0.011},
+                                         Case{20, 6, 118, "enskog-rectangle", fluid, 0.01, 0.0075},
                                          Case{40, 6, 118, "enskog-rectangle", high_fluid, 0.01}),
                          name_of);
 // A crystal close to T_c keeps what it froze with. 12 other beds at 3 T_c scatter by 0.0162(33) where each states

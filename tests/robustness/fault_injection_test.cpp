@@ -116,7 +116,7 @@ TEST_F(Faults, FilesMayNotGrowBeyondALimit) {
   // The C library's own streams included. The signal that comes with the limit is ignored, as most shells have it not.
   const auto before = ::signal(SIGXFSZ, SIG_IGN);
   int failed = 0;
-  for (const rlim_t bytes : {0, 100, 700, 3000, 10'000, 30'000}) {
+  for (const rlim_t bytes : {0u, 100u, 700u, 3000u, 10'000u, 30'000u}) {
     fs::remove_all(folder_ / "o");
     ProgramResult result;
     {
@@ -242,7 +242,7 @@ TEST_F(Faults, MemoryIsShort) {
   text.replace(text.find("\"0.2 s\""), 7, "0");
   text.replace(text.find("\"0.5 s\""), 7, "\"0.05 s\"");
   write_text(folder_ / "large.json", text);
-  for (const rlim_t megabytes : {16, 20, 24, 32, 64}) {
+  for (const rlim_t megabytes : {16u, 20u, 24u, 32u, 64u}) {
     fs::remove_all(folder_ / "m");
     ProgramResult result;
     {
