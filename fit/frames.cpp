@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "fit/fit_profile.hpp"
 #include "statistics/correlated_series.hpp"
@@ -58,13 +59,10 @@ Eigen::MatrixXd block_means(const ProfileFrames& frames, int block) {
 std::vector<double> heights_of(const ProfileFrames& frames) {
   const std::size_t bins = frames.height.size(), count = frames.frames();
   std::vector<double> series(count, 0.0);
-  double mean = 0.0;
   for (std::size_t f = 0; f < count; ++f) {
     for (std::size_t i = 0; i < bins; ++i) series[f] += frames.height[i] * frames.number_density[f * bins + i];
-    mean += series[f] / static_cast<double>(count);
   }
-  for (double& x : series) x -= mean;
-  return series;
+  return statistics::from_mean(std::move(series));
 }
 
 // How much further from the whole sample's mean than means of resampled blocks are, the means of other films would be.
@@ -138,7 +136,7 @@ int independent_block(const ProfileFrames& frames) {
   std::string message;
   if (!shape_is_good(frames, message)) return 1;
   const double inefficiency = statistics::memory_of(heights_of(frames));
-  if (inefficiency < 1.2) return 1;
+  if (inefficiency < statistics::least_memory) return 1;
   // A block of b frames with memory misses about 2 x memory/b of the variance of the mean.
   const int block = static_cast<int>(std::ceil(4.0 * inefficiency));
   return std::clamp(block, 1, static_cast<int>(frames.frames() / 4));

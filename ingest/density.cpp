@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "ingest/atomic_file.hpp"
 #include "statistics/correlated_series.hpp"
@@ -97,9 +98,9 @@ Plateau find_plateau(const std::vector<std::vector<double>>& series_by_bin, cons
 // The variance of the mean of a series that remembers.
 double variance_of_mean(std::vector<double> series) {
   const double n = static_cast<double>(series.size());
-  double mean = 0, variance = 0;
-  for (const double value : series) mean += value / n;
-  for (double& value : series) value -= mean, variance += value * value;
+  series = statistics::from_mean(std::move(series));
+  double variance = 0;
+  for (const double value : series) variance += value * value;
   const double independent = variance / (n - 1) / n;
   if (series.size() < 24 || !(variance > 0)) return independent;
   const double memory = statistics::memory_of(series);

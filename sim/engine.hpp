@@ -99,6 +99,7 @@ class Engine final : public Simulation {
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
   void commit(std::uint32_t i, const Candidate& next, double exit);
   void fly_on(std::uint32_t i, const Motion& motion);
+  // The same where the record says `motion` already.
   void predict(std::uint32_t i, const Motion& motion) {
     const double exit = shell_exit_of(i, motion);
     commit(i, next_event(i, motion, exit), exit);

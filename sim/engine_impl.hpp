@@ -203,7 +203,7 @@ template <class Space, class Rule, class Sizes>
   return best;
 }
 
-// What the disk meets next, if it comes before `exit`.
+// What the disk meets next, if that is before `exit`, when it leaves its shell; later floors are not told.
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion,
                                                                      [[maybe_unused]] double exit) const -> Candidate {

@@ -29,7 +29,8 @@ std::vector<double> periodic_spline_curvatures(const std::vector<double>& values
   return curvature;
 }
 
-// The positive root h of gap + gap_rate h - bend h^2/2, gap >= 0, bend > 0, without cancellation.
+// The first positive root h of gap + gap_rate h - bend h^2/2, gap >= 0, without cancellation; bend > 0 or gap_rate < 0,
+// NaN where there is none.
 double step_to_root(double gap, double gap_rate, double bend) {
   const double root = std::sqrt(gap_rate * gap_rate + 2 * bend * gap);
   return gap_rate < 0 ? 2 * gap / (root - gap_rate) : (gap_rate + root) / bend;

@@ -62,31 +62,12 @@ void BlockedCovariance::add(std::span<const double> sample) {
   block_length_ *= 2;
 }
 
-namespace {
-
-// The series from its mean.
-std::vector<double> from_mean(std::vector<double> series) {
-  double mean = 0;
-  for (const double x : series) mean += x / static_cast<double>(series.size());
-  for (double& x : series) x -= mean;
-  return series;
-}
-
-// What the square of a window's sum counts in the variance of the mean of `count` values: exact where they are
-// independent.
-double window_weight(std::size_t count, std::size_t window) {
-  const auto n = static_cast<double>(count), w = static_cast<double>(window);
-  return 1 / (w * (n - w) * (n - w + 1));
-}
-
-}  // namespace
-
 std::vector<double> BlockedCovariance::first_moment() const {
   std::vector<double> moment(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     for (std::size_t i = 0; i < size_; ++i) moment[b] += static_cast<double>(i) * blocks_[b][i];
   }
-  return from_mean(std::move(moment));
+  return statistics::from_mean(std::move(moment));
 }
 
 std::size_t BlockedCovariance::window() const {
@@ -96,7 +77,7 @@ std::size_t BlockedCovariance::window() const {
     for (const double x : blocks_[b]) sum[b] += x;
   }
   const double memory =
-      std::max(statistics::memory_of(from_mean(std::move(sum))), statistics::memory_of(first_moment()));
+      std::max(statistics::memory_of(statistics::from_mean(std::move(sum))), statistics::memory_of(first_moment()));
   return memory < statistics::least_memory ? 2 : 2 * statistics::half_window(memory, blocks_.size());
 }
 
@@ -113,7 +94,7 @@ std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t l
   for (const std::vector<double>& block : blocks_) {
     for (std::size_t i = 0; i < n; ++i) mean[i] += block[first + i] / static_cast<double>(count);
   }
-  double weight = window_weight(count, window);
+  double weight = 1 / statistics::window_divisor(count, window);
   if (window > 1) weight *= statistics::corrected_variance(first_moment(), window / 2).correction;
   for (std::size_t b = 0; b < count; ++b) {
     for (std::size_t i = 0; i < n; ++i) sum[i] += blocks_[b][first + i] - mean[i];

@@ -5,6 +5,13 @@
 
 namespace shakebed::statistics {
 
+std::vector<double> from_mean(std::vector<double> series) {
+  double mean = 0;
+  for (const double x : series) mean += x / static_cast<double>(series.size());
+  for (double& x : series) x -= mean;
+  return series;
+}
+
 double memory_of(std::span<const double> series) {
   double variance = 0;
   for (const double x : series) variance += x * x;
@@ -24,6 +31,11 @@ std::size_t half_window(double memory, std::size_t count) {
   return std::min(static_cast<std::size_t>(std::ceil(asked)), count / (2 * least_windows));
 }
 
+double window_divisor(std::size_t count, std::size_t window) {
+  const auto n = static_cast<double>(count), w = static_cast<double>(window);
+  return w * (n - w) * (n - w + 1);
+}
+
 double variance_by_windows(std::span<const double> series, std::size_t window) {
   double sum = 0, squares = 0;
   for (std::size_t k = 0; k < series.size(); ++k) {
@@ -32,8 +44,7 @@ double variance_by_windows(std::span<const double> series, std::size_t window) {
     squares += sum * sum;
     sum -= series[k + 1 - window];
   }
-  const auto n = static_cast<double>(series.size()), w = static_cast<double>(window);
-  return squares / (w * (n - w) * (n - w + 1));
+  return squares / window_divisor(series.size(), window);
 }
 
 WindowVariance corrected_variance(std::span<const double> series, std::size_t half) {
