@@ -19,12 +19,14 @@ enum Partner : std::int32_t {
   lid_above = -6,
 };
 
-// Bits of Disk::near: what the disk could touch while it stays in its shell.
+// Bits of Disk::near: what the disk could touch while it stays in its shell, and whether a neighbour could be on the
+// other side of a periodic box's edge, so that nearest images must be told.
 enum Near : std::uint8_t {
   near_left_wall = 1,
   near_right_wall = 2,
   near_floor = 4,
   near_lid = 8,
+  near_edge = 16,
 };
 
 // Reduced units: lengths in D, masses in m, accelerations in g (weightless scenes: T = 1 at the start instead).
@@ -36,7 +38,7 @@ struct alignas(64) Disk {
   double event_time;         // when the next event of this disk is due
   std::int32_t partner;      // with whom: a disk's number or one of Partner
   std::uint16_t neighbours;  // how many disks its neighbour list holds
-  std::uint8_t near;         // which walls its shell can reach, bits of Near
+  std::uint8_t near;         // which walls and edges its shell can reach, bits of Near
   std::uint8_t skin;         // radius of its shell, in units of skin_unit
   float shell_x, shell_z;    // centre of its shell
 };

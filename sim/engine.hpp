@@ -89,10 +89,15 @@ class Engine final : public Simulation {
   void bring_forward(std::uint32_t i) { write_down(i, motion_at(disks_[i], now_)); }
 
   // --- prediction
-  Lanes contact_times(const std::uint32_t* ids, const Motion& motion, double radius) const;
+  // `images`: whether to tell which images of the others are the nearest.
+  template <bool images>
+  Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Motion& motion, double radius) const;
+  template <bool images>
   Candidate earliest_in(const NeighbourBlock& block, const Motion& motion, double radius) const;
   Candidate next_of_many(std::uint32_t i, const Motion& motion, Candidate best) const;
+  template <bool images>
   Candidate next_contact(std::uint32_t i, const Motion& motion) const;
+  Candidate next_contact_near_edge(std::uint32_t i, const Motion& motion) const;
   Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best, double exit) const;
   Candidate next_event(std::uint32_t i, const Motion& motion, double exit) const;
   double shell_exit_of(std::uint32_t i, const Motion& motion) const;
@@ -115,7 +120,7 @@ class Engine final : public Simulation {
   }
   void choose_skin(std::uint32_t i);
   std::span<const std::uint32_t> find_neighbours(std::uint32_t i);
-  void mark_near_walls(std::uint32_t i);
+  void mark_near_bounds(std::uint32_t i);
   void leave_shell(std::uint32_t i);
 
   // --- contacts
@@ -189,7 +194,7 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
+  bool beyond_cache_ = false;   // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;
   // Of the disk that look_round() was called for: those nearby, and the radius
@@ -198,6 +203,7 @@ class Engine final : public Simulation {
   LargeVector<std::uint32_t> nearby_, found_;
   LargeVector<float> reached_by_;
   std::size_t nearby_count_ = 0;
+  double largest_contact_ = 1;  // distance of two disks' centres
   float shell_slack_ = 0;  // covers the rounding of shells' centres, distances and exit times
 };
 

@@ -95,13 +95,14 @@ void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motio
 // ------------------------------------------------------------------------------------------------
 // prediction
 
-// Contact times of one disk, whose state is that at now_, with four others;
+// Contact times of one disk, whose state is that at now_, with four others, ids 0 and 1 and the two from `beyond` on;
 // `never` where there is none or where the other has something earlier to do.
 template <class Space, class Rule, class Sizes>
+template <bool images>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
-                                                                              const Motion& motion,
+                                                                              std::size_t beyond, const Motion& motion,
                                                                               [[maybe_unused]] double radius) const {
-  const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[2]], &k3 = disks_[ids[3]];
+  const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[beyond]], &k3 = disks_[ids[beyond + 1]];
   const Lanes position02 = two_pairs(&k0.x, &k2.x), position13 = two_pairs(&k1.x, &k3.x);
   const Lanes velocity02 = two_pairs(&k0.vx, &k2.vx), velocity13 = two_pairs(&k1.vx, &k3.vx);
   const Lanes x = __builtin_shufflevector(position02, position13, 0, 4, 2, 6),
@@ -123,14 +124,14 @@ template <class Space, class Rule, class Sizes>
   } else {
     dz = fused(vz, dt, z) - all_lanes(motion.z());
   }
-  if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
-  if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
+  if constexpr (images && Space::wraps_x) dx = period_x_.nearest(dx);
+  if constexpr (images && Space::wraps_z) dz = period_z_.nearest(dz);
   const Lanes dvx = vx - all_lanes(motion.vx()), dvz = vz - all_lanes(motion.vz());
 
   Lanes contact_squared = all_lanes(1);
   if constexpr (!Sizes::equal) {
     const Lanes distance = all_lanes(radius) + Lanes{sizes_.radius(ids[0]), sizes_.radius(ids[1]),
-                                                     sizes_.radius(ids[2]), sizes_.radius(ids[3])};
+                                                     sizes_.radius(ids[beyond]), sizes_.radius(ids[beyond + 1])};
     contact_squared = distance * distance;
   }
   // As time_to_disk() in contact_time.hpp, but in the form (-b - root) / a: its division does not wait for the root.
@@ -140,20 +141,23 @@ template <class Space, class Rule, class Sizes>
   const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), all_lanes(0));
   const Lanes a = fused(dvx, dvx, dvz * dvz);
   const Lanes root = sqrt_lanes(fused(b, b, -(a * c)));
+  // Earlier than the other's next event: -(b + root) < a (event_time - time), which does not wait for the contact.
+  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (root > fused(time - event_time, a, -b));
   const Lanes contact = fused(-(b + root), all_lanes(1) / a, time);
-  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (contact < event_time);
   // The larger of the contact and 0 or, where there is none, `never`: quicker than a selection.
   return larger(contact, unless(meets, all_lanes(never)));
 }
 
 // The earliest contact with the eight of a block.
 template <class Space, class Rule, class Sizes>
+template <bool images>
 [[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::earliest_in(const NeighbourBlock& block,
                                                                            const Motion& motion, double radius) const
     -> Candidate {
-  const Lanes first = contact_times(block.disk.data(), motion, radius);
-  const Lanes second = contact_times(block.disk.data() + 4, motion, radius);
-  const Earliest earliest = earliest_of_eight(first, second, block.disk.data());
+  const std::uint32_t* const ids = block.disk.data();
+  const Lanes times0145 = contact_times<images>(ids, 4, motion, radius);
+  const Lanes times2367 = contact_times<images>(ids + 2, 4, motion, radius);
+  const Earliest earliest = earliest_of_eight(times0145, times2367, ids);
   return {earliest.time, earliest.id};
 }
 
@@ -166,22 +170,28 @@ template <class Space, class Rule, class Sizes>
   };
   if (disks_[i].neighbours <= inline_neighbours + 4) [[likely]] {
     const std::uint32_t* const four = shells_.second_block(i).disk.data();
-    const Earliest earliest = earliest_of_four(contact_times(four, motion, radius), four);
+    const Earliest earliest = earliest_of_four(contact_times<true>(four, 2, motion, radius), four);
     consider({earliest.time, earliest.id});
   } else {
-    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in(block, motion, radius)); });
+    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in<true>(block, motion, radius)); });
   }
   return best;
 }
 
 // The next contact with another disk; its time is `never` where there is none.
 template <class Space, class Rule, class Sizes>
+template <bool images>
 [[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i, const Motion& motion) const
     -> Candidate {
-  const Candidate best = earliest_in(shells_.first_block(i), motion, sizes_.radius(i));
+  const Candidate best = earliest_in<images>(shells_.first_block(i), motion, sizes_.radius(i));
   if (disks_[i].neighbours > inline_neighbours) [[unlikely]]
     return next_of_many(i, motion, best);
   return best;
+}
+template <class Space, class Rule, class Sizes>
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_contact_near_edge(std::uint32_t i, const Motion& motion) const
+    -> Candidate {
+  return next_contact<true>(i, motion);
 }
 
 // The next wall that the disk meets, if it comes before `best`; else `best`. The floor is not looked for beyond `exit`.
@@ -207,9 +217,15 @@ template <class Space, class Rule, class Sizes>
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion,
                                                                      [[maybe_unused]] double exit) const -> Candidate {
-  const Candidate next = next_contact(i, motion);
+  const unsigned near = disks_[i].near;
+  Candidate next;
+  if ((Space::wraps_x || Space::wraps_z) && (near & near_edge) != 0) [[unlikely]] {
+    next = next_contact_near_edge(i, motion);
+  } else {
+    next = next_contact<false>(i, motion);
+  }
   if constexpr (Space::has_walls) {
-    if (disks_[i].near != 0) return next_wall(i, motion, next, exit);
+    if ((near & ~unsigned{near_edge}) != 0) return next_wall(i, motion, next, exit);
   }
   return next;
 }
@@ -376,20 +392,26 @@ std::span<const std::uint32_t> Engine<Space, Rule, Sizes>::find_neighbours(std::
   return {found_.data(), found};
 }
 
-// Notes which walls the disk could touch from its shell.
+// Notes which walls the disk could touch from its shell, and whether a neighbour could stand beyond the box's edge.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::mark_near_walls(std::uint32_t i) {
+void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
+  Disk& disk = disks_[i];
+  unsigned near = 0;
+  const auto note = [&near](bool it_is, unsigned bit) { near |= bit & -static_cast<unsigned>(it_is); };
   if constexpr (Space::has_walls) {
-    Disk& disk = disks_[i];
     const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
-    unsigned near = 0;
-    const auto note = [&near](bool it_is, unsigned bit) { near |= bit & -static_cast<unsigned>(it_is); };
     note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
     note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
     note(disk.shell_z < floor_.highest() + reach, near_floor);
     note(disk.shell_z > lid_height_ - reach, near_lid);
-    disk.near = static_cast<std::uint8_t>(near);
   }
+  const double reach = largest_contact_ + disk.skin * skin_unit + largest_skin_ + shell_slack_;
+  const auto at_edge = [reach](double centre, const Period& period) {
+    return (centre < reach) | (centre > period.length - reach);
+  };
+  if constexpr (Space::wraps_x) note(at_edge(disk.shell_x, period_x_), near_edge);
+  if constexpr (Space::wraps_z) note(at_edge(disk.shell_z, period_z_), near_edge);
+  disk.near = static_cast<std::uint8_t>(near);
 }
 
 template <class Space, class Rule, class Sizes>
@@ -399,7 +421,7 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
   look_round(i);
   choose_skin(i);
   shells_.file(i, reach(i));
-  mark_near_walls(i);
+  mark_near_bounds(i);
   shells_.relist(i, find_neighbours(i));
 }
 
@@ -920,8 +942,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   checked_at_ = -1;
   crawls_ = 0;
   events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
-  double largest_contact = 1;
-  if constexpr (!Sizes::equal) largest_contact = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
@@ -932,13 +953,13 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
   // Two disks that stay in their shells must not come near a second image of each other.
   if constexpr (Space::wraps_x) {
-    if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact) / 4);
+    if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact_) / 4);
   }
-  if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact) / 4);
+  if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact_) / 4);
   // Distances of shells' centres are taken in single precision.
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
-  shells_.reset(disks_.data(), count_, largest_contact + 2 * largest_skin_ + shell_slack_, width_, height);
+  shells_.reset(disks_.data(), count_, largest_contact_ + 2 * largest_skin_ + shell_slack_, width_, height);
   for (std::uint32_t i = 0; i < count_; ++i) {
     centre_shell(i);
     disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
@@ -950,7 +971,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
     shells_.set_reach(i, reach(i));
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
-    mark_near_walls(i);
+    mark_near_bounds(i);
     look_round(i);
     shells_.list(i, find_neighbours(i));
   }
