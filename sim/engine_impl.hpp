@@ -256,7 +256,7 @@ template <class Space, class Rule, class Sizes>
 // Writes down what comes next for disk i, unless it leaves its shell before. Which of the two is a coin toss that no
 // processor foresees: there is no branch on it.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, double exit) {
+[[gnu::noinline]] void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, double exit) {
   Disk& disk = disks_[i];
   const bool leaves = exit < next.time;
   const double time = leaves ? exit : next.time;

@@ -15,10 +15,11 @@
 
 namespace shakebed::sim {
 
-// One of two without a branch, where a branch would be a coin toss. (A conditional expression is what the compiler
-// makes of it.)
+// One of two without a branch, where a branch would be a coin toss. The compiler may not see where the mask is from: it
+// makes branches of conditional expressions, and of masks that it knows to be two-valued.
 inline std::int32_t choose(bool which, std::int32_t if_true, std::int32_t if_false) {
-  const std::int32_t mask = -static_cast<std::int32_t>(which);
+  std::int32_t mask = -static_cast<std::int32_t>(which);
+  asm("" : "+r"(mask));
   return (if_true & mask) | (if_false & ~mask);
 }
 
