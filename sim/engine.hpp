@@ -194,7 +194,7 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  bool beyond_cache_ = false;   // so many disks that it pays to fetch ahead
+  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;
   // Of the disk that look_round() was called for: those nearby, and the radius
@@ -204,7 +204,7 @@ class Engine final : public Simulation {
   LargeVector<float> reached_by_;
   std::size_t nearby_count_ = 0;
   double largest_contact_ = 1;  // distance of two disks' centres
-  float shell_slack_ = 0;  // covers the rounding of shells' centres, distances and exit times
+  float shell_slack_ = 0;       // covers the rounding of shells' centres, distances and exit times
 };
 
 }  // namespace shakebed::sim

@@ -7,6 +7,10 @@
 // order is exact: by time, then by the order of insertion. Events of a later
 // turn of the ring are not written down at all: the disks' records know them,
 // and are looked through when that turn begins.
+//
+// Where the ring would be far larger than the caches it holds no more than two
+// stretches of the turn; what comes later is written down by stretches, and put
+// into the ring's buckets shortly before a stretch begins.
 #pragma once
 
 #include <algorithm>
@@ -18,13 +22,15 @@
 #include <vector>
 
 #include "sim/disk.hpp"
+#include "sim/event_stretches.hpp"
 #include "sim/fetch.hpp"
 #include "sim/lanes.hpp"
 #include "sim/large_vector.hpp"
 
 namespace shakebed::sim {
 
-inline constexpr std::size_t fits_cache = 8'000;  // that many disks and their lists stay in a second-level cache
+inline constexpr std::size_t fits_cache = 8'000;       // that many disks and their lists stay in a second-level cache
+inline constexpr std::size_t fits_one_ring = 200'000;  // up to that many disks one ring for the whole turn is quicker
 
 class EventQueue {
  public:
@@ -40,14 +46,24 @@ class EventQueue {
     disks_ = disks;
     count_ = static_cast<std::uint32_t>(count);
     beyond_cache_ = count > fits_cache;
-    size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket, 64.0));
+    in_stretches_ = count > fits_one_ring;
+    events_a_bucket_ = in_stretches_ ? 6 : 8;
+    const double turn = in_stretches_ ? 2 : 1.2;  // the mean time between two events of a disk, times this
+    size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket_, 64.0));
     // Behind the ring's last bucket stand two more, which stay empty: of the next turn nothing is written down.
-    const auto places = static_cast<std::size_t>(size_ + 2);
+    auto places = static_cast<std::size_t>(size_ + 2);
+    places_mask_ = ~std::size_t{0};
+    if (in_stretches_) {
+      stretch_shift_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(std::sqrt(size_)))) + 1;
+      size_ = ((size_ >> stretch_shift_) + 1) << stretch_shift_;
+      places = std::size_t{2} << stretch_shift_;
+      places_mask_ = places - 1;
+    }
     ring_.resize(places);
     held_.resize(places);
     further_.resize(places);
     grow(128);
-    clear(start, events_a_time / events_a_bucket);
+    clear(start, events_a_time / events_a_bucket_);
   }
 
   // The event of disk a (with b; a itself when alone) now stands at `time`,
@@ -56,6 +72,10 @@ class EventQueue {
     const double place = time * buckets_a_time_;
     if (place < run_ends_) [[unlikely]] {
       insert_into_run({time, pair_of(a, b)});
+      return;
+    }
+    if (place >= ring_ends_) [[unlikely]] {
+      put_into_stretch({time, pair_of(a, b)}, place);
       return;
     }
     // A later turn's is left to that turn. Without a branch, which would often be mistaken: it is written where nothing
@@ -70,7 +90,7 @@ class EventQueue {
     }
     held_[index] = static_cast<std::uint8_t>(held + counted);
     Entry* place_of = &ring_[index].entries[held];
-    if (!beyond_cache_) {
+    if (!beyond_cache_ || in_stretches_) {
       place_of->time = time;
       place_of->pair = pair_of(a, b);
       return;
@@ -134,20 +154,16 @@ class EventQueue {
   }
 
   std::size_t bytes() const {
-    return ring_.capacity() * (sizeof(Bucket) + 5) + blocks_.capacity() * sizeof(Further) +
+    return ring_.capacity() * (sizeof(Bucket) + 5) + blocks_.capacity() * sizeof(Further) + stretches_.bytes() +
            2 * (times_.capacity() * sizeof(double) + pairs_.capacity() * sizeof(std::uint64_t));
   }
 
  private:
-  static constexpr double events_a_bucket = 8,
-                          usual_fullness = 11,  // entries, of which some are dead when they come up
-      turn = 1.2;                               // the ring spans as many mean times between two events of a disk
+  static constexpr double usual_fullness =
+      1.375;  // entries an event when a bucket is taken up, some dead by their turn
   static constexpr std::uint32_t entries_a_bucket = 16;
 
-  struct Entry {
-    double time;
-    std::uint64_t pair;  // the second disk in the upper half
-  };
+  using Entry = EventEntry;
   struct alignas(64) Bucket {
     std::array<Entry, entries_a_bucket> entries;
   };
@@ -159,7 +175,13 @@ class EventQueue {
 
   static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
   // Where in the ring one of this turn's buckets is.
-  std::size_t index_of(std::int64_t bucket) const { return static_cast<std::size_t>(bucket - this_turn_); }
+  std::size_t index_of(std::int64_t bucket) const {
+    return static_cast<std::size_t>(bucket - this_turn_) & places_mask_;
+  }
+  // Which of this turn's stretches it belongs to.
+  std::size_t stretch_of(std::int64_t bucket) const {
+    return static_cast<std::size_t>(bucket - this_turn_) >> stretch_shift_;
+  }
 
   // Is a's next event still that with b (alone: a == b) at this time?
   bool stands(std::uint32_t a, std::uint32_t b, double time) const {
@@ -215,6 +237,7 @@ class EventQueue {
     std::fill(further_.begin(), further_.end(), 0u);
     blocks_.resize(1);
     free_ = 0;
+    if (in_stretches_) stretches_.reset(static_cast<std::size_t>(size_ >> stretch_shift_));
     for (Waiting& waiting : waiting_) waiting.place = &nowhere_;
     set_current(static_cast<std::int64_t>(start * buckets_a_time_) - 1);
     set_turn();
@@ -258,6 +281,31 @@ class EventQueue {
   void set_turn() {
     this_turn_ = current_;
     turn_ends_ = static_cast<double>(this_turn_ + size_);
+    set_ring_end(in_stretches_ ? this_turn_ + (std::int64_t{1} << stretch_shift_) : this_turn_ + size_);
+  }
+  // Up to where the ring holds this turn's events.
+  void set_ring_end(std::int64_t bucket) {
+    ring_end_ = bucket;
+    ring_ends_ = in_stretches_ ? static_cast<double>(bucket) : std::numeric_limits<double>::infinity();
+  }
+  // An event beyond what the ring holds. Apart from push(), which would become slower by it.
+  [[gnu::noinline]] void put_into_stretch(Entry entry, double place) {
+    if (place < turn_ends_) stretches_.append(stretch_of(static_cast<std::int64_t>(place)), entry);
+  }
+  // Puts the next stretch's events into the ring.
+  [[gnu::noinline]] void take_up_stretch() {
+    const std::size_t stretch = stretch_of(ring_end_);
+    set_ring_end(ring_end_ + (std::int64_t{1} << stretch_shift_));
+    stretches_.take(stretch, [this](const Entry& entry) {
+      const std::size_t index = index_of(static_cast<std::int64_t>(entry.time * buckets_a_time_));
+      const std::uint32_t held = held_[index];
+      if (held == entries_a_bucket) [[unlikely]] {
+        put_further(further_[index], entry);
+        return;
+      }
+      held_[index] = static_cast<std::uint8_t>(held + 1);
+      ring_[index].entries[held] = entry;
+    });
   }
 
   [[gnu::noinline]] void insert_into_run(Entry entry) {
@@ -280,7 +328,7 @@ class EventQueue {
   // Takes the next bucket into the run; where the run was empty, the next one
   // that holds a valid event. False when every bucket up to `until` is empty.
   [[gnu::noinline]] bool lengthen_run(double until) {
-    if (beyond_cache_) put_waiting();
+    if (beyond_cache_ && !in_stretches_) put_waiting();
     std::size_t left = end_ - next_;
     for (std::size_t k = 0; k < left; ++k) {
       times_[k] = times_[next_ + k];
@@ -292,7 +340,8 @@ class EventQueue {
       if (left == 0 && static_cast<double>(current_ + 1) > until * buckets_a_time_) return false;
       set_current(current_ + 1);
       if (current_ == this_turn_ + size_) [[unlikely]] {
-        const double fullness = static_cast<double>(taken_up_) / (usual_fullness * static_cast<double>(size_));
+        const double fullness =
+            static_cast<double>(taken_up_) / (usual_fullness * events_a_bucket_ * static_cast<double>(size_));
         const bool fits = fullness > 0.6 && fullness < 1.6;
         const double other = buckets_a_time_ * std::clamp(fullness, 0.125, 8.0);
         if (!fits && other > coarsest && other < finest) {
@@ -302,6 +351,8 @@ class EventQueue {
         }
         begin_turn();
       }
+      // Two buckets ahead are looked at already.
+      if (in_stretches_ && current_ + 2 >= ring_end_ && ring_end_ < this_turn_ + size_) take_up_stretch();
       const std::size_t here = index_of(current_);
       if (held_[here] != 0) sort_into_run(collect(here));
     } while (end_ == 0);
@@ -402,7 +453,13 @@ class EventQueue {
   std::int64_t this_turn_ = 0;            // the bucket with which the ring's turn began
   double run_ends_ = 0, turn_ends_ = 0;   // the buckets behind the current one and the turn's last one
   std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
-  bool beyond_cache_ = false;
+  bool beyond_cache_ = false, in_stretches_ = false;
+  double events_a_bucket_ = 8;
+  std::size_t places_mask_ = 0;
+  int stretch_shift_ = 0;      // a stretch is 2 to that power buckets
+  std::int64_t ring_end_ = 0;  // the bucket up to which the ring holds the turn's events,
+  double ring_ends_ = 0;       // and where later ones go to stretches_
+  EventStretches stretches_;
   std::size_t coming_ = 0, sent_for_ = 0;      // the next bucket's place, and how many of its disks have been sent for
   std::array<Waiting, most_waiting> waiting_;  // the latest ones, one after another, from pushed_ on
   std::size_t pushed_ = 0;
