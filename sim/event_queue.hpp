@@ -159,8 +159,8 @@ class EventQueue {
   }
 
  private:
-  static constexpr double usual_fullness =
-      1.375;  // entries an event when a bucket is taken up, some dead by their turn
+  // Entries of a bucket when it is taken up, by the events it is to hold; some will be dead by their turn.
+  static constexpr double usual_fullness = 1.375;
   static constexpr std::uint32_t entries_a_bucket = 16;
 
   using Entry = EventEntry;
