@@ -86,8 +86,8 @@ TEST(PeriodicFluid, HasThePressureOfKolafaAndRottnerTowardsFreezing) {
   expect_compressibility(128, 0.85, 9.245785, 200, 100, 4);
 }
 
-// Between the fluid and the solid: 1,024 disks would be 1.9 % low, 65,536 must be within 1 %. It relaxes slowly: runs of
-// 64 blocks scatter by 0.019 from seed to seed, of 192 by 0.004.
+// Between the fluid and the solid: 1,024 disks would be 1.9 % low, 65,536 must be within 1 %. It relaxes slowly: runs
+// of 64 blocks scatter by 0.019 from seed to seed, of 192 by 0.004.
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottnerWhereItFreezes) {
   expect_compressibility(256, 0.90, 10.2059, 150, 192, 2, 0.01 * 10.2059);
 }
