@@ -203,7 +203,7 @@ class Engine final : public Simulation {
   LargeVector<std::uint32_t> nearby_, found_;
   LargeVector<float> reached_by_;
   std::size_t nearby_count_ = 0;
-  double largest_contact_ = 1;  // distance of two disks' centres
+  double largest_contact_ = 1;  // the largest distance of two centres in contact
   float shell_slack_ = 0;       // covers the rounding of shells' centres, distances and exit times
 };
 

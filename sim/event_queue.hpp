@@ -56,7 +56,7 @@ class EventQueue {
     if (in_stretches_) {
       stretch_shift_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(std::sqrt(size_)))) + 1;
       size_ = ((size_ >> stretch_shift_) + 1) << stretch_shift_;
-      places = std::size_t{2} << stretch_shift_;
+      places = 2 * static_cast<std::size_t>(stretch_length());
       places_mask_ = places - 1;
     }
     ring_.resize(places);
@@ -90,7 +90,7 @@ class EventQueue {
     }
     held_[index] = static_cast<std::uint8_t>(held + counted);
     Entry* place_of = &ring_[index].entries[held];
-    if (!beyond_cache_ || in_stretches_) {
+    if (!pushes_wait()) {
       place_of->time = time;
       place_of->pair = pair_of(a, b);
       return;
@@ -178,6 +178,7 @@ class EventQueue {
   std::size_t index_of(std::int64_t bucket) const {
     return static_cast<std::size_t>(bucket - this_turn_) & places_mask_;
   }
+  std::int64_t stretch_length() const { return std::int64_t{1} << stretch_shift_; }
   // Which of this turn's stretches it belongs to.
   std::size_t stretch_of(std::int64_t bucket) const {
     return static_cast<std::size_t>(bucket - this_turn_) >> stretch_shift_;
@@ -212,6 +213,7 @@ class EventQueue {
     Further& block = blocks_[first];
     block.entries[block.held++] = entry;
   }
+  bool pushes_wait() const { return beyond_cache_ && !in_stretches_; }
   void put_waiting() {
     for (std::size_t k = 0; k < most_waiting; ++k) {  // the oldest first
       Waiting& waiting = waiting_[pushed_++ % most_waiting];
@@ -281,12 +283,7 @@ class EventQueue {
   void set_turn() {
     this_turn_ = current_;
     turn_ends_ = static_cast<double>(this_turn_ + size_);
-    set_ring_end(in_stretches_ ? this_turn_ + (std::int64_t{1} << stretch_shift_) : this_turn_ + size_);
-  }
-  // Up to where the ring holds this turn's events.
-  void set_ring_end(std::int64_t bucket) {
-    ring_end_ = bucket;
-    ring_ends_ = in_stretches_ ? static_cast<double>(bucket) : std::numeric_limits<double>::infinity();
+    ring_ends_ = in_stretches_ ? static_cast<double>(this_turn_ + stretch_length()) : never;
   }
   // An event beyond what the ring holds. Apart from push(), which would become slower by it.
   [[gnu::noinline]] void put_into_stretch(Entry entry, double place) {
@@ -294,17 +291,10 @@ class EventQueue {
   }
   // Puts the next stretch's events into the ring.
   [[gnu::noinline]] void take_up_stretch() {
-    const std::size_t stretch = stretch_of(ring_end_);
-    set_ring_end(ring_end_ + (std::int64_t{1} << stretch_shift_));
+    const std::size_t stretch = stretch_of(static_cast<std::int64_t>(ring_ends_));
+    ring_ends_ += static_cast<double>(stretch_length());
     stretches_.take(stretch, [this](const Entry& entry) {
-      const std::size_t index = index_of(static_cast<std::int64_t>(entry.time * buckets_a_time_));
-      const std::uint32_t held = held_[index];
-      if (held == entries_a_bucket) [[unlikely]] {
-        put_further(further_[index], entry);
-        return;
-      }
-      held_[index] = static_cast<std::uint8_t>(held + 1);
-      ring_[index].entries[held] = entry;
+      push(entry.time, static_cast<std::uint32_t>(entry.pair), static_cast<std::uint32_t>(entry.pair >> 32));
     });
   }
 
@@ -328,7 +318,7 @@ class EventQueue {
   // Takes the next bucket into the run; where the run was empty, the next one
   // that holds a valid event. False when every bucket up to `until` is empty.
   [[gnu::noinline]] bool lengthen_run(double until) {
-    if (beyond_cache_ && !in_stretches_) put_waiting();
+    if (pushes_wait()) put_waiting();
     std::size_t left = end_ - next_;
     for (std::size_t k = 0; k < left; ++k) {
       times_[k] = times_[next_ + k];
@@ -352,7 +342,7 @@ class EventQueue {
         begin_turn();
       }
       // Two buckets ahead are looked at already.
-      if (in_stretches_ && current_ + 2 >= ring_end_ && ring_end_ < this_turn_ + size_) take_up_stretch();
+      if (run_ends_ + 1 >= ring_ends_ && ring_ends_ < turn_ends_) take_up_stretch();
       const std::size_t here = index_of(current_);
       if (held_[here] != 0) sort_into_run(collect(here));
     } while (end_ == 0);
@@ -456,9 +446,8 @@ class EventQueue {
   bool beyond_cache_ = false, in_stretches_ = false;
   double events_a_bucket_ = 8;
   std::size_t places_mask_ = 0;
-  int stretch_shift_ = 0;      // a stretch is 2 to that power buckets
-  std::int64_t ring_end_ = 0;  // the bucket up to which the ring holds the turn's events,
-  double ring_ends_ = 0;       // and where later ones go to stretches_
+  int stretch_shift_ = 0;     // a stretch is 2 to that power buckets
+  double ring_ends_ = never;  // the bucket from which on this turn's events are in stretches_
   EventStretches stretches_;
   std::size_t coming_ = 0, sent_for_ = 0;      // the next bucket's place, and how many of its disks have been sent for
   std::array<Waiting, most_waiting> waiting_;  // the latest ones, one after another, from pushed_ on

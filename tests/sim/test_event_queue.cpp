@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
+#include <functional>
 #include <queue>
 #include <utility>
 #include <vector>
