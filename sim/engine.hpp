@@ -68,9 +68,25 @@ class Engine final : public Simulation {
   void set_bath_temperature(double temperature) override;
 
  private:
+  friend EventQueue;  // settle(), waits_for()
   struct Candidate {
     double time;
     std::int32_t partner;
+  };
+  // What the disks of the latest contact will do next, foreseen but not written down: that waits until the next event
+  // has begun, so that both overlap in the processor.
+  static constexpr std::uint32_t nothing_pending = 0xffffffff;
+  struct Pending {
+    std::uint32_t disk = nothing_pending;
+    std::int32_t partner = nobody;
+    double time = never, exit = never;
+    // Number by number: what has been written in parts cannot be read at once before it has reached the cache.
+    void is(std::uint32_t i, const Candidate& next, double exit_of_i) {
+      disk = i;
+      partner = next.partner;
+      time = next.time;
+      exit = exit_of_i;
+    }
   };
 
   // A disk's state at one moment, in registers: what is predicted from it must
@@ -91,23 +107,39 @@ class Engine final : public Simulation {
   // --- prediction
   // `images`: whether to tell which images of the others are the nearest.
   template <bool images>
-  Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Motion& motion, double radius) const;
+  Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Disk& me, double radius) const;
   template <bool images>
-  Candidate earliest_in(const NeighbourBlock& block, const Motion& motion, double radius) const;
-  Candidate next_of_many(std::uint32_t i, const Motion& motion, Candidate best) const;
+  Candidate earliest_in(const NeighbourBlock& block, const Disk& me, double radius) const;
+  Candidate next_of_many(std::uint32_t i, Candidate best) const;
   template <bool images>
-  Candidate next_contact(std::uint32_t i, const Motion& motion) const;
-  Candidate next_contact_near_edge(std::uint32_t i, const Motion& motion) const;
-  Candidate next_wall(std::uint32_t i, const Motion& motion, Candidate best, double exit) const;
-  Candidate next_event(std::uint32_t i, const Motion& motion, double exit) const;
+  Candidate next_contact(std::uint32_t i) const;
+  Candidate next_wall(std::uint32_t i, Candidate best, double exit) const;
+  // Could a neighbour of any of both be on the other side of a periodic box's edge?
+  bool is_near_edge(std::uint32_t i, std::uint32_t j) const {
+    return (Space::wraps_x || Space::wraps_z) && ((disks_[i].near | disks_[j].near) & near_edge) != 0;
+  }
+  template <bool images>
+  Candidate next_event_by(std::uint32_t i, double exit) const;
+  Candidate next_event(std::uint32_t i, double exit) const;
   double shell_exit_of(std::uint32_t i, const Motion& motion) const;
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
-  void commit(std::uint32_t i, const Candidate& next, double exit);
+  void commit(std::uint32_t i, Candidate next, double exit);
+  void settle();
+  // Must what is pending be written down before the event of disks i and k at `time` can be told? Not if all of it
+  // comes later and is that of other disks: one that it claims has nothing to do until then, or it would not be
+  // claimed.
+  bool waits_for(double time, std::uint32_t i, std::uint32_t k) const {
+    bool waits = false;
+    for (const Pending& one : pending_)
+      waits = waits || i == one.disk || k == one.disk || !(time < one.time) || !(time < one.exit);
+    return waits;
+  }
   void fly_on(std::uint32_t i, const Motion& motion);
-  // The same where the record says `motion` already.
+  // The same where the record says `motion` already. It is pending then.
   void predict(std::uint32_t i, const Motion& motion) {
     const double exit = shell_exit_of(i, motion);
-    commit(i, next_event(i, motion, exit), exit);
+    settle();
+    pending_[0].is(i, next_event(i, exit), exit);
   }
   void predict_all();
 
@@ -197,6 +229,7 @@ class Engine final : public Simulation {
   bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   NeighbourShells shells_;
   EventQueue queue_;
+  std::array<Pending, 2> pending_;
   // Of the disk that look_round() was called for: those nearby, and the radius
   // of a shell of its own that would just reach theirs. The arrays are longer
   // than their counts, see compress().

@@ -84,23 +84,25 @@ auto Engine<Space, Rule, Sizes>::motion_at(const Disk& disk, double time) const 
   }
 }
 
+// The disk's state from now on; what comes next is not known yet. In pairs, as it is read: what has been written in
+// parts cannot be read at once before it has reached the cache.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motion) {
   Disk& disk = disks_[i];
   put_pair(&disk.x, motion.place);
   put_pair(&disk.vx, motion.velocity);
-  disk.own_time = now_;
+  put_pair(&disk.own_time, both(now_));
 }
 
 // ------------------------------------------------------------------------------------------------
 // prediction
 
-// Contact times of one disk, whose state is that at now_, with four others, ids 0 and 1 and the two from `beyond` on;
+// Contact times of one disk, whose record is that of now_, with four others, ids 0 and 1 and the two from `beyond` on;
 // `never` where there is none or where the other has something earlier to do.
 template <class Space, class Rule, class Sizes>
 template <bool images>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
-                                                                              std::size_t beyond, const Motion& motion,
+                                                                              std::size_t beyond, const Disk& me,
                                                                               [[maybe_unused]] double radius) const {
   const Disk &k0 = disks_[ids[0]], &k1 = disks_[ids[1]], &k2 = disks_[ids[beyond]], &k3 = disks_[ids[beyond + 1]];
   const Lanes position02 = two_pairs(&k0.x, &k2.x), position13 = two_pairs(&k1.x, &k3.x);
@@ -115,18 +117,18 @@ template <bool images>
 
   const Lanes time = all_lanes(now_);
   const Lanes dt = time - own_time;
-  Lanes dx = fused(vx, dt, x) - all_lanes(motion.x());
+  Lanes dx = fused(vx, dt, x) - all_lanes(me.x);
   Lanes dz;
   if constexpr (Space::falls) {
     const Lanes fall = all_lanes(gravity_) * dt;
-    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(motion.z());
+    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(me.z);
     vz = vz - fall;
   } else {
-    dz = fused(vz, dt, z) - all_lanes(motion.z());
+    dz = fused(vz, dt, z) - all_lanes(me.z);
   }
   if constexpr (images && Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (images && Space::wraps_z) dz = period_z_.nearest(dz);
-  const Lanes dvx = vx - all_lanes(motion.vx()), dvz = vz - all_lanes(motion.vz());
+  const Lanes dvx = vx - all_lanes(me.vx), dvz = vz - all_lanes(me.vz);
 
   Lanes contact_squared = all_lanes(1);
   if constexpr (!Sizes::equal) {
@@ -151,29 +153,28 @@ template <bool images>
 // The earliest contact with the eight of a block.
 template <class Space, class Rule, class Sizes>
 template <bool images>
-[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::earliest_in(const NeighbourBlock& block,
-                                                                           const Motion& motion, double radius) const
-    -> Candidate {
+[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::earliest_in(const NeighbourBlock& block, const Disk& me,
+                                                                           double radius) const -> Candidate {
   const std::uint32_t* const ids = block.disk.data();
-  const Lanes times0145 = contact_times<images>(ids, 4, motion, radius);
-  const Lanes times2367 = contact_times<images>(ids + 2, 4, motion, radius);
+  const Lanes times0145 = contact_times<images>(ids, 4, me, radius);
+  const Lanes times2367 = contact_times<images>(ids + 2, 4, me, radius);
   const Earliest earliest = earliest_of_eight(times0145, times2367, ids);
   return {earliest.time, earliest.id};
 }
 
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_of_many(std::uint32_t i, const Motion& motion,
-                                                                Candidate best) const -> Candidate {
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_of_many(std::uint32_t i, Candidate best) const -> Candidate {
+  const Disk& me = disks_[i];
   const double radius = sizes_.radius(i);
   const auto consider = [&](const Candidate& other) {
     if (other.time < best.time) best = other;
   };
-  if (disks_[i].neighbours <= inline_neighbours + 4) [[likely]] {
+  if (me.neighbours <= inline_neighbours + 4) [[likely]] {
     const std::uint32_t* const four = shells_.second_block(i).disk.data();
-    const Earliest earliest = earliest_of_four(contact_times<true>(four, 2, motion, radius), four);
+    const Earliest earliest = earliest_of_four(contact_times<true>(four, 2, me, radius), four);
     consider({earliest.time, earliest.id});
   } else {
-    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in<true>(block, motion, radius)); });
+    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in<true>(block, me, radius)); });
   }
   return best;
 }
@@ -181,53 +182,48 @@ template <class Space, class Rule, class Sizes>
 // The next contact with another disk; its time is `never` where there is none.
 template <class Space, class Rule, class Sizes>
 template <bool images>
-[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i, const Motion& motion) const
-    -> Candidate {
-  const Candidate best = earliest_in<images>(shells_.first_block(i), motion, sizes_.radius(i));
-  if (disks_[i].neighbours > inline_neighbours) [[unlikely]]
-    return next_of_many(i, motion, best);
+[[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i) const -> Candidate {
+  const Disk& me = disks_[i];
+  const Candidate best = earliest_in<images>(shells_.first_block(i), me, sizes_.radius(i));
+  if (me.neighbours > inline_neighbours) [[unlikely]]
+    return next_of_many(i, best);
   return best;
-}
-template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_contact_near_edge(std::uint32_t i, const Motion& motion) const
-    -> Candidate {
-  return next_contact<true>(i, motion);
 }
 
 // The next wall that the disk meets, if it comes before `best`; else `best`. The floor is not looked for beyond `exit`.
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, const Motion& motion, Candidate best,
-                                                             double exit) const -> Candidate {
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_wall(std::uint32_t i, Candidate best, double exit) const
+    -> Candidate {
+  const Disk& me = disks_[i];
   const double radius = sizes_.radius(i);
-  const unsigned near = disks_[i].near;
+  const unsigned near = me.near;
   const auto consider = [&](double wait, std::int32_t wall) {
     if (now_ + wait < best.time) best = {now_ + wait, wall};
   };
-  if (near & near_left_wall) consider(time_to_wall(motion.x() - radius, -motion.vx()), left_wall);
-  if (near & near_right_wall) consider(time_to_wall(width_ - radius - motion.x(), motion.vx()), right_wall);
-  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - motion.z(), motion.vz(), gravity_), lid_above);
+  if (near & near_left_wall) consider(time_to_wall(me.x - radius, -me.vx), left_wall);
+  if (near & near_right_wall) consider(time_to_wall(width_ - radius - me.x, me.vx), right_wall);
+  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - me.z, me.vz, gravity_), lid_above);
   if (near & near_floor) {
     const double horizon = std::min(best.time, exit) - now_;
-    consider(floor_.time_to_contact(motion.z() - radius, motion.vz(), gravity_, now_, horizon), floor_below);
+    consider(floor_.time_to_contact(me.z - radius, me.vz, gravity_, now_, horizon), floor_below);
   }
   return best;
 }
 
 // What the disk meets next, if that is before `exit`, when it leaves its shell; later floors are not told.
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] inline auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, const Motion& motion,
-                                                                     [[maybe_unused]] double exit) const -> Candidate {
-  const unsigned near = disks_[i].near;
-  Candidate next;
-  if ((Space::wraps_x || Space::wraps_z) && (near & near_edge) != 0) [[unlikely]] {
-    next = next_contact_near_edge(i, motion);
-  } else {
-    next = next_contact<false>(i, motion);
-  }
+template <bool images>
+[[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_event_by(std::uint32_t i, [[maybe_unused]] double exit) const
+    -> Candidate {
+  const Candidate next = next_contact<images>(i);
   if constexpr (Space::has_walls) {
-    if ((near & ~unsigned{near_edge}) != 0) return next_wall(i, motion, next, exit);
+    if ((disks_[i].near & ~unsigned{near_edge}) != 0) return next_wall(i, next, exit);
   }
   return next;
+}
+template <class Space, class Rule, class Sizes>
+auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, double exit) const -> Candidate {
+  return is_near_edge(i, i) ? next_event_by<true>(i, exit) : next_event_by<false>(i, exit);
 }
 
 // When the disk, whose state now is `motion`, leaves its shell.
@@ -256,7 +252,7 @@ template <class Space, class Rule, class Sizes>
 // Writes down what comes next for disk i, unless it leaves its shell before. Which of the two is a coin toss that no
 // processor foresees: there is no branch on it.
 template <class Space, class Rule, class Sizes>
-[[gnu::noinline]] void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, const Candidate& next, double exit) {
+[[gnu::noinline]] void Engine<Space, Rule, Sizes>::commit(std::uint32_t i, Candidate next, double exit) {
   Disk& disk = disks_[i];
   const bool leaves = exit < next.time;
   const double time = leaves ? exit : next.time;
@@ -274,13 +270,22 @@ template <class Space, class Rule, class Sizes>
   queue_.push(time, i, other);
 }
 
+// Writes down what is pending. Outside process_until() nothing is.
+template <class Space, class Rule, class Sizes>
+[[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::settle() {
+  for (Pending& one : pending_) {
+    if (one.disk == nothing_pending) return;
+    commit(one.disk, {one.time, one.partner}, one.exit);
+    one.disk = nothing_pending;
+    one.time = one.exit = never;
+  }
+}
+
 // The disk's state is `motion` from now on: written down, with what comes next.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::fly_on(std::uint32_t i, const Motion& motion) {
-  const double exit = shell_exit_of(i, motion);
-  const Candidate next = next_event(i, motion, exit);
   write_down(i, motion);
-  commit(i, next, exit);
+  predict(i, motion);
 }
 
 // Everything anew. Every disk must be predicted, even one that another has
@@ -296,7 +301,7 @@ void Engine<Space, Rule, Sizes>::predict_all() {
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Motion motion = motion_at(disks_[i], now_);
     const double exit = shell_exit_of(i, motion);
-    Candidate next = next_event(i, motion, exit);
+    Candidate next = next_event(i, exit);
     const Disk& disk = disks_[i];
     if (disk.partner >= 0 && next.time >= disk.event_time) next = {disk.event_time, disk.partner};
     commit(i, next, exit);  // also where it stands already: the disk may leave its shell before
@@ -456,11 +461,12 @@ template <class Space, class Rule, class Sizes>
 template <bool watched>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i = 0, with = 0;
-  while (queue_.pop(until, i, with)) {
+  while (queue_.pop(until, i, with, *this)) {
     if (beyond_cache_) fetch_for_upcoming();
     now_ = disks_[i].event_time;
     if (--events_to_check_ == 0) [[unlikely]] {
       if (locked()) {
+        settle();
         relieve();
         tell_all();
         continue;
@@ -472,6 +478,7 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
       process(i, with);
     }
   }
+  settle();
   now_ = until;
 }
 
@@ -580,22 +587,31 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   Motion first = motion_at(disks_[i], now_), second = motion_at(disks_[j], now_);
   exchange(i, j, first, second);
   ++counters_.disk_collisions;
-  // Both are predicted before either record changes, so that the two
-  // predictions overlap in the processor. Neither sees the other: they
-  // separate.
   const TwoLanes exits = shell_exits_of(i, j, first, second);
-  const Candidate next_first = next_event(i, first, exits[0]);
-  Candidate next_second = next_event(j, second, exits[1]);
   write_down(i, first);
   write_down(j, second);
-  commit(i, next_first, exits[0]);
-  // Between prediction and now only the first's new partner has got another event.
+  settle();
+  // Both are predicted before what comes next is written down of either, so that the two predictions overlap in the
+  // processor. Neither finds the other: they separate.
+  Candidate next_first, next_second;
+  if (is_near_edge(i, j)) [[unlikely]] {  // asked once: for each of both it would be two coin tosses
+    next_first = next_event_by<true>(i, exits[0]);
+    next_second = next_event_by<true>(j, exits[1]);
+  } else {
+    next_first = next_event_by<false>(i, exits[0]);
+    next_second = next_event_by<false>(j, exits[1]);
+  }
   if (next_second.partner == next_first.partner) [[unlikely]] {
+    // What the first meets is no longer free for the second.
+    commit(i, next_first, exits[0]);
     const bool taken = next_second.partner >= 0 && next_second.time < never &&
                        !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
-    if (taken) next_second = next_event(j, second, exits[1]);
+    if (taken) next_second = next_event(j, exits[1]);
+    commit(j, next_second, exits[1]);
+    return;
   }
-  commit(j, next_second, exits[1]);
+  pending_[0].is(i, next_first, exits[0]);
+  pending_[1].is(j, next_second, exits[1]);
 }
 
 // The contact itself: changes the velocities, the spins and the ledger.
@@ -817,6 +833,7 @@ void Engine<Space, Rule, Sizes>::act_bath() {
     disk.vz = speed * draw.second;
     bath_work_ += kinetic(disk, i) - before;
     predict(i, motion_at(disk, now_));
+    settle();
     tell(i);
     bath_at_ = now_ - std::log(random_.uniform_positive()) / (bath->rate * count_);
     return;

@@ -106,10 +106,13 @@ class EventQueue {
   }
 
   // The earliest valid event at or before `until`: its disk, that with which it was pushed (itself when alone), and its
-  // time in disks[disk].event_time. False if none.
-  bool pop(double until, std::uint32_t& disk, std::uint32_t& with) {
+  // time in disks[disk].event_time. False if none. The owner may leave events that it knows of unwritten as long as
+  // owner.waits_for(time, disk, with) is false for the event that would come up: else it must settle() them first.
+  template <class Owner>
+  bool pop(double until, std::uint32_t& disk, std::uint32_t& with, Owner& owner) {
     for (;;) {
       if (next_ + looks_ahead >= end_) [[unlikely]] {
+        owner.settle();
         if (!lengthen_run(until)) return false;
         if (beyond_cache_) {
           const std::size_t later = index_of(current_ + 2);
@@ -128,13 +131,17 @@ class EventQueue {
       }
       const double time = times_[next_];
       const std::uint64_t pair = pairs_[next_];
+      const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
+      if (owner.waits_for(time, first, second)) [[unlikely]] {
+        owner.settle();
+        continue;
+      }
       if (time > until) [[unlikely]]
         return false;
       ++next_;
       now_ = time;
       // The partner counts too: a disk may have found another one at the very
       // same time, and its former partner must still have its turn.
-      const auto first = static_cast<std::uint32_t>(pair), second = static_cast<std::uint32_t>(pair >> 32);
       disk = first;
       with = second;
       if (stands(first, second, time)) [[likely]]
