@@ -165,6 +165,7 @@ class Engine final : public Simulation {
   bool is_mutual(std::uint32_t i, std::uint32_t j) const {
     return disks_[j].event_time == now_ && disks_[j].partner == static_cast<std::int32_t>(i);
   }
+  void fetch_lists(std::size_t ahead) const;
   void fetch_for_upcoming() const;
   void collide(std::uint32_t i, std::uint32_t j);
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);

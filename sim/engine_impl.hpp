@@ -433,6 +433,15 @@ void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
 // ------------------------------------------------------------------------------------------------
 // the loop
 
+// Sends for the neighbour lists of the two disks that come up so many events from now.
+template <class Space, class Rule, class Sizes>
+[[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_lists(std::size_t ahead) const {
+  std::uint32_t a = 0, b = 0;
+  if (!queue_.upcoming(ahead, a, b)) return;
+  fetch(&shells_.first_block(a));
+  fetch(&shells_.first_block(b));
+}
+
 // Sends for what will be asked for soon: first the neighbour lists of disks that will collide, some events later the
 // neighbours' records, and the cells round a disk that will leave its shell. (The records of disks that come up at all
 // are sent for by the queue, a bucket ahead; half of those events will be dead before their turn, so no more than
@@ -441,10 +450,7 @@ template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] void Engine<Space, Rule, Sizes>::fetch_for_upcoming() const {
   constexpr std::size_t neighbours_ahead = 4;
   std::uint32_t a = 0, b = 0;
-  if (queue_.upcoming(EventQueue::looks_ahead, a, b)) {
-    fetch(&shells_.first_block(a));
-    fetch(&shells_.first_block(b));
-  }
+  fetch_lists(EventQueue::looks_ahead);
   if (!queue_.upcoming(neighbours_ahead, a, b)) return;
   for (std::uint32_t neighbour : shells_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
@@ -462,7 +468,8 @@ template <bool watched>
 void Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i = 0, with = 0;
   while (queue_.pop(until, i, with, *this)) {
-    if (beyond_cache_) fetch_for_upcoming();
+    // Of so few disks that all is in the second-level cache, the lists alone are worth it.
+    beyond_cache_ ? fetch_for_upcoming() : fetch_lists(3);
     now_ = disks_[i].event_time;
     if (--events_to_check_ == 0) [[unlikely]] {
       if (locked()) {
