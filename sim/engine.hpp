@@ -7,7 +7,8 @@
 // the partner's own next event; the partner's former partner is not told, it
 // finds out when its old time comes and then predicts anew. Between events
 // disks fly freely: straight lines in pairs' relative coordinates, gravity or
-// not.
+// not. What was predicted is written down only when the next event has begun,
+// unless that could change it (Pending, waits_for(), settle()).
 //
 // Time is counted from the last rebasing, so its resolution does not fade in
 // long runs. At fixed moments (every `synchronisation interval`) the engine
@@ -18,6 +19,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -73,8 +75,8 @@ class Engine final : public Simulation {
     double time;
     std::int32_t partner;
   };
-  // What the disks of the latest contact will do next, foreseen but not written down: that waits until the next event
-  // has begun, so that both overlap in the processor.
+  // What a disk of the latest event will do next, foreseen but not written down: that waits until the next event has
+  // begun, so that both overlap in the processor.
   static constexpr std::uint32_t nothing_pending = 0xffffffff;
   struct Pending {
     std::uint32_t disk = nothing_pending;

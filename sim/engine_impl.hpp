@@ -288,7 +288,7 @@ void Engine<Space, Rule, Sizes>::fly_on(std::uint32_t i, const Motion& motion) {
   predict(i, motion);
 }
 
-// Everything anew. Every disk must be predicted, even one that another has
+// Everything anew, from records that are those of now_. Every disk must be predicted, even one that another has
 // already claimed: its own best event may be an earlier one with a third, or
 // the edge of its shell.
 template <class Space, class Rule, class Sizes>
