@@ -281,7 +281,8 @@ inline Earliest earliest_of_four(Lanes times, const std::uint32_t* ids) {
   const auto bits = static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(times, earliest, _CMP_EQ_OQ)));
   return {_mm256_cvtsd_f64(earliest), static_cast<std::int32_t>(ids[__builtin_ctz(bits)])};
 #else
-  return earliest_of(&times[0], ids, 4);
+  const double in_order[4] = {times[0], times[1], times[2], times[3]};
+  return earliest_of(in_order, ids, 4);
 #endif
 }
 // The times of ids 0, 1, 4, 5 and those of 2, 3, 6, 7: so two masks become one in their order.
