@@ -30,6 +30,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "sim/checkpoint_bytes.hpp"
@@ -41,10 +42,11 @@
 #include "sim/floor.hpp"
 #include "sim/lanes.hpp"
 #include "sim/large_vector.hpp"
-#include "sim/neighbour_shells.hpp"
+#include "sim/neighbour_lists.hpp"
 #include "sim/overlap.hpp"
 #include "sim/policies.hpp"
 #include "sim/random.hpp"
+#include "sim/shell_grid.hpp"
 #include "sim/simulation.hpp"
 #include "sim/space_filling_curve.hpp"
 
@@ -147,6 +149,7 @@ class Engine final : public Simulation {
 
   // --- shells
   void centre_shell(std::uint32_t i);
+  template <bool how_near>
   void look_round(std::uint32_t i);
   // Radius of the disk and of its shell together [D].
   float reach(std::uint32_t i) const {
@@ -229,8 +232,9 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
-  NeighbourShells shells_;
+  bool beyond_cache_ = false;                                               // so many disks that it pays to fetch ahead
+  ShellGrid<std::conditional_t<Space::falls, WideCell, NarrowCell>> grid_;  // where the shells are
+  NeighbourLists lists_;
   EventQueue queue_;
   std::array<Pending, 2> pending_;
   // Of the disk that look_round() was called for: those nearby, and the radius

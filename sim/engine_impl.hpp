@@ -170,11 +170,11 @@ template <class Space, class Rule, class Sizes>
     if (other.time < best.time) best = other;
   };
   if (me.neighbours <= inline_neighbours + 4) [[likely]] {
-    const std::uint32_t* const four = shells_.second_block(i).disk.data();
+    const std::uint32_t* const four = lists_.second_block(i).disk.data();
     const Earliest earliest = earliest_of_four(contact_times<true>(four, 2, me, radius), four);
     consider({earliest.time, earliest.id});
   } else {
-    shells_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in<true>(block, me, radius)); });
+    lists_.further_blocks(i, [&](const NeighbourBlock& block) { consider(earliest_in<true>(block, me, radius)); });
   }
   return best;
 }
@@ -184,7 +184,7 @@ template <class Space, class Rule, class Sizes>
 template <bool images>
 [[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::next_contact(std::uint32_t i) const -> Candidate {
   const Disk& me = disks_[i];
-  const Candidate best = earliest_in<images>(shells_.first_block(i), me, sizes_.radius(i));
+  const Candidate best = earliest_in<images>(lists_.first_block(i), me, sizes_.radius(i));
   if (me.neighbours > inline_neighbours) [[unlikely]]
     return next_of_many(i, best);
   return best;
@@ -321,11 +321,12 @@ void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
   disk.shell_z = static_cast<float>(disk.z);
 }
 
-// Fills nearby_ with the disks round i and with how large a shell of i's would
-// just reach theirs.
+// Fills nearby_ with the disks whose shells the largest shell of i's would reach and, if it is asked how near they are,
+// reached_by_ with how large a shell of i's would just reach theirs.
 template <class Space, class Rule, class Sizes>
+template <bool how_near>
 void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
-  const std::size_t most = inline_neighbours * (shells_.most_cells_round() + 1);
+  const std::size_t most = inline_neighbours * (grid_.most_eights_round() + 1);
   if (nearby_.size() < most) [[unlikely]] {
     nearby_.resize(2 * most);
     reached_by_.resize(2 * most);
@@ -336,22 +337,25 @@ void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
   const WordLanes me = all_words(i);
   const Period across = period_x_, up = period_z_;
   std::uint32_t* const nearby = nearby_.data();
-  float* const reached = reached_by_.data();
+  [[maybe_unused]] float* const reached = reached_by_.data();
   std::size_t count = 0;
-  shells_.each_cell_round(i, [&](const Cell& cell) {
-    FloatLanes dx = eight_floats(cell.x.data()) - x, dz = eight_floats(cell.z.data()) - z;
+  grid_.each_eight_round(i, [&](FloatLanes cx, FloatLanes cz, FloatLanes reach, WordLanes ids) {
+    FloatLanes dx = cx - x, dz = cz - z;
     if constexpr (Space::wraps_x) dx = across.nearest(dx);
     if constexpr (Space::wraps_z) dz = up.nearest(dz);
-    const WordLanes ids = eight_words(cell.disk.data());
-    const FloatLanes reached_by = sqrt_floats(fused(dx, dx, dz * dz)) - eight_floats(cell.reach.data()) - mine;
-    const WordLanes near = (reached_by < largest) & (ids != me);
-    count += compress(near, ids, reached_by, nearby + count, reached + count);
+    const FloatLanes contact = reach + mine, far = contact + largest, squared = fused(dx, dx, dz * dz);
+    const WordLanes near = (squared < far * far) & (ids != me);
+    if constexpr (how_near) {
+      count += compress(near, ids, sqrt_floats(squared) - contact, nearby + count, reached + count);
+    } else {
+      count += compress(near, ids, nearby + count);
+    }
   });
   nearby_count_ = count;
 }
 
 // The largest shell with which i would have no more than eight neighbours,
-// within bounds: it stops short of the ninth nearest.
+// within bounds: it stops short of the ninth nearest. After look_round<true>().
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
   constexpr std::size_t usual = std::size_t{2} * inline_neighbours;
@@ -381,7 +385,7 @@ void Engine<Space, Rule, Sizes>::choose_skin(std::uint32_t i) {
   disks_[i].skin = static_cast<std::uint8_t>(skin * static_cast<float>(1 / skin_unit));
 }
 
-// Those of nearby_ that i's shell reaches.
+// Those of nearby_ that i's shell reaches. After look_round<true>().
 template <class Space, class Rule, class Sizes>
 std::span<const std::uint32_t> Engine<Space, Rule, Sizes>::find_neighbours(std::uint32_t i) {
   const FloatLanes skin = all_floats(static_cast<float>(disks_[i].skin * skin_unit));
@@ -419,15 +423,24 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
   disk.near = static_cast<std::uint8_t>(near);
 }
 
+// Draws a new shell round disk i, in all but the lists of the neighbours that it loses or wins: lists_.mend() is to
+// follow.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
-  shells_.unfile(i);
+  grid_.unfile(i);
   centre_shell(i);
-  look_round(i);
-  choose_skin(i);
-  shells_.file(i, reach(i));
+  look_round<false>(i);
+  std::span<const std::uint32_t> found(nearby_.data(), nearby_count_);
+  if (nearby_count_ <= inline_neighbours) [[likely]] {  // then it can be the largest
+    disks_[i].skin = static_cast<std::uint8_t>(largest_skin_ / skin_unit);
+  } else {
+    look_round<true>(i);
+    choose_skin(i);
+    found = find_neighbours(i);
+  }
+  grid_.file(i, reach(i));
   mark_near_bounds(i);
-  shells_.relist(i, find_neighbours(i));
+  lists_.relist(i, found);
 }
 
 // ------------------------------------------------------------------------------------------------
@@ -438,8 +451,8 @@ template <class Space, class Rule, class Sizes>
 [[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_lists(std::size_t ahead) const {
   std::uint32_t a = 0, b = 0;
   if (!queue_.upcoming(ahead, a, b)) return;
-  fetch(&shells_.first_block(a));
-  fetch(&shells_.first_block(b));
+  fetch(&lists_.first_block(a));
+  fetch(&lists_.first_block(b));
 }
 
 // Sends for what will be asked for soon: first the neighbour lists of disks that will collide, some events later the
@@ -452,15 +465,12 @@ template <class Space, class Rule, class Sizes>
   std::uint32_t a = 0, b = 0;
   fetch_lists(EventQueue::looks_ahead);
   if (!queue_.upcoming(neighbours_ahead, a, b)) return;
-  for (std::uint32_t neighbour : shells_.first_block(a).disk) fetch(&disks_[neighbour]);
+  for (std::uint32_t neighbour : lists_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
-    shells_.each_place_round(a, [](const Cell& cell) {
-      fetch(&cell);
-      fetch(&cell.reach);
-    });
+    grid_.fetch_round(a);
     return;
   }
-  for (std::uint32_t neighbour : shells_.first_block(b).disk) fetch(&disks_[neighbour]);
+  for (std::uint32_t neighbour : lists_.first_block(b).disk) fetch(&disks_[neighbour]);
 }
 
 template <class Space, class Rule, class Sizes>
@@ -508,6 +518,7 @@ template <class Space, class Rule, class Sizes>
     bring_forward(i);
     leave_shell(i);
     predict(i, motion_at(disk, now_));
+    lists_.mend();  // what it needs is on its way, and the prediction does not wait for it
   } else {
     hit_wall(i);
   }
@@ -787,7 +798,7 @@ void Engine<Space, Rule, Sizes>::relieve() {
     };
     for (std::uint32_t i = 0; i < count_; ++i) {
       Disk& disk = disks_[i];
-      shells_.each_neighbour(i, [&](std::uint32_t k) {
+      lists_.each_neighbour(i, [&](std::uint32_t k) {
         if (k < i) return;
         Disk& other = disks_[k];
         double dx = other.x - disk.x, dz = other.z - disk.z;
@@ -980,24 +991,26 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
     if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact_) / 4);
   }
   if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact_) / 4);
+  largest_skin_ = std::floor(largest_skin_ / skin_unit) * skin_unit;  // as records hold it
   // Distances of shells' centres are taken in single precision.
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
-  shells_.reset(disks_.data(), count_, largest_contact_ + 2 * largest_skin_ + shell_slack_, width_, height);
+  grid_.reset(disks_.data(), largest_contact_ + 2 * largest_skin_ + shell_slack_, width_, height);
+  lists_.reset(disks_.data(), count_);
   for (std::uint32_t i = 0; i < count_; ++i) {
     centre_shell(i);
     disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
-    shells_.file(i, reach(i));
+    grid_.file(i, reach(i));
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
-    look_round(i);
+    look_round<true>(i);
     choose_skin(i);
-    shells_.set_reach(i, reach(i));
+    grid_.set_reach(i, reach(i));
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     mark_near_bounds(i);
-    look_round(i);
-    shells_.list(i, find_neighbours(i));
+    look_round<true>(i);
+    lists_.list(i, find_neighbours(i));
   }
   predict_all();
 }
@@ -1175,7 +1188,8 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
 template <class Space, class Rule, class Sizes>
 std::size_t Engine<Space, Rule, Sizes>::bytes() const {
   return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
-         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) + shells_.bytes() + queue_.bytes();
+         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) + grid_.bytes() + lists_.bytes() +
+         queue_.bytes();
 }
 
 }  // namespace shakebed::sim

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -160,6 +161,46 @@ void rank_times(const double* times, std::int64_t* ranks) {
 using FloatLanes = float __attribute__((vector_size(32)));
 using WordLanes = std::int32_t __attribute__((vector_size(32)));
 
+// Four of one place and four of another.
+inline FloatLanes four_and_four(const float* first, const float* second) {
+#if defined(__AVX__)
+  return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(first)), _mm_loadu_ps(second), 1);
+#else
+  return FloatLanes{first[0], first[1], first[2], first[3], second[0], second[1], second[2], second[3]};
+#endif
+}
+inline WordLanes four_and_four(const std::uint32_t* first, const std::uint32_t* second) {
+#if defined(__AVX__)
+  const __m128i a = _mm_loadu_si128(reinterpret_cast<const __m128i*>(first)),
+                b = _mm_loadu_si128(reinterpret_cast<const __m128i*>(second));
+  return reinterpret_cast<WordLanes>(_mm256_insertf128_si256(_mm256_castsi128_si256(a), b, 1));
+#else
+  const auto word = [](std::uint32_t value) { return static_cast<std::int32_t>(value); };
+  return WordLanes{word(first[0]),  word(first[1]),  word(first[2]),  word(first[3]),
+                   word(second[0]), word(second[1]), word(second[2]), word(second[3])};
+#endif
+}
+// The upper half of a float's bits is a float of eight binary digits; of a positive one the next that is no smaller.
+inline std::uint16_t upper_half(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return static_cast<std::uint16_t>((bits + (value > 0 ? 0xffff : 0)) >> 16);
+}
+// The floats of four such halves and four others.
+inline FloatLanes four_and_four(const std::uint16_t* first, const std::uint16_t* second) {
+#if defined(__AVX2__)
+  const __m128i halves = _mm_unpacklo_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(first)),
+                                            _mm_loadl_epi64(reinterpret_cast<const __m128i*>(second)));
+  return _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(halves), 16));
+#else
+  FloatLanes lanes;
+  for (int k = 0; k < 4; ++k) {
+    lanes[k] = std::bit_cast<float>(std::uint32_t{first[k]} << 16);
+    lanes[k + 4] = std::bit_cast<float>(std::uint32_t{second[k]} << 16);
+  }
+  return lanes;
+#endif
+}
+
 // Bit k is the mask's lane k.
 inline unsigned bits_of(WordLanes mask) {
 #if defined(__AVX__)
@@ -184,6 +225,18 @@ inline FloatLanes eight_floats(const float* floats) {
 // Bit k set where words[k] == value, k = 0 to 7.
 inline unsigned equal_words(const std::uint32_t* words, std::uint32_t value) {
   return bits_of(eight_words(words) == static_cast<std::int32_t>(value));
+}
+// The same of four words.
+inline unsigned equal_among_four(const std::uint32_t* words, std::uint32_t value) {
+#if defined(__SSE2__)
+  const __m128i equal = _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(words)),
+                                        _mm_set1_epi32(static_cast<std::int32_t>(value)));
+  return static_cast<unsigned>(_mm_movemask_ps(_mm_castsi128_ps(equal)));
+#else
+  unsigned bits = 0;
+  for (unsigned k = 0; k < 4; ++k) bits |= static_cast<unsigned>(words[k] == value) << k;
+  return bits;
+#endif
 }
 // Bit k set where words[k] is one of the eight `among`.
 inline unsigned words_among(const std::uint32_t* words, const std::uint32_t* among) {
@@ -231,28 +284,44 @@ inline FloatLanes fused(FloatLanes a, FloatLanes b, FloatLanes c) {
   return c;
 #endif
 }
-// Writes the lanes whose mask is set, in order, to the start of out; all eight
-// places may be written. How many they are.
-inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std::uint32_t* words_out,
-                         float* floats_out) {
 #if defined(__AVX2__) && defined(__BMI2__)
-  const auto bits = static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+// The lanes whose mask's bit is set, in order, as the indices of a permutation.
+inline __m256i lanes_in(unsigned bits) {
   const std::uint64_t bytes = _pdep_u64(bits, 0x0101010101010101) * 0xff;
   const auto order = static_cast<long long>(_pext_u64(0x0706050403020100, bytes));
-  const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order));
+  return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order));
+}
+#endif
+// Writes the lanes whose mask is set, in order, to the start of out; all eight
+// places may be written. How many they are.
+inline unsigned compress(WordLanes mask, WordLanes words, std::uint32_t* words_out) {
+#if defined(__AVX2__) && defined(__BMI2__)
+  const unsigned bits = bits_of(mask);
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(words_out),
-                      _mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(words), lanes));
-  _mm256_storeu_ps(floats_out, _mm256_permutevar8x32_ps(floats, lanes));
+                      _mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(words), lanes_in(bits)));
   return static_cast<unsigned>(__builtin_popcount(bits));
 #else
   unsigned count = 0;
   for (int k = 0; k < 8; ++k) {
     words_out[count] = static_cast<std::uint32_t>(words[k]);
-    floats_out[count] = floats[k];
     count += mask[k] != 0;
   }
   return count;
 #endif
+}
+// The same, and of floats that go with them.
+inline unsigned compress(WordLanes mask, WordLanes words, FloatLanes floats, std::uint32_t* words_out,
+                         float* floats_out) {
+#if defined(__AVX2__) && defined(__BMI2__)
+  _mm256_storeu_ps(floats_out, _mm256_permutevar8x32_ps(floats, lanes_in(bits_of(mask))));
+#else
+  unsigned count = 0;
+  for (int k = 0; k < 8; ++k) {
+    floats_out[count] = floats[k];
+    count += mask[k] != 0;
+  }
+#endif
+  return compress(mask, words, words_out);
 }
 
 // The earliest of some times, none of them NaN, and the id that goes with it; of equal times the first one's.

@@ -10,8 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "sim/neighbour_shells.hpp"
+#include "sim/neighbour_lists.hpp"
 #include "sim/random.hpp"
+#include "sim/shell_grid.hpp"
 #include "sim/simulation.hpp"
 
 namespace shakebed::sim {
@@ -232,39 +233,78 @@ TEST(Engine, SaysWhereDisksCollapse) {
 }
 
 // Two disks at the very edge of each other's reach, of which by rounding one sees the other and is not seen by it.
-TEST(NeighbourShells, AreAlwaysMutual) {
+TEST(NeighbourLists, AreAlwaysMutual) {
   std::vector<Disk> disks(4);
-  NeighbourShells shells;
-  shells.reset(disks.data(), 3, 1.5, 30, 30);
-  for (std::uint32_t i = 0; i < 3; ++i) shells.file(i, 0.75f);
+  NeighbourLists lists;
+  lists.reset(disks.data(), 3);
   const auto neighbours = [&](std::uint32_t i) {
     std::vector<std::uint32_t> found;
-    shells.each_neighbour(i, [&](std::uint32_t k) { found.push_back(k); });
+    lists.each_neighbour(i, [&](std::uint32_t k) { found.push_back(k); });
     return found;
   };
   const std::array<std::uint32_t, inline_neighbours> two = {2}, zero = {0};
-  shells.list(0, {two.data(), 1});
-  shells.list(1, {zero.data(), 1});
-  shells.list(2, {});
+  lists.list(0, {two.data(), 1});
+  lists.list(1, {zero.data(), 1});
+  lists.list(2, {});
   EXPECT_THAT(neighbours(0), testing::ElementsAre(1));
   EXPECT_THAT(neighbours(1), testing::ElementsAre(0));
   EXPECT_THAT(neighbours(2), testing::IsEmpty());
-  shells.relist(0, {zero.data(), 0});
+  lists.relist(0, {zero.data(), 0});
+  lists.mend();
   EXPECT_THAT(neighbours(1), testing::IsEmpty());
 }
 
+// Lists drawn anew at random, of up to twenty neighbours, beside a table of who is whose neighbour.
+TEST(NeighbourLists, StayMutualWhateverIsDrawn) {
+  constexpr std::uint32_t count = 60;
+  std::vector<Disk> disks(count + 1);
+  NeighbourLists lists;
+  lists.reset(disks.data(), count);
+  std::array<std::array<bool, count>, count> together{};
+  Random random(3);
+  for (int round = 0; round < 20'000; ++round) {
+    const std::uint32_t i = random.below(count), most = random.below(8) == 0 ? 20 : 8;
+    std::vector<std::uint32_t> found;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const bool kept = together[i][k] && random.below(8) != 0;
+      if (k != i && found.size() < most && (kept || random.below(20) == 0)) found.push_back(k);
+    }
+    const std::size_t size = found.size();
+    for (std::uint32_t k = 0; k < count; ++k) together[i][k] = together[k][i] = false;
+    for (const std::uint32_t k : found) together[i][k] = together[k][i] = true;
+    found.resize(size + inline_neighbours);
+    lists.relist(i, {found.data(), size});
+    lists.mend();
+    for (std::uint32_t k = 0; k < count; ++k) {
+      std::array<bool, count> listed{};
+      std::uint32_t neighbours = 0;
+      lists.each_neighbour(k, [&](std::uint32_t other) {
+        ASSERT_LT(other, count);
+        listed[other] = true;
+        ++neighbours;
+      });
+      ASSERT_EQ(listed, together[k]) << "round " << round << ", disk " << k;
+      ASSERT_EQ(neighbours, std::count(listed.begin(), listed.end(), true));
+      for (std::uint32_t place = neighbours; place < inline_neighbours; ++place)  // all eight are read
+        ASSERT_EQ(lists.first_block(k).disk[place], count);
+    }
+  }
+}
+
 // A hundred shells with one centre: their cell has no room for all, and lends and takes back further ones.
-TEST(NeighbourShells, FindsWhatACellHasNoRoomFor) {
+template <class Cell>
+void finds_what_a_cell_has_no_room_for() {
   constexpr std::uint32_t count = 100;
   std::vector<Disk> disks(count + 1);
-  NeighbourShells shells;
-  shells.reset(disks.data(), count, 1.5, 30, 30);
+  ShellGrid<Cell> shells;
+  shells.reset(disks.data(), 1.5, 30, 30);
   const auto found = [&] {
     std::vector<std::uint32_t> ids;
-    shells.each_cell_round(0, [&](const Cell& cell) {
-      for (unsigned place = 0; place < Cell::places; ++place) {
-        EXPECT_EQ(std::isfinite(cell.reach[place]), cell.disk[place] != nobody_here);
-        if (cell.disk[place] != nobody_here) ids.push_back(cell.disk[place]);
+    shells.each_eight_round(0, [&](FloatLanes x, FloatLanes, FloatLanes reach, WordLanes disk) {
+      for (unsigned lane = 0; lane < 8; ++lane) {
+        if (std::isnan(x[lane])) continue;
+        EXPECT_EQ(reach[lane], 0.75f);
+        ids.push_back(static_cast<std::uint32_t>(disk[lane]));
       }
     });
     std::sort(ids.begin(), ids.end());
@@ -290,6 +330,8 @@ TEST(NeighbourShells, FindsWhatACellHasNoRoomFor) {
   while (!filed.empty()) unfile(filed.front());
   EXPECT_THAT(found(), testing::IsEmpty());
 }
+TEST(ShellGrid, FindsWhatAWideCellHasNoRoomFor) { finds_what_a_cell_has_no_room_for<WideCell>(); }
+TEST(ShellGrid, FindsWhatANarrowCellHasNoRoomFor) { finds_what_a_cell_has_no_room_for<NarrowCell>(); }
 
 // The queue's buckets follow a rate of events that changes a million times over.
 TEST(Engine, KeepsItsOrderThroughBursts) {
