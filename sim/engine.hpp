@@ -30,7 +30,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "sim/checkpoint_bytes.hpp"
@@ -149,8 +149,11 @@ class Engine final : public Simulation {
 
   // --- shells
   void centre_shell(std::uint32_t i);
-  template <bool how_near>
-  void look_round(std::uint32_t i);
+  template <class Grid>
+  void file_shells(Grid& grid, double height);
+  void file_shells(double height);
+  template <bool how_near, class Grid>
+  void look_round(const Grid& grid, std::uint32_t i);
   // Radius of the disk and of its shell together [D].
   float reach(std::uint32_t i) const {
     return static_cast<float>(disks_[i].skin) * static_cast<float>(skin_unit) + static_cast<float>(sizes_.radius(i));
@@ -159,6 +162,8 @@ class Engine final : public Simulation {
   std::span<const std::uint32_t> find_neighbours(std::uint32_t i);
   void mark_near_bounds(std::uint32_t i);
   void leave_shell(std::uint32_t i);
+  template <class Grid>
+  void draw_shell(Grid& grid, std::uint32_t i);
 
   // --- contacts
   template <bool watched>
@@ -232,8 +237,8 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  bool beyond_cache_ = false;                                               // so many disks that it pays to fetch ahead
-  ShellGrid<std::conditional_t<Space::falls, WideCell, NarrowCell>> grid_;  // where the shells are
+  bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
+  std::variant<ShellGrid<NarrowCell>, ShellGrid<WideCell>> grid_;  // where the shells are
   NeighbourLists lists_;
   EventQueue queue_;
   std::array<Pending, 2> pending_;

@@ -7,6 +7,7 @@ namespace shakebed::sim {
 inline constexpr double rest_hop = 1e-4;        // length of the hop of a disk at rest
                                                 // on the floor without a contact clock
 inline constexpr double shell_slack = 1e-9;     // covers the rounding of shells' centres and exit times
+inline constexpr double most_crowding = 0.01;   // of cells of four shells; above, cells of seven are quicker
 inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
 
 // ------------------------------------------------------------------------------------------------
@@ -324,9 +325,9 @@ void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
 // Fills nearby_ with the disks whose shells the largest shell of i's would reach and, if it is asked how near they are,
 // reached_by_ with how large a shell of i's would just reach theirs.
 template <class Space, class Rule, class Sizes>
-template <bool how_near>
-void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
-  const std::size_t most = inline_neighbours * (grid_.most_eights_round() + 1);
+template <bool how_near, class Grid>
+void Engine<Space, Rule, Sizes>::look_round(const Grid& grid, std::uint32_t i) {
+  const std::size_t most = inline_neighbours * (grid.most_eights_round() + 1);
   if (nearby_.size() < most) [[unlikely]] {
     nearby_.resize(2 * most);
     reached_by_.resize(2 * most);
@@ -339,7 +340,7 @@ void Engine<Space, Rule, Sizes>::look_round(std::uint32_t i) {
   std::uint32_t* const nearby = nearby_.data();
   [[maybe_unused]] float* const reached = reached_by_.data();
   std::size_t count = 0;
-  grid_.each_eight_round(i, [&](FloatLanes cx, FloatLanes cz, FloatLanes reach, WordLanes ids) {
+  grid.each_eight_round(i, [&](FloatLanes cx, FloatLanes cz, FloatLanes reach, WordLanes ids) {
     FloatLanes dx = cx - x, dz = cz - z;
     if constexpr (Space::wraps_x) dx = across.nearest(dx);
     if constexpr (Space::wraps_z) dz = up.nearest(dz);
@@ -427,18 +428,28 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
 // follow.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
-  grid_.unfile(i);
+  std::visit([this, i](auto& grid) { draw_shell(grid, i); }, grid_);
+}
+template <class Space, class Rule, class Sizes>
+template <class Grid>
+void Engine<Space, Rule, Sizes>::draw_shell(Grid& grid, std::uint32_t i) {
+  grid.unfile(i);
   centre_shell(i);
-  look_round<false>(i);
+  // Where no more than eight are near the largest shell will do, and nobody need be ranked. So it most often is where
+  // it was so before.
+  const auto largest = static_cast<std::uint8_t>(largest_skin_ / skin_unit);
+  bool largest_will_do = disks_[i].skin == largest;
+  if (largest_will_do) [[likely]] {
+    look_round<false>(grid, i);
+    largest_will_do = nearby_count_ <= inline_neighbours;
+  }
   std::span<const std::uint32_t> found(nearby_.data(), nearby_count_);
-  if (nearby_count_ <= inline_neighbours) [[likely]] {  // then it can be the largest
-    disks_[i].skin = static_cast<std::uint8_t>(largest_skin_ / skin_unit);
-  } else {
-    look_round<true>(i);
+  if (!largest_will_do) [[unlikely]] {
+    look_round<true>(grid, i);
     choose_skin(i);
     found = find_neighbours(i);
   }
-  grid_.file(i, reach(i));
+  grid.file(i, reach(i));
   mark_near_bounds(i);
   lists_.relist(i, found);
 }
@@ -467,7 +478,7 @@ template <class Space, class Rule, class Sizes>
   if (!queue_.upcoming(neighbours_ahead, a, b)) return;
   for (std::uint32_t neighbour : lists_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
-    grid_.fetch_round(a);
+    std::visit([a](const auto& grid) { grid.fetch_round(a); }, grid_);
     return;
   }
   for (std::uint32_t neighbour : lists_.first_block(b).disk) fetch(&disks_[neighbour]);
@@ -969,6 +980,28 @@ double Engine<Space, Rule, Sizes>::density_round_disks() const {
   return squares / (count_ * width_ * thickness);
 }
 
+// Files every disk's shell, round where it is now, in a grid of that height.
+template <class Space, class Rule, class Sizes>
+template <class Grid>
+void Engine<Space, Rule, Sizes>::file_shells(Grid& grid, double height) {
+  grid.reset(disks_.data(), largest_contact_ + 2 * largest_skin_ + shell_slack_, width_, height);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    centre_shell(i);
+    disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
+    grid.file(i, reach(i));
+  }
+}
+// The same in the kind of cells that suits it: a bed is denser at times than it may be now.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::file_shells(double height) {
+  if constexpr (!Space::falls) {
+    auto& narrow = grid_.template emplace<ShellGrid<NarrowCell>>();
+    file_shells(narrow, height);
+    if (narrow.crowding() < most_crowding) return;
+  }
+  file_shells(grid_.template emplace<ShellGrid<WideCell>>(), height);
+}
+
 // From positions, velocities, spins and clocks at now_ = 0 alone.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
@@ -995,23 +1028,22 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   // Distances of shells' centres are taken in single precision.
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
-  grid_.reset(disks_.data(), largest_contact_ + 2 * largest_skin_ + shell_slack_, width_, height);
   lists_.reset(disks_.data(), count_);
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    centre_shell(i);
-    disks_[i].skin = static_cast<std::uint8_t>(std::min(largest_skin_, 0.36) / skin_unit);
-    grid_.file(i, reach(i));
-  }
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    look_round<true>(i);
-    choose_skin(i);
-    grid_.set_reach(i, reach(i));
-  }
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    mark_near_bounds(i);
-    look_round<true>(i);
-    lists_.list(i, find_neighbours(i));
-  }
+  file_shells(height);
+  std::visit(
+      [this](auto& grid) {
+        for (std::uint32_t i = 0; i < count_; ++i) {
+          look_round<true>(grid, i);
+          choose_skin(i);
+          grid.set_reach(i, reach(i));
+        }
+        for (std::uint32_t i = 0; i < count_; ++i) {
+          mark_near_bounds(i);
+          look_round<true>(grid, i);
+          lists_.list(i, find_neighbours(i));
+        }
+      },
+      grid_);
   predict_all();
 }
 
@@ -1188,8 +1220,8 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
 template <class Space, class Rule, class Sizes>
 std::size_t Engine<Space, Rule, Sizes>::bytes() const {
   return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
-         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) + grid_.bytes() + lists_.bytes() +
-         queue_.bytes();
+         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
+         std::visit([](const auto& grid) { return grid.bytes(); }, grid_) + lists_.bytes() + queue_.bytes();
 }
 
 }  // namespace shakebed::sim

@@ -265,11 +265,11 @@ class EventQueue {
   void push_this_turn(double first) {
     std::array<Entry, 64> batch;
     std::size_t found = 0;
-    // Records one behind the other are sent for, too: the processor does not foresee them well enough. From farther
-    // memory it does.
-    const std::uint32_t ahead = pushes_wait() ? 32 : 0;
+    // Records one behind the other are sent for, too: the processor does not foresee them well enough. Where there are
+    // many more of them it costs more than it brings.
+    const bool fetches = pushes_wait();
     for (std::uint32_t i = 0; i < count_; ++i) {
-      fetch(&disks_[std::min(i + ahead, count_)]);
+      if (fetches) fetch(&disks_[std::min(i + 32, count_)]);
       const double time = disks_[i].event_time, place = time * buckets_a_time_;
       const auto me = static_cast<std::int32_t>(i), other = choose(disks_[i].partner < 0, me, disks_[i].partner);
       const Disk& partner = disks_[static_cast<std::uint32_t>(other)];

@@ -39,6 +39,7 @@ class NeighbourLists {
     blocks_.assign(1, {});
     links_.assign(1, 0);
     free_block_ = 0;
+    lost_ = won_ = 0;
     for (std::uint32_t i = 0; i < count; ++i) disks_[i].neighbours = 0;
   }
 

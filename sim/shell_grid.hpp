@@ -17,12 +17,12 @@
 
 namespace shakebed::sim {
 
-// What a cell holds: shells whose centres are in it, all that a search asks of them. Where it has no room it lends
-// itself a further one.
 inline constexpr std::uint32_t nobody_here = 0xffffffff;
 inline constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
 
-// Seven shells in two cache lines: for beds, dense below and thin above, where four to a cell would often be too few.
+// A cell holds shells whose centres are in it, all that a search asks of them. Where it has no room it lends itself a
+// further one. There are two kinds: of seven shells in two cache lines, for beds, mixtures and clusters, and of four in
+// one, for where few cells hold more.
 struct alignas(64) WideCell {
   static constexpr unsigned places = 7;
   alignas(32) std::array<float, 8> x, z{};  // the shells' centres; x of an empty place is NaN
@@ -43,7 +43,6 @@ struct alignas(64) WideCell {
 };
 static_assert(sizeof(WideCell) == 128);
 
-// Four shells in one cache line: for fluids of one density, which hold two or three a cell.
 struct alignas(64) NarrowCell {
   static constexpr unsigned places = 4;
   std::array<float, places> x, z{};
@@ -151,10 +150,12 @@ class ShellGrid {
   [[gnu::always_inline]] void fetch_round(std::uint32_t i) const {
     each_place_round(i, [](const Cell& cell) {
       fetch(&cell);
-      if constexpr (sizeof cell > 64) fetch(&cell.reach);
+      if constexpr (sizeof(Cell) > 64) fetch(&cell.reach);
     });
   }
 
+  // Further cells lent, by all that there are.
+  double crowding() const { return static_cast<double>(crowded_.size() - 1) / static_cast<double>(cells_.size()); }
   std::size_t bytes() const { return (cells_.capacity() + crowded_.capacity()) * sizeof(Cell); }
 
  private:

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -81,12 +82,15 @@ TEST(Engine, DoesNotCareWhenOneLooks) {
 }
 
 TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
-  std::vector<Scene> scenes(5, shaken_bed());
+  std::vector<Scene> scenes(6, shaken_bed());
   scenes[1].bath = LangevinBath{2, 1, 0.37};
   scenes[2].bath = AndersenBath{2, 0.5};
   scenes[3].disks.species = {{60, 1, 1}, {40, 1.4, 2.744}};
   scenes[4].disks.contact = Surface{};
   scenes[4].box.sides = PeriodicSides{};
+  scenes[5] = fluid();
+  scenes[5].disks.species = {{40, 1, 1}, {250, 0.3, 0.09}};
+  scenes[5].start = RandomStart{};
   for (const Scene& scene : scenes) {
     const auto a = simulate(scene);
     std::vector<std::uint8_t> saved;
@@ -321,6 +325,7 @@ void finds_what_a_cell_has_no_room_for() {
   };
   for (std::uint32_t i = 0; i < count; ++i) file(i);
   EXPECT_EQ(found(), filed);
+  EXPECT_EQ(shells.crowding(), (count - 1) / Cell::places / 400.0);  // of 20 x 20 cells
   Random random(5);
   for (int round = 0; round < 2000; ++round) {
     const std::uint32_t i = random.below(count);
@@ -332,6 +337,22 @@ void finds_what_a_cell_has_no_room_for() {
 }
 TEST(ShellGrid, FindsWhatAWideCellHasNoRoomFor) { finds_what_a_cell_has_no_room_for<WideCell>(); }
 TEST(ShellGrid, FindsWhatANarrowCellHasNoRoomFor) { finds_what_a_cell_has_no_room_for<NarrowCell>(); }
+
+// A reach filed in half a float's bits must not be too small, or a neighbour would be missed.
+TEST(NarrowCell, FilesAReachThatIsNoSmaller) {
+  NarrowCell cell;
+  for (float reach = 1e-3f; reach < 1e4f; reach *= 1.0001f) {
+    cell.set_reach(2, reach);
+    const float filed = std::bit_cast<float>(std::uint32_t{cell.reach[2]} << 16);
+    ASSERT_GE(filed, reach);
+    ASSERT_LE(filed, reach * (1 + 0x1p-7f));
+  }
+  for (int k = 64; k <= 128; ++k) {  // equal disks' reaches, in units of the skins
+    const float reach = static_cast<float>(k) / 128;
+    cell.set_reach(2, reach);
+    ASSERT_EQ(std::bit_cast<float>(std::uint32_t{cell.reach[2]} << 16), reach);
+  }
+}
 
 // The queue's buckets follow a rate of events that changes a million times over.
 TEST(Engine, KeepsItsOrderThroughBursts) {
