@@ -88,31 +88,42 @@ TEST_P(EventQueueOrder, IsThatOfAHeap) {
 
 INSTANTIATE_TEST_SUITE_P(Disks, EventQueueOrder, testing::Values(3, 500, 20'000, 250'000));
 
-// A pair's common event is written down once and handed out once; where both have something else by then, not at all.
-TEST(EventQueue, ForgetsAPairOfWhichBothHaveSomethingElse) {
-  std::vector<Disk> disks(5);
-  EventQueue queue;
-  Prompt owner;
-  queue.reset(disks.data(), 4, 0, 10);
-  const auto meet = [&](std::uint32_t a, std::uint32_t b, double time) {
-    disks[a].event_time = disks[b].event_time = time;
-    disks[a].partner = static_cast<std::int32_t>(b);
-    disks[b].partner = static_cast<std::int32_t>(a);
-    queue.push(time, a, b);
-  };
-  meet(0, 1, 0.3);
-  meet(2, 3, 0.4);
-  meet(1, 2, 0.2);  // 0 and 3 do not know it yet
-  std::uint32_t disk = 0, with = 0;
-  ASSERT_TRUE(queue.pop(never, disk, with, owner));
-  EXPECT_EQ(disk + with, 3u);
-  EXPECT_EQ(disk * with, 2u);
-  disks[1].event_time = disks[2].event_time = never;
-  ASSERT_TRUE(queue.pop(never, disk, with, owner));
-  EXPECT_EQ(disk, 0u);
-  EXPECT_EQ(with, 1u);
-  disks[0].event_time = disks[3].event_time = never;
-  EXPECT_FALSE(queue.pop(100, disk, with, owner));
+// A pair's common event is written down once and handed out once; who has been left by the other has its turn still,
+// and where both have something else by then nobody has. All in one bucket, and in three.
+TEST(EventQueue, KnowsWhoOfAPairHasSomethingElse) {
+  for (const double scale : {1.0, 40.0}) {
+    std::vector<Disk> disks(7);
+    EventQueue queue;
+    Prompt owner;
+    queue.reset(disks.data(), 6, 0, 10);
+    const auto meet = [&](std::uint32_t a, std::uint32_t b, double time) {
+      disks[a].event_time = disks[b].event_time = time * scale;
+      disks[a].partner = static_cast<std::int32_t>(b);
+      disks[b].partner = static_cast<std::int32_t>(a);
+      queue.push(time * scale, a, b);
+    };
+    std::uint32_t disk = 0, with = 0;
+    const auto next_is = [&](std::uint32_t a, std::uint32_t b, double time) {
+      ASSERT_TRUE(queue.pop(never, disk, with, owner));
+      EXPECT_EQ(disk, a);
+      EXPECT_EQ(with, b);
+      EXPECT_EQ(disks[disk].event_time, time * scale);
+    };
+    meet(4, 5, 0.5);
+    meet(0, 1, 0.3);
+    meet(2, 3, 0.4);
+    meet(1, 2, 0.2);  // 0 and 3 do not know it yet
+    meet(4, 0, 0.1);  // and now 0 has something else, too; 5 does not know it yet
+    next_is(4, 0, 0.1);
+    disks[4].event_time = disks[0].event_time = never;
+    next_is(1, 2, 0.2);
+    disks[1].event_time = disks[2].event_time = never;
+    next_is(3, 2, 0.4);
+    disks[3].event_time = never;
+    next_is(5, 4, 0.5);
+    disks[5].event_time = never;
+    EXPECT_FALSE(queue.pop(1000, disk, with, owner));
+  }
 }
 
 }  // namespace
