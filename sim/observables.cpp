@@ -7,25 +7,53 @@
 
 namespace shakebed::sim {
 
+namespace {
+
+// A Gaussian of unit height about `centre`, by grid points from `first` to `last`, added to `density`. By the point
+// nearest to its centre and ratios from point to point: two exponentials instead of one a point; after k points to
+// 1e-16 k of the value there. falls: exp(-k^2 step^2 / 2), `step` being the grid's spacing in the Gaussian's width.
+void add_gaussian(double centre, double weight, double step, const std::vector<double>& falls, double first,
+                  double last, std::vector<double>& density) {
+  const double nearest = std::clamp(std::round(centre), first, last);
+  const double away = (nearest - centre) * step;
+  const double value = weight * std::exp(-0.5 * away * away), ratio = std::exp(-away * step);
+  const auto middle = static_cast<std::size_t>(nearest);
+  const auto above = static_cast<std::size_t>(last - nearest), below = static_cast<std::size_t>(nearest - first);
+  density[middle] += value;
+  double here = value;
+  for (std::size_t k = 1; k <= above; ++k) density[middle + k] += falls[k] * (here *= ratio);
+  here = value;
+  const double downwards = 1 / ratio;
+  for (std::size_t k = 1; k <= below; ++k) density[middle - k] += falls[k] * (here *= downwards);
+}
+
+}  // namespace
+
 void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
                  double shift, std::vector<double>& density) {
-  const double reach = kernel.kind == KernelKind::gaussian ? 6 * kernel.width : kernel.width / 2;
-  const double weight = kernel.kind == KernelKind::gaussian
-                            ? 1 / (width * kernel.width * std::sqrt(2 * std::numbers::pi))
-                            : 1 / (width * kernel.width);
+  const bool gaussian = kernel.kind == KernelKind::gaussian;
+  const double reach = gaussian ? 6 * kernel.width : kernel.width / 2;
+  const double weight =
+      gaussian ? 1 / (width * kernel.width * std::sqrt(2 * std::numbers::pi)) : 1 / (width * kernel.width);
+  const double step = grid.spacing / kernel.width;
+  std::vector<double> falls;
+  if (gaussian) {
+    const double most = std::min(static_cast<double>(grid.points), std::floor(2 * reach / grid.spacing) + 2);
+    for (double k = 0; k < most; ++k) falls.push_back(std::exp(-0.5 * (k * step) * (k * step)));
+  }
   for (double z : heights) {
     const double place = (z - shift - grid.lowest) / grid.spacing;
     const double first = std::max(0.0, std::ceil(place - reach / grid.spacing));
     const double last = std::min(static_cast<double>(grid.points) - 1, std::floor(place + reach / grid.spacing));
+    if (!(first <= last)) continue;
+    if (gaussian) {
+      add_gaussian(place, weight, step, falls, first, last, density);
+      continue;
+    }
     for (double i = first; i <= last; ++i) {
-      double value = weight;
       const double distance = (i - place) * grid.spacing;
-      if (kernel.kind == KernelKind::gaussian) {
-        value *= std::exp(-0.5 * (distance / kernel.width) * (distance / kernel.width));
-      } else if (std::abs(std::abs(distance) - reach) < 1e-12) {
-        value *= 0.5;  // on the very edge of two windows: half to each
-      }
-      density[static_cast<std::size_t>(i)] += value;
+      const bool on_edge = std::abs(std::abs(distance) - reach) < 1e-12;  // of two windows: half to each
+      density[static_cast<std::size_t>(i)] += on_edge ? 0.5 * weight : weight;
     }
   }
 }

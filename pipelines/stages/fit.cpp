@@ -503,7 +503,7 @@ void Fit::run(RunContext& context) const {
 
 StageRow fit_stage() {
   return {.name = "fit",
-          .version = 7,
+          .version = 8,
           .summary = "fits temperature and solid height to a density profile",
           .accepts = {"extract", "simulate"},
           .fewest_inputs = 0,

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "sim/observables.hpp"
 #include "sim/random.hpp"
@@ -122,6 +123,30 @@ TEST(Density, HasTheDisksUnderIt) {
     double area = 0;
     for (double value : density) area += value * grid.spacing;
     EXPECT_NEAR(area, 10, kernel.kind == KernelKind::gaussian ? 1e-7 : 0.05);
+  }
+}
+
+// The Gaussians are told from point to point; here each point's value from its own exponential. Disks inside, at the
+// edges and beyond them, grids finer and coarser than the kernel.
+TEST(Density, IsTheSumOfTheKernels) {
+  Random random(44);
+  for (const double spacing : {0.002, 0.05, 0.4, 3.0}) {
+    const ProfileGrid grid{-1, spacing, static_cast<std::size_t>(9 / spacing)};
+    const double top = grid.lowest + spacing * static_cast<double>(grid.points), width = 0.25;
+    for (int i = 0; i < 200; ++i) {
+      const double z = grid.lowest - 2 + (top - grid.lowest + 4) * random.uniform(), shift = random.uniform() - 0.5;
+      std::vector<double> density(grid.points);
+      add_density(grid, {KernelKind::gaussian, width}, 30, {z}, shift, density);
+      for (std::size_t k = 0; k < grid.points; ++k) {
+        const double away = (grid.lowest + spacing * static_cast<double>(k) + shift - z) / width;
+        const double value = std::exp(-0.5 * away * away) / (30 * width * std::sqrt(2 * std::numbers::pi));
+        if (std::abs(away) > 6 + 1e-9) {
+          ASSERT_EQ(density[k], 0) << z << ' ' << k;
+        } else if (std::abs(away) < 6 - 1e-9) {
+          ASSERT_NEAR(density[k], value, 1e-12 * value) << z << ' ' << k;
+        }
+      }
+    }
   }
 }
 
