@@ -428,7 +428,7 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
 // follow.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::leave_shell(std::uint32_t i) {
-  std::visit([this, i](auto& grid) { draw_shell(grid, i); }, grid_);
+  std::visit([this, i](auto& grid) { this->draw_shell(grid, i); }, grid_);
 }
 template <class Space, class Rule, class Sizes>
 template <class Grid>

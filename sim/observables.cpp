@@ -39,7 +39,11 @@ void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, co
   std::vector<double> falls;
   if (gaussian) {
     const double most = std::min(static_cast<double>(grid.points), std::floor(2 * reach / grid.spacing) + 2);
-    for (double k = 0; k < most; ++k) falls.push_back(std::exp(-0.5 * (k * step) * (k * step)));
+    falls.resize(static_cast<std::size_t>(most));
+    for (std::size_t k = 0; k < falls.size(); ++k) {
+      const double away = static_cast<double>(k) * step;
+      falls[k] = std::exp(-0.5 * away * away);
+    }
   }
   for (double z : heights) {
     const double place = (z - shift - grid.lowest) / grid.spacing;
@@ -50,10 +54,10 @@ void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, co
       add_gaussian(place, weight, step, falls, first, last, density);
       continue;
     }
-    for (double i = first; i <= last; ++i) {
-      const double distance = (i - place) * grid.spacing;
+    for (auto i = static_cast<std::size_t>(first); i <= static_cast<std::size_t>(last); ++i) {
+      const double distance = (static_cast<double>(i) - place) * grid.spacing;
       const bool on_edge = std::abs(std::abs(distance) - reach) < 1e-12;  // of two windows: half to each
-      density[static_cast<std::size_t>(i)] += on_edge ? 0.5 * weight : weight;
+      density[i] += on_edge ? 0.5 * weight : weight;
     }
   }
 }

@@ -115,8 +115,8 @@ TEST(BlockedCovariance, KnowsThatOfAShortSeriesWithALongMemory) {
 TEST(Density, HasTheDisksUnderIt) {
   const ProfileGrid grid{-2, 0.05, 400};
   Random random(43);
-  std::vector<double> heights;
-  for (int i = 0; i < 300; ++i) heights.push_back(3 + 10 * random.uniform());
+  std::vector<double> heights(300);
+  for (double& z : heights) z = 3 + 10 * random.uniform();
   for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.3}, Kernel{KernelKind::top_hat, 0.7}}) {
     std::vector<double> density(grid.points);
     add_density(grid, kernel, 30, heights, 0, density);
