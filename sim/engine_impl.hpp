@@ -7,7 +7,7 @@ namespace shakebed::sim {
 inline constexpr double rest_hop = 1e-4;        // length of the hop of a disk at rest
                                                 // on the floor without a contact clock
 inline constexpr double shell_slack = 1e-9;     // covers the rounding of shells' centres and exit times
-inline constexpr double most_crowding = 0.01;   // of cells of four shells; above, cells of seven are quicker
+inline constexpr double most_crowding = 0.01;   // further cells a cell of four shells; above, seven are quicker
 inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
 
 // ------------------------------------------------------------------------------------------------

@@ -47,6 +47,10 @@ void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, co
   }
   for (double z : heights) {
     const double place = (z - shift - grid.lowest) / grid.spacing;
+    if (std::isnan(place)) {  // nowhere in particular: not to be left out
+      std::fill(density.begin(), density.end(), place);
+      return;
+    }
     const double first = std::max(0.0, std::ceil(place - reach / grid.spacing));
     const double last = std::min(static_cast<double>(grid.points) - 1, std::floor(place + reach / grid.spacing));
     if (!(first <= last)) continue;

@@ -154,7 +154,7 @@ class ShellGrid {
     });
   }
 
-  // Further cells lent, by all that there are.
+  // Further cells lent at one time since the reset, at most, by all places of the grid.
   double crowding() const { return static_cast<double>(crowded_.size() - 1) / static_cast<double>(cells_.size()); }
   std::size_t bytes() const { return (cells_.capacity() + crowded_.capacity()) * sizeof(Cell); }
 

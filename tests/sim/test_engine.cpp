@@ -88,7 +88,7 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[3].disks.species = {{60, 1, 1}, {40, 1.4, 2.744}};
   scenes[4].disks.contact = Surface{};
   scenes[4].box.sides = PeriodicSides{};
-  scenes[5] = fluid();
+  scenes[5] = fluid();  // five shells a cell
   scenes[5].disks.species = {{40, 1, 1}, {250, 0.3, 0.09}};
   scenes[5].start = RandomStart{};
   for (const Scene& scene : scenes) {

@@ -89,7 +89,7 @@ TEST_P(EventQueueOrder, IsThatOfAHeap) {
 INSTANTIATE_TEST_SUITE_P(Disks, EventQueueOrder, testing::Values(3, 500, 20'000, 250'000));
 
 // A pair's common event is written down once and handed out once; who has been left by the other has its turn still,
-// and where both have something else by then nobody has. All in one bucket, and in three.
+// and where both have something else by then nobody has. All in one bucket, and each in its own.
 TEST(EventQueue, KnowsWhoOfAPairHasSomethingElse) {
   for (const double scale : {1.0, 40.0}) {
     std::vector<Disk> disks(7);

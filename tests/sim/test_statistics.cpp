@@ -150,6 +150,15 @@ TEST(Density, IsTheSumOfTheKernels) {
   }
 }
 
+TEST(Density, DoesNotHideAPlaceThatIsNoNumber) {
+  const ProfileGrid grid{-1, 0.05, 100};
+  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.3}, Kernel{KernelKind::top_hat, 0.7}}) {
+    std::vector<double> density(grid.points);
+    add_density(grid, kernel, 30, {1, std::nan("")}, 0, density);
+    for (double value : density) EXPECT_TRUE(std::isnan(value));
+  }
+}
+
 // 306 disks in a hard box of 30 D: 4.561 D, as in the independent simulation of this bed.
 TEST(IdealPacking, HasTheCentreOfMassOfAlternateRows) {
   EXPECT_NEAR(ideal_centre_of_mass(306, 30, true), 4.561, 5e-4);
