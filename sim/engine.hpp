@@ -49,8 +49,12 @@
 #include "sim/shell_grid.hpp"
 #include "sim/simulation.hpp"
 #include "sim/space_filling_curve.hpp"
+#include "sim/tiles.hpp"
 
 namespace shakebed::sim {
+
+// In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
+enum class Order { of_time, of_tiles, of_the_rest };
 
 template <class Space, class Rule, class Sizes>
 class Engine final : public Simulation {
@@ -110,9 +114,9 @@ class Engine final : public Simulation {
 
   // --- prediction
   // `images`: whether to tell which images of the others are the nearest.
-  template <bool images>
+  template <bool images, bool others_ahead = false>
   Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Disk& me, double radius) const;
-  template <bool images>
+  template <bool images, bool others_ahead = false>
   Candidate earliest_in(const NeighbourBlock& block, const Disk& me, double radius) const;
   Candidate next_of_many(std::uint32_t i, Candidate best) const;
   template <bool images>
@@ -122,8 +126,9 @@ class Engine final : public Simulation {
   bool is_near_edge(std::uint32_t i, std::uint32_t j) const {
     return (Space::wraps_x || Space::wraps_z) && ((disks_[i].near | disks_[j].near) & near_edge) != 0;
   }
-  template <bool images>
+  template <bool images, bool others_ahead>
   Candidate next_event_by(std::uint32_t i, double exit) const;
+  template <bool others_ahead = false>
   Candidate next_event(std::uint32_t i, double exit) const;
   double shell_exit_of(std::uint32_t i, const Motion& motion) const;
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
@@ -168,6 +173,7 @@ class Engine final : public Simulation {
   // --- contacts
   template <bool watched>
   void process_until(double until);
+  template <Order order>
   void process(std::uint32_t i, std::uint32_t k);
   void process_and_tell(std::uint32_t i, std::uint32_t k);
   void tell(std::uint32_t i) const;
@@ -177,6 +183,7 @@ class Engine final : public Simulation {
   }
   void fetch_lists(std::size_t ahead) const;
   void fetch_for_upcoming() const;
+  template <Order order>
   void collide(std::uint32_t i, std::uint32_t j);
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
@@ -187,6 +194,31 @@ class Engine final : public Simulation {
   void relieve();
 
   void act_bath();
+
+  // --- tiles
+  static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
+  void choose_tiles();
+  void leave_tiles();
+  void process_tiles_until(double until);
+  bool process_window(double until);
+  void queue_tile(const Tile& tile, double until);
+  template <Order order>
+  bool process_queued(const Tile* tile, double until);
+  bool is_for_tile(const Tile& tile, std::uint32_t i, double time) const {
+    return tile.holds(disks_[i], margin_ + margin_growth_ * (time - log_.start()));
+  }
+  void defer(double time, std::uint32_t a, std::uint32_t b) {
+    deferred_.push_back({time, static_cast<std::uint64_t>(b) << 32 | a});
+  }
+  template <Order order>
+  void predict_in_window(std::uint32_t i);
+  template <bool others_ahead>
+  Candidate next_contact_of(std::uint32_t i, const Disk& me) const;
+  Candidate contact_with_past(std::uint32_t i, std::uint32_t k) const;
+  bool kept_near(std::uint32_t i) const;
+  void go_back(std::uint32_t i, std::uint32_t j);
+  void take_back(std::uint32_t i);
+  void take_back_last(std::uint32_t i);
 
   // --- synchronisation
   void synchronise();
@@ -235,6 +267,16 @@ class Engine final : public Simulation {
   Watcher* watcher_ = nullptr;
   double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
 
+  // --- tiles; none: everything is done in the order of time
+  std::vector<Tile> tiles_;
+  ContactLog log_;
+  std::vector<EventEntry> deferred_, rest_;
+  std::vector<std::uint32_t> taken_back_;  // disks that have lost contacts
+  double longest_window_ = 0;
+  double rate_in_tiles_ = 1;               // events a time unit in the window before
+  double margin_ = 0, margin_growth_ = 0;  // from a tile's border, when a window begins, and what is added a time unit
+  std::uint64_t events_left_ = 0;          // so many more in a window, and something has locked
+
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
   bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
@@ -255,3 +297,4 @@ class Engine final : public Simulation {
 }  // namespace shakebed::sim
 
 #include "sim/engine_impl.hpp"
+#include "sim/engine_tiles.hpp"

@@ -99,9 +99,10 @@ void Engine<Space, Rule, Sizes>::write_down(std::uint32_t i, const Motion& motio
 // prediction
 
 // Contact times of one disk, whose record is that of now_, with four others, ids 0 and 1 and the two from `beyond` on;
-// `never` where there is none or where the other has something earlier to do.
+// `never` where there is none or where the other has something earlier to do. If others may be ahead of now_, the
+// record may be an earlier one, and contacts before the others' flights began are not told.
 template <class Space, class Rule, class Sizes>
-template <bool images>
+template <bool images, bool others_ahead>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
                                                                               std::size_t beyond, const Disk& me,
                                                                               [[maybe_unused]] double radius) const {
@@ -116,7 +117,8 @@ template <bool images>
   const Lanes own_time = __builtin_shufflevector(times02, times13, 0, 4, 2, 6),
               event_time = __builtin_shufflevector(times02, times13, 1, 5, 3, 7);
 
-  const Lanes time = all_lanes(now_);
+  Lanes time = all_lanes(now_);
+  if constexpr (others_ahead) time = larger(time, own_time);
   const Lanes dt = time - own_time;
   Lanes dx = fused(vx, dt, x) - all_lanes(me.x);
   Lanes dz;
@@ -126,6 +128,11 @@ template <bool images>
     vz = vz - fall;
   } else {
     dz = fused(vz, dt, z) - all_lanes(me.z);
+  }
+  if constexpr (others_ahead) {
+    const Lanes since = time - all_lanes(me.own_time);
+    dx = fused(all_lanes(-me.vx), since, dx);
+    dz = fused(all_lanes(-me.vz), since, dz);
   }
   if constexpr (images && Space::wraps_x) dx = period_x_.nearest(dx);
   if constexpr (images && Space::wraps_z) dz = period_z_.nearest(dz);
@@ -153,12 +160,12 @@ template <bool images>
 
 // The earliest contact with the eight of a block.
 template <class Space, class Rule, class Sizes>
-template <bool images>
+template <bool images, bool others_ahead>
 [[gnu::always_inline]] inline auto Engine<Space, Rule, Sizes>::earliest_in(const NeighbourBlock& block, const Disk& me,
                                                                            double radius) const -> Candidate {
   const std::uint32_t* const ids = block.disk.data();
-  const Lanes times0145 = contact_times<images>(ids, 4, me, radius);
-  const Lanes times2367 = contact_times<images>(ids + 2, 4, me, radius);
+  const Lanes times0145 = contact_times<images, others_ahead>(ids, 4, me, radius);
+  const Lanes times2367 = contact_times<images, others_ahead>(ids + 2, 4, me, radius);
   const Earliest earliest = earliest_of_eight(times0145, times2367, ids);
   return {earliest.time, earliest.id};
 }
@@ -213,9 +220,10 @@ template <class Space, class Rule, class Sizes>
 
 // What the disk meets next, if that is before `exit`, when it leaves its shell; later floors are not told.
 template <class Space, class Rule, class Sizes>
-template <bool images>
+template <bool images, bool others_ahead>
 [[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_event_by(std::uint32_t i, [[maybe_unused]] double exit) const
     -> Candidate {
+  if constexpr (others_ahead) return next_contact_of<true>(i, disks_[i]);
   const Candidate next = next_contact<images>(i);
   if constexpr (Space::has_walls) {
     if ((disks_[i].near & ~unsigned{near_edge}) != 0) return next_wall(i, next, exit);
@@ -223,8 +231,9 @@ template <bool images>
   return next;
 }
 template <class Space, class Rule, class Sizes>
+template <bool others_ahead>
 auto Engine<Space, Rule, Sizes>::next_event(std::uint32_t i, double exit) const -> Candidate {
-  return is_near_edge(i, i) ? next_event_by<true>(i, exit) : next_event_by<false>(i, exit);
+  return is_near_edge(i, i) ? next_event_by<true, others_ahead>(i, exit) : next_event_by<false, others_ahead>(i, exit);
 }
 
 // When the disk, whose state now is `motion`, leaves its shell.
@@ -294,7 +303,11 @@ void Engine<Space, Rule, Sizes>::fly_on(std::uint32_t i, const Motion& motion) {
 // the edge of its shell.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::predict_all() {
-  queue_.reset(disks_.data(), count_, now_, event_rate_);
+  if (tiles_.empty()) {
+    queue_.reset(disks_.data(), count_, now_, event_rate_);
+  } else {
+    queue_.begin_window(disks_.data(), count_, now_, now_, 0);  // tiles look for their events in the records
+  }
   for (std::uint32_t i = 0; i < count_; ++i) {
     disks_[i].event_time = never;
     disks_[i].partner = nobody;
@@ -312,14 +325,23 @@ void Engine<Space, Rule, Sizes>::predict_all() {
 // ------------------------------------------------------------------------------------------------
 // shells
 
-// Centres the disk's shell on where it is now.
+// Centres the disk's shell on where it is now, and takes the image of it that is in the box.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
   Disk& disk = disks_[i];
-  if constexpr (Space::wraps_x) disk.x = period_x_.wrapped(disk.x);
-  if constexpr (Space::wraps_z) disk.z = period_z_.wrapped(disk.z);
-  disk.shell_x = static_cast<float>(disk.x);
-  disk.shell_z = static_cast<float>(disk.z);
+  TwoLanes here = motion_at(disk, now_).place;
+  if constexpr (Space::wraps_x) {
+    const double off = period_x_.beyond(here[0]);
+    disk.x -= off;
+    here[0] -= off;
+  }
+  if constexpr (Space::wraps_z) {
+    const double off = period_z_.beyond(here[1]);
+    disk.z -= off;
+    here[1] -= off;
+  }
+  disk.shell_x = static_cast<float>(here[0]);
+  disk.shell_z = static_cast<float>(here[1]);
 }
 
 // Fills nearby_ with the disks whose shells the largest shell of i's would reach and, if it is asked how near they are,
@@ -503,7 +525,7 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
     if constexpr (watched) {
       process_and_tell(i, with);
     } else {
-      process(i, with);
+      process<Order::of_time>(i, with);
     }
   }
   settle();
@@ -512,23 +534,34 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
 
 // The event of disk i that is due now, with disk k if k is not i: the same that its record says, but known earlier.
 template <class Space, class Rule, class Sizes>
+template <Order order>
 [[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::process(std::uint32_t i, std::uint32_t k) {
   const Disk& disk = disks_[i];
   if (disk.partner >= 0) [[likely]] {
     const std::uint32_t j = k != i ? k : static_cast<std::uint32_t>(disk.partner);
     if (is_mutual(i, j)) [[likely]] {
+      if constexpr (order == Order::of_the_rest) go_back(i, j);
       // The lower first, so that its rounding does not depend on who predicted it.
       const std::uint32_t swap = (i ^ j) & -static_cast<std::uint32_t>(j < i);
-      collide(i ^ swap, j ^ swap);
+      collide<order>(i ^ swap, j ^ swap);
     } else {  // the partner was hit by another disk first
       ++counters_.predictions_renewed;
-      fly_on(i, motion_at(disk, now_));
+      if constexpr (order == Order::of_time) {
+        fly_on(i, motion_at(disk, now_));
+      } else {
+        if constexpr (order == Order::of_the_rest) go_back(i, i);
+        predict_in_window<order>(i);
+      }
     }
   } else if (disk.partner == shell_exit) {
     ++counters_.shell_exits;
-    bring_forward(i);
+    if constexpr (order == Order::of_time) bring_forward(i);
     leave_shell(i);
-    predict(i, motion_at(disk, now_));
+    if constexpr (order == Order::of_time) {
+      predict(i, motion_at(disk, now_));
+    } else {
+      predict_in_window<order>(i);
+    }
     lists_.mend();  // what it needs is on its way, and the prediction does not wait for it
   } else {
     hit_wall(i);
@@ -547,7 +580,7 @@ template <class Space, class Rule, class Sizes>
   const std::uint32_t b = touches ? std::max(i, static_cast<std::uint32_t>(before.partner)) : i;
   const Motion first = motion_at(disks_[a], now_);
   const Motion second = touches ? motion_at(disks_[b], now_) : first;
-  process(i, k);
+  process<Order::of_time>(i, k);
   const double time = base_ + now_;
   if (touches) {
     double dx = second.x() - first.x(), dz = second.z() - first.z();
@@ -587,7 +620,11 @@ void Engine<Space, Rule, Sizes>::advance_to(double time) {
       goal = synchronise_at_;
     if (!(goal > now_)) return;
     const double until = std::min({goal, synchronise_at_, bath_at_});
-    watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
+    if (tiles_.empty()) {
+      watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
+    } else if constexpr (tiles_apply) {
+      process_tiles_until(until);
+    }
     if (now_ == bath_at_) act_bath();
     if (now_ == synchronise_at_) {
       const bool arrived = goal == synchronise_at_;  // before the next one is set
@@ -612,30 +649,34 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
 }
 
 template <class Space, class Rule, class Sizes>
+template <Order order>
 void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
   Motion first = motion_at(disks_[i], now_), second = motion_at(disks_[j], now_);
+  [[maybe_unused]] const TwoLanes before = first.velocity;
   exchange(i, j, first, second);
+  if constexpr (order == Order::of_tiles) log_.add(now_, i, j, sizes_.mass(i) * (first.velocity - before));
   ++counters_.disk_collisions;
   const TwoLanes exits = shell_exits_of(i, j, first, second);
   write_down(i, first);
   write_down(j, second);
   settle();
+  constexpr bool others_ahead = order == Order::of_the_rest;
   // Both are predicted before what comes next is written down of either, so that the two predictions overlap in the
   // processor. Neither finds the other: they separate.
   Candidate next_first, next_second;
   if (is_near_edge(i, j)) [[unlikely]] {  // asked once: for each of both it would be two coin tosses
-    next_first = next_event_by<true>(i, exits[0]);
-    next_second = next_event_by<true>(j, exits[1]);
+    next_first = next_event_by<true, others_ahead>(i, exits[0]);
+    next_second = next_event_by<true, others_ahead>(j, exits[1]);
   } else {
-    next_first = next_event_by<false>(i, exits[0]);
-    next_second = next_event_by<false>(j, exits[1]);
+    next_first = next_event_by<false, others_ahead>(i, exits[0]);
+    next_second = next_event_by<false, others_ahead>(j, exits[1]);
   }
   if (next_second.partner == next_first.partner) [[unlikely]] {
     // What the first meets is no longer free for the second.
     commit(i, next_first, exits[0]);
     const bool taken = next_second.partner >= 0 && next_second.time < never &&
                        !(next_second.time < disks_[static_cast<std::uint32_t>(next_second.partner)].event_time);
-    if (taken) next_second = next_event(j, exits[1]);
+    if (taken) next_second = next_event<others_ahead>(j, exits[1]);
     commit(j, next_second, exits[1]);
     return;
   }
@@ -938,13 +979,12 @@ void Engine<Space, Rule, Sizes>::synchronise() {
 // nothing, so a resumed run has the numbers of the one it continues.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::renumber() {
-  const auto cell = [](double value) { return static_cast<std::uint32_t>(std::clamp(value + 16, 0.0, 65535.0)); };
   std::vector<std::uint64_t> keys(count_);
   for (std::uint32_t i = 0; i < count_; ++i) {
     double x = disks_[i].x, z = disks_[i].z;
     if constexpr (Space::wraps_x) x = period_x_.wrapped(x);
     if constexpr (Space::wraps_z) z = period_z_.wrapped(z);
-    keys[i] = static_cast<std::uint64_t>(hilbert_place(cell(x), cell(z))) << 32 | i;
+    keys[i] = static_cast<std::uint64_t>(hilbert_place(hilbert_cell(x), hilbert_cell(z))) << 32 | i;
   }
   std::sort(keys.begin(), keys.end());
   const auto permute = [&](auto& values) {
@@ -1029,6 +1069,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
   lists_.reset(disks_.data(), count_);
+  choose_tiles();
   file_shells(height);
   std::visit(
       [this](auto& grid) {
@@ -1128,6 +1169,9 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   watcher_ = watcher;
+  if constexpr (tiles_apply) {  // a watcher is told everything in the order of time
+    if (!tiles_.empty()) leave_tiles();
+  }
   tell_all();
 }
 
@@ -1221,7 +1265,8 @@ template <class Space, class Rule, class Sizes>
 std::size_t Engine<Space, Rule, Sizes>::bytes() const {
   return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
          (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
-         std::visit([](const auto& grid) { return grid.bytes(); }, grid_) + lists_.bytes() + queue_.bytes();
+         std::visit([](const auto& grid) { return grid.bytes(); }, grid_) + lists_.bytes() + queue_.bytes() +
+         log_.bytes() + (deferred_.capacity() + rest_.capacity()) * sizeof(EventEntry);
 }
 
 }  // namespace shakebed::sim

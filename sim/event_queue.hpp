@@ -47,6 +47,7 @@ class EventQueue {
     count_ = static_cast<std::uint32_t>(count);
     beyond_cache_ = count > fits_cache;
     in_stretches_ = count > fits_one_ring;
+    in_window_ = false;
     events_a_bucket_ = in_stretches_ ? 6 : 8;
     const double turn = in_stretches_ ? 2 : 1.2;  // the mean time between two events of a disk, times this
     size_ = static_cast<std::int64_t>(std::max(turn * static_cast<double>(count) / events_a_bucket_, 64.0));
@@ -64,6 +65,28 @@ class EventQueue {
     further_.resize(places);
     grow(128);
     clear(start, events_a_time / events_a_bucket_);
+  }
+
+  // Forgets everything; from now on only what comes before `end` is written down, about so many events. The rest is
+  // left in the records; so is all if the window has no length.
+  void begin_window(const Disk* disks, std::size_t count, double start, double end, double events) {
+    disks_ = disks;
+    count_ = static_cast<std::uint32_t>(count);
+    beyond_cache_ = in_window_ = true;
+    in_stretches_ = false;
+    const double length = end - start;
+    buckets_a_time_ = length > 0 ? std::clamp(std::max(events / 8, 16.0) / length, coarsest, finest) : 1;
+    // Some buckets more, since pop() looks ahead.
+    size_ = length > 0 ? static_cast<std::int64_t>(length * buckets_a_time_) + std::int64_t{2 * looks_ahead + 2} : 0;
+    places_mask_ = ~std::size_t{0};
+    const auto places = static_cast<std::size_t>(size_ + 2);
+    if (ring_.size() < places) {
+      ring_.resize(places + places / 8);
+      held_.resize(ring_.size());
+      further_.resize(ring_.size());
+    }
+    grow(128);
+    empty(places, start);
   }
 
   // The event of disk a (with b; a itself when alone) now stands at `time`,
@@ -220,7 +243,7 @@ class EventQueue {
     Further& block = blocks_[first];
     block.entries[block.held++] = entry;
   }
-  bool pushes_wait() const { return beyond_cache_ && !in_stretches_; }
+  bool pushes_wait() const { return beyond_cache_ && !in_stretches_ && !in_window_; }
   void put_waiting() {
     for (std::size_t k = 0; k < most_waiting; ++k) {  // the oldest first
       Waiting& waiting = waiting_[pushed_++ % most_waiting];
@@ -240,13 +263,17 @@ class EventQueue {
 
   // Empties the queue and chooses the width of its buckets.
   void clear(double start, double buckets_a_time) {
-    now_ = start;
     buckets_a_time_ = std::clamp(buckets_a_time, coarsest, finest);
-    std::fill(held_.begin(), held_.end(), std::uint8_t{0});
-    std::fill(further_.begin(), further_.end(), 0u);
+    if (in_stretches_) stretches_.reset(static_cast<std::size_t>(size_ >> stretch_shift_));
+    empty(ring_.size(), start);
+  }
+  // Empties the ring's first places and begins its turn at `start`.
+  void empty(std::size_t places, double start) {
+    now_ = start;
+    std::fill_n(held_.begin(), places, std::uint8_t{0});
+    std::fill_n(further_.begin(), places, 0u);
     blocks_.resize(1);
     free_ = 0;
-    if (in_stretches_) stretches_.reset(static_cast<std::size_t>(size_ >> stretch_shift_));
     for (Waiting& waiting : waiting_) waiting.place = &nowhere_;
     set_current(static_cast<std::int64_t>(start * buckets_a_time_) - 1);
     set_turn();
@@ -321,7 +348,8 @@ class EventQueue {
     times_[place] = entry.time;
     pairs_[place] = entry.pair;
     moved_ += end_ - place;
-    if (moved_ > 8192 + 32 * std::size_t{count_} && buckets_a_time_ < finest) [[unlikely]] {  // what rebuilding costs
+    if (moved_ > 8192 + 32 * std::size_t{count_} && buckets_a_time_ < finest && !in_window_)
+        [[unlikely]] {  // what rebuilding costs
       rebuild(8 * buckets_a_time_);
     }
   }
@@ -454,7 +482,7 @@ class EventQueue {
   std::int64_t this_turn_ = 0;            // the bucket with which the ring's turn began
   double run_ends_ = 0, turn_ends_ = 0;   // the buckets behind the current one and the turn's last one
   std::size_t taken_up_ = 0, moved_ = 0;  // since the ring's turn began: events, and entries shifted in the run
-  bool beyond_cache_ = false, in_stretches_ = false;
+  bool beyond_cache_ = false, in_stretches_ = false, in_window_ = false;
   double events_a_bucket_ = 8;
   std::size_t places_mask_ = 0;
   int stretch_shift_ = 0;     // a stretch is 2 to that power buckets

@@ -54,7 +54,9 @@ struct Period {
     return fused(all_floats(static_cast<float>(minus_length)),
                  fused(difference, all_floats(static_cast<float>(inverse)), large) - large, difference);
   }
-  double wrapped(double position) const { return position - length * std::floor(position * inverse); }
+  // By how much a position is beyond the box: a whole number of periods.
+  double beyond(double position) const { return length * std::floor(position * inverse); }
+  double wrapped(double position) const { return position - beyond(position); }
 };
 
 // Rules. `clocked`: dissipative rules know when each disk was last hit, for the

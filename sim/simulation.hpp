@@ -65,7 +65,8 @@ class Watcher {
 class Simulation {
  public:
   virtual ~Simulation() = default;
-  // Runs to the given time since the start (never backwards). Its events do not depend on where one stops to look.
+  // Runs to the given time since the start (never backwards). Its events do not depend on where one stops to look; in
+  // beds that go on tile by tile (see engine_tiles.hpp) their rounding does.
   virtual void advance_to(double time) = 0;
   virtual double time() const = 0;
   virtual void snapshot(Snapshot& out) const = 0;
@@ -83,7 +84,7 @@ class Simulation {
   virtual std::vector<std::uint8_t> checkpoint() const = 0;
   virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;
   // From now on the watcher (nullptr: nobody) is told; first of all how every disk flies now. It changes nothing of the
-  // run, must outlive it, and is not part of a checkpoint.
+  // run, but that it then is one in the order of time; it must outlive the run, and is not part of a checkpoint.
   virtual void watch(Watcher* watcher) = 0;
   // Another temperature for the Langevin, Andersen or thermal-floor reservoir, from now on. Not part of a checkpoint.
   // Throws std::invalid_argument where the scene has none of them.

@@ -2,6 +2,7 @@
 // neighbours in memory.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace shakebed::sim {
@@ -24,5 +25,12 @@ inline std::uint32_t hilbert_place(std::uint32_t column, std::uint32_t row) {
   }
   return place;
 }
+
+// The curve's square, cells of 1 D, begins somewhat beside the box's corner: disks may stand beyond the walls' places.
+inline constexpr double hilbert_offset = 16;
+inline std::uint32_t hilbert_cell(double place) {
+  return static_cast<std::uint32_t>(std::clamp(place + hilbert_offset, 0.0, 65535.0));
+}
+inline double place_of_hilbert_cell(std::uint32_t cell) { return cell - hilbert_offset; }
 
 }  // namespace shakebed::sim

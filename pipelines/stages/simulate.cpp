@@ -522,14 +522,16 @@ class Simulate::Run {
     }
   }
 
-  // In steps short enough to be interrupted. Where a synchronisation of the engine lies on the way and it is time, the
-  // state is kept: in memory now and then, on disk every `checkpoint_seconds`.
+  // In steps short enough to be interrupted, the same ones in a run that goes on from a checkpoint. Where a
+  // synchronisation of the engine lies on the way and it is time, the state is kept: in memory now and then, on disk
+  // every `checkpoint_seconds`.
   void run_to(double time, const char* what) {
     const double step = std::max(stage_.bed_.period(), 1.0);
     const double end = times_.moment(times_.periods * times_.phases);
     while (simulation_->time() < time) {
       context_.check_interrupted();
-      double goal = std::min(time, simulation_->time() + step);
+      const double steps_done = std::floor(simulation_->time() / step + 1e-9);
+      const double goal = std::min(time, (steps_done + 1) * step);
       const double synchronisation = simulation_->next_synchronisation();
       const bool save_due = stage_.checkpoint_seconds_ > 0 &&
                             std::chrono::duration<double>(std::chrono::steady_clock::now() - last_saved_).count() >=
