@@ -16,6 +16,8 @@
 // and predicts everything from scratch: its state there is nothing but
 // positions, velocities, spins and contact clocks, so a run continued from a
 // checkpoint taken there gives the same bytes as one that was never stopped.
+//
+// Large periodic beds go on tile by tile: engine_tiles.hpp.
 #pragma once
 
 #include <algorithm>

@@ -1170,7 +1170,7 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   watcher_ = watcher;
   if constexpr (tiles_apply) {  // a watcher is told everything in the order of time
-    if (!tiles_.empty()) leave_tiles();
+    if (watcher != nullptr && !tiles_.empty()) leave_tiles();
   }
   tell_all();
 }
