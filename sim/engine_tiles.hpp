@@ -24,6 +24,7 @@ namespace shakebed::sim {
 inline constexpr std::uint32_t fewest_tiled = 400'000;  // disks; fewer are quicker in the order of time
 inline constexpr double events_a_window = 0.9;          // of each disk
 inline constexpr double fewest_in_window = 0.45;        // fewer do not repay the tiles
+inline constexpr double shortest_window = 1e-9;         // so many events that even this is too long: time stands still
 inline constexpr double longest_way = 0.12;             // of a disk in a window, root mean square [D]
 inline constexpr double inward = 6;                     // by how much a tile's inside shrinks in a window [D]
 
@@ -62,12 +63,15 @@ void Engine<Space, Rule, Sizes>::process_tiles_until(double until) {
     const double windows = std::ceil((until - now_) / longest);
     const double start = now_, end = windows > 1 ? start + (until - start) / windows : until;
     const std::uint64_t before = counters_.events();
-    if (!process_window(end)) {
+    if (longest < shortest_window || !process_window(end)) {  // something has locked
       leave_tiles();
       process_until<false>(until);
       return;
     }
-    rate_in_tiles_ = static_cast<double>(counters_.events() - before) / (end - start);
+    const std::uint64_t events = counters_.events() - before;
+    const double rate = static_cast<double>(events) / (end - start);
+    const bool tells = events > count_ / 8;  // some windows are very short
+    rate_in_tiles_ = tells ? rate : std::clamp(rate, rate_in_tiles_ / 8, 8 * rate_in_tiles_);
   }
 }
 
@@ -124,12 +128,10 @@ bool Engine<Space, Rule, Sizes>::process_queued(const Tile* tile, double until) 
   std::uint32_t i = 0, with = 0;
   while (queue_.pop(until, i, with, *this)) {
     fetch_for_upcoming();
-    const double before = now_;
     now_ = disks_[i].event_time;
     if constexpr (order == Order::of_tiles) {
       if (!is_for_tile(*tile, i, now_) || (disks_[i].partner == shell_exit && !kept_near(i))) {
         defer(now_, i, with);
-        now_ = before;
         continue;
       }
     }
