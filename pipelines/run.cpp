@@ -332,7 +332,13 @@ void remove_leftovers(const fs::path& out) {
   for (const fs::directory_entry& entry : fs::directory_iterator(out, error)) {
     const std::string name = entry.path().filename().string();
     const bool part = name.starts_with('.') && name.ends_with(".part");
-    if (name.starts_with(partial_prefix) || part) fs::remove_all(entry.path(), error);
+    if (!name.starts_with(partial_prefix) && !part) continue;
+    // A program that a killed run had started may still write there for a moment: gnuplot, say.
+    for (int attempt = 0; attempt < 20; ++attempt) {
+      fs::remove_all(entry.path(), error);
+      if (!error) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
   }
 }
 
