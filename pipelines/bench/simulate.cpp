@@ -112,7 +112,7 @@ void speed_and_growth(const Effort& effort, StageResult& result) {
     double cpu = 0;
     while (static_cast<double>(simulation->counters().collisions() - before.collisions()) < wanted) {
       effort.check_interrupted();
-      cpu += cpu_seconds_of([&] { simulation->advance_to(simulation->time() + std::max(0.02, 1e5 / (8 * n))); });
+      cpu += cpu_seconds_of([&] { simulation->advance_to(simulation->time() + std::max(0.25, 1e5 / (8 * n))); });
     }
     const sim::Counters after = simulation->counters();
     const auto collisions = static_cast<double>(after.collisions() - before.collisions());
