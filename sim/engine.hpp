@@ -209,9 +209,7 @@ class Engine final : public Simulation {
   bool is_for_tile(const Tile& tile, std::uint32_t i, double time) const {
     return tile.holds(disks_[i], margin_ + margin_growth_ * (time - log_.start()));
   }
-  void defer(double time, std::uint32_t a, std::uint32_t b) {
-    deferred_.push_back({time, static_cast<std::uint64_t>(b) << 32 | a});
-  }
+  void defer(double time, std::uint32_t a, std::uint32_t b) { deferred_.push_back({time, pair_of(a, b)}); }
   template <Order order>
   void predict_in_window(std::uint32_t i);
   template <bool others_ahead>

@@ -93,8 +93,7 @@ bool Engine<Space, Rule, Sizes>::process_window(double until) {
   rest_.swap(deferred_);
   now_ = start;
   queue_.begin_window(disks_.data(), count_, start, until, 1.3 * static_cast<double>(rest_.size()));
-  for (const EventEntry& one : rest_)
-    queue_.push(one.time, static_cast<std::uint32_t>(one.pair), static_cast<std::uint32_t>(one.pair >> 32));
+  for (const EventEntry& one : rest_) queue_.push(one);
   if (!process_queued<Order::of_the_rest>(nullptr, until)) return false;
   now_ = until;
   return true;

@@ -127,6 +127,7 @@ class EventQueue {
     waiting.entry.time = time;
     waiting.entry.pair = pair_of(a, b);
   }
+  void push(const EventEntry& entry) { push(entry.time, entry.first(), entry.second()); }
 
   // The earliest valid event at or before `until`: its disk, that with which it was pushed (itself when alone), and its
   // time in disks[disk].event_time. False if none. The owner may leave events that it knows of unwritten as long as
@@ -147,9 +148,9 @@ class EventQueue {
       // Two of the next bucket at a time: sent for all at once they would wait for each other.
       if (beyond_cache_) {
         for (int k = 0; k < 2 && sent_for_ < held_[coming_]; ++k, ++sent_for_) {
-          const std::uint64_t pair = ring_[coming_].entries[sent_for_].pair;
-          fetch(&disks_[static_cast<std::uint32_t>(pair)]);
-          fetch(&disks_[pair >> 32]);
+          const Entry& entry = ring_[coming_].entries[sent_for_];
+          fetch(&disks_[entry.first()]);
+          fetch(&disks_[entry.second()]);
         }
       }
       const double time = times_[next_];
@@ -203,7 +204,6 @@ class EventQueue {
     std::array<Entry, 7> entries;
   };
 
-  static std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
   // Where in the ring one of this turn's buckets is.
   std::size_t index_of(std::int64_t bucket) const {
     return static_cast<std::size_t>(bucket - this_turn_) & places_mask_;
@@ -222,7 +222,7 @@ class EventQueue {
   // Does any of the two disks have an event at the entry's time? (With whom is
   // asked when it comes up.)
   unsigned counts(const Entry& entry) const {
-    const Disk &first = disks_[static_cast<std::uint32_t>(entry.pair)], &second = disks_[entry.pair >> 32];
+    const Disk &first = disks_[entry.first()], &second = disks_[entry.second()];
     return static_cast<unsigned>(first.event_time == entry.time) |
            static_cast<unsigned>(second.event_time == entry.time);
   }
@@ -304,9 +304,7 @@ class EventQueue {
       batch[found] = {time, pair_of(i, static_cast<std::uint32_t>(other))};
       found += (place >= first) & (place < turn_ends_) & !pushed_by_other;
       if (found == batch.size() || i + 1 == count_) {
-        for (std::size_t k = 0; k < found; ++k)
-          push(batch[k].time, static_cast<std::uint32_t>(batch[k].pair),
-               static_cast<std::uint32_t>(batch[k].pair >> 32));
+        for (std::size_t k = 0; k < found; ++k) push(batch[k]);
         found = 0;
       }
     }
@@ -331,9 +329,7 @@ class EventQueue {
   [[gnu::noinline]] void take_up_stretch() {
     const std::size_t stretch = stretch_of(static_cast<std::int64_t>(ring_ends_));
     ring_ends_ += static_cast<double>(stretch_length());
-    stretches_.take(stretch, [this](const Entry& entry) {
-      push(entry.time, static_cast<std::uint32_t>(entry.pair), static_cast<std::uint32_t>(entry.pair >> 32));
-    });
+    stretches_.take(stretch, [this](const Entry& entry) { push(entry); });
   }
 
   [[gnu::noinline]] void insert_into_run(Entry entry) {

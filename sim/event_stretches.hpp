@@ -16,7 +16,11 @@ namespace shakebed::sim {
 struct EventEntry {
   double time;
   std::uint64_t pair;  // the second disk in the upper half
+
+  std::uint32_t first() const { return static_cast<std::uint32_t>(pair); }
+  std::uint32_t second() const { return static_cast<std::uint32_t>(pair >> 32); }
 };
+inline std::uint64_t pair_of(std::uint32_t a, std::uint32_t b) { return static_cast<std::uint64_t>(b) << 32 | a; }
 
 class EventStretches {
  public:
