@@ -489,15 +489,19 @@ template <class Space, class Rule, class Sizes>
 }
 
 // Sends for what will be asked for soon: first the neighbour lists of disks that will collide, some events later the
-// neighbours' records, and the cells round a disk that will leave its shell. (The records of disks that come up at all
-// are sent for by the queue, a bucket ahead; half of those events will be dead before their turn, so no more than
-// that.)
+// neighbours' records, the contact clocks, and the cells round a disk that will leave its shell. (The records of disks
+// that come up at all are sent for by the queue, a bucket ahead; half of those events will be dead before their turn,
+// so no more than that.)
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] void Engine<Space, Rule, Sizes>::fetch_for_upcoming() const {
   constexpr std::size_t neighbours_ahead = 4;
   std::uint32_t a = 0, b = 0;
   fetch_lists(EventQueue::looks_ahead);
   if (!queue_.upcoming(neighbours_ahead, a, b)) return;
+  if constexpr (Rule::dissipates) {
+    fetch(&last_contact_[a]);
+    fetch(&last_contact_[b]);
+  }
   for (std::uint32_t neighbour : lists_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
     std::visit([a](const auto& grid) { grid.fetch_round(a); }, grid_);

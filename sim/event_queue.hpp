@@ -431,15 +431,17 @@ class EventQueue {
     std::uint64_t* const pairs = pairs_.data() + end_;
     end_ += count;
     if (count <= entries_ranked) [[likely]] {
-      std::fill_n(&unsorted_times_[count], entries_ranked - count, never);
       alignas(32) std::array<std::int64_t, entries_ranked> ranks;
-      const std::size_t ranked = count <= 8 ? 8 : count <= 16 ? 16 : 24;
+      const std::size_t ranked = count <= 8 ? 8 : count <= 16 ? 16 : count <= 24 ? 24 : entries_ranked;
+      std::fill_n(&unsorted_times_[count], ranked - count, never);
       if (ranked == 8) {
         rank_times<8>(unsorted_times_.data(), ranks.data());
       } else if (ranked == 16) {
         rank_times<16>(unsorted_times_.data(), ranks.data());
-      } else {
+      } else if (ranked == 24) {
         rank_times<24>(unsorted_times_.data(), ranks.data());
+      } else {
+        rank_times<entries_ranked>(unsorted_times_.data(), ranks.data());
       }
       for (std::size_t k = 0; k < ranked; ++k) {
         const auto rank = static_cast<std::size_t>(ranks[k]);
@@ -458,7 +460,7 @@ class EventQueue {
     }
   }
 
-  static constexpr std::size_t entries_ranked = 24, most_waiting = 8;
+  static constexpr std::size_t entries_ranked = 40, most_waiting = 8;
   static constexpr double coarsest = 1e-6, finest = 1e12;  // buckets a time unit
   struct Waiting {
     Entry* place;

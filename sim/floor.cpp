@@ -1,7 +1,6 @@
 #include "sim/floor.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -93,7 +92,7 @@ FloorMotion::FloorMotion(const SinusoidalFloor& floor)
       lowest_(-std::abs(floor.amplitude)),
       largest_acceleration_(std::abs(floor.amplitude) * angular_frequency_ * angular_frequency_),
       largest_jerk_(largest_acceleration_ * angular_frequency_) {
-  note_ceilings(largest_acceleration_);
+  note_bounds();
 }
 
 FloorMotion::FloorMotion(const TabulatedFloor& floor)
@@ -114,36 +113,41 @@ FloorMotion::FloorMotion(const TabulatedFloor& floor)
     const double change = curvatures_[(i + 1) % curvatures_.size()] - curvatures_[i];
     largest_jerk_ = std::max(largest_jerk_, std::abs(change) / spacing_);
   }
-  note_ceilings(curvature);
+  note_bounds();
 }
 
-void FloorMotion::note_ceilings(double largest_curvature) {
-  const double part = period_ / parts;
-  const double bulge = part * part / 8 * largest_curvature;  // out of the span of its ends, at most
+// The parabola that touches the floor at the part's beginning and bends least. Its bend up to `later` is twice the mean
+// of the floor's acceleration until then, weighed by 1 - t/later, and so changes by a third of the jerk.
+void FloorMotion::note_bounds() {
+  constexpr std::int64_t looks = 4;  // at the floor, in a part
+  const double rounding = 1e-10 * (highest_ - lowest_);
+  part_ = period_ / parts;
   parts_a_time_ = parts / period_;
-  ceilings_.resize(static_cast<std::size_t>(levels * parts));
-  const auto at = [&](std::int64_t level, std::int64_t k) -> double& {
-    return ceilings_[static_cast<std::size_t>(level * parts + k % parts)];
-  };
-  for (std::int64_t k = 0; k < parts; ++k)
-    at(0, k) = std::max(position(part * static_cast<double>(k)), position(part * static_cast<double>(k + 1))) + bulge;
-  for (std::int64_t level = 1; level < levels; ++level) {
-    for (std::int64_t k = 0; k < parts; ++k)
-      at(level, k) = std::max(at(level - 1, k), at(level - 1, k + (std::int64_t{1} << (level - 1))));
+  bounded_for_ = bounded_parts * part_;
+  for (std::int64_t k = 0; k < parts; ++k) {
+    const double begin = part_ * static_cast<double>(k);
+    Motion bound = motion(begin);
+    double bend = bound.acceleration;
+    for (std::int64_t look = 1; look <= looks * (bounded_parts + 1); ++look) {
+      const double later = part_ / looks * static_cast<double>(look);
+      const double rise = motion(begin, later).position - bound.position - bound.velocity * later;
+      bend = std::max(bend, 2 * rise / (later * later));
+    }
+    bound.acceleration = bend + largest_jerk_ * part_ / (6 * looks);  // between two looks
+    bound.position += rounding;
+    bounds_.push_back(bound);
   }
 }
 
-double FloorMotion::ceiling(double now, double horizon) const {
-  constexpr double rounding = 1e-6;  // of a part
-  constexpr std::int64_t most_parts = std::int64_t{1} << (levels - 1);
-  if (!(horizon * parts_a_time_ < most_parts - 2)) return highest_;  // it may begin and end within a part
-  const auto first = static_cast<std::int64_t>(std::floor(now * parts_a_time_ - rounding));
-  const auto last = static_cast<std::int64_t>(std::floor((now + horizon) * parts_a_time_ + rounding));
-  // Two spans of as many parts as the largest power of two that fits in cover them all.
-  const std::uint64_t span = std::bit_floor(static_cast<std::uint64_t>(last - first + 1));
-  const auto level = static_cast<std::int64_t>(std::countr_zero(span));
-  const auto at = [&](std::int64_t k) { return ceilings_[static_cast<std::size_t>(level * parts + k % parts)]; };
-  return std::max(at(first + parts), at(last - static_cast<std::int64_t>(span) + 1 + parts));
+// For how long a point in free flight stays above the floor's bound, which lasts bounded_for_.
+double FloorMotion::time_above_bound(double bottom, double vz, double gravity, double now) const {
+  const double part = std::floor(now * parts_a_time_), since = now - part * part_;
+  const Motion& bound = bounds_[static_cast<std::size_t>(static_cast<std::int64_t>(part) & (parts - 1))];
+  const double acceleration = std::max(bound.acceleration, -gravity);
+  const double gap = bottom - (bound.position + (bound.velocity + 0.5 * acceleration * since) * since);
+  const double gap_rate = vz - (bound.velocity + acceleration * since);
+  const double time = gap > 0 ? step_to_root(gap, gap_rate, gravity + acceleration) : 0;
+  return time < bounded_for_ ? time : bounded_for_;
 }
 
 FloorMotion::Motion FloorMotion::motion(double now, double later) const {
@@ -182,10 +186,17 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
     const double t = time_to_fall(std::max(bottom, 0.0), vz, gravity);
     return t <= horizon ? t : never;
   }
-  if (gravity == 0 && bottom > highest_ && vz >= 0) return never;
-  // Most points are far from the floor all the while, as far as it can rise until then. A flight is lowest at an end.
-  if (std::min(bottom, bottom + (vz - 0.5 * gravity * horizon) * horizon) > ceiling(now, horizon)) return never;
-  double t = bottom > highest_ ? time_to_fall(bottom - highest_, vz, gravity) : 0;
+  if (gravity == 0 && vz >= 0) horizon = std::min(horizon, period_);  // what is not met by then never is
+  double t = time_above_bound(bottom, vz, gravity, now);
+  if (t >= horizon) return never;
+  if (t == bounded_for_) [[unlikely]] {
+    if (bottom > highest_) t = std::max(t, time_to_fall(bottom - highest_, vz, gravity));
+    while (t < horizon) {
+      const double above = time_above_bound(bottom + (vz - 0.5 * gravity * t) * t, vz - gravity * t, gravity, now + t);
+      t += above;
+      if (above < bounded_for_) break;
+    }
+  }
   const double rounding = 1e-17 * (highest_ - lowest_);
   const double largest_bend = gravity + largest_acceleration_, longest_step = period_ / 6;
   while (t <= horizon) {
@@ -193,7 +204,6 @@ double FloorMotion::time_to_contact(double bottom, double vz, double gravity, do
     const double gap = bottom + (vz - 0.5 * gravity * t) * t - floor.position;
     const double gap_rate = vz - gravity * t - floor.velocity;
     if (gap <= 0 && gap_rate < 0) return t;
-    if (gravity == 0 && gap + floor.position > highest_ && vz >= 0) return never;
     const double touching = std::max(gap, 0.0);
     // The bend is bound for somewhat longer than a straight line takes.
     const double far = gap_rate < 0 ? std::min(1.25 * touching / -gap_rate, longest_step) : longest_step;

@@ -794,7 +794,7 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 20,
+          .version = 21,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,

@@ -147,5 +147,41 @@ TEST(TabulatedFloor, FollowsASineThroughItsSamples) {
   }
 }
 
+// A floor of jerks, under gravity and without: no flight goes below it before the contact, and there the gap is closed.
+TEST(TabulatedFloor, IsMetAtTheFirstCrossing) {
+  Random random(23);
+  int met = 0;
+  for (int trial = 0; trial < 3'000; ++trial) {
+    TabulatedFloor table{2.0, {}};
+    for (int i = 0; i < 11; ++i) table.heights.push_back(random.uniform());
+    const FloorMotion floor(table);
+    Flight f{0, 2 * random.normal_pair().first, trial % 3 == 0 ? 0.0 : 1.0, 7 * random.uniform()};
+    if (trial % 4 < 2) f.vz = floor.velocity(f.now) + 0.1 * f.vz;  // it follows the floor for a while
+    f.bottom = floor.position(f.now) + random.uniform() * random.uniform() * random.uniform();
+    const double horizon = trial % 2 == 0 ? 0.4 * random.uniform() : 5;
+    const double t = floor.time_to_contact(f.bottom, f.vz, f.gravity, f.now, horizon);
+    const auto gap_at = [&](double later) {
+      return f.bottom + (f.vz - 0.5 * f.gravity * later) * later - floor.position(f.now + later);
+    };
+    const double end = std::min(t, horizon);
+    for (int k = 1; k < 4'000; ++k) ASSERT_GT(gap_at(end * k / 4'000), -1e-13) << "trial " << trial << ", step " << k;
+    if (t == never) continue;
+    ++met;
+    ASSERT_LE(t, horizon);
+    ASSERT_NEAR(gap_at(t), 0, 1e-13) << "trial " << trial;
+  }
+  EXPECT_GT(met, 1'000);
+  EXPECT_LT(met, 2'500);
+}
+
+// What recedes without gravity is met within a period or never; the search ends.
+TEST(MovingFloor, IsNotMetByWhatFloatsAboveIt) {
+  const FloorMotion floor(SinusoidalFloor{0.5, 0.3});
+  EXPECT_EQ(floor.time_to_contact(0.5 + 1e-9, 0, 0, 1, never), never);
+  EXPECT_EQ(floor.time_to_contact(0.5 - 1e-3, 1e-3, 0, 0.75 / 0.3 + 1e-3, never), never);
+  EXPECT_NEAR(floor.time_to_contact(0.25, 0, 0, 0, never), 1 / (12 * 0.3), 1e-14);
+  EXPECT_NEAR(floor.time_to_contact(0.25, 0, 0, 0.25 / 0.3, never), (1 + 1 / 12.0 - 0.25) / 0.3, 1e-14);
+}
+
 }  // namespace
 }  // namespace shakebed::sim
