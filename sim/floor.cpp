@@ -116,9 +116,9 @@ FloorMotion::FloorMotion(const TabulatedFloor& floor)
   note_bounds();
 }
 
-// Each touches the floor at its part's beginning and bends as little as it may. What it must bend to be above the floor at
-// `later` is the mean of the floor's acceleration until then, weighed by 2 (1 - t/later): with `later` that changes by a
-// third of the jerk at most.
+// Each touches the floor at its part's beginning and bends as little as it may. What it must bend to be above the floor
+// at `later` is the mean of the floor's acceleration until then, weighed by 2 (1 - t/later): with `later` that changes
+// by a third of the jerk at most.
 void FloorMotion::note_bounds() {
   constexpr std::int64_t looks = 4;  // at the floor, in a part
   const double rounding = 1e-10 * (highest_ - lowest_);
