@@ -113,6 +113,7 @@ Sha256::Sha256()
 void Sha256::block(const unsigned char* bytes) { sha256_blocks(state_.data(), bytes, 1); }
 
 void Sha256::update(std::string_view bytes) {
+  if (bytes.empty()) return;
   length_ += bytes.size();
   const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
   std::size_t left = bytes.size();

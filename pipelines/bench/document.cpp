@@ -231,15 +231,16 @@ void draw(const Figure& figure, const fs::path& directory) {
   if (index == 0) throw StageError(fmt::format("there is nothing to draw in {}.svg", figure.name));
   write_file(directory / (figure.name + ".dat"), data);
   const double margin = std::max(1.6, std::pow(worst / best, 0.05));  // markers whole, over many decades too
+  // The label's empty second line keeps it off the key.
   const std::string script =
       "set encoding utf8\nset terminal svg size 860,620 noenhanced font 'Helvetica,16' background '#ffffff' linewidth "
       "1.4\n" +
-      fmt::format("set output {}\nset xlabel {} offset 0,0.6\nset ylabel {}\nset title {} font ',15'\n",
+      fmt::format("set output {}\nset xlabel {}.\"\\n\" offset 0,0.6\nset ylabel {}\nset title {} font ',15'\n",
                   gnuplot_text(figure.name + ".svg"), gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label),
                   gnuplot_text(figure.title)) +
       "set logscale xy\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
       "'#dddddd' "
-      "lt 1 lw 0.6\nset key below horizontal maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
+      "lt 1 lw 0.6\nset key below horizontal Left reverse maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
       logarithmic_axis("x", cheapest / 1.3, dearest * 1.3) + logarithmic_axis("y", best / margin, worst * margin) +
       plot + "\n";
   write_file(directory / (figure.name + ".gp"), script);

@@ -39,7 +39,7 @@ void fluid(benchmark::State& state) {
   const std::uint64_t before = simulation->counters().collisions();
   // A step long enough to hold about 2e6 collisions.
   const double step = std::max(0.25, 2e6 / (8.0 * rows * rows));
-  for (auto _ : state) simulation->advance_to(simulation->time() + step);
+  for ([[maybe_unused]] auto _ : state) simulation->advance_to(simulation->time() + step);
   report(state, *simulation, simulation->counters().collisions() - before, simulation->energy().kinetic / energy - 1);
 }
 BENCHMARK(fluid)
@@ -69,7 +69,7 @@ void shaken_bed(benchmark::State& state) {
   simulation->advance_to(50 / frequency);
   const std::uint64_t before = simulation->counters().collisions();
   std::uint64_t periods = 50;
-  for (auto _ : state) simulation->advance_to(static_cast<double>(++periods) / frequency);
+  for ([[maybe_unused]] auto _ : state) simulation->advance_to(static_cast<double>(++periods) / frequency);
   const EnergyLedger ledger = simulation->energy();
   report(state, *simulation, simulation->counters().collisions() - before, ledger.imbalance() / ledger.dissipated);
 }
