@@ -207,33 +207,29 @@ struct ProfileFrames {
   std::vector<double> number_density;  // frame by frame
   [[nodiscard]] std::size_t frames() const { return height.empty() ? 0 : number_density.size() / height.size(); }
 };
-// Mean, errors and full covariance of the mean. Frames are averaged in blocks of `block` first (correlated frames).
-// bad_input when fewer than 2 blocks or the sizes disagree.
+// Mean, errors and full covariance of the mean of frames that follow one another in time: by windows as long as three
+// times the area-weighted height remembers [Sokal1997], but six of them fit in. bad_input with fewer than 2 frames or
+// when the sizes disagree.
 struct FrameAverage {
   FitStatus status = FitStatus::ok;
   std::string message;
-  int block = 1;
-  int blocks = 0;
+  int window = 1;  // frames
   Profile profile;
 };
-FrameAverage average_frames(const ProfileFrames& frames, int block = 1);
-// A block length whose means are nearly independent: four times the statistical inefficiency 1 + 2 sum of correlations
-// [Sokal1997] of the area-weighted height (errors of the mean are then some 6 % too small at most), at least 1.
-int independent_block(const ProfileFrames& frames);
+FrameAverage average_frames(const ProfileFrames& frames);
 
-// Bootstrap over blocks of frames: refits resampled means (diagonal errors of the whole sample). They are spread as
-// means of other films would be, not as blocks that share some memory are, and intervals are those of few blocks
-// (Student).
+// Bootstrap over windows of frames [Shao2010]: refits the mean moved by normal multiples of what each window is from
+// it, so that the resamples have the covariance of average_frames(). Bins are weighed by the scatter of single frames.
+// Intervals are those of as few independent samples as there are (Student).
 struct BootstrapOptions {
   int resamples = 200;
-  int block = 0;  // 0: independent_block
   std::uint64_t seed = 1;
   double confidence = 0.95;
 };
 struct BootstrapResult {
   FitStatus status = FitStatus::ok;
   std::string message;
-  int block = 1;
+  int window = 1;     // frames
   int succeeded = 0;  // of the resamples
   Estimate temperature, shift;
   Interval temperature_interval, shift_interval;  // from percentiles

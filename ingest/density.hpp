@@ -40,29 +40,21 @@ std::vector<double> density_of_frame(std::span<const double> heights, double bed
 struct DensityProfile {
   HeightBins bins;
   Kernel kernel;
-  std::vector<double> number_density;  // n D^2, one a bin
-  std::vector<double> std_error;       // of number_density
-  std::vector<double> area_fraction;   // pi/4 n D^2 from centres; covered fraction from coverage
-  std::vector<double> covariance;      // bins x bins, row by row, of the mean number_density
-  std::size_t samples = 0;             // frames
-  std::size_t block_frames = 1;        // frames in a block when the errors stopped growing
-  double correlation_frames = 1;       // frames that count as one: variance of the mean over naive variance
-  std::size_t independent_blocks = 0;  // degrees of freedom of the covariance, about
+  std::vector<double> number_density;   // n D^2, one a bin
+  std::vector<double> std_error;        // of number_density
+  std::vector<double> area_fraction;    // pi/4 n D^2 from centres; covered fraction from coverage
+  std::vector<double> covariance;       // bins x bins, row by row, of the mean number_density
+  std::size_t samples = 0;              // frames
+  double memory_frames = 1;             // frames that tell as much of the bed's height as one independent one
+  std::size_t window_frames = 1;        // length of the windows behind the covariance
+  std::size_t independent_samples = 0;  // behind the covariance, about
 };
 
-// Mean, errors and covariance of per-frame densities that follow one another in time (frames x bins). Errors are found
-// by doubling blocks until they stop growing [FlyvbjergPetersen1989]; where the mean height of the disks remembers
-// longer than that, the covariance is made larger along what moves with it. `scale_std_error` is the relative error of
-// D in px, added to the covariance as a common factor (density goes as D^2).
+// Mean, errors and covariance of per-frame densities that follow one another in time (frames x bins): by windows of
+// frames as long as three times the bed's height remembers, but six of them fit in. `scale_relative_std_error` is that
+// of D in px, added to the covariance as a common factor (density goes as D^2).
 DensityProfile average_profile(const std::vector<std::vector<double>>& densities, const HeightBins& bins,
                                const Kernel& kernel, double scale_relative_std_error = 0);
-
-// Standard error of the mean of a correlated series, by blocking; also the block length at the plateau.
-struct BlockedError {
-  double mean = 0, std_error = 0;
-  std::size_t block_length = 1;
-};
-BlockedError blocked_error(std::span<const double> series);
 
 // CSV: comment lines starting with '#', then height,number_density,std_error,area_fraction,samples. 17 digits. Atomic.
 void write_profile_csv(const std::filesystem::path& path, const DensityProfile& profile,

@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "ingest/nearby.hpp"
+#include "statistics/correlated_series.hpp"
 
 namespace shakebed::ingest {
 
@@ -175,11 +176,10 @@ VelocityMeasurement measure_velocities(const Measurement& measurement, const Vel
       const double x = std::sqrt(low * high);
       factor = x < 1e-3 ? 1 + x / 3 : x * x / (2 * (x - 1 + std::exp(-x)));
     }
-    const BlockedError error = blocked_error(series);
     t.finite_time_factor = factor;
     t.localisation_bias_m = total_noise / total_count * to_temperature;
     t.over_mg_m = mean_square * factor * to_temperature;
-    t.std_error_m = error.std_error * factor * to_temperature;
+    t.std_error_m = statistics::mean_of(series).std_error * factor * to_temperature;
     return t;
   };
   result.horizontal = temperature(sum_xx, next_xx);
@@ -239,9 +239,9 @@ VelocityMeasurement VelocityMeter::result() {
       mean.localisation_bias_m += t.localisation_bias_m / n;
       mean.finite_time_factor += t.finite_time_factor / n;
     }
-    const BlockedError error = blocked_error(series);
-    mean.over_mg_m = error.mean;
-    mean.std_error_m = error.std_error;
+    const statistics::Mean found = statistics::mean_of(series);
+    mean.over_mg_m = found.value;
+    mean.std_error_m = found.std_error;
     return mean;
   };
   all.horizontal = mean_of(&VelocityMeasurement::horizontal);

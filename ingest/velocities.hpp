@@ -24,7 +24,7 @@ struct Link {
 
 struct KineticTemperature {
   double over_mg_m = 0;            // T/(m g), m: <(v - flow)^2>/g of one component
-  double std_error_m = 0;          // by blocking over frames
+  double std_error_m = 0;          // by windows of frames
   double localisation_bias_m = 0;  // what was taken off: 2 sigma^2/(g dt^2)
   double finite_time_factor = 1;   // what it was multiplied by: 1 + the loss of speed over dt by collisions
 };
@@ -48,7 +48,7 @@ std::vector<Link> link_disks(const Measurement& measurement, double largest_step
 VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options);
 
 // The same while frames come in, in bounded memory: stretches of `stretch_frames` frames are measured one after another
-// (each begins with the last frame of the one before), T is their mean, its error by blocking over them.
+// (each begins with the last frame of the one before), T is their mean, its error by windows of them.
 class VelocityMeter {
  public:
   // `bead_diameter_m`: D in metres.

@@ -170,8 +170,9 @@ Json profile_numbers(const ingest::DensityProfile& profile) {
   for (const double density : profile.number_density) greatest = std::max(greatest, density);
   return Json{{"greatest_density", quantity_json(greatest, "1/D^2")},
               {"frames", profile.samples},
-              {"block_frames", profile.block_frames},
-              {"correlation_frames", profile.correlation_frames}};
+              {"memory_frames", profile.memory_frames},
+              {"window_frames", profile.window_frames},
+              {"independent_samples", profile.independent_samples}};
 }
 
 ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::vector<std::string> comments) {
@@ -575,9 +576,10 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   }
   {
     const std::size_t n = found.profile.number_density.size();
-    std::string text =
-        "# covariance of number_density: height_i,height_j,covariance (j >= i, only what is not "
-        "0)\nheight_i,height_j,covariance\n";
+    std::string text = fmt::format(
+        "# covariance of number_density (j >= i, only what is not 0)\n# independent_blocks: {}\n"
+        "height_i,height_j,covariance\n",
+        found.profile.independent_samples);
     for (std::size_t i = 0; i < n && found.profile.covariance.size() == n * n; ++i) {
       for (std::size_t j = i; j < n; ++j) {
         const double value = found.profile.covariance[i * n + j];

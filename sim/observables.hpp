@@ -57,7 +57,7 @@ class BedObserver {
   std::vector<double> density_covariance(std::size_t first, std::size_t last) const {
     return covariance_.of_means(first, last);
   }
-  std::size_t covariance_blocks() const { return covariance_.independent_blocks(); }
+  std::size_t covariance_blocks() const { return covariance_.windows().independent; }
   Measured centre_of_mass() const;
   Measured temperature_x() const;        // m <v_x^2>
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase

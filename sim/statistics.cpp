@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "statistics/correlated_series.hpp"
-
 namespace shakebed::sim {
 
 void BlockedMean::add(std::span<const double> sample) {
@@ -70,44 +68,18 @@ std::vector<double> BlockedCovariance::first_moment() const {
   return statistics::from_mean(std::move(moment));
 }
 
-std::size_t BlockedCovariance::window() const {
-  if (blocks_.size() < 16) return 1;
+statistics::Windows BlockedCovariance::windows() const {
   std::vector<double> sum(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     for (const double x : blocks_[b]) sum[b] += x;
   }
-  const double memory =
-      std::max(statistics::memory_of(statistics::from_mean(std::move(sum))), statistics::memory_of(first_moment()));
-  return memory < statistics::least_memory ? 2 : 2 * statistics::half_window(memory, blocks_.size());
-}
-
-std::size_t BlockedCovariance::independent_blocks() const {
-  const std::size_t window = this->window();
-  return window == 1 ? blocks_.size() : (3 * blocks_.size() + 2 * window) / (4 * window);
+  const std::vector<double> moment = first_moment();
+  return statistics::windows_for(
+      std::max(statistics::memory_of(statistics::from_mean(std::move(sum))), statistics::memory_of(moment)), moment);
 }
 
 std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t last) const {
-  const std::size_t count = blocks_.size(), n = last - first;
-  std::vector<double> covariance(n * n, 0.0), mean(n, 0.0), sum(n, 0.0);
-  if (count < 2) return covariance;
-  const std::size_t window = this->window();
-  for (const std::vector<double>& block : blocks_) {
-    for (std::size_t i = 0; i < n; ++i) mean[i] += block[first + i] / static_cast<double>(count);
-  }
-  double weight = 1 / statistics::window_divisor(count, window);
-  if (window > 1) weight *= statistics::corrected_variance(first_moment(), window / 2).correction;
-  for (std::size_t b = 0; b < count; ++b) {
-    for (std::size_t i = 0; i < n; ++i) sum[i] += blocks_[b][first + i] - mean[i];
-    if (b + 1 < window) continue;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = i; k < n; ++k) covariance[i * n + k] += weight * sum[i] * sum[k];
-    }
-    for (std::size_t i = 0; i < n; ++i) sum[i] -= blocks_[b + 1 - window][first + i] - mean[i];
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t k = 0; k < i; ++k) covariance[i * n + k] = covariance[k * n + i];
-  }
-  return covariance;
+  return statistics::covariance_by_windows(blocks_, first, last, windows());
 }
 
 Measured propagated(double value, std::span<const double> gradient, std::span<const double> covariance) {

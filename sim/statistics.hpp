@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "statistics/correlated_series.hpp"
+
 namespace shakebed::sim {
 
 struct Measured {
@@ -53,17 +55,10 @@ class BlockedCovariance {
   explicit BlockedCovariance(std::size_t size = 1) : size_(size) {}
   void add(std::span<const double> sample);  // of `size` values
   std::size_t blocks() const { return blocks_.size(); }
-  // Of the means of the quantities first to last-1, row by row, from means over overlapping windows
-  // [MeketonSchmeiser1984]: as long as three times the correlations of the quantities' sum and of their first moment
-  // (sum of i x_i) last, but 6 of them fit in. What such windows miss for what they still share with their neighbours,
-  // their halves miss twice: all of the covariance is made larger by what that says of the first moment, 2 - (variance
-  // by halves)/(variance), if more than 1 [VatsFlegal2022]. Zeros with fewer than 2 blocks.
+  // Of the means of the quantities first to last-1, row by row, by windows of blocks.
   std::vector<double> of_means(std::size_t first, std::size_t last) const;
-  // As many independent samples would tell a variance as well as of_means() does: 3/4 of the windows side by side, for
-  // the window function behind it, flat to the half of its length and then falling, has 4/3 of it under its square
-  // [PolitisRomano1995].
-  std::size_t independent_blocks() const;
-  std::size_t window() const;  // length of the windows in blocks: even, or 1 with fewer than 16 blocks
+  // By what of the quantities' sum and their first moment (sum of i x_i) remembers longer, corrected for the latter.
+  statistics::Windows windows() const;
 
   template <class Archive>
   void visit(Archive& archive) {

@@ -1,5 +1,5 @@
-// How well the mean of a series is known whose values remember those before them. All functions but the first take the
-// series from its mean: its values add up to 0.
+// How well the mean of a series, or of many that are sampled together, is known whose values remember those before
+// them. What takes a series takes it from its mean, so that its values add up to 0, but from_mean() and mean_of().
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,7 @@
 
 namespace shakebed::statistics {
 
+// Zeros where the values are equal to 1e-12.
 std::vector<double> from_mean(std::vector<double> series);
 
 // 1 + 2 sum of the correlations, summed to five times itself [Sokal1997]: how many values tell as much as one
@@ -32,5 +33,25 @@ struct WindowVariance {
   double variance, correction;
 };
 WindowVariance corrected_variance(std::span<const double> series, std::size_t half);
+
+// The windows by which samples of many quantities are judged.
+struct Windows {
+  std::size_t length = 1;       // in samples: even, or 1 with fewer than 16 samples
+  double correction = 1;        // by which what they say of (co)variances must be multiplied
+  std::size_t independent = 0;  // independent samples that would tell a variance as well
+};
+// Windows for samples of which `slowest` remembers for longest, for `memory` samples or so.
+Windows windows_for(double memory, std::span<const double> slowest);
+
+// The mean of a series as it is, and its error by windows: 0 with fewer than 2 values.
+struct Mean {
+  double value = 0, std_error = 0;
+};
+Mean mean_of(std::span<const double> series);
+
+// The covariance of the means of the quantities first to last-1 of samples that follow one another, row by row: by
+// overlapping windows [MeketonSchmeiser1984], corrected. Zeros with fewer than 2 samples.
+std::vector<double> covariance_by_windows(std::span<const std::vector<double>> samples, std::size_t first,
+                                          std::size_t last, const Windows& windows);
 
 }  // namespace shakebed::statistics

@@ -92,7 +92,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 15,
+          .version = 16,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,

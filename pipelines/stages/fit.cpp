@@ -107,10 +107,11 @@ class Fit : public Stage {
     fields.boolean("robust", options_.robust, {.help = "Huber's loss: outliers count linearly"});
     fields.boolean("sweep", options_.sweep, {.help = "also T against window"});
     fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
-    fields.integer("bootstrap", bootstrap_,
-                   {.help = "resamples over blocks of frames, for the error of T that frames show by themselves: of an "
-                            "extract stage, or of a simulate stage that kept its frames; 0: none",
-                    .range = from_to(0, 100'000)});
+    fields.integer(
+        "bootstrap", bootstrap_,
+        {.help = "resamples over windows of frames, for the error of T that frames show by themselves: of an "
+                 "extract stage, or of a simulate stage that kept its frames; 0: none",
+         .range = from_to(0, 100'000)});
     if (!fields.decoding()) return;
     fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
                    "there are no frames to resample: no extract or simulate stage in \"from\"");
@@ -182,11 +183,6 @@ void read_covariance(const Input& source, fit::Profile& profile) {
     const double value = std::strtod(cells[2].c_str(), nullptr);
     profile.covariance[*i * n + *j] = profile.covariance[*j * n + *i] = value;
   });
-  if (const Json found = source.result(); source.stage == "extract" && found.contains("profile")) {
-    const double frames = found["profile"].value("frames", 0.0),
-                 together = found["profile"].value("correlation_frames", 1.0);
-    profile.covariance_samples = static_cast<int>(frames / std::max(1.0, together));
-  }
 }
 
 fit::Profile profile_of(const ProfileTable& table) {
@@ -353,7 +349,7 @@ Json bootstrap_json(const fit::BootstrapResult& result, std::uint32_t resamples)
   Json out{{"status", fit::to_string(result.status)},
            {"resamples", resamples},
            {"succeeded", result.succeeded},
-           {"frames_a_block", result.block}};
+           {"window_frames", result.window}};
   if (!result.message.empty()) out["message"] = result.message;
   if (result.status != fit::FitStatus::ok) return out;
   out["temperature"] = quantity_json(result.temperature.value, "m g D", result.temperature.std_error);
@@ -503,7 +499,7 @@ void Fit::run(RunContext& context) const {
 
 StageRow fit_stage() {
   return {.name = "fit",
-          .version = 8,
+          .version = 9,
           .summary = "fits temperature and solid height to a density profile",
           .accepts = {"extract", "simulate"},
           .fewest_inputs = 0,

@@ -32,30 +32,6 @@ TEST(Density, ChordKernelIsTheChordOfADisk) {
   EXPECT_NEAR(density[0], 2 * std::sqrt(0.25 - 0.04) / (std::numbers::pi / 4), 1e-12);
 }
 
-// An autoregressive series x' = a x + noise has 1/(1-a)^2 times the variance of the mean of white noise.
-TEST(Blocking, FindsTheErrorOfACorrelatedSeries) {
-  RandomStream random(7);
-  const double memory = 0.8;
-  std::vector<double> series;
-  double x = 0;
-  for (int k = 0; k < 40000; ++k) {
-    x = memory * x + random.normal();
-    series.push_back(x);
-  }
-  const BlockedError error = blocked_error(series);
-  const double expected = 1 / (1 - memory) / std::sqrt(40000.0);
-  EXPECT_GT(error.std_error, 0.8 * expected);
-  EXPECT_LT(error.std_error, 1.25 * expected);
-  EXPECT_LT(std::abs(error.mean), 5 * expected);
-}
-
-TEST(Blocking, WhiteNoiseIsLeftAlone) {
-  RandomStream random(8);
-  std::vector<double> series;
-  for (int k = 0; k < 4096; ++k) series.push_back(random.normal());
-  EXPECT_NEAR(blocked_error(series).std_error, 1 / 64.0, 0.2 / 64.0);
-}
-
 TEST(AverageProfile, CovarianceIsThatOfTheMeanAndHoldsTheScaleError) {
   RandomStream random(9);
   const HeightBins bins{0, 1, 3};

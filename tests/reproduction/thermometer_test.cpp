@@ -75,7 +75,7 @@ std::vector<Bias> measure(double reduced, BedRun run, int beds, double fluid_fro
   for (int i = 0; i < beds; ++i) {
     run.seed = 1000 + static_cast<std::uint64_t>(100 * reduced) + 7919 * static_cast<std::uint64_t>(i);
     const ProfileFrames frames = profiles_of(run);
-    const FrameAverage average = average_frames(frames, independent_block(frames));
+    const FrameAverage average = average_frames(frames);
     for (Bias& row : table) {
       const FitResult fit = fit_profile(average.profile, options_of(row.method, run, fluid_from));
       if (fit.ok()) {
@@ -178,7 +178,7 @@ TEST(Thermometer, LayeredSurface) {
       run.temperature = reduced * run.bed.critical();
       run.seed = 50 + repeat + static_cast<std::uint64_t>(1000 * reduced);
       const ProfileFrames frames = profiles_of(run);
-      library.push_back({run.temperature, average_frames(frames, independent_block(frames)).profile, 0.0});
+      library.push_back({run.temperature, average_frames(frames).profile, 0.0});
     }
   }
   for (const double reduced : {0.2, 0.4, 0.6, 0.8}) {
@@ -231,7 +231,7 @@ TEST(Thermometer, CoverageOfTwoHundredSimulatedProfiles) {
     for (std::uint64_t k = 0; k < 200; ++k) {
       run.seed = 31 * k + static_cast<std::uint64_t>(row.reduced);
       const ProfileFrames part = profiles_of(run);
-      const FrameAverage average = average_frames(part, independent_block(part));
+      const FrameAverage average = average_frames(part);
       FitOptions options = options_of({"enskog-rectangle", "above"}, run, 5);
       options.interval = true;
       const FitResult fit = fit_profile(average.profile, options);

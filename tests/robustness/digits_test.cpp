@@ -216,7 +216,7 @@ Row covariance() {
     const std::vector<double> matrix = found.of_means(0, 3);
     // What of_means() says it does: means over overlapping windows, larger by what the halves of the windows say of the
     // first moment.
-    const std::size_t n = samples.size(), window = found.window();
+    const std::size_t n = samples.size(), window = found.windows().length;
     std::array<Real, 3> mean{};
     for (const auto& sample : samples) {
       for (std::size_t k = 0; k < 3; ++k) mean[k] += Real(sample[k]) / n;

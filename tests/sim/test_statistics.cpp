@@ -97,7 +97,7 @@ TEST(BlockedCovariance, KnowsThatOfAShortSeriesWithALongMemory) {
         covariance.add(sample);
       }
       const double variance = covariance.of_means(1, 2)[0];
-      const std::size_t independent = covariance.independent_blocks();
+      const std::size_t independent = covariance.windows().independent;
       xx += variance / runs;
       blocks += static_cast<double>(independent) / runs;
       held += std::abs(sum / n) < (independent < 15 ? student[independent - 4] : 2.0) * std::sqrt(variance);

@@ -90,5 +90,57 @@ TEST(CorrelatedSeries, ErrsByATenthOnTheSafeSideForTheMeanOfValuesThatRemember) 
   EXPECT_LT(windows_alone / truth, 0.95);
 }
 
+TEST(CorrelatedSeries, KnowsTheErrorOfAMean) {
+  // Of 400 series that remember 9, each for 100 memories: 4 standard errors, of 60 independent samples a series.
+  std::mt19937_64 random(5);
+  constexpr int runs = 400;
+  double stated = 0;
+  for (int run = 0; run < runs; ++run) {
+    double mean = 0;
+    std::vector<double> series = series_that_remembers(random, 0.8, 900, mean);
+    for (double& x : series) x += 7;
+    const Mean found = mean_of(series);
+    EXPECT_NEAR(found.value, 7, 1e-12);
+    stated += found.std_error * found.std_error / runs;
+  }
+  EXPECT_NEAR(stated / (9.0 / 900), 1, 0.05);
+  EXPECT_EQ(mean_of(std::vector<double>{3}).value, 3);
+  EXPECT_EQ(mean_of(std::vector<double>{3}).std_error, 0);
+  EXPECT_EQ(mean_of({}).value, 0);
+}
+
+TEST(CorrelatedSeries, WhatRoundingLeftIsNoScatter) {
+  std::vector<double> equal(64, 11.7);
+  for (std::size_t k = 0; k < equal.size(); ++k) equal[k] *= 1 + 1e-15 * static_cast<double>(k % 5);
+  EXPECT_EQ(from_mean(equal), std::vector<double>(64, 0.0));
+  EXPECT_EQ(mean_of(equal).std_error, 0);
+}
+
+TEST(CorrelatedSeries, KnowsTheCovarianceOfMeans) {
+  // Three quantities, the second 0.6 of the first and noise, the third independent: independent samples, whose
+  // covariance windows tell as well as 3/8 of them would. Windows of any length agree with single samples but for that.
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  std::vector<std::vector<double>> samples;
+  for (int k = 0; k < 8'000; ++k) {
+    const double a = normal(random), b = normal(random);
+    samples.push_back({1 + a, 0.6 * a + 0.8 * b, 5 + 2 * normal(random)});
+  }
+  const auto one = covariance_by_windows(samples, 0, 3, {1, 1, 8'000});
+  const auto ten = covariance_by_windows(samples, 0, 3, {10, 1, 600});
+  const auto part = covariance_by_windows(samples, 1, 3, {10, 2, 600});
+  const double expected[] = {1, 0.6, 0, 0.6, 1, 0, 0, 0, 4};
+  const double scale[] = {1, 1, 2, 1, 1, 2, 2, 2, 4};
+  for (std::size_t i = 0; i < 9; ++i) {
+    // 4.5 standard errors of 8,000 and of 600 independent samples.
+    EXPECT_NEAR(one[i] * 8'000, expected[i], 4.5 * scale[i] * std::sqrt(2.0 / 8'000)) << i;
+    EXPECT_NEAR(ten[i] * 8'000, expected[i], 4.5 * scale[i] * std::sqrt(2.0 / 600)) << i;
+  }
+  EXPECT_DOUBLE_EQ(part[0], 2 * ten[4]);
+  EXPECT_DOUBLE_EQ(part[1], 2 * ten[5]);
+  EXPECT_DOUBLE_EQ(part[2], part[1]);
+  EXPECT_EQ(covariance_by_windows(std::span(samples).first(1), 0, 3, {1, 1, 1}), std::vector<double>(9, 0.0));
+}
+
 }  // namespace
 }  // namespace shakebed::statistics
