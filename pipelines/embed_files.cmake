@@ -1,7 +1,7 @@
 # Writes a C++ file that holds the text of files: cmake -DOUTPUT=... -DNAMES="a;b" -DPATHS="/x/a;/x/b" -P embed_files.cmake
 string(REPLACE "|" ";" NAMES "${NAMES}")
 string(REPLACE "|" ";" PATHS "${PATHS}")
-set(text "#include \"pipelines/embedded.hpp\"\n\nnamespace shakebed::pipelines {\n\nconst std::vector<EmbeddedFile>& embedded_files() {\n  static const std::vector<EmbeddedFile> files = {\n")
+set(text "#include \"pipelines/formats/embedded.hpp\"\n\nnamespace shakebed::pipelines {\n\nconst std::vector<EmbeddedFile>& embedded_files() {\n  static const std::vector<EmbeddedFile> files = {\n")
 foreach(name path IN ZIP_LISTS NAMES PATHS)
   file(READ "${path}" content)
   if(content MATCHES "\\)=embedded=")

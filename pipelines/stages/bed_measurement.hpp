@@ -6,16 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "pipelines/config.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/json.hpp"
-#include "pipelines/stages.hpp"
+#include "pipelines/formats/config.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/json.hpp"
 #include "pipelines/stages/scene_options.hpp"
-#include "sim/flights.hpp"
-#include "sim/observables.hpp"
-#include "sim/order.hpp"
-#include "sim/simulation.hpp"
-#include "sim/velocities.hpp"
+#include "pipelines/stages/stage.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/flights.hpp"
+#include "sim/measure/observables.hpp"
+#include "sim/measure/order.hpp"
+#include "sim/measure/velocities.hpp"
 
 namespace shakebed::pipelines {
 

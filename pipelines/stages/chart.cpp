@@ -6,13 +6,13 @@
 #include <cmath>
 #include <complex>
 
-#include "fit/straight_line.hpp"
-#include "pipelines/bed.hpp"
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
+#include "fit/profile_fit/straight_line.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/figure.hpp"
-#include "pipelines/trajectory.hpp"
-#include "sim/order.hpp"
+#include "sim/measure/order.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -6,7 +6,7 @@
 // .../crossings.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

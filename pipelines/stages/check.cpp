@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "pipelines/files.hpp"
+#include "pipelines/formats/files.hpp"
 
 namespace shakebed::pipelines {
 

@@ -3,7 +3,7 @@
 // Files: check.json, junit.xml, summary.md.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "fit/critical_temperature.hpp"
-#include "pipelines/files.hpp"
+#include "fit/profile_fit/critical_temperature.hpp"
+#include "pipelines/formats/files.hpp"
 #include "pipelines/stages/study_table.hpp"
 
 namespace shakebed::pipelines {

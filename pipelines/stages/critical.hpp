@@ -5,7 +5,7 @@
 // From a study over temperature; files: critical.json, critical.csv.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

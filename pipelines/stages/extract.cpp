@@ -1,6 +1,6 @@
 #include "pipelines/stages/extract.hpp"
 
-#include "pipelines/images_module.hpp"
+#include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -5,7 +5,7 @@
 // the simulated bed, passed on).
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

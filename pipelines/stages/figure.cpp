@@ -7,11 +7,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "fit/hydrostatic_profile.hpp"
-#include "pipelines/bed.hpp"
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/process.hpp"
+#include "fit/theory/hydrostatic_profile.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/process.hpp"
 
 namespace shakebed::pipelines {
 namespace {

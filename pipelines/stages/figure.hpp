@@ -4,7 +4,7 @@
 // where a fit is among the inputs); figure.json (how far the curves are from one another).
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

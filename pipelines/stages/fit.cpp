@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/expansion.hpp"
-#include "fit/fit_profile.hpp"
-#include "fit/simulated_profiles.hpp"
-#include "pipelines/bed.hpp"
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/theory.hpp"
-#include "pipelines/trajectory.hpp"
-#include "sim/observables.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
+#include "fit/profile_fit/simulated_profiles.hpp"
+#include "fit/theory/expansion.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/theory.hpp"
+#include "sim/measure/observables.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -8,7 +8,7 @@
 // resampling blocks of frames beside that of the fit.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

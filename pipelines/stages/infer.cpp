@@ -8,12 +8,12 @@
 #include <mutex>
 #include <thread>
 
-#include "fit/fit_profile.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/replica_seed.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
-#include "sim/observables.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/observables.hpp"
 
 namespace shakebed::pipelines {
 

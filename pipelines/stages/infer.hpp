@@ -4,7 +4,7 @@
 // Files: infer.json (target, nearest pair, its distance, every point), infer.csv (a row a point).
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

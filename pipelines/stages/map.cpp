@@ -8,11 +8,11 @@
 #include <charconv>
 #include <set>
 
-#include "fit/empirical_map.hpp"
-#include "pipelines/bed.hpp"
-#include "pipelines/files.hpp"
+#include "fit/map/empirical_map.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/files.hpp"
 #include "pipelines/stages/study_table.hpp"
-#include "pipelines/theory.hpp"
+#include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {
 namespace {

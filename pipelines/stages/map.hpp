@@ -3,7 +3,7 @@
 // Files: map.json, map.csv.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

@@ -4,7 +4,7 @@
 // bed.json (the bed's, passed on).
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

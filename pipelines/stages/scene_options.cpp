@@ -6,9 +6,10 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/trajectory.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/trajectory.hpp"
+#include "sim/engine/start.hpp"
 
 namespace shakebed::pipelines {
 

@@ -7,9 +7,9 @@
 #include <variant>
 #include <vector>
 
-#include "pipelines/bed.hpp"
-#include "pipelines/config.hpp"
-#include "sim/scene.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/config.hpp"
+#include "sim/scene/scene.hpp"
 
 namespace shakebed::pipelines {
 

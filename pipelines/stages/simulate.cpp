@@ -15,15 +15,15 @@
 #include <numeric>
 #include <thread>
 
-#include "pipelines/files.hpp"
-#include "pipelines/replica_seed.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/bed_measurement.hpp"
+#include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
-#include "pipelines/trajectory.hpp"
-#include "sim/archive.hpp"
-#include "sim/observables.hpp"
-#include "sim/random.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/archive.hpp"
+#include "sim/measure/observables.hpp"
 
 namespace shakebed::pipelines {
 

@@ -22,8 +22,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "pipelines/stages.hpp"
-#include "sim/simulation.hpp"
+#include "pipelines/stages/stage.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace shakebed::pipelines {
 
@@ -32,8 +32,8 @@ StageRow simulate_stage();
 // What a run is gone on from after a kill: a state behind its hash.
 void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
 
-// Where the simulation has lost its precision (sim/observables.hpp): writes the last sound state, if there is one, and
-// throws StageError, which says what is wrong, when, and where that state is.
+// Where the simulation has lost its precision (sim/measure/observables.hpp): writes the last sound state, if there is
+// one, and throws StageError, which says what is wrong, when, and where that state is.
 void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
                        const std::filesystem::path& checkpoint);
 

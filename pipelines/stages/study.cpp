@@ -10,11 +10,11 @@
 #include <mutex>
 #include <thread>
 
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/plan.hpp"
-#include "pipelines/replica_seed.hpp"
-#include "pipelines/run.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/runner/plan.hpp"
+#include "pipelines/runner/run.hpp"
+#include "pipelines/stages/replica_seed.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -6,7 +6,7 @@
 // replicas). Finished runs outlive a kill.
 #pragma once
 
-#include "pipelines/stages.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "pipelines/csv.hpp"
-#include "pipelines/errors.hpp"
-#include "pipelines/files.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/formats/files.hpp"
 
 namespace shakebed::pipelines {
 

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <random>
 
-#include "pipelines/bench/choice.hpp"
-#include "pipelines/bench/document.hpp"
-#include "pipelines/errors.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "tests/bench/program/choice.hpp"
+#include "tests/bench/program/document.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/flights.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/flights.hpp"
 
 namespace {
 

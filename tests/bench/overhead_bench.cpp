@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

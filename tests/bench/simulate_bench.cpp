@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace {
 

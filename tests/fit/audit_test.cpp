@@ -1,4 +1,4 @@
-#include "fit/audit.hpp"
+#include "fit/audit/audit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "fit/expansion.hpp"
+#include "fit/theory/expansion.hpp"
 #include "tests/fit/synthetic.hpp"
 
 // What the Enskog curve makes of true disks, in the local-density picture (best-of as the truth, no noise, even

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "fit/expansion.hpp"
+#include "fit/theory/expansion.hpp"
 #include "tests/fit/synthetic.hpp"
 
 // How often the 95 % intervals hold the truth. Seeds are fixed, so the numbers below repeat; a change of the fitter

@@ -1,4 +1,4 @@
-#include "fit/critical_temperature.hpp"
+#include "fit/profile_fit/critical_temperature.hpp"
 
 #include <gtest/gtest.h>
 

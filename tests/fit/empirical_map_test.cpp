@@ -1,10 +1,10 @@
-#include "fit/empirical_map.hpp"
+#include "fit/map/empirical_map.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "fit/fit_benchmark.hpp"
+#include "tests/bench/cases/fit_benchmark.hpp"
 #include "tests/fit/synthetic.hpp"
 
 namespace shakebed::fit {

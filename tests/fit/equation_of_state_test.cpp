@@ -1,4 +1,4 @@
-#include "fit/equation_of_state.hpp"
+#include "fit/theory/equation_of_state.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "fit/expansion.hpp"
+#include "fit/theory/expansion.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "fit/fit_profile.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
 
 int main() {
   using namespace shakebed::fit;

@@ -1,4 +1,4 @@
-#include "fit/fit_profile.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "fit/expansion.hpp"
-#include "fit/fermi_profile.hpp"
+#include "fit/theory/expansion.hpp"
+#include "fit/theory/fermi_profile.hpp"
 #include "tests/fit/synthetic.hpp"
 
 namespace shakebed::fit {

@@ -1,11 +1,11 @@
-#include "fit/gamma_temperature.hpp"
+#include "fit/map/gamma_temperature.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
-#include "fit/fermi_profile.hpp"
+#include "fit/theory/fermi_profile.hpp"
 
 namespace shakebed::fit {
 namespace {

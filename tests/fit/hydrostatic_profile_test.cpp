@@ -1,4 +1,4 @@
-#include "fit/hydrostatic_profile.hpp"
+#include "fit/theory/hydrostatic_profile.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "fit/fermi_profile.hpp"
-#include "fit/quadrature.hpp"
+#include "fit/theory/fermi_profile.hpp"
+#include "fit/theory/quadrature.hpp"
 
 namespace shakebed::fit {
 namespace {

@@ -1,4 +1,4 @@
-#include "fit/jump_height.hpp"
+#include "fit/map/jump_height.hpp"
 
 #include <gtest/gtest.h>
 

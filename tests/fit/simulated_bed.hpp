@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "fit/equation_of_state.hpp"
-#include "fit/expansion.hpp"
-#include "fit/fit_profile.hpp"
-#include "sim/observables.hpp"
-#include "sim/simulation.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
+#include "fit/theory/equation_of_state.hpp"
+#include "fit/theory/expansion.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/observables.hpp"
 
 // Elastic disks on a still floor between periodic sides, each redrawn from the Maxwellian at T at random moments: a bed
 // whose temperature is known because it was set. Nothing of the equations of state under test enters.

@@ -1,4 +1,4 @@
-#include "fit/simulated_profiles.hpp"
+#include "fit/profile_fit/simulated_profiles.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fit/expansion.hpp"
+#include "fit/theory/expansion.hpp"
 #include "tests/fit/synthetic.hpp"
 
 namespace shakebed::fit {

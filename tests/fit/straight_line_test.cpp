@@ -1,4 +1,4 @@
-#include "fit/straight_line.hpp"
+#include "fit/profile_fit/straight_line.hpp"
 
 #include <gtest/gtest.h>
 

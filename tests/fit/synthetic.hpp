@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "fit/fit_profile.hpp"
-#include "fit/hydrostatic_profile.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
+#include "fit/theory/hydrostatic_profile.hpp"
 
 // Profiles whose truth is known: a model curve through a kernel, with normal noise of a stated size.
 namespace shakebed::fit::synthetic {

@@ -1,4 +1,4 @@
-#include "ingest/density.hpp"
+#include "ingest/profile/density.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "ingest/random_stream.hpp"
+#include "ingest/synthetic/random_stream.hpp"
 #include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {

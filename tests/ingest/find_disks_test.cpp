@@ -1,4 +1,4 @@
-#include "ingest/find_disks.hpp"
+#include "ingest/find/find_disks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string>
 
-#include "ingest/finder_benchmark.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
+#include "tests/bench/cases/finder_benchmark.hpp"
 #include "tests/ingest/test_files.hpp"
 #include "tests/ingest/truth.hpp"
 

@@ -1,4 +1,4 @@
-#include "ingest/finder_benchmark.hpp"
+#include "tests/bench/cases/finder_benchmark.hpp"
 
 #include <gtest/gtest.h>
 

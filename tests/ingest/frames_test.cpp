@@ -1,5 +1,5 @@
-#include "ingest/frames.hpp"
-#include "ingest/atomic_file.hpp"
+#include "ingest/frames/frames.hpp"
+#include "ingest/frames/atomic_file.hpp"
 
 #include <gtest/gtest.h>
 

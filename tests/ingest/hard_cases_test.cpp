@@ -8,10 +8,10 @@
 #include <tuple>
 #include <vector>
 
-#include "ingest/find_disks.hpp"
-#include "ingest/measure_bed.hpp"
-#include "ingest/random_stream.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/find/find_disks.hpp"
+#include "ingest/profile/measure_bed.hpp"
+#include "ingest/synthetic/random_stream.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/test_files.hpp"
 #include "tests/ingest/truth.hpp"
 

@@ -1,12 +1,12 @@
-#include "ingest/lens.hpp"
+#include "ingest/profile/lens.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "ingest/measure_bed.hpp"
-#include "ingest/random_stream.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/profile/measure_bed.hpp"
+#include "ingest/synthetic/random_stream.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest {
 namespace {

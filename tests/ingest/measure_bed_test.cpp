@@ -1,4 +1,4 @@
-#include "ingest/measure_bed.hpp"
+#include "ingest/profile/measure_bed.hpp"
 
 #include <gtest/gtest.h>
 
@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "ingest/overlay.hpp"
-#include "ingest/random_stream.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/profile/overlay.hpp"
+#include "ingest/synthetic/random_stream.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {

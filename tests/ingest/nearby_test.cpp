@@ -1,4 +1,4 @@
-#include "ingest/nearby.hpp"
+#include "ingest/find/nearby.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,10 +6,10 @@
 #include <random>
 #include <string>
 
-#include "ingest/bead_profile.hpp"
-#include "ingest/blurred_disk.hpp"
-#include "ingest/find_disks.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/find/bead_profile.hpp"
+#include "ingest/find/blurred_disk.hpp"
+#include "ingest/find/find_disks.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest {
 namespace {

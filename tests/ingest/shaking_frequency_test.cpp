@@ -1,5 +1,5 @@
 // A shaker's frequency from places in frames: told within its error, and not told where there is none.
-#include "ingest/shaking_frequency.hpp"
+#include "ingest/profile/shaking_frequency.hpp"
 
 #include <gtest/gtest.h>
 

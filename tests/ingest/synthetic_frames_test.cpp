@@ -1,4 +1,4 @@
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 #include <gtest/gtest.h>
 

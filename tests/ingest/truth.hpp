@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "ingest/find_disks.hpp"
-#include "ingest/synthetic_frames.hpp"
+#include "ingest/find/find_disks.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest::test {
 

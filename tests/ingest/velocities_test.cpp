@@ -1,10 +1,10 @@
-#include "ingest/velocities.hpp"
+#include "ingest/profile/velocities.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "ingest/random_stream.hpp"
+#include "ingest/synthetic/random_stream.hpp"
 
 namespace shakebed::ingest {
 namespace {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

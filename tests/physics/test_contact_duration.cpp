@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/observables.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/observables.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

@@ -12,9 +12,9 @@
 #include <tuple>
 #include <vector>
 
-#include "sim/contact_time.hpp"
-#include "sim/floor.hpp"
-#include "sim/random.hpp"
+#include "sim/engine/contact_time.hpp"
+#include "sim/engine/floor_motion.hpp"
+#include "sim/engine/random.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

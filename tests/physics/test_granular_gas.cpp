@@ -8,9 +8,9 @@
 #include <numbers>
 #include <vector>
 
-#include "sim/random.hpp"
-#include "sim/simulation.hpp"
-#include "sim/statistics.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/statistics.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

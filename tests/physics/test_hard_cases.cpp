@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "sim/checkpoint_bytes.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/checkpoint_bytes.hpp"
+#include "sim/engine/simulation.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/flights.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/flights.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

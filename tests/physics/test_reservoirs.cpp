@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/simulation.hpp"
-#include "sim/velocities.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/velocities.hpp"
 #include "tests/physics/law.hpp"
 
 namespace shakebed::sim {

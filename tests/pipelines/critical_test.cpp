@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -8,11 +8,11 @@
 #include <numbers>
 #include <random>
 
-#include "pipelines/bed.hpp"
-#include "pipelines/config.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/sha256_block.hpp"
-#include "pipelines/trajectory.hpp"
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/config.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/sha256_block.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/json.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

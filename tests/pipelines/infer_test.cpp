@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <thread>
 
-#include "pipelines/json.hpp"
-#include "pipelines/replica_seed.hpp"
+#include "pipelines/formats/json.hpp"
+#include "pipelines/stages/replica_seed.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -7,9 +7,9 @@
 #include <map>
 #include <thread>
 
-#include "fit/hydrostatic_profile.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/json.hpp"
+#include "fit/theory/hydrostatic_profile.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -6,8 +6,8 @@
 
 #include <filesystem>
 
-#include "pipelines/files.hpp"
-#include "pipelines/run.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/runner/run.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "pipelines/stages/simulate.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/sim/spoilt_simulation.hpp"

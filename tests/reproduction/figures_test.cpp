@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "pipelines/csv.hpp"
-#include "pipelines/files.hpp"
-#include "pipelines/json.hpp"
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace shakebed::tests {

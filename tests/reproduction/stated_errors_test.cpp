@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

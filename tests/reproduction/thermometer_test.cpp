@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/simulated_profiles.hpp"
+#include "fit/profile_fit/simulated_profiles.hpp"
 #include "tests/fit/simulated_bed.hpp"
 
 namespace shakebed::fit::simulated {

@@ -1,6 +1,6 @@
 // How many digits the kernels keep, by shadow runs in 60-digit arithmetic on the same doubles: event times, floor
-// roots, f and its inverse, k, covariance. Prints the table that `shakebed bench` shows (pipelines/bench/digits.json),
-// and checks that what is shown there is not better than what is found here.
+// roots, f and its inverse, k, covariance. Prints the table that `shakebed bench` shows
+// (tests/bench/program/digits.json), and checks that what is shown there is not better than what is found here.
 //
 // A number's conditioning is taken off where it is the input's and not the algorithm's: each row says what its error is
 // relative to.
@@ -15,13 +15,13 @@
 #include <numbers>
 #include <vector>
 
-#include "fit/equation_of_state.hpp"
-#include "fit/expansion.hpp"
-#include "fit/jump_height.hpp"
-#include "sim/contact_time.hpp"
-#include "sim/floor.hpp"
-#include "sim/random.hpp"
-#include "sim/statistics.hpp"
+#include "fit/map/jump_height.hpp"
+#include "fit/theory/equation_of_state.hpp"
+#include "fit/theory/expansion.hpp"
+#include "sim/engine/contact_time.hpp"
+#include "sim/engine/floor_motion.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/measure/statistics.hpp"
 
 namespace {
 
@@ -302,7 +302,7 @@ TEST(DigitsKept, AreWhatTheBenchmarkShows) {
   }
   if (const char* path = std::getenv("SHAKEBED_WRITE_DIGITS"); path != nullptr)
     std::ofstream(path) << found.dump(2) << "\n";
-  std::ifstream stream(SHAKEBED_SOURCE_DIR "/pipelines/bench/digits.json");
+  std::ifstream stream(SHAKEBED_SOURCE_DIR "/tests/bench/program/digits.json");
   const auto shown = nlohmann::ordered_json::parse(stream);
   ASSERT_EQ(shown["rows"].size(), rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {

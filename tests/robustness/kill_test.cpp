@@ -9,7 +9,7 @@
 #include <set>
 #include <thread>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

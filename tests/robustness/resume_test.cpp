@@ -8,7 +8,7 @@
 #include <random>
 #include <thread>
 
-#include "pipelines/json.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <set>
 
-#include "pipelines/files.hpp"
+#include "pipelines/formats/files.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace shakebed::sim {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "sim/collision.hpp"
-#include "sim/random.hpp"
+#include "sim/engine/collision.hpp"
+#include "sim/engine/random.hpp"
 
 namespace shakebed::sim {
 namespace {

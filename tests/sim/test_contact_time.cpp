@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "sim/contact_time.hpp"
-#include "sim/random.hpp"
+#include "sim/engine/contact_time.hpp"
+#include "sim/engine/random.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "sim/neighbour_lists.hpp"
-#include "sim/random.hpp"
-#include "sim/shell_grid.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/neighbour_lists.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/engine/shell_grid.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "sim/event_queue.hpp"
-#include "sim/random.hpp"
+#include "sim/engine/event_queue.hpp"
+#include "sim/engine/random.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -4,9 +4,9 @@
 #include <limits>
 #include <numbers>
 
-#include "sim/contact_time.hpp"
-#include "sim/floor.hpp"
-#include "sim/random.hpp"
+#include "sim/engine/contact_time.hpp"
+#include "sim/engine/floor_motion.hpp"
+#include "sim/engine/random.hpp"
 
 namespace shakebed::sim {
 namespace {

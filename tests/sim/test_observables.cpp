@@ -6,13 +6,13 @@
 #include <memory>
 #include <numbers>
 
-#include "sim/archive.hpp"
-#include "sim/flights.hpp"
-#include "sim/observables.hpp"
-#include "sim/order.hpp"
-#include "sim/random.hpp"
-#include "sim/simulation.hpp"
-#include "sim/velocities.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/archive.hpp"
+#include "sim/measure/flights.hpp"
+#include "sim/measure/observables.hpp"
+#include "sim/measure/order.hpp"
+#include "sim/measure/velocities.hpp"
 #include "tests/sim/spoilt_simulation.hpp"
 
 namespace shakebed::sim {

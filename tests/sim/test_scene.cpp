@@ -6,8 +6,9 @@
 #include <string>
 #include <typeinfo>
 
-#include "sim/overlap.hpp"
-#include "sim/simulation.hpp"
+#include "sim/engine/overlap.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/engine/start.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/observables.hpp"
-#include "sim/random.hpp"
-#include "sim/statistics.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/measure/observables.hpp"
+#include "sim/measure/statistics.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace shakebed::sim {
 namespace {

@@ -1,7 +1,7 @@
 // A simulation's checkpoint: damaged bytes are refused; what is accepted goes on for a while.
 #include <stdexcept>
 
-#include "sim/simulation.hpp"
+#include "sim/engine/simulation.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::sim;

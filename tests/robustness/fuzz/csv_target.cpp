@@ -1,8 +1,8 @@
 // A profile of the user's: what is read has finite numbers and is written and read back the same.
 #include <cmath>
 
-#include "pipelines/errors.hpp"
-#include "pipelines/files.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/formats/files.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::pipelines;

@@ -1,6 +1,6 @@
 // A trajectory: as it is, and as a compressed one. Frames read are whole, and are written and read back the same.
-#include "pipelines/errors.hpp"
-#include "pipelines/trajectory.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::pipelines;

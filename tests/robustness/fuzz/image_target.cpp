@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <opencv2/core/utils/logger.hpp>
 
-#include "ingest/find_disks.hpp"
-#include "ingest/frames.hpp"
-#include "sim/checkpoint_bytes.hpp"
+#include "ingest/find/find_disks.hpp"
+#include "ingest/frames/frames.hpp"
+#include "sim/engine/checkpoint_bytes.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::ingest;

@@ -1,6 +1,6 @@
 // A recipe: parsed, written, parsed again; decoded into a plan whose resolved form is a recipe itself.
-#include "pipelines/json.hpp"
-#include "pipelines/plan.hpp"
+#include "pipelines/formats/json.hpp"
+#include "pipelines/runner/plan.hpp"
 #include "tests/robustness/fuzz/fuzz.hpp"
 
 using namespace shakebed::pipelines;

@@ -1,0 +1,182 @@
+#include <gsl/gsl_cdf.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "fit/profile_fit/fit_profile.hpp"
+#include "statistics/correlated_series.hpp"
+
+namespace shakebed::fit {
+
+namespace {
+
+bool shape_is_good(const ProfileFrames& frames, std::string& message) {
+  const std::size_t bins = frames.height.size();
+  if (bins == 0 || frames.number_density.empty()) {
+    message = "there are no frames";
+    return false;
+  }
+  if (frames.number_density.size() % bins != 0) {
+    message = "the densities are not a whole number of frames of " + std::to_string(bins) + " bins";
+    return false;
+  }
+  for (const double value : frames.number_density) {
+    if (!std::isfinite(value)) {
+      message = "a density is not a finite number";
+      return false;
+    }
+  }
+  for (const double value : frames.height) {
+    if (!std::isfinite(value)) {
+      message = "a height is not a finite number";
+      return false;
+    }
+  }
+  return true;
+}
+
+// The frames one by one, and the windows by which they are judged.
+struct Samples {
+  std::vector<double> mean;
+  std::vector<std::vector<double>> frames;
+  statistics::Windows windows;
+};
+Samples samples_of(const ProfileFrames& frames) {
+  const std::size_t bins = frames.height.size(), count = frames.frames();
+  Samples samples;
+  samples.mean.assign(bins, 0.0);
+  std::vector<double> height(count, 0.0);
+  for (std::size_t f = 0; f < count; ++f) {
+    const double* frame = frames.number_density.data() + f * bins;
+    samples.frames.emplace_back(frame, frame + bins);
+    for (std::size_t i = 0; i < bins; ++i) {
+      samples.mean[i] += frame[i] / static_cast<double>(count);
+      height[f] += frames.height[i] * frame[i];
+    }
+  }
+  height = statistics::from_mean(std::move(height));
+  samples.windows = statistics::windows_for(statistics::memory_of(height), height);
+  return samples;
+}
+
+// Normal variates, the same on every platform.
+double normal(std::mt19937_64& generator) {
+  return gsl_cdf_ugaussian_Pinv((static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53);
+}
+
+}  // namespace
+
+FrameAverage average_frames(const ProfileFrames& frames) {
+  FrameAverage average;
+  if (shape_is_good(frames, average.message) && frames.frames() < 2) average.message = "there is one frame only";
+  if (!average.message.empty()) {
+    average.status = FitStatus::bad_input;
+    return average;
+  }
+  const Samples samples = samples_of(frames);
+  const std::size_t bins = frames.height.size();
+  average.window = static_cast<int>(samples.windows.length);
+  Profile& profile = average.profile;
+  profile.height = frames.height;
+  profile.number_density = samples.mean;
+  profile.covariance_samples = static_cast<int>(samples.windows.independent);
+  profile.covariance = statistics::covariance_by_windows(samples.frames, 0, bins, samples.windows);
+  for (std::size_t i = 0; i < bins; ++i) profile.std_error.push_back(std::sqrt(profile.covariance[i * bins + i]));
+  return average;
+}
+
+BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& options,
+                              const BootstrapOptions& bootstrap) {
+  BootstrapResult result;
+  if (shape_is_good(frames, result.message)) {
+    if (frames.frames() < 2)
+      result.message = "there is one frame only";
+    else if (bootstrap.resamples < 10 || !(bootstrap.confidence > 0.0 && bootstrap.confidence < 1.0))
+      result.message = "at least 10 resamples and a confidence between 0 and 1 are needed";
+  }
+  if (!result.message.empty()) {
+    result.status = FitStatus::bad_input;
+    return result;
+  }
+  const Samples samples = samples_of(frames);
+  const std::size_t bins = frames.height.size(), count = frames.frames(), window = samples.windows.length;
+  result.window = static_cast<int>(window);
+  // Weighed by the scatter of single frames, which is well known. By errors from a few windows, what these happen to
+  // show little of would weigh much, and scatter little by the same windows.
+  Profile profile;
+  profile.height = frames.height;
+  profile.number_density = samples.mean;
+  const statistics::Windows single{1, 1, count};
+  for (std::size_t i = 0; i < bins; ++i)
+    profile.std_error.push_back(std::sqrt(statistics::covariance_by_windows(samples.frames, i, i + 1, single).front()));
+  FitOptions plain = options;
+  plain.interval = plain.sweep = plain.compare = false;
+  plain.curve_points = 0;
+  const FitResult whole = fit_profile(profile, plain);
+  if (!whole.ok()) {
+    result.status = whole.status;
+    result.message = whole.message;
+    return result;
+  }
+  // Every resample is fitted on the window of the whole sample.
+  plain.window.low = whole.window_low;
+  plain.window.high = whole.window_high;
+  std::mt19937_64 generator(bootstrap.seed);
+  std::vector<double> temperatures;
+  std::vector<double> shifts;
+  // Of the sum over a window, so that the resamples' covariance is that by windows.
+  const double share = std::sqrt(samples.windows.correction / statistics::window_divisor(count, window));
+  for (int resample = 0; resample < bootstrap.resamples; ++resample) {
+    std::vector<double> before{0.0};  // the sum of the variates of the windows that begin before each frame
+    for (std::size_t w = 0; w < count; ++w)
+      before.push_back(before.back() + (w + window <= count ? share * normal(generator) : 0.0));
+    profile.number_density = samples.mean;
+    for (std::size_t f = 0; f < count; ++f) {
+      // Of all windows that the frame is in.
+      const double weight = before[f + 1] - before[f + 1 < window ? 0 : f + 1 - window];
+      for (std::size_t i = 0; i < bins; ++i)
+        profile.number_density[i] += weight * (samples.frames[f][i] - samples.mean[i]);
+    }
+    const FitResult fit = fit_profile(profile, plain);
+    if (!fit.ok()) continue;
+    temperatures.push_back(fit.temperature.value);
+    shifts.push_back(fit.shift.value);
+  }
+  result.succeeded = static_cast<int>(temperatures.size());
+  if (result.succeeded < bootstrap.resamples / 2) {
+    result.status = FitStatus::not_converged;
+    result.message = "only " + std::to_string(result.succeeded) + " of the resamples could be fitted";
+    return result;
+  }
+  const double degrees = std::max(1.0, static_cast<double>(samples.windows.independent) - 1.0);
+  const auto summarise = [&](std::vector<double>& values, double centre, Estimate& estimate, Interval& interval) {
+    std::sort(values.begin(), values.end());
+    double sum = 0.0;
+    for (const double value : values) sum += value;
+    const double mean = sum / static_cast<double>(values.size());
+    double variance = 0.0;
+    for (const double value : values) variance += (value - mean) * (value - mean);
+    estimate = {centre, std::sqrt(variance / static_cast<double>(values.size() - 1)), false};
+    const auto quantile = [&](double fraction) {
+      const double position = fraction * static_cast<double>(values.size() - 1);
+      const auto i = static_cast<std::size_t>(position);
+      const double part = position - static_cast<double>(i);
+      return i + 1 < values.size() ? (1.0 - part) * values[i] + part * values[i + 1] : values.back();
+    };
+    interval.status = FitStatus::ok;
+    interval.confidence = bootstrap.confidence;
+    // Percentiles, moved apart as Student's are from the normal ones: the windows are few.
+    const double upper = 0.5 * (1.0 + bootstrap.confidence);
+    const double apart = gsl_cdf_tdist_Pinv(upper, degrees) / gsl_cdf_ugaussian_Pinv(upper);
+    interval.low = centre + apart * (quantile(1.0 - upper) - centre);
+    interval.high = centre + apart * (quantile(upper) - centre);
+  };
+  summarise(temperatures, whole.temperature.value, result.temperature, result.temperature_interval);
+  summarise(shifts, whole.shift.value, result.shift, result.shift_interval);
+  result.temperatures = std::move(temperatures);
+  return result;
+}
+
+}  // namespace shakebed::fit

@@ -1,0 +1,35 @@
+#pragma once
+// A map of where disks may be: chi-squared of an ideal disk and rim contrast, at the scale where a disk is a few pixels
+// wide.
+
+#include <vector>
+
+#include "ingest/calibrate/calibration.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// A place where an ideal disk fits.
+struct DiskCandidate {
+  double x = 0, y = 0;  // px of the full frame
+  double score = 0;     // 2 for a perfect lone disk, about 1 for one among touching ones, 0 on empty background
+};
+
+// Factor by which a frame is reduced for the map of disks of this radius (their radius becomes 4.5 to 9 px, or stays).
+int map_reduction(double radius_px);
+
+// Local maxima of the map of `small` (a flattened frame reduced by `factor`) for disks of `radius_px` full pixels, with
+// a score of at least `least_score`, the best first; of two nearer than `least_distance_px` only the better stays. The
+// map reaches 0.8 radii beyond the frame, where cut disks have their centres.
+std::vector<DiskCandidate> find_candidates(const GrayFrame& small, int factor, double radius_px, double least_score,
+                                           double least_distance_px);
+
+// The same from the bead's learned profile: the frame is a sum of beads, and the filter that turns each of them into a
+// narrow peak of height 1, as well as the noise (sigma, contrast units of the full frame) allows, tells a strongly
+// blurred crystal's beads from its voids, which the ideal disk alone does not (Wiener's filter). `small` must not have
+// been smoothed.
+std::vector<DiskCandidate> find_matched_candidates(const GrayFrame& small, int factor, const BeadProfile& profile,
+                                                   double radius_px, double noise, double least_score,
+                                                   double least_distance_px);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,127 @@
+#pragma once
+// Disks in a frame, to a hundredth of a pixel, with nothing to guess.
+//
+// Flatten -> chi-squared map of an ideal disk -> interior test -> joint least squares over touching neighbours with the
+// bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/calibrate/calibration.hpp"
+#include "ingest/calibrate/flatten.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// One disk found. Centre in the pixel-centre convention.
+struct FoundDisk {
+  double x_px = 0, y_px = 0;
+  double radius_px = 0;                   // of the species, one value a film
+  double variance_x = 0, variance_y = 0;  // px^2, from the fit's curvature and the frame's noise
+  double covariance_xy = 0;               // px^2
+  double quality = 0;                     // 0 .. 1: 1 is a bead like all the others
+  double contrast = 0;                    // its own contrast, 1 for a typical bead
+  bool cut = false;                       // cut by the border of the frame or of the region of interest
+  bool half_hidden = false;               // part of it does not look like a bead: covered, out of focus, in shadow
+};
+
+// Everything is found when left alone; each member overrides one finding.
+struct FindOptions {
+  Polarity polarity = Polarity::automatic;
+  std::optional<double> radius_px;    // a first value, refined unless hold_radius
+  bool hold_radius = false;           // keep radius_px exactly
+  std::optional<PixelRectangle> roi;  // centres outside are not reported
+  int joint_fit_sweeps =
+      20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
+  bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge
+  bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
+  bool learn_rim = false;         // fill FindResult::profile
+};
+
+// What is common to all frames of a film, learned from its first frames.
+struct FinderCalibration {
+  Polarity polarity = Polarity::automatic;
+  double radius_px = 0;
+  double radius_std_error_px = 0;
+  double rim_radius_px = 0;         // where the recorded profile has its edge: radius_px unless the tone curve moves it
+  double edge_width_px = 0;         // sigma of the blurred edge, the pixel's own 0.29 px included
+  double noise_level = 0;           // sigma of the residuals in grey levels, away from edges
+  double contrast_level = 0;        // bead minus background, grey levels, at the middle of the frame
+  bool radius_of_all_rims = false;  // told from the profile below, the rims of all beads, not from open ones alone
+  double tone_exponent = 1;         // recorded level = light^exponent, told from the rims; 1 for a linear camera
+  bool solid_borders = false;       // floor, walls or lid are in view; each frame is searched without them
+  int width = 0, height = 0;        // of the frames it was learned from
+  BeadProfile profile;
+  LightField light;
+  std::vector<float> level_deciles;  // of the first of its frames: 10 %, 20 % .. 90 %
+  std::size_t frames_used = 0;
+  std::size_t disks_used = 0;
+  std::vector<std::string> warnings;  // plain sentences
+};
+
+struct FindResult {
+  std::vector<FoundDisk> disks;  // from top to bottom, then left to right
+  std::size_t rejected = 0;      // disks of another size or clarity seen and not reported
+  double residual_level = 0;     // rms of frame - model over the beads, grey levels
+  FrameLight light;              // of this frame
+  std::size_t steps = 0;         // of single beads, in fitting them
+  std::string why_nothing;       // a sentence when disks is empty
+  BeadProfile profile;           // learned from this frame's beads, if asked for
+  std::size_t profile_beads = 0;
+  [[nodiscard]] bool empty() const { return disks.empty(); }
+};
+
+// Learns from frames of one film (all of one size; two or three suffice). `found == false` with a reason when the
+// frames show no disks: a blank frame, noise, something else.
+struct LearnedBeads;
+struct CalibrationResult {
+  bool found = false;
+  FinderCalibration calibration;
+  std::string why_not;
+  std::shared_ptr<LearnedBeads> beads;  // for tell_radius()
+};
+CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+
+// The same in two parts, for who may have to learn again from frames put right: all that finding needs, radius_px being
+// that of the rims as recorded, ...
+CalibrationResult learn_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
+// ... the same from frames that differ by less than a hundredth in place from those of `before` ...
+CalibrationResult learn_again(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                              const FinderCalibration& before);
+// ... and the radius behind shading, blur and tone curve, with its error.
+void tell_radius(CalibrationResult& result);
+
+// The frame with floor, walls and lid unseen (see solid_borders.hpp).
+GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration);
+
+// Finds the disks of one frame of that film. Depends on nothing but its arguments. Throws std::invalid_argument when
+// the frame's pixel count is not width * height.
+FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options = {});
+
+// The radius from several frames' rims: their profiles averaged. Frames in any order; the result depends on the order
+// only by rounding.
+constexpr std::size_t rim_frames = 10;  // of a film are enough
+class RadiusFromFrames {
+ public:
+  void add(const FindResult& found);  // found with learn_rim
+  // Puts radius and error into the calibration the frames were searched with; leaves it alone when the frames tell
+  // nothing new.
+  void refine(FinderCalibration& calibration) const;
+
+ private:
+  double step_px_ = 0;
+  std::vector<double> sums_;
+  std::size_t beads_ = 0, frames_ = 0;
+};
+
+// Both in one call, for a single photograph.
+FindResult find_disks(const GrayFrame& frame, const FindOptions& options = {},
+                      FinderCalibration* calibration_found = nullptr);
+
+// The frame minus the model of background and found disks, in grey levels: what the model does not explain.
+GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const FinderCalibration& calibration);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,58 @@
+#pragma once
+// Pixels that are not square and lenses that bend: frames made such that a bead is a circle of one size everywhere.
+
+#include <string>
+#include <vector>
+
+#include "ingest/find/find_disks.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// What turns recorded places into true ones: columns are stretched by `pixel_aspect` (the length a pixel spans across
+// over the length it spans upwards), then a point at distance r from the middle moves to r (1 + radial (r/h)^2), h half
+// the diagonal: positive undoes a barrel, negative a pincushion; the corners move by h * radial.
+struct Lens {
+  double pixel_aspect = 1;
+  double radial = 0;
+  [[nodiscard]] bool plain() const { return pixel_aspect == 1 && radial == 0; }
+};
+
+struct PixelPlace {
+  double x = 0, y = 0;
+};
+
+// The lens for frames of one size. True frames are as high as recorded ones and as much wider as their pixels are, with
+// a margin for what a barrel's corners move out. Both in the pixel-centre convention.
+class LensMap {
+ public:
+  // Throws std::invalid_argument for an aspect outside 0.5 .. 2 or a radial term outside -0.3 .. 0.3.
+  LensMap(const Lens& lens, int recorded_width, int recorded_height);
+  [[nodiscard]] const Lens& lens() const { return lens_; }
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] PixelPlace to_true(PixelPlace recorded) const;
+  [[nodiscard]] PixelPlace to_recorded(PixelPlace seen) const;
+  // The frame as a plain camera would have recorded it (cubic interpolation; beyond its border its outermost pixels).
+  [[nodiscard]] GrayFrame corrected(const GrayFrame& recorded) const;
+
+ private:
+  [[nodiscard]] double shrink(double q) const;
+
+  Lens lens_;
+  int recorded_width_, recorded_height_, width_, height_;
+  double margin_x_ = 0, margin_y_ = 0;
+  double middle_x_ = 0, middle_y_ = 0, half_diagonal_ = 1;  // stretched, without the margin
+};
+
+// What is left of aspect and radial term in frames that were taken for plain, from the beads' own rims: least squares
+// of the residual on how rims would move, over all whole disks.
+struct LensEstimate {
+  bool known = false;  // enough disks
+  Lens lens;
+  double aspect_std_error = 0, radial_std_error = 0;
+};
+LensEstimate estimate_lens(const std::vector<const GrayFrame*>& frames, const std::vector<FindResult>& found,
+                           const FinderCalibration& calibration);
+
+}  // namespace shakebed::ingest

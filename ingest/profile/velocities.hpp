@@ -1,0 +1,69 @@
+#pragma once
+// Velocities and kinetic temperatures from disks linked between frames that follow closely.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "ingest/profile/measure_bed.hpp"
+
+namespace shakebed::ingest {
+
+struct VelocityOptions {
+  double frame_rate_hz = 0;  // required, > 0
+  double gravity_m_per_s2 = 9.81;
+  double largest_step = 0.45;   // D between two frames; beyond it neighbours could be mistaken for one another
+  double flow_bin_width = 1.0;  // D: the mean flow is that of each height bin and each pair of frames
+};
+
+// One disk followed from frame to the next.
+struct Link {
+  std::size_t frame = 0;         // the earlier of the two
+  std::size_t from = 0, to = 0;  // places in Measurement::disks
+};
+
+struct KineticTemperature {
+  double over_mg_m = 0;            // T/(m g), m: <(v - flow)^2>/g of one component
+  double std_error_m = 0;          // by windows of frames
+  double localisation_bias_m = 0;  // what was taken off: 2 sigma^2/(g dt^2)
+  double finite_time_factor = 1;   // what it was multiplied by: 1 + the loss of speed over dt by collisions
+};
+
+struct VelocityMeasurement {
+  KineticTemperature horizontal, vertical;
+  std::size_t links = 0;
+  double linked_share = 0;            // of the disks that could have been linked
+  double mean_step = 0;               // D between frames
+  std::vector<std::string> warnings;  // plain sentences, e.g. that the frames follow too slowly
+};
+
+// Links each disk to the only one nearer than largest_step in the next frame, if both agree that they are nearest.
+std::vector<Link> link_disks(const Measurement& measurement, double largest_step);
+
+// T_x and T_z of the linked disks. The flow of each height bin in each pair of frames is removed (with the loss of one
+// degree of freedom a bin restored); the localisation error's share is subtracted, told from the stated variances; the
+// finite-time loss is told from the velocity's own correlation between successive steps, C(dt)/C(0) = exp(-dt/tau), for
+// which the mean over dt of a velocity with that memory has 2 (x - 1 + exp(-x))/x^2 of the variance, x = dt/tau.
+// Throws std::invalid_argument without a frame rate.
+VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options);
+
+// The same while frames come in, in bounded memory: stretches of `stretch_frames` frames are measured one after another
+// (each begins with the last frame of the one before), T is their mean, its error by windows of them.
+class VelocityMeter {
+ public:
+  // `bead_diameter_m`: D in metres.
+  VelocityMeter(double bead_diameter_m, const VelocityOptions& options, std::size_t stretch_frames = 50);
+  void add(const std::vector<MeasuredDisk>& disks_of_frame);
+  VelocityMeasurement result();
+
+ private:
+  void measure_stretch();
+  double bead_diameter_m_;
+  VelocityOptions options_;
+  std::size_t stretch_frames_;
+  Measurement stretch_;
+  std::size_t frames_ = 0;  // in the stretch
+  std::vector<VelocityMeasurement> measured_;
+};
+
+}  // namespace shakebed::ingest

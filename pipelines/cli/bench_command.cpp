@@ -1,0 +1,33 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/formats/errors.hpp"
+
+namespace shakebed::pipelines {
+
+int command_bench(const Arguments& arguments) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path here = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (const fs::path& place : {here / SHAKEBED_BENCH_FROM_PROGRAM, fs::path(SHAKEBED_BENCH_IN_BUILD)}) {
+    if (!fs::is_regular_file(place, error)) continue;
+    std::vector<char*> words;
+    std::string name = "shakebed bench";
+    words.push_back(name.data());
+    for (std::size_t i = 2; i < arguments.command_line.size(); ++i)
+      words.push_back(const_cast<char*>(arguments.command_line[i].c_str()));
+    words.push_back(nullptr);
+    ::execv(place.c_str(), words.data());
+    throw StageError(fmt::format("{}: cannot be started: {}", place.string(), std::strerror(errno)));
+  }
+  throw StageError(
+      "the program shakebed-bench is not installed; build it with: cmake --build --preset release --target "
+      "shakebed_bench");
+}
+
+}  // namespace shakebed::pipelines

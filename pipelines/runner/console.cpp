@@ -1,0 +1,81 @@
+#include "pipelines/runner/console.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace shakebed::pipelines {
+
+Console::Console(Level level) : level_(level), terminal_(::isatty(STDERR_FILENO) == 1) {}
+Console::~Console() { end_progress(); }
+
+void Console::write(std::string_view prefix, std::string_view line) {
+  const std::lock_guard lock(mutex_);
+  std::string text;
+  if (line_open_) text += "\r\033[K";
+  line_open_ = false;
+  text += prefix;
+  text += line;
+  text += '\n';
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+void Console::message(std::string_view line) {
+  if (level_ != Level::quiet) write("", line);
+}
+void Console::detail(std::string_view line) {
+  if (level_ == Level::verbose) write("", line);
+}
+void Console::warning(std::string_view line) { write("warning: ", line); }
+void Console::error(std::string_view line) { write("error: ", line); }
+
+void Console::progress(std::string_view what, double fraction, std::string_view note) {
+  if (level_ == Level::quiet) return;
+  const std::lock_guard lock(mutex_);
+  const auto now = Clock::now();
+  if (what != progress_of_) {
+    progress_of_ = what;
+    progress_since_ = progress_shown_ = now;
+    shown_fraction_ = 0;
+    return;
+  }
+  fraction = std::clamp(fraction, 0.0, 1.0);
+  const double since_shown = std::chrono::duration<double>(now - progress_shown_).count();
+  const double elapsed = std::chrono::duration<double>(now - progress_since_).count();
+  const bool show =
+      terminal_ ? since_shown >= 0.1 : since_shown >= 20 || (fraction >= shown_fraction_ + 0.1 && since_shown >= 2);
+  if (!show) return;
+  progress_shown_ = now;
+  shown_fraction_ = fraction;
+  std::string left;
+  if (fraction > 0.02 && elapsed > 0.5)
+    left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / fraction));
+  const std::string line = fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
+  if (terminal_) {
+    std::fputs(("\r\033[K" + line.substr(0, 118)).c_str(), stderr);
+    std::fflush(stderr);
+    line_open_ = true;
+  } else {
+    std::fputs((line + "\n").c_str(), stderr);
+  }
+}
+
+void Console::end_progress() {
+  const std::lock_guard lock(mutex_);
+  if (line_open_) std::fputs("\r\033[K", stderr);
+  line_open_ = false;
+  progress_of_.clear();
+}
+
+std::string duration_text(double seconds) {
+  if (seconds < 0.0995) return fmt::format("{:.0f} ms", seconds * 1e3);
+  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  const auto whole = static_cast<long>(std::lround(seconds));
+  if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
+  return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,138 @@
+#include "pipelines/runner/manifest.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <ctime>
+
+#include "pipelines/formats/files.hpp"
+#include "pipelines/version.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+std::string program_version() { return SHAKEBED_VERSION; }
+std::string source_revision() { return SHAKEBED_REVISION; }
+std::string compiler_text() {
+#if defined(__clang__)
+  return fmt::format("clang {}.{}.{}", __clang_major__, __clang_minor__, __clang_patchlevel__);
+#else
+  return fmt::format("g++ {}.{}.{}", __GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__);
+#endif
+}
+std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+
+namespace {
+Json file_entry(const std::string& name, std::uint64_t bytes, const std::string& sha) {
+  return Json{{"file", name}, {"bytes", bytes}, {"sha256", sha}};
+}
+}  // namespace
+
+Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome& outcome, const std::string& started) {
+  Json out;
+  out["pipeline"] = plan.name;
+  out["shakebed"] = program_version();
+  out["git"] = source_revision();
+  out["compiler"] = compiler_text();
+  out["build_type"] = SHAKEBED_BUILD_TYPE;
+  char host[256] = "?";
+  ::gethostname(host, sizeof host - 1);
+  out["host"] = host;
+  out["command_line"] = options.command_line;
+  out["started"] = started;
+  out["finished"] = utc_now();
+  out["wall_seconds"] = outcome.wall_seconds;
+  out["exit_code"] = static_cast<int>(outcome.code);
+  if (!outcome.error.empty()) out["error"] = outcome.error;
+  out["warnings"] = outcome.warnings;
+  out["failed_checks"] = outcome.failed_checks;
+  Json recipe;
+  recipe["file"] = plan.file;
+  std::error_code error;
+  if (fs::is_regular_file(plan.file, error)) {
+    recipe["sha256"] = sha256_of_file(plan.file);
+    recipe["directory"] = fs::absolute(plan.directory, error).string();
+  }
+  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
+  recipe["settings"] = Json::object();
+  for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
+  out["recipe"] = std::move(recipe);
+  out["document"] = plan.document.to_json();
+  out["stages"] = Json::array();
+  for (std::size_t i = 0; i < outcome.stages.size(); ++i) {
+    const StageOutcome& stage = outcome.stages[i];
+    Json entry;
+    entry["id"] = stage.id;
+    entry["stage"] = stage.kind;
+    entry["version"] = plan.stages[i].row->version;
+    if (plan.stages[i].row->uses_seed) entry["seed"] = plan.stages[i].seed;
+    entry["state"] = to_string(stage.state);
+    if (!stage.reasons.empty()) entry["why"] = stage.reasons;
+    if (!stage.error.empty()) entry["error"] = stage.error;
+    if (stage.record) {
+      entry["wall_seconds"] = stage.record->wall_seconds;
+      entry["cpu_seconds"] = stage.record->cpu_seconds;
+      if (!stage.record->timings.empty()) entry["timings"] = stage.record->timings;
+      entry["warnings"] = stage.record->warnings;
+      entry["inputs"] = Json::array();
+      for (const Fingerprint& file : stage.record->inputs) {
+        if (!file.sha256.empty()) entry["inputs"].push_back(file_entry(file.file, file.bytes, file.sha256));
+      }
+      for (const auto& [pointer, path] : plan.stages[i].input_files) {
+        if (!fs::is_regular_file(path, error)) continue;
+        Json external = file_entry(path, fs::file_size(path, error), sha256_of_file(path));
+        external["external"] = true;
+        entry["inputs"].push_back(std::move(external));
+      }
+      entry["outputs"] = Json::array();
+      for (const Fingerprint& file : stage.record->outputs) {
+        entry["outputs"].push_back(file_entry(stage.id + "/" + file.file, file.bytes, file.sha256));
+      }
+    }
+    out["stages"].push_back(std::move(entry));
+  }
+  out["outputs"] = Json::array();
+  for (const char* name : {"resolved.json", "summary.json", "summary.md", "report.html"}) {
+    const fs::path path = outcome.out / name;
+    if (fs::is_regular_file(path, error))
+      out["outputs"].push_back(file_entry(name, fs::file_size(path), sha256_of_file(path)));
+  }
+  return out;
+}
+
+VerifyResult verify_output(const fs::path& out) {
+  const Json manifest = read_json(out / "manifest.json");
+  VerifyResult result;
+  const auto check = [&](const Json& entry) {
+    const std::string name = entry.value("file", std::string());
+    const bool external = entry.value("external", false);
+    const fs::path path = external ? fs::path(name) : out / name;
+    ++result.files;
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) {
+      result.problems.push_back(name + ": missing");
+    } else if (sha256_of_file(path) != entry.value("sha256", std::string())) {
+      result.problems.push_back(name + ": changed since the run");
+    }
+  };
+  try {
+    for (const Json& stage : manifest.at("stages")) {
+      if (stage.contains("outputs")) {
+        for (const Json& entry : stage["outputs"]) check(entry);
+      }
+      if (stage.contains("inputs")) {
+        for (const Json& entry : stage["inputs"]) {
+          if (entry.value("external", false)) check(entry);
+        }
+      }
+    }
+    for (const Json& entry : manifest.at("outputs")) check(entry);
+  } catch (const nlohmann::json::exception&) {
+    throw InputError((out / "manifest.json").string() + ": is not a manifest of ours");
+  }
+  return result;
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,83 @@
+// Running a plan: what is up to date is kept, the rest is made, all or nothing for each stage.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipelines/runner/cache.hpp"
+#include "pipelines/runner/console.hpp"
+#include "pipelines/runner/plan.hpp"
+
+namespace shakebed::pipelines {
+
+struct RunOptions {
+  std::filesystem::path out;
+  std::optional<std::string> only, from, until;  // ids
+  bool force = false;                            // run what is selected even when it is up to date
+  int jobs = 0;                                  // threads; 0: as many as there are processors
+  std::vector<std::string> command_line;         // for the manifest
+  std::vector<Setting> settings;                 // for the manifest: what --set changed
+};
+
+enum class StageState { ran, kept, not_selected, failed, interrupted, waiting };
+std::string_view to_string(StageState state);
+
+struct StageOutcome {
+  std::string id, kind;
+  StageState state = StageState::waiting;
+  std::vector<std::string> reasons{};   // why it ran (or would)
+  std::optional<StageRecord> record{};  // what is there now
+  std::string error{};
+};
+
+struct RunOutcome {
+  ExitCode code = exit_ok;
+  std::vector<StageOutcome> stages;
+  std::vector<std::string> failed_checks, warnings;
+  std::string error;  // what stopped it
+  double wall_seconds = 0;
+  std::filesystem::path out;
+};
+
+// Runs the stages of a plan below out. Stops at the first that fails; everything finished before is kept. Does not
+// throw for what goes wrong in a stage. `label` stands before messages (the point of a sweep); no console: silent.
+void run_stages(const Plan& plan, const RunOptions& options, Console* console, RunOutcome& outcome);
+
+// The whole: takes the lock on OUT, runs the stages, writes resolved.json, summary.json, report.html and manifest.json.
+RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& console);
+
+// What a run would do, without doing it: stages with state `kept` or `waiting` and the reasons.
+std::vector<StageOutcome> explain(const Plan& plan, const RunOptions& options);
+// As lines for people: "bed: runs: floor/amplitude changed ...".
+std::string explanation_text(const std::vector<StageOutcome>& stages);
+
+// Ctrl-C and SIGTERM ask running stages to stop; a second one ends the program at once.
+void install_interrupt_handler();
+bool interrupt_requested();
+
+// An exclusive lock on a folder, held by the kernel for as long as this process lives: a killed run leaves none behind.
+class FolderLock {
+ public:
+  // Throws StageError naming the process that works there.
+  explicit FolderLock(const std::filesystem::path& folder);
+  FolderLock(FolderLock&& other) noexcept : descriptor_(other.descriptor_), path_(other.path_) {
+    other.descriptor_ = -1;
+  }
+  ~FolderLock();
+
+ private:
+  int descriptor_ = -1;
+  std::filesystem::path path_;
+};
+
+// summary.json: the numbers of every stage under its id.
+Json summary_json(const Plan& plan, const RunOutcome& outcome);
+// Removes what a killed run left half-written in OUT. What unfinished stages keep in their scratch folders stays.
+void remove_leftovers(const std::filesystem::path& out);
+inline constexpr std::string_view scratch_name = ".scratch";
+// Where a stage keeps what must outlive a kill: OUT/.scratch/<id>/<key of its work>. Removed when the stage finished.
+std::filesystem::path scratch_folder(const std::filesystem::path& out, const StageRecord& fresh);
+
+}  // namespace shakebed::pipelines

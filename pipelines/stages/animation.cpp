@@ -1,0 +1,203 @@
+#include "pipelines/stages/animation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "pipelines/formats/trajectory.hpp"
+
+namespace shakebed::pipelines {
+
+namespace {
+
+constexpr std::size_t most_disks = 5000, most_frames = 96, most_positions = 200'000;
+
+// Plays what `scene` describes on the canvas in `figure`. Positions are 16-bit fractions of the drawn width and height.
+// Colours follow the page's; who asked for less motion gets a bed at rest and a button.
+constexpr std::string_view player = R"js(
+(() => {
+  const figure = document.getElementById("bed-in-motion"), scene = JSON.parse(figure.dataset.scene);
+  const bytes = Uint8Array.from(atob(figure.dataset.positions), c => c.charCodeAt(0));
+  const at = new Uint16Array(bytes.buffer), n = scene.radius.length, frames = scene.floor.length;
+  const canvas = figure.querySelector("canvas"), context = canvas.getContext("2d");
+  const button = figure.querySelector("button"), slider = figure.querySelector("input"), text = figure.querySelector("output");
+  figure.classList.add("plays");
+  let shown = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, since = 0;
+  const draw = () => {
+    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, margin = 0.6;
+    const unit = width / (scene.width + 2 * margin), height = Math.round(unit * (scene.high - scene.low));
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); canvas.style.height = height + "px";
+    }
+    const css = getComputedStyle(figure), colors = [css.getPropertyValue("--disk-a"), css.getPropertyValue("--disk-b")];
+    const x = v => (v + margin) * unit, y = v => (scene.high - v) * unit;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    for (const tone of [0, 1]) {
+      context.beginPath();
+      for (let i = 0; i < n; ++i) {
+        if (scene.tone[i] !== tone) continue;
+        const k = 2 * (shown * n + i), r = Math.max(0.5, scene.radius[i] * unit - 0.4);
+        const cx = x(at[k] / 65535 * scene.width), cy = y(scene.low + at[k + 1] / 65535 * (scene.high - scene.low));
+        context.moveTo(cx + r, cy); context.arc(cx, cy, r, 0, 2 * Math.PI);
+      }
+      context.fillStyle = colors[tone]; context.fill();
+    }
+    context.strokeStyle = css.color; context.lineWidth = Math.max(1, 0.12 * unit); context.beginPath();
+    const floor = y(scene.floor[shown]);
+    if (scene.walls) { context.moveTo(x(0), 0); context.lineTo(x(0), floor); context.lineTo(x(scene.width), floor); context.lineTo(x(scene.width), 0); }
+    else { context.moveTo(x(0), floor); context.lineTo(x(scene.width), floor); }
+    context.stroke();
+    slider.value = shown; text.textContent = scene.label[shown];
+    figure.dataset.drawn = Number(figure.dataset.drawn || 0) + 1;
+  };
+  const step = now => {
+    if (playing) {
+      if (now - since >= 50) { since = now; shown = (shown + 1) % frames; draw(); }
+      requestAnimationFrame(step);
+    }
+  };
+  const set = on => { playing = on && frames > 1; button.textContent = playing ? "Pause" : "Play"; if (playing) requestAnimationFrame(step); };
+  button.onclick = () => set(!playing);
+  slider.max = frames - 1;
+  slider.oninput = () => { set(false); shown = Number(slider.value); draw(); };
+  new ResizeObserver(draw).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  draw(); set(playing);
+})();
+)js";
+
+std::string numbers(const std::vector<double>& values) {
+  std::string out = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) out += fmt::format("{}{:.4g}", i == 0 ? "" : ",", values[i]);
+  return out + "]";
+}
+
+// One frame without a script.
+std::string still_picture(const TrajectoryFrame& frame, double low, double high) {
+  std::string svg = fmt::format(
+      "<svg viewBox=\"-0.6 {:.3f} {:.3f} {:.3f}\" style=\"max-height:70vh;width:100%\" role=\"img\" "
+      "aria-label=\"the bed at one moment\">\n<g fill=\"var(--disk-a)\">\n",
+      -high, frame.width + 1.2, high - low);
+  for (std::size_t i = 0; i < frame.size(); ++i)
+    svg += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\"/>", frame.x[i], -frame.z[i],
+                       frame.radius.empty() ? 0.5 : frame.radius[i]);
+  return svg + fmt::format(
+                   "</g>\n<path d=\"M0 {:.3f}V{:.3f}H{:.3f}V{:.3f}\" fill=\"none\" stroke=\"currentColor\" "
+                   "stroke-width=\"0.12\"/></svg>",
+                   -high, -frame.floor_position, frame.width, -high);
+}
+
+}  // namespace
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](std::size_t k) -> unsigned {
+      return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u;
+    };
+    const unsigned word = byte(0) << 16 | byte(1) << 8 | byte(2);
+    out += digits[word >> 18];
+    out += digits[word >> 12 & 63];
+    out += i + 1 < bytes.size() ? digits[word >> 6 & 63] : '=';
+    out += i + 2 < bytes.size() ? digits[word & 63] : '=';
+  }
+  return out;
+}
+
+std::string animation_html(const std::filesystem::path& trajectory, double period) {
+  // The first frames, as many as a page can carry.
+  std::vector<TrajectoryFrame> frames;
+  {
+    TrajectoryReader reader(trajectory);
+    TrajectoryFrame frame;
+    std::size_t most = most_frames;
+    while (frames.size() < most && reader.read(frame)) {
+      if (frame.size() == 0 || frame.size() > most_disks) return "";
+      most = std::clamp<std::size_t>(most_positions / frame.size(), 1, most_frames);
+      if (!frames.empty() && frame.size() != frames.front().size()) break;
+      frames.push_back(frame);
+    }
+  }
+  if (frames.empty()) return "";
+  const TrajectoryFrame& first = frames.front();
+  const std::size_t n = first.size();
+
+  // Played as time went, or by the floor's phase: cycle after cycle, each made of one frame of every phase.
+  std::vector<std::size_t> order(frames.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const bool strobe = period > 0 && frames.size() > 1 && frames[1].time - frames[0].time > period / 8;
+  if (strobe) {
+    std::vector<std::size_t> times_seen(frames.size(), 0);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      for (std::size_t k = 0; k < i; ++k) times_seen[i] += frames[k].phase == frames[i].phase;
+    }
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return std::pair(times_seen[a], frames[a].phase) < std::pair(times_seen[b], frames[b].phase);
+    });
+  }
+
+  double high = 1, low = 0;
+  for (const TrajectoryFrame& frame : frames) {
+    low = std::min(low, frame.floor_position);
+    for (std::size_t i = 0; i < n; ++i)
+      high = std::max(high, frame.z[i] + (frame.radius.empty() ? 0.5 : frame.radius[i]));
+  }
+  high += 0.3, low -= 0.3;
+  // Not taller than twice its width: of a disk thrown far up only the bed below is worth a page.
+  high = std::min(high, low + std::max(2 * first.width, 10.0));
+
+  std::string positions;
+  positions.reserve(frames.size() * n * 4);
+  const auto put = [&](double fraction) {
+    const auto value = static_cast<std::uint16_t>(std::lround(65535 * std::clamp(fraction, 0.0, 1.0)));
+    positions += static_cast<char>(value & 0xFF);
+    positions += static_cast<char>(value >> 8);
+  };
+  std::vector<double> floor, radius(n, 0.5);
+  std::string labels = "[", tones = "[";
+  for (const std::size_t i : order) {
+    const TrajectoryFrame& frame = frames[i];
+    for (std::size_t k = 0; k < n; ++k) {
+      double x = frame.x[k];
+      if (frame.periodic) x -= std::floor(x / first.width) * first.width;
+      put(x / first.width), put((frame.z[k] - low) / (high - low));
+    }
+    floor.push_back(frame.floor_position);
+    labels += fmt::format("{}\"{}t = {:.1f} √(D/g)\"", floor.size() == 1 ? "" : ",",
+                          period > 0 ? fmt::format("phase {:.2f}, ", frame.phase) : "", frame.time);
+  }
+  if (!first.radius.empty()) radius = first.radius;
+  // Two tones by the height in the first frame show how the bed mixes.
+  for (std::size_t k = 0; k < n; ++k)
+    tones += fmt::format("{}{}", k == 0 ? "" : ",",
+                         static_cast<long>(std::floor(std::max(0.0, frames[order[0]].z[k]) / 2)) % 2);
+  const std::string scene = fmt::format(
+      "{{\"width\":{:.6g},\"low\":{:.6g},\"high\":{:.6g},\"walls\":{},\"radius\":{},\"floor\":{},\"tone\":{}],"
+      "\"label\":{}]}}",
+      first.width, low, high, first.periodic ? "false" : "true", numbers(radius), numbers(floor), tones, labels);
+
+  std::string quoted;
+  for (const char c : scene) quoted += c == '"' ? std::string("&quot;") : std::string(1, c);
+  return fmt::format(
+      "<figure id=\"bed-in-motion\" data-scene=\"{}\" data-positions=\"{}\">\n<canvas role=\"img\" aria-label=\"the "
+      "bed in "
+      "motion\"></canvas>\n<div class=\"still\">{}</div>\n<div class=\"controls\"><button "
+      "type=\"button\">Play</button><input "
+      "type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame\"><output></output></div>\n<figcaption>{} disks, {} "
+      "frames of "
+      "the trajectory{}. Two tones by the height at the beginning show how the bed mixes.</figcaption></figure>\n"
+      "<script>{}</script>\n",
+      quoted, base64(positions), still_picture(frames[order[0]], low, high), n, frames.size(),
+      strobe ? ", in the order of the floor's phase: each is from another cycle, as under a stroboscope"
+             : " as time went",
+      player);
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,44 @@
+#include <fmt/format.h>
+
+#include "pipelines/stages/stage.hpp"
+
+namespace shakebed::pipelines {
+
+std::filesystem::path Input::file(std::string_view name) const {
+  const std::filesystem::path path = directory / name;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw InputError(fmt::format("stage \"{}\" ({}) left no file {}", id, stage, name));
+  }
+  return path;
+}
+
+bool Input::has(std::string_view name) const {
+  std::error_code error;
+  return std::filesystem::is_regular_file(directory / name, error);
+}
+
+Json Input::result() const { return read_json(file(result_name)); }
+
+const Input* RunContext::find_input(std::string_view kind) const {
+  const auto found = inputs_of(kind);
+  return found.empty() ? nullptr : found.front();
+}
+
+std::vector<const Input*> RunContext::inputs_of(std::string_view kind) const {
+  std::vector<const Input*> found;
+  for (const Input& input : inputs()) {
+    if (input.stage == kind) found.push_back(&input);
+  }
+  return found;
+}
+
+const Input& RunContext::input(std::string_view kind) const {
+  const auto found = inputs_of(kind);
+  if (found.empty()) throw InputError(fmt::format("needs the result of a stage \"{}\": name one in \"from\"", kind));
+  if (found.size() > 1)
+    throw InputError(fmt::format("\"from\" names {} stages \"{}\", one is needed", found.size(), kind));
+  return *found.front();
+}
+
+}  // namespace shakebed::pipelines

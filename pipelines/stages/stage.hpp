@@ -1,0 +1,145 @@
+// The stages: a table with one row each. Command line, schema, defaults, order, cache and report derive from the row.
+//
+// How to add a stage
+//   1. pipelines/stages/<name>.hpp declares one function, `StageRow <name>_stage();`.
+//   2. pipelines/stages/<name>.cpp holds the options struct with its defaults, a class derived from Stage whose
+//      describe() names every option once (see config.hpp) and whose run() does the work, and the function that fills
+//      the row:
+//
+//        namespace shakebed::pipelines {
+//        namespace {
+//        class Shake : public Stage {
+//         public:
+//          void describe(Fields& fields) override {
+//            fields.quantity("amplitude", amplitude_, dimension::length, {.help = "amplitude", .required = true,
+//                                                                         .range = positive, .example = "\"2.5 mm\""});
+//          }
+//          void run(RunContext& context) const override {
+//            const Input& bed = context.input("simulate");                    // by the kind of the stage it comes from
+//            const auto lines = read_profile_csv(bed.file("profile.csv"));    // InputError when it is not one
+//            for (int i = 0; i < n; ++i) {
+//              context.check_interrupted();                                   // throws Interrupted after Ctrl-C
+//              context.progress(double(i) / n, "shaking");
+//            }
+//            write_file(context.output("shake.json"), dump(result));          // output() is inside a temporary folder
+//          }
+//         private:
+//          double amplitude_ = 0;  // [m]
+//        };
+//        }  // namespace
+//        StageRow shake_stage() {
+//          return {.name = "shake", .version = 1, .summary = "shakes the bed", .accepts = {"simulate"}, .fewest_inputs
+//          = 1,
+//                  .most_inputs = 1, .result = "shake.json", .make = [] { return std::make_unique<Shake>(); }};
+//        }
+//        }
+//
+//   3. one line in stages.cpp puts the row into the table; one in CMakeLists.txt compiles the file.
+//
+// A stage is a pure function: options + the inputs' files → files in its output folder. It reads no clock, no
+// environment and no other file; its random numbers come from seed(). The same options, inputs and seed give the same
+// bytes. When what it computes changes, raise `version`: cached results of the old one are then not used again.
+//
+// The output folder is a temporary one, renamed to OUT/<id> when run() returns: whoever looks sees either all of a
+// stage's files or none. On an exception or Ctrl-C it is removed.
+//
+// Errors: throw InputError for a file that is not what it should be (exit 4), StageError for work that cannot be done
+// (exit 5). Mistakes in options belong into describe(): fields.require(...) (exit 3). What is odd but not wrong:
+// context.warning(); it stands first in the report. A result that is not what was expected: context.check_failed().
+//
+// Common keys of every stage, read by the plan: "stage", "id", "from", "units", and "seed" where `uses_seed` is set.
+//
+// Result files: JSON with quantities as {"value", "std_error", "unit"} (quantity_json); `result` in the row names the
+// one that summary.json repeats under the stage's id and that "/<id>/..." pointers of a check look into. Time and host
+// do not belong into it: wall and CPU time are in manifest.json (context.timing() adds a number there).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipelines/formats/config.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/formats/json.hpp"
+
+namespace shakebed::pipelines {
+
+// A finished stage whose files another one reads.
+struct Input {
+  std::string id;     // of the stage in this recipe
+  std::string stage;  // its kind: "simulate"
+  std::filesystem::path directory;
+  std::string result_name;  // "fit.json"
+
+  // A file of it that must be there: throws InputError.
+  std::filesystem::path file(std::string_view name) const;
+  bool has(std::string_view name) const;
+  // Its result file. Throws InputError.
+  Json result() const;
+};
+
+// What a running stage sees of the world.
+class RunContext {
+ public:
+  virtual ~RunContext() = default;
+
+  // --- what goes in
+  virtual const std::vector<Input>& inputs() const = 0;  // in the order of "from"
+  virtual std::uint64_t seed() const = 0;
+  virtual int jobs() const = 0;  // threads it may use; the result must not depend on it
+  // The only input of one of these kinds. Throws InputError if there is none or more than one.
+  const Input& input(std::string_view kind) const;
+  const Input* find_input(std::string_view kind) const;  // nullptr if none
+  std::vector<const Input*> inputs_of(std::string_view kind) const;
+
+  // --- what comes out
+  virtual const std::filesystem::path& output_directory() const = 0;
+  std::filesystem::path output(std::string_view name) const { return output_directory() / name; }
+  // A folder for what must outlive a kill -9, Ctrl-C or an error: checkpoints. The same work (stage version, options,
+  // seed, inputs' bytes, program) started again under the same OUT finds the same folder with what was left in it;
+  // other work never does. It is made on the first call, may be read from any thread, and is removed when the stage has
+  // finished. Write files there atomically (write_file_atomically): whoever comes next sees whole ones only.
+  virtual const std::filesystem::path& scratch() = 0;
+
+  // --- on the way. May be called from any thread.
+  virtual void progress(double fraction, std::string_view what = {}) = 0;  // cheap: call as often as you like
+  virtual bool interrupted() const = 0;                                    // cheap: an atomic flag
+  void check_interrupted() const {
+    if (interrupted()) throw Interrupted();
+  }
+  virtual void log(std::string_view line) = 0;          // into OUT/<id>/log.txt, and to stderr with --verbose
+  virtual void warning(std::string_view sentence) = 0;  // shown at once, kept in the manifest and first in the report
+  virtual void timing(std::string_view name, double value) = 0;  // a measured speed or time: into manifest.json only
+  virtual void check_failed(std::string_view sentence) = 0;      // the stage is done, but the run ends with exit 6
+};
+
+// Options, and the work. One object for each stage of a recipe.
+class Stage {
+ public:
+  virtual ~Stage() = default;
+  // Names every option: reads, writes or describes them (see config.hpp). Called once when decoding.
+  virtual void describe(Fields& fields) = 0;
+  virtual void run(RunContext& context) const = 0;
+};
+
+struct StageRow {
+  std::string_view name;
+  int version = 1;
+  std::string_view summary;                 // for `shakebed schema`, `--help` and the report
+  std::vector<std::string_view> accepts{};  // kinds of stages that "from" may name
+  int fewest_inputs = 0, most_inputs = 0;
+  bool uses_seed = false;
+  bool uses_images = false;      // loads the images module when it runs
+  std::string_view result = {};  // the JSON file with its numbers
+  std::unique_ptr<Stage> (*make)() = nullptr;
+};
+
+// The table, in the order of a pipeline.
+const std::vector<StageRow>& stage_table();
+// nullptr if there is none of this name.
+const StageRow* find_stage(std::string_view name);
+
+}  // namespace shakebed::pipelines

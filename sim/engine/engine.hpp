@@ -1,0 +1,300 @@
+// The event loop. One class template, specialised by run_scene.cpp for what the
+// scene names.
+//
+// Every disk has one next event, kept in its record: with another disk, with a
+// wall, or with the edge of its shell. It is predicted when something happens
+// to the disk, and only then. A pair's contact is taken when it is earlier than
+// the partner's own next event; the partner's former partner is not told, it
+// finds out when its old time comes and then predicts anew. Between events
+// disks fly freely: straight lines in pairs' relative coordinates, gravity or
+// not. What was predicted is written down only when the next event has begun,
+// unless that could change it (Pending, waits_for(), settle()).
+//
+// Time is counted from the last rebasing, so its resolution does not fade in
+// long runs. At fixed moments (every `synchronisation interval`) the engine
+// brings all disks to one time, rebases it by a whole number of floor periods
+// and predicts everything from scratch: its state there is nothing but
+// positions, velocities, spins and contact clocks, so a run continued from a
+// checkpoint taken there gives the same bytes as one that was never stopped.
+//
+// Large periodic beds go on tile by tile: engine_tiles.hpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "sim/engine/checkpoint_bytes.hpp"
+#include "sim/engine/collision.hpp"
+#include "sim/engine/contact_time.hpp"
+#include "sim/engine/disk.hpp"
+#include "sim/engine/event_queue.hpp"
+#include "sim/engine/fetch.hpp"
+#include "sim/engine/floor_motion.hpp"
+#include "sim/engine/lanes.hpp"
+#include "sim/engine/large_vector.hpp"
+#include "sim/engine/neighbour_lists.hpp"
+#include "sim/engine/overlap.hpp"
+#include "sim/engine/policies.hpp"
+#include "sim/engine/random.hpp"
+#include "sim/engine/shell_grid.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/engine/space_filling_curve.hpp"
+#include "sim/engine/tiles.hpp"
+
+namespace shakebed::sim {
+
+// In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
+enum class Order { of_time, of_tiles, of_the_rest };
+
+template <class Space, class Rule, class Sizes>
+class Engine final : public Simulation {
+ public:
+  Engine(const Scene& scene, FloorMotion floor, const std::vector<Placed>& placed);
+
+  void advance_to(double time) override;
+  double time() const override { return base_ + now_; }
+  double next_synchronisation() const override { return base_ + synchronise_at_; }
+  void snapshot(Snapshot& out) const override;
+  DiskProperties properties() const override;
+  EnergyLedger energy() const override;
+  Counters counters() const override { return counters_; }
+  double largest_overlap() const override;
+  std::size_t bytes() const override;
+  std::vector<std::uint8_t> checkpoint() const override;
+  void restore(const std::vector<std::uint8_t>& bytes) override;
+  void watch(Watcher* watcher) override;
+  void set_bath_temperature(double temperature) override;
+
+ private:
+  friend EventQueue;  // settle(), waits_for()
+  struct Candidate {
+    double time;
+    std::int32_t partner;
+  };
+  // What a disk of the latest event will do next, foreseen but not written down: that waits until the next event has
+  // begun, so that both overlap in the processor.
+  static constexpr std::uint32_t nothing_pending = 0xffffffff;
+  struct Pending {
+    std::uint32_t disk = nothing_pending;
+    std::int32_t partner = nobody;
+    double time = never, exit = never;
+    // Number by number: what has been written in parts cannot be read at once before it has reached the cache.
+    void is(std::uint32_t i, const Candidate& next, double exit_of_i) {
+      disk = i;
+      partner = next.partner;
+      time = next.time;
+      exit = exit_of_i;
+    }
+  };
+
+  // A disk's state at one moment, in registers: what is predicted from it must
+  // not wait for the record to be written.
+  struct Motion {
+    TwoLanes place, velocity;  // {x, z} each
+    double x() const { return place[0]; }
+    double z() const { return place[1]; }
+    double vx() const { return velocity[0]; }
+    double vz() const { return velocity[1]; }
+  };
+
+  // --- flight
+  Motion motion_at(const Disk& disk, double time) const;
+  void write_down(std::uint32_t i, const Motion& motion);
+  void bring_forward(std::uint32_t i) { write_down(i, motion_at(disks_[i], now_)); }
+
+  // --- prediction
+  // `images`: whether to tell which images of the others are the nearest.
+  template <bool images, bool others_ahead = false>
+  Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Disk& me, double radius) const;
+  template <bool images, bool others_ahead = false>
+  Candidate earliest_in(const NeighbourBlock& block, const Disk& me, double radius) const;
+  Candidate next_of_many(std::uint32_t i, Candidate best) const;
+  template <bool images>
+  Candidate next_contact(std::uint32_t i) const;
+  Candidate next_wall(std::uint32_t i, Candidate best, double exit) const;
+  // Could a neighbour of any of both be on the other side of a periodic box's edge?
+  bool is_near_edge(std::uint32_t i, std::uint32_t j) const {
+    return (Space::wraps_x || Space::wraps_z) && ((disks_[i].near | disks_[j].near) & near_edge) != 0;
+  }
+  template <bool images, bool others_ahead>
+  Candidate next_event_by(std::uint32_t i, double exit) const;
+  template <bool others_ahead = false>
+  Candidate next_event(std::uint32_t i, double exit) const;
+  double shell_exit_of(std::uint32_t i, const Motion& motion) const;
+  TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
+  void commit(std::uint32_t i, Candidate next, double exit);
+  void settle();
+  // Must what is pending be written down before the event of disks i and k at `time` can be told? Not if all of it
+  // comes later and is that of other disks: one that it claims has nothing to do until then, or it would not be
+  // claimed.
+  bool waits_for(double time, std::uint32_t i, std::uint32_t k) const {
+    bool waits = false;
+    for (const Pending& one : pending_)
+      waits = waits || i == one.disk || k == one.disk || !(time < one.time) || !(time < one.exit);
+    return waits;
+  }
+  void fly_on(std::uint32_t i, const Motion& motion);
+  // The same where the record says `motion` already. It is pending then.
+  void predict(std::uint32_t i, const Motion& motion) {
+    const double exit = shell_exit_of(i, motion);
+    settle();
+    pending_[0].is(i, next_event(i, exit), exit);
+  }
+  void predict_all();
+
+  // --- shells
+  void centre_shell(std::uint32_t i);
+  template <class Grid>
+  void file_shells(Grid& grid, double height);
+  void file_shells(double height);
+  template <bool how_near, class Grid>
+  void look_round(const Grid& grid, std::uint32_t i);
+  // Radius of the disk and of its shell together [D].
+  float reach(std::uint32_t i) const {
+    return static_cast<float>(disks_[i].skin) * static_cast<float>(skin_unit) + static_cast<float>(sizes_.radius(i));
+  }
+  void choose_skin(std::uint32_t i);
+  std::span<const std::uint32_t> find_neighbours(std::uint32_t i);
+  void mark_near_bounds(std::uint32_t i);
+  void leave_shell(std::uint32_t i);
+  template <class Grid>
+  void draw_shell(Grid& grid, std::uint32_t i);
+
+  // --- contacts
+  template <bool watched>
+  void process_until(double until);
+  template <Order order>
+  void process(std::uint32_t i, std::uint32_t k);
+  void process_and_tell(std::uint32_t i, std::uint32_t k);
+  void tell(std::uint32_t i) const;
+  void tell_all() const;
+  bool is_mutual(std::uint32_t i, std::uint32_t j) const {
+    return disks_[j].event_time == now_ && disks_[j].partner == static_cast<std::int32_t>(i);
+  }
+  void fetch_lists(std::size_t ahead) const;
+  void fetch_for_upcoming() const;
+  template <Order order>
+  void collide(std::uint32_t i, std::uint32_t j);
+  void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
+  void hit_wall(std::uint32_t i);
+  void hit_floor(std::uint32_t i, Motion& motion);
+  void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Surface& surface);
+  bool too_soon(std::uint32_t i, std::uint32_t j);
+  bool locked();
+  void relieve();
+
+  void act_bath();
+
+  // --- tiles
+  static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
+  void choose_tiles();
+  void leave_tiles();
+  void process_tiles_until(double until);
+  bool process_window(double until);
+  void queue_tile(const Tile& tile, double until);
+  template <Order order>
+  bool process_queued(const Tile* tile, double until);
+  bool is_for_tile(const Tile& tile, std::uint32_t i, double time) const {
+    return tile.holds(disks_[i], margin_ + margin_growth_ * (time - log_.start()));
+  }
+  void defer(double time, std::uint32_t a, std::uint32_t b) { deferred_.push_back({time, pair_of(a, b)}); }
+  template <Order order>
+  void predict_in_window(std::uint32_t i);
+  template <bool others_ahead>
+  Candidate next_contact_of(std::uint32_t i, const Disk& me) const;
+  Candidate contact_with_past(std::uint32_t i, std::uint32_t k) const;
+  bool kept_near(std::uint32_t i) const;
+  void go_back(std::uint32_t i, std::uint32_t j);
+  void take_back(std::uint32_t i);
+  void take_back_last(std::uint32_t i);
+
+  // --- synchronisation
+  void synchronise();
+  double density_round_disks() const;  // disks a unit of area
+  void begin_interval();
+  void renumber();
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit visit);
+
+  double kinetic_energy() const;
+  double potential_energy() const;
+
+  // --- what the scene says
+  std::uint32_t count_;
+  double gravity_ = 0;
+  double width_ = 0;
+  double lid_height_ = never;
+  Period period_x_, period_z_;
+  FloorMotion floor_;
+  bool hard_sides_ = false;
+  Surface disk_surface_, side_surface_, floor_surface_, lid_surface_;
+  double contact_duration_ = 0;
+  double inverse_inertia_ratio_ = 2;  // 1/q
+  [[no_unique_address]] Sizes sizes_;
+  Bath bath_;
+
+  // --- the state
+  LargeVector<Disk> disks_;            // and a sentinel after the last
+  std::vector<std::uint32_t> labels_;  // what a disk is called outside: its place in the start
+  std::vector<double> spins_;          // rough disks only
+  std::vector<double> last_contact_;   // contact clocks, dissipative disks only
+  double now_ = 0;                     // since base_
+  double base_ = 0;                    // of the present count, since the start
+  double interval_ = 1;                // the floor's period
+  std::uint64_t intervals_ = 1;        // that many of them between synchronisations now
+  std::uint64_t intervals_done_ = 0;
+  double synchronise_at_ = 1;
+  double event_rate_ = 1;
+  std::uint64_t events_at_synchronisation_ = 0;
+  double bath_at_ = never;  // next action of the reservoir
+  double checked_at_ = -1;  // for rows that lock, see locked()
+  std::uint64_t events_to_check_ = 1;
+  std::uint32_t crawls_ = 0;
+  Random random_;
+  Counters counters_;
+  Watcher* watcher_ = nullptr;
+  double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
+
+  // --- tiles; none: everything is done in the order of time
+  std::vector<Tile> tiles_;
+  ContactLog log_;
+  std::vector<EventEntry> deferred_, rest_;
+  std::vector<std::uint32_t> taken_back_;  // disks that have lost contacts
+  double longest_window_ = 0;
+  double rate_in_tiles_ = 1;               // events a time unit in the window before
+  double margin_ = 0, margin_growth_ = 0;  // from a tile's border, when a window begins, and what is added a time unit
+  std::uint64_t events_left_ = 0;          // so many more in a window, and something has locked
+
+  // --- bookkeeping
+  double smallest_skin_ = 0.15, largest_skin_ = 0.36;
+  bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
+  std::variant<ShellGrid<NarrowCell>, ShellGrid<WideCell>> grid_;  // where the shells are
+  NeighbourLists lists_;
+  EventQueue queue_;
+  std::array<Pending, 2> pending_;
+  // Of the disk that look_round() was called for: those nearby, and the radius
+  // of a shell of its own that would just reach theirs. The arrays are longer
+  // than their counts, see compress().
+  LargeVector<std::uint32_t> nearby_, found_;
+  LargeVector<float> reached_by_;
+  std::size_t nearby_count_ = 0;
+  double largest_contact_ = 1;  // the largest distance of two centres in contact
+  float shell_slack_ = 0;       // covers the rounding of shells' centres, distances and exit times
+};
+
+}  // namespace shakebed::sim
+
+#include "sim/engine/engine_impl.hpp"
+#include "sim/engine/engine_tiles.hpp"

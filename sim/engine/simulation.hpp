@@ -1,0 +1,96 @@
+// A running simulation, whatever its engine: the interface between the physics and those who watch it. Reduced units.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "sim/scene/scene.hpp"
+
+namespace shakebed::sim {
+
+// Where everything is at one moment; index = disk.
+struct Snapshot {
+  double time = 0;  // since the start
+  double floor_position = 0, floor_velocity = 0;
+  std::vector<double> x, z, vx, vz, spin;  // spin empty for smooth disks
+};
+
+// What never changes; index = disk.
+struct DiskProperties {
+  std::vector<double> radius, mass;
+};
+
+// Where the energy went since the start, in m g D (weightless: in T at the start).
+// kinetic + potential + dissipated - floor_work - bath_work = initial.
+struct EnergyLedger {
+  double initial = 0;
+  double kinetic = 0, potential = 0;  // now; kinetic includes spin
+  double dissipated = 0;              // in contacts
+  double floor_work = 0;              // done by the floor's motion (and by a thermal floor)
+  double bath_work = 0;               // given by the reservoir
+  double imbalance() const { return kinetic + potential + dissipated - floor_work - bath_work - initial; }
+};
+
+struct Counters {
+  std::uint64_t disk_collisions = 0;  // between two disks
+  std::uint64_t wall_collisions = 0;  // with sides and lid
+  std::uint64_t floor_collisions = 0;
+  std::uint64_t elastic_contacts = 0;     // of the dissipative ones, those the contact clock made elastic
+  std::uint64_t predictions_renewed = 0;  // a partner was hit by another disk first
+  std::uint64_t shell_exits = 0;
+  std::uint64_t synchronisations = 0;
+  std::uint64_t locks_relieved = 0;  // endless chains of contacts at one instant that were ended
+  double virial = 0;                 // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
+  std::uint64_t events() const {
+    return disk_collisions + wall_collisions + floor_collisions + predictions_renewed + shell_exits;
+  }
+  std::uint64_t collisions() const { return disk_collisions + wall_collisions + floor_collisions; }
+};
+
+// Told of everything that happens between looks, as it happens. Disks by their place in the start, times since the
+// start, in reduced units; under periodic sides positions may lie a little outside the box.
+class Watcher {
+ public:
+  virtual ~Watcher() = default;
+  // From this time on the disk flies freely from here, until it is named again. A flight that goes on may be repeated.
+  virtual void flies(double time, std::uint32_t disk, double x, double z, double vx, double vz) = 0;
+  // Two disks touched. (x, z): centre of the first, (dx, dz): from it to the second's; (px, pz): momentum given to the
+  // second, taken from the first.
+  virtual void touched(double time, double x, double z, double dx, double dz, double px, double pz) = 0;
+  // A disk, its centre at height z, touched the floor, or the lid or a side, and got this momentum.
+  virtual void touched_wall(double time, std::uint32_t disk, bool floor, double z, double px, double pz) = 0;
+};
+
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+  // Runs to the given time since the start (never backwards). Its events do not depend on where one stops to look; in
+  // beds that go on tile by tile (see engine_tiles.hpp) their rounding does.
+  virtual void advance_to(double time) = 0;
+  virtual double time() const = 0;
+  virtual void snapshot(Snapshot& out) const = 0;
+  virtual DiskProperties properties() const = 0;
+  virtual EnergyLedger energy() const = 0;
+  virtual Counters counters() const = 0;
+  // Largest overlap of any two disks now, in D, 0 if none (brute force over cells, O(N)).
+  virtual double largest_overlap() const = 0;
+  virtual std::size_t bytes() const = 0;  // memory held
+  // The engine canonicalises its state at moments that only the run itself decides (see engine.hpp). checkpoint() gives
+  // everything needed to go on to the same bytes from there; it may be called only when time() is such a moment, right
+  // after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not of this
+  // scene.
+  virtual double next_synchronisation() const = 0;
+  virtual std::vector<std::uint8_t> checkpoint() const = 0;
+  virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;
+  // From now on the watcher (nullptr: nobody) is told; first of all how every disk flies now. It changes nothing of the
+  // run, but that it then is one in the order of time; it must outlive the run, and is not part of a checkpoint.
+  virtual void watch(Watcher* watcher) = 0;
+  // Another temperature for the Langevin, Andersen or thermal-floor reservoir, from now on. Not part of a checkpoint.
+  // Throws std::invalid_argument where the scene has none of them.
+  virtual void set_bath_temperature(double temperature) = 0;
+};
+
+// The one place where a scene becomes a specialised engine. Throws std::invalid_argument with check()'s words.
+std::unique_ptr<Simulation> simulate(const Scene& scene);
+}  // namespace shakebed::sim

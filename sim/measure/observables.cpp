@@ -1,0 +1,265 @@
+#include "sim/measure/observables.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+namespace shakebed::sim {
+
+namespace {
+
+// A Gaussian of unit height about `centre`, by grid points from `first` to `last`, added to `density`. By the point
+// nearest to its centre and ratios from point to point: two exponentials instead of one a point; after k points to
+// 1e-16 k of the value there. falls: exp(-k^2 step^2 / 2), `step` being the grid's spacing in the Gaussian's width.
+void add_gaussian(double centre, double weight, double step, const std::vector<double>& falls, double first,
+                  double last, std::vector<double>& density) {
+  const double nearest = std::clamp(std::round(centre), first, last);
+  const double away = (nearest - centre) * step;
+  const double value = weight * std::exp(-0.5 * away * away), ratio = std::exp(-away * step);
+  const auto middle = static_cast<std::size_t>(nearest);
+  const auto above = static_cast<std::size_t>(last - nearest), below = static_cast<std::size_t>(nearest - first);
+  density[middle] += value;
+  double here = value;
+  for (std::size_t k = 1; k <= above; ++k) density[middle + k] += falls[k] * (here *= ratio);
+  here = value;
+  const double downwards = 1 / ratio;
+  for (std::size_t k = 1; k <= below; ++k) density[middle - k] += falls[k] * (here *= downwards);
+}
+
+}  // namespace
+
+void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
+                 double shift, std::vector<double>& density) {
+  const bool gaussian = kernel.kind == KernelKind::gaussian;
+  const double reach = gaussian ? 6 * kernel.width : kernel.width / 2;
+  const double weight =
+      gaussian ? 1 / (width * kernel.width * std::sqrt(2 * std::numbers::pi)) : 1 / (width * kernel.width);
+  const double step = grid.spacing / kernel.width;
+  std::vector<double> falls;
+  if (gaussian) {
+    const double most = std::min(static_cast<double>(grid.points), std::floor(2 * reach / grid.spacing) + 2);
+    falls.resize(static_cast<std::size_t>(most));
+    for (std::size_t k = 0; k < falls.size(); ++k) {
+      const double away = static_cast<double>(k) * step;
+      falls[k] = std::exp(-0.5 * away * away);
+    }
+  }
+  for (double z : heights) {
+    const double place = (z - shift - grid.lowest) / grid.spacing;
+    if (std::isnan(place)) {  // nowhere in particular: not to be left out
+      std::fill(density.begin(), density.end(), place);
+      return;
+    }
+    const double first = std::max(0.0, std::ceil(place - reach / grid.spacing));
+    const double last = std::min(static_cast<double>(grid.points) - 1, std::floor(place + reach / grid.spacing));
+    if (!(first <= last)) continue;
+    if (gaussian) {
+      add_gaussian(place, weight, step, falls, first, last, density);
+      continue;
+    }
+    for (auto i = static_cast<std::size_t>(first); i <= static_cast<std::size_t>(last); ++i) {
+      const double distance = (static_cast<double>(i) - place) * grid.spacing;
+      const bool on_edge = std::abs(std::abs(distance) - reach) < 1e-12;  // of two windows: half to each
+      density[i] += on_edge ? 0.5 * weight : weight;
+    }
+  }
+}
+
+double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) {
+  const auto full = static_cast<std::uint32_t>(std::floor(width * (1 + 1e-12)));
+  const bool room_for_shift = !hard_sides || width - full >= 0.5;
+  double sum = 0;
+  std::uint32_t left = count;
+  for (std::uint32_t row = 0; left > 0; ++row) {
+    const std::uint32_t here = std::min(left, std::max(1u, row % 2 == 1 && !room_for_shift ? full - 1 : full));
+    sum += here * (0.5 + row * std::numbers::sqrt3 / 2);
+    left -= here;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+std::string precision_lost(const Simulation& simulation) {
+  std::ostringstream out;
+  out.precision(3);
+  const EnergyLedger ledger = simulation.energy();
+  const double turned_over = std::abs(ledger.initial) + std::abs(ledger.kinetic) + std::abs(ledger.potential) +
+                             ledger.dissipated + std::abs(ledger.floor_work) + std::abs(ledger.bath_work);
+  if (!std::isfinite(turned_over)) {
+    out << "a position, a velocity or an energy is no longer a number";
+    return out.str();
+  }
+  if (std::abs(ledger.imbalance()) > 1e-6 * turned_over) {
+    out << "the energy ledger misses " << std::abs(ledger.imbalance()) << " of the " << turned_over
+        << " turned over (1e-6 of it is allowed)";
+    return out.str();
+  }
+  const double overlap = simulation.largest_overlap();
+  if (!(overlap <= 1e-9)) out << "two disks overlap by " << overlap << " D (1e-9 D is allowed)";
+  return out.str();
+}
+
+namespace {
+
+enum Scalar : std::size_t { centre, t_x, spin_t, bottom_row, scalar_count };
+
+}  // namespace
+
+BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const ProfileGrid& grid,
+                         const Kernel& kernel)
+    : width_(scene.box.width),
+      masses_(disks.mass),
+      phases_(phases),
+      grid_(grid),
+      kernel_(kernel),
+      layer_count_(static_cast<std::size_t>(std::ceil(static_cast<double>(grid.points) * grid.spacing)) + 1),
+      layer_bottom_(std::floor(grid.lowest)),
+      period_sum_(2 * grid.points + scalar_count),
+      means_(2 * grid.points + scalar_count),
+      covariance_(grid.points),
+      centre_by_phase_(phases),
+      layers_(phases * layer_count_) {
+  for (std::size_t i = 0; i < masses_.size(); ++i)
+    inertias_.push_back(scene.disks.inertia_ratio * masses_[i] * disks.radius[i] * disks.radius[i]);
+}
+
+void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
+  const auto n = static_cast<double>(at.z.size());
+  if (phase == 0) std::fill(period_sum_.begin(), period_sum_.end(), 0.0);
+  std::vector<double> density(grid_.points);
+  const double share = 1.0 / phases_;
+  for (int frame = 0; frame < 2; ++frame) {
+    std::fill(density.begin(), density.end(), 0.0);
+    add_density(grid_, kernel_, width_, at.z, frame == 0 ? 0 : at.floor_position, density);
+    for (std::size_t i = 0; i < grid_.points; ++i)
+      period_sum_[static_cast<std::size_t>(frame) * grid_.points + i] += share * density[i];
+  }
+  double z = 0, vx2 = 0, vz = 0, vz2 = 0, spin2 = 0;
+  double mass = 0, in_bottom_row = 0;
+  constexpr double row = std::numbers::sqrt3 / 2;
+  for (std::size_t i = 0; i < at.z.size(); ++i) {
+    const double m = masses_[i];
+    mass += m;
+    z += m * at.z[i];
+    vx2 += m * at.vx[i] * at.vx[i];
+    vz += m * at.vz[i];
+    vz2 += m * at.vz[i] * at.vz[i];
+    const double place = std::clamp(std::floor(at.z[i] - layer_bottom_), 0.0, static_cast<double>(layer_count_ - 1));
+    LayerSums& layer = layers_[phase * layer_count_ + static_cast<std::size_t>(place)];
+    layer.count += 1;
+    layer.mass += m;
+    layer.vx2 += m * at.vx[i] * at.vx[i];
+    layer.vz += m * at.vz[i];
+    layer.vz2 += m * at.vz[i] * at.vz[i];
+    if (!at.spin.empty()) {
+      const double spin = inertias_[i] * at.spin[i] * at.spin[i];
+      layer.spin += spin;
+      spin2 += spin;
+    }
+    in_bottom_row += std::abs(at.z[i] - at.floor_position - 0.5) < row / 2;
+  }
+  double* scalars = &period_sum_[2 * grid_.points];
+  scalars[centre] += share * z / mass;
+  scalars[t_x] += share * vx2 / n;
+  scalars[spin_t] += share * spin2 / n;
+  scalars[bottom_row] += share * in_bottom_row / (width_ * row);
+  centre_by_phase_[phase] += z / mass;
+  mean_vz_.push_back(vz / mass);
+  mean_vz2_.push_back(vz2 / n);
+  mean_mass_ = mass / n;
+  if (phase + 1 == phases_) {
+    means_.add(period_sum_);
+    covariance_.add(std::span(period_sum_).first(grid_.points));
+    ++periods_;
+  }
+}
+
+Profile BedObserver::density(bool floor_frame) const {
+  Profile profile;
+  const std::size_t first = floor_frame ? grid_.points : 0;
+  for (std::size_t i = 0; i < grid_.points; ++i) {
+    profile.height.push_back(grid_.height(i));
+    profile.number_density.push_back(means_.mean(first + i));
+    profile.std_error.push_back(means_.std_error(first + i));
+  }
+  profile.samples = periods_ * phases_;
+  return profile;
+}
+
+Measured BedObserver::centre_of_mass() const {
+  const std::size_t i = 2 * grid_.points + centre;
+  return {means_.mean(i), means_.std_error(i)};
+}
+Measured BedObserver::temperature_x() const {
+  const std::size_t i = 2 * grid_.points + t_x;
+  return {means_.mean(i), means_.std_error(i)};
+}
+Measured BedObserver::spin_temperature() const {
+  const std::size_t i = 2 * grid_.points + spin_t;
+  return {means_.mean(i), means_.std_error(i)};
+}
+
+Measured BedObserver::bottom_row_density() const {
+  const std::size_t i = 2 * grid_.points + bottom_row;
+  return {means_.mean(i), means_.std_error(i)};
+}
+
+Measured BedObserver::temperature_z() const {
+  std::vector<double> mean(phases_);
+  for (std::size_t k = 0; k < periods_ * phases_; ++k) mean[k % phases_] += mean_vz_[k] / static_cast<double>(periods_);
+  BlockedMean blocks;
+  double sum = 0;
+  for (std::size_t k = 0; k < periods_ * phases_; ++k) {
+    const double m = mean[k % phases_];
+    sum += mean_vz2_[k] + mean_mass_ * (m * m - 2 * m * mean_vz_[k]);
+    if (k % phases_ + 1 == phases_) {
+      blocks.add(sum / phases_);
+      sum = 0;
+    }
+  }
+  return {blocks.mean(), blocks.std_error()};
+}
+
+Measured BedObserver::temperature_z_local() const {
+  double sum = 0, count = 0;
+  for (const LayerSums& layer : layers_) {
+    if (layer.count < 2) continue;
+    sum += (layer.vz2 - layer.vz * layer.vz / layer.mass) * layer.count / (layer.count - 1);
+    count += layer.count;
+  }
+  // Its relative error is that of T_z: the same velocities, another mean taken away.
+  const Measured whole = temperature_z();
+  const double value = count > 0 ? sum / count : 0;
+  return {value, whole.value > 0 ? value * whole.std_error / whole.value : 0};
+}
+
+std::vector<BedObserver::Layer> BedObserver::layers() const {
+  std::vector<Layer> result;
+  double total = 0;
+  for (const LayerSums& sums : layers_) total += sums.count;
+  for (std::size_t index = 0; index < layer_count_; ++index) {
+    double count = 0, mass = 0, vx2 = 0, vz = 0, thermal = 0, spin = 0;
+    for (std::uint32_t phase = 0; phase < phases_; ++phase) {
+      const LayerSums& sums = layer(phase, index);
+      if (sums.count == 0) continue;
+      count += sums.count;
+      vx2 += sums.vx2;
+      vz += sums.vz;
+      mass += sums.mass;
+      thermal += sums.vz2 - sums.vz * sums.vz / sums.mass;
+      spin += sums.spin;
+    }
+    if (count == 0) continue;
+    result.push_back({layer_bottom_ + static_cast<double>(index) + 0.5, vx2 / count, thermal / count, vz / mass,
+                      count / total, spin / count});
+  }
+  return result;
+}
+
+std::vector<double> BedObserver::centre_of_mass_by_phase() const {
+  std::vector<double> result = centre_by_phase_;
+  for (double& value : result) value /= static_cast<double>(periods_);
+  return result;
+}
+
+}  // namespace shakebed::sim

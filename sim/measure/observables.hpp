@@ -1,0 +1,107 @@
+// What is measured of a running bed, from snapshots at equally spaced phases of the shaking. Reduced units.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/statistics.hpp"
+
+namespace shakebed::sim {
+
+// The window through which a density is measured: the profile is the true one convolved with it.
+enum class KernelKind { top_hat, gaussian };
+struct Kernel {
+  KernelKind kind = KernelKind::gaussian;
+  double width = 0.5;  // full width of a top hat, standard deviation of a Gaussian, in D
+};
+
+struct ProfileGrid {
+  double lowest = 0, spacing = 0.25;  // heights lowest + i spacing, in D
+  std::size_t points = 0;
+  double height(std::size_t i) const { return lowest + static_cast<double>(i) * spacing; }
+};
+
+struct Profile {
+  std::vector<double> height;          // D, above the floor's mean position (or the floor itself)
+  std::vector<double> number_density;  // phi = n D^2
+  std::vector<double> std_error;       // allows for correlation in time
+  std::uint64_t samples = 0;           // snapshots
+};
+
+// Adds every disk's kernel, per unit width, to density[i]. heights: of the disks' centres.
+void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
+                 double shift, std::vector<double>& density);
+
+// Height of the centre of mass of count equal disks packed hexagonally on a floor at 0: rows of floor(width), in a hard
+// box alternately one less where half a diameter is missing.
+double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
+
+// Why the run can no longer be trusted, "two disks overlap by 3e-7 D ..."; empty when it can: every number finite, no
+// overlap above 1e-9 D, the energy ledger closed to 1e-6 of what has been turned over.
+std::string precision_lost(const Simulation& simulation);
+
+// Collects snapshots taken at `phases` moments of each period, in order, and averages over whole periods.
+class BedObserver {
+ public:
+  BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const ProfileGrid& grid,
+              const Kernel& kernel);
+
+  // The snapshot at the given phase, 0 <= phase < phases; phase 0 begins a period.
+  void observe(const Snapshot& at, std::uint32_t phase);
+
+  std::uint64_t periods() const { return periods_; }
+  Profile density(bool floor_frame) const;
+  // Covariance of the lab frame's densities, points first to last-1 of the grid, row by row.
+  std::vector<double> density_covariance(std::size_t first, std::size_t last) const {
+    return covariance_.of_means(first, last);
+  }
+  std::size_t covariance_blocks() const { return covariance_.windows().independent; }
+  Measured centre_of_mass() const;
+  Measured temperature_x() const;        // m <v_x^2>
+  Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
+  Measured temperature_z_local() const;  // without the mean velocity of each layer of 1 D at each phase
+  Measured spin_temperature() const;     // I <w^2>; 0 for smooth disks
+  // Number density in the lowest row: centres between (1/2 -+ sqrt(3)/4) D above the moving floor. 2/sqrt 3 when every
+  // site of a packed row is taken (between hard sides up to half a disk less).
+  Measured bottom_row_density() const;
+  struct Layer {  // by height, layers of 1 D
+    double height, temperature_x, temperature_z, mean_velocity_z;
+    double share;  // of the disks
+    double spin_temperature;
+  };
+  std::vector<Layer> layers() const;
+  std::vector<double> centre_of_mass_by_phase() const;
+
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(periods_, period_sum_, means_, covariance_, mean_vz_, mean_vz2_, mean_mass_, centre_by_phase_, layers_);
+  }
+
+ private:
+  struct LayerSums {
+    double count = 0, mass = 0, vx2 = 0, vz = 0, vz2 = 0;  // velocities weighted with the masses
+    double spin = 0;                                       // I w^2
+  };
+  const LayerSums& layer(std::uint32_t phase, std::size_t index) const { return layers_[phase * layer_count_ + index]; }
+
+  double width_;
+  std::vector<double> masses_;
+  std::vector<double> inertias_;  // I of each disk
+  std::uint32_t phases_;
+  ProfileGrid grid_;
+  Kernel kernel_;
+  std::size_t layer_count_;
+  double layer_bottom_;
+  std::uint64_t periods_ = 0;
+  std::vector<double> period_sum_;  // lab profile, floor profile, then scalars: see observe()
+  BlockedMean means_;
+  BlockedCovariance covariance_;
+  std::vector<double> mean_vz_, mean_vz2_;  // a value a phase and period; the second with the mass
+  double mean_mass_ = 1;
+  std::vector<double> centre_by_phase_;
+  std::vector<LayerSums> layers_;
+};
+
+}  // namespace shakebed::sim

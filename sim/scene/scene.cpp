@@ -1,0 +1,184 @@
+#include "sim/scene/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+namespace shakebed::sim {
+
+namespace {
+
+// "12.5", "0.92": enough digits to recognise what one wrote.
+std::string number(double value) {
+  std::ostringstream out;
+  out.precision(10);
+  out << value;
+  return out.str();
+}
+
+class Check {
+ public:
+  explicit Check(const Scene& scene) : scene_(scene) {}
+
+  std::vector<SceneProblem> operator()() {
+    disks();
+    box();
+    floor();
+    bath();
+    if (problems_.empty()) room();
+    return problems_;
+  }
+
+ private:
+  void require(bool holds, const std::string& where, const std::string& what) {
+    if (!holds) problems_.push_back({where, what});
+  }
+  template <class Value>
+  void surface(const Value& s, const std::string& where) {
+    require(s.restitution >= 0 && s.restitution <= 1, where + "/restitution",
+            "a restitution lies between 0 and 1, not " + number(s.restitution));
+    require(s.friction >= 0 && std::isfinite(s.friction), where + "/friction",
+            "a friction coefficient is not negative, but this one is " + number(s.friction));
+    require(s.tangential_restitution >= -1 && s.tangential_restitution <= 1, where + "/tangential_restitution",
+            "a tangential restitution lies between -1 and 1, not " + number(s.tangential_restitution));
+  }
+  bool falls() const { return std::holds_alternative<UniformGravity>(scene_.gravity); }
+  bool periodic_upwards() const { return std::holds_alternative<PeriodicTop>(scene_.box.top); }
+  double height() const {
+    if (const auto* lid = std::get_if<Lid>(&scene_.box.top)) return lid->height;
+    if (const auto* top = std::get_if<PeriodicTop>(&scene_.box.top)) return top->height;
+    return INFINITY;
+  }
+
+  void disks() {
+    const Disks& d = scene_.disks;
+    require(d.species.size() == 1 || d.species.size() == 2, "/disks",
+            "there are one or two species, not " + std::to_string(d.species.size()));
+    for (const Species& s : d.species) {
+      require(s.diameter > 0 && std::isfinite(s.diameter), "/disks/diameter",
+              "a diameter is positive, not " + number(s.diameter));
+      require(s.mass > 0 && std::isfinite(s.mass), "/disks/mass", "a mass is positive, not " + number(s.mass));
+    }
+    require(scene_.count() < 1u << 28, "/disks/count", "more than 268,435,455 disks cannot be numbered");
+    surface(d.contact, "/disks");
+    require(
+        d.inertia_ratio > 0 && d.inertia_ratio <= 1, "/disks/inertia",
+        "I/(m R^2) lies above 0 and not above 1 (1/2 for a disk, 2/5 for a sphere), not " + number(d.inertia_ratio));
+    require(d.contact_duration >= 0 && std::isfinite(d.contact_duration), "/disks/contact_duration",
+            "a contact's duration is not negative, but this one is " + number(d.contact_duration));
+  }
+
+  void box() {
+    const Box& b = scene_.box;
+    double largest = 0;
+    for (const Species& s : scene_.disks.species) largest = std::max(largest, s.diameter);
+    require(b.width >= largest && std::isfinite(b.width), "/box/width",
+            "the box is " + number(b.width) + " D wide, narrower than a disk of " + number(largest) + " D");
+    // Beyond it a place is known to no better than 1e-7 D, and cells are more than can be counted.
+    constexpr double most = 1e9;
+    require(!(b.width > most) && !(std::isfinite(height()) && height() > most), "/box",
+            "the box is larger than 1e9 D: places so far apart cannot be told to 1e-7 D");
+    const bool periodic = std::holds_alternative<PeriodicSides>(b.sides);
+    const double least = 2 * largest + 3;  // a disk must never meet two images of one neighbour
+    require(!periodic || b.width >= least, "/box/width",
+            "a periodic box of " + number(b.width) +
+                " D is too narrow: a disk could meet two images of the same one; at least " + number(least) +
+                " D are needed");
+    require(!periodic_upwards() || height() >= least, "/box/height",
+            "a periodic box of " + number(height()) + " D is too low: at least " + number(least) + " D are needed");
+    require(!periodic_upwards() || periodic, "/box/sides", "a box that is periodic upwards has periodic sides too");
+    require(!(periodic_upwards() && falls()), "/box/height",
+            "a box that is periodic upwards has no gravity: a disk would fall for ever");
+    require(falls() || !std::holds_alternative<OpenTop>(b.top), "/box/lid",
+            "without gravity an open box loses its disks: give it a lid, or make it periodic");
+    if (const auto* sides = std::get_if<HardSides>(&b.sides)) surface(sides->surface, "/box/sides");
+    if (const auto* lid = std::get_if<Lid>(&b.top)) surface(lid->surface, "/box/lid");
+    surface(b.floor_surface, "/floor");
+  }
+
+  void floor() {
+    double amplitude = 0;
+    if (const auto* sine = std::get_if<SinusoidalFloor>(&scene_.box.floor)) {
+      amplitude = sine->amplitude;
+      require(sine->amplitude > 0 && std::isfinite(sine->amplitude), "/floor/amplitude",
+              "an amplitude is positive, not " + number(sine->amplitude) + "; a floor that stands still is \"still\"");
+      require(sine->frequency > 0 && std::isfinite(sine->frequency), "/floor/frequency",
+              "a frequency is positive, not " + number(sine->frequency));
+    } else if (const auto* table = std::get_if<TabulatedFloor>(&scene_.box.floor)) {
+      require(table->period > 0 && std::isfinite(table->period), "/floor/period",
+              "a period is positive, not " + number(table->period));
+      require(table->heights.size() >= 4, "/floor/heights",
+              "a period of the floor needs at least 4 positions, not " + std::to_string(table->heights.size()));
+      for (double h : table->heights) {
+        require(std::isfinite(h), "/floor/heights", "a position of the floor is not a number");
+        amplitude = std::max(amplitude, std::abs(h));
+      }
+      if (!table->heights.empty()) {
+        const auto [low, high] = std::minmax_element(table->heights.begin(), table->heights.end());
+        require(*high > *low, "/floor/heights",
+                "the floor's positions are all the same; a floor that stands still is \"still\"");
+      }
+    } else {
+      return;
+    }
+    require(!(amplitude > 1e9), "/floor", "the floor moves farther than 1e9 D");
+    require(!periodic_upwards(), "/floor/motion", "a box that is periodic upwards has no floor that could move");
+    double largest = 0;
+    for (const Species& s : scene_.disks.species) largest = std::max(largest, s.diameter);
+    require(height() > amplitude + largest, "/box/lid",
+            "the lid at " + number(height()) + " D leaves no room for a disk above the floor, which rises to " +
+                number(amplitude) + " D");
+  }
+
+  void bath() {
+    const auto positive = [&](double value, const char* name) {
+      require(value > 0 && std::isfinite(value), std::string("/bath/") + name,
+              std::string("must be positive, not ") + number(value));
+    };
+    if (const auto* b = std::get_if<LangevinBath>(&scene_.bath)) {
+      positive(b->temperature, "temperature");
+      positive(b->rate, "rate");
+      positive(b->interval, "interval");
+    } else if (const auto* a = std::get_if<AndersenBath>(&scene_.bath)) {
+      positive(a->temperature, "temperature");
+      positive(a->rate, "rate");
+    } else if (const auto* w = std::get_if<WhiteNoiseBath>(&scene_.bath)) {
+      positive(w->heating, "heating");
+      positive(w->interval, "interval");
+      require(
+          scene_.disks.contact.restitution < 1, "/bath",
+          "white noise heats without end what does not dissipate: with restitution 1 there is no temperature to reach");
+    } else if (const auto* t = std::get_if<ThermalFloor>(&scene_.bath)) {
+      positive(t->temperature, "temperature");
+      require(!periodic_upwards(), "/bath", "a thermal floor needs a floor, but the box is periodic upwards");
+    }
+  }
+
+  // Is there room for all the disks?
+  void room() {
+    if (std::isinf(height())) return;
+    double area = 0;
+    for (const Species& s : scene_.disks.species) area += s.count * std::numbers::pi / 4 * s.diameter * s.diameter;
+    const double fraction = area / (scene_.box.width * height());
+    require(
+        fraction <= std::numbers::pi / (2 * std::numbers::sqrt3), "/box",
+        "the disks would cover " + number(fraction) + " of the box; no packing of equal disks covers more than 0.9069");
+  }
+
+  const Scene& scene_;
+  std::vector<SceneProblem> problems_;
+};
+
+}  // namespace
+
+std::uint32_t Scene::count() const {
+  std::uint32_t sum = 0;
+  for (const Species& s : disks.species) sum += s.count;
+  if (const auto* placed = std::get_if<PlacedStart>(&start)) return static_cast<std::uint32_t>(placed->disks.size());
+  return sum;
+}
+
+std::vector<SceneProblem> check(const Scene& scene) { return Check(scene)(); }
+
+}  // namespace shakebed::sim
