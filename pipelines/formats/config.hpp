@@ -72,6 +72,7 @@ struct InputFiles {
 };
 
 class Fields;
+struct KnownBed;  // formats/bed.hpp
 
 // One row of a tagged choice.
 template <class T>
@@ -102,6 +103,7 @@ class Fields {
     // Every input file that was named: pointer and file.
     std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
     std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
+    const KnownBed* bed = nullptr;           // what those stages know of the bed
   };
 
   // Reads an object. After describing, call finish(): it reports the keys that nobody asked for.
@@ -122,6 +124,8 @@ class Fields {
   // Kinds of the stages that "from" names, in its order (decoding only).
   const std::vector<std::string>& upstream() const { return source_.upstream; }
   bool has_upstream(std::string_view kind) const;
+  // What the stages that "from" names know of the bed; nullptr where they know none (decoding only).
+  const KnownBed* known_bed() const { return source_.bed; }
 
   // --- one method a type. `value` holds the default before and what was read after.
   void number(std::string_view key, double& value, const About& about = {});

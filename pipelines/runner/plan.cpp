@@ -570,7 +570,10 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     for (const std::size_t k : arrows[i]) {
       planned.from.push_back(position[k]);
       stage_source.upstream.emplace_back(drafts[k].row->name);
+      if (!planned.bed) planned.bed = plan.stages[position[k]].bed;
     }
+    if (planned.bed) stage_source.bed = &*planned.bed;
+    const std::size_t problems_before = problems.size();
     CommonOptions common;
     common.id = draft.common.id;
     Fields fields = Fields::decode(*draft.node, planned.pointer, stage_source);
@@ -584,6 +587,10 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     planned.seed = common.seed;
     planned.stage->describe(fields);
     fields.finish();
+    if (problems.size() == problems_before) {
+      if (auto bed = planned.stage->bed())
+        planned.bed = KnownBed{std::move(*bed), fmt::format("stage \"{}\" ({})", planned.id, planned.pointer)};
+    }
     for (auto& [pointer, path] : planned.input_files) pointer.erase(0, planned.pointer.size());
     planned.options = Json::object();
     Fields encoder = Fields::encode(planned.options);

@@ -57,10 +57,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/json.hpp"
@@ -123,6 +125,9 @@ class Stage {
   // Names every option: reads, writes or describes them (see config.hpp). Called once when decoding.
   virtual void describe(Fields& fields) = 0;
   virtual void run(RunContext& context) const = 0;
+  // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
+  // state it again, and may not state it otherwise.
+  virtual std::optional<BedDescription> bed() const { return std::nullopt; }
 };
 
 struct StageRow {
