@@ -594,6 +594,7 @@ int command_status(const Arguments& arguments) {
   for (const auto& [id, record] : records) {
     std::uint64_t bytes = 0;
     std::vector<std::string> damaged;
+    const std::optional<StageCost> cost = read_cost(out / id);
     for (const Fingerprint& file : record.outputs) {
       bytes += file.bytes;
       if (fs::file_size(out / id / file.file, error) != file.bytes || error) damaged.push_back(file.file);
@@ -601,12 +602,12 @@ int command_status(const Arguments& arguments) {
     json["stages"].push_back(Json{{"id", id},
                                   {"stage", record.stage},
                                   {"version", record.version},
-                                  {"wall_seconds", record.wall_seconds},
+                                  {"wall_seconds", cost ? Json(cost->wall_seconds) : Json()},
                                   {"files", record.outputs.size()},
                                   {"bytes", bytes},
                                   {"damaged", damaged}});
     text += fmt::format("  {:<16} {:<10} {:>5} files {:>12} bytes  {:>10}{}\n", id, record.stage, record.outputs.size(),
-                        bytes, duration_text(record.wall_seconds),
+                        bytes, cost ? duration_text(cost->wall_seconds) : "",
                         damaged.empty() ? "" : fmt::format("  damaged: {}", fmt::join(damaged, ", ")));
   }
   if (records.empty()) text += "  no finished stage\n";
@@ -633,17 +634,6 @@ int command_verify(const Arguments& arguments) {
                             result.files));
   }
   return result.problems.empty() ? exit_ok : exit_check_failed;
-}
-
-// Whether two result files differ in nothing but the time the work took.
-bool same_but_for_timings(const fs::path& before, const fs::path& after) {
-  std::error_code error;
-  if (before.extension() != ".json" || !fs::is_regular_file(before, error)) return false;
-  Json first = read_json(before), second = read_json(after);
-  for (Json* json : {&first, &second}) {
-    for (const char* key : {"cpu_seconds", "collisions_per_second"}) json->erase(key);
-  }
-  return first == second;
 }
 
 int command_rerun(const Arguments& arguments) {
@@ -682,8 +672,7 @@ int command_rerun(const Arguments& arguments) {
       const std::string name = entry.value("file", std::string());
       ++files;
       if (!fs::is_regular_file(options.out / name, error) ||
-          (sha256_of_file(options.out / name) != entry.value("sha256", std::string()) &&
-           !same_but_for_timings(before / name, options.out / name)))
+          sha256_of_file(options.out / name) != entry.value("sha256", std::string()))
         different.push_back(name);
     }
   }
@@ -691,9 +680,9 @@ int command_rerun(const Arguments& arguments) {
     print(dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}}));
   } else {
     for (const std::string& name : different) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
-    print(different.empty() ? fmt::format("the same: all {} files of {} came out byte for byte, timings aside\n", files,
-                                          before.string())
-                            : fmt::format("{} of {} files differ\n", different.size(), files));
+    print(different.empty()
+              ? fmt::format("the same: all {} files of {} came out byte for byte\n", files, before.string())
+              : fmt::format("{} of {} files differ\n", different.size(), files));
   }
   return different.empty() ? exit_ok : exit_check_failed;
 }

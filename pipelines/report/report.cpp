@@ -652,15 +652,16 @@ class Report {
     }
     for (std::size_t i = 0; i < n; ++i) {
       const StageOutcome& stage = outcome_.stages[i];
-      const std::string time = stage.record ? duration_text(stage.record->wall_seconds) : "";
+      const std::string time =
+          stage.cost ? fmt::format("<!-- times -->, {}<!-- /times -->", duration_text(stage.cost->wall_seconds)) : "";
       const std::string state = stage.state == StageState::kept ? "kept" : std::string(to_string(stage.state));
       svg += fmt::format(
           "<g><title>{}</title><rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" rx=\"6\"/><text "
-          "x=\"{}\" y=\"{}\">{}</text><text class=\"small\" x=\"{}\" y=\"{}\">{}{}{}</text></g>\n",
+          "x=\"{}\" y=\"{}\">{}</text><text class=\"small\" x=\"{}\" y=\"{}\">{}{}</text></g>\n",
           html(plan_.stages[i].row->summary), stage.state == StageState::failed ? "failed" : "", x_of(i), y_of(i),
           box_width, box_height, x_of(i) + 10, y_of(i) + 23,
           html(stage.id.size() <= 14 ? stage.id : stage.id.substr(0, 13) + "…"), x_of(i) + 10, y_of(i) + 42,
-          html(state), time.empty() ? "" : ", ", time);
+          html(state), time);
     }
     return "<h2>Stages</h2>\n<div class=\"scroll\" style=\"padding:8px\">" + svg + "</svg></div>\n";
   }
@@ -776,12 +777,11 @@ std::string markdown(std::string_view text) {
 
 std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
   const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
-  std::string out = fmt::format("# {}\n\n**{}** in {}\n", markdown(title),
+  std::string out = fmt::format("# {}\n\n**{}**\n", markdown(title),
                                 outcome.code == exit_ok             ? "Passed"
                                 : outcome.code == exit_check_failed ? "A check failed"
                                 : outcome.code == exit_interrupted  ? "Interrupted"
-                                                                    : "Stopped",
-                                duration_text(outcome.wall_seconds));
+                                                                    : "Stopped");
   if (!outcome.error.empty()) out += fmt::format("\n> {}\n", markdown(outcome.error));
   for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
     const PlannedStage& stage = plan.stages[i];
@@ -808,11 +808,13 @@ std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
     out += "\n## Warnings\n\n";
     for (const std::string& warning : outcome.warnings) out += fmt::format("- {}\n", markdown(warning));
   }
-  out += "\n## Stages\n\n| stage | kind | | time |\n|---|---|---|---|\n";
+  out += "\n## Stages\n\n| stage | kind | |\n|---|---|---|\n";
+  std::string times = duration_text(outcome.wall_seconds);
   for (const StageOutcome& stage : outcome.stages) {
-    out += fmt::format("| {} | {} | {} | {} |\n", markdown(stage.id), stage.kind, to_string(stage.state),
-                       stage.record ? duration_text(stage.record->wall_seconds) : "");
+    out += fmt::format("| {} | {} | {} |\n", markdown(stage.id), stage.kind, to_string(stage.state));
+    if (stage.cost) times += fmt::format("; {} {}", markdown(stage.id), duration_text(stage.cost->wall_seconds));
   }
+  out += fmt::format("\n<!-- times -->\nTime: {}\n<!-- /times -->\n", times);
   return out + fmt::format("\nshakebed {} ({})\n", program_version(), source_revision());
 }
 

@@ -1,5 +1,8 @@
 // report.html: one file that shows everything, without a network: warnings first, the figures, the bed, the numbers
 // beside the published ones, what was assumed, the stages with their times, and where it all came from.
+//
+// What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md: without these
+// blocks the pages of two runs with the same seeds are equal byte for byte.
 #pragma once
 
 #include <filesystem>

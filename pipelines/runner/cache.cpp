@@ -52,9 +52,6 @@ Json StageRecord::to_json() const {
   out["outputs"] = pipelines::to_json(outputs);
   out["warnings"] = warnings;
   out["failed_checks"] = failed_checks;
-  out["wall_seconds"] = wall_seconds;
-  out["cpu_seconds"] = cpu_seconds;
-  out["timings"] = timings;
   return out;
 }
 
@@ -71,9 +68,6 @@ StageRecord StageRecord::from_json(const Json& json, const std::string& file) {
     record.outputs = fingerprints_from(json.at("outputs"));
     record.warnings = json.at("warnings").get<std::vector<std::string>>();
     record.failed_checks = json.at("failed_checks").get<std::vector<std::string>>();
-    record.wall_seconds = json.at("wall_seconds").get<double>();
-    record.cpu_seconds = json.at("cpu_seconds").get<double>();
-    record.timings = json.at("timings");
     return record;
   } catch (const nlohmann::json::exception&) {
     throw InputError(file + ": is not the record of a stage");
@@ -87,6 +81,37 @@ std::optional<StageRecord> read_record(const std::filesystem::path& stage_direct
   try {
     return StageRecord::from_json(read_json(path), path.string());
   } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+Json StageCost::to_json() const {
+  Json out{{"wall_seconds", wall_seconds},
+           {"cpu_seconds", cpu_seconds},
+           {"threads", threads},
+           {"host", host},
+           {"finished", finished}};
+  out.update(timings);
+  return out;
+}
+
+std::optional<StageCost> read_cost(const std::filesystem::path& stage_directory) {
+  const std::filesystem::path path = stage_directory / cost_name;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  try {
+    Json json = read_json(path);
+    StageCost cost{.wall_seconds = json.at("wall_seconds").get<double>(),
+                   .cpu_seconds = json.at("cpu_seconds").get<double>(),
+                   .threads = json.at("threads").get<int>(),
+                   .host = json.at("host").get<std::string>(),
+                   .finished = json.at("finished").get<std::string>()};
+    for (const char* key : {"wall_seconds", "cpu_seconds", "threads", "host", "finished"}) json.erase(key);
+    cost.timings = std::move(json);
+    return cost;
+  } catch (const InputError&) {
+    return std::nullopt;
+  } catch (const nlohmann::json::exception&) {
     return std::nullopt;
   }
 }
@@ -192,7 +217,7 @@ std::vector<Fingerprint> fingerprint_directory(const std::filesystem::path& dire
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(directory)) {
     if (!entry.is_regular_file()) continue;
     const std::string name = entry.path().lexically_relative(directory).generic_string();
-    if (name == record_name || name == "log.txt") continue;
+    if (name == record_name || name == cost_name || name == "log.txt") continue;
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());

@@ -83,9 +83,7 @@ FolderLock::FolderLock(const fs::path& folder) : path_(folder / ".lock") {
     if (::fstat(descriptor_, &held) == 0 && ::stat(path_.c_str(), &named) == 0 && held.st_ino == named.st_ino) break;
     ::close(descriptor_);
   }
-  char host[128] = "?";
-  ::gethostname(host, sizeof host - 1);
-  const std::string owner = fmt::format("process {} on {}", ::getpid(), host);
+  const std::string owner = fmt::format("process {} on {}", ::getpid(), host_name());
   if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, owner.data(), owner.size(), 0) < 0) {
     // Only a courtesy to whoever finds the folder locked; the lock itself holds.
   }
@@ -280,8 +278,13 @@ void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, co
   }
 }
 
-StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, const Stamps& stamps, std::vector<Input> inputs,
-                      const RunOptions& options, Console* console) {
+struct Finished {
+  StageRecord record;
+  StageCost cost;
+};
+
+Finished run_stage(const PlannedStage& stage, StageRecord fresh, const Stamps& stamps, std::vector<Input> inputs,
+                   const RunOptions& options, Console* console) {
   const fs::path place = options.out / stage.id;
   const fs::path working = options.out / fmt::format("{}{}-{}", partial_prefix, stage.id, ::getpid());
   const fs::path scratch = scratch_folder(options.out, fresh);
@@ -302,23 +305,26 @@ StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, const Stamps
   }
   const auto wall_start = std::chrono::steady_clock::now();
   const double cpu_start = cpu_seconds_so_far();
-  StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
+  StageCost cost{.threads = options.jobs > 0 ? options.jobs : processors(), .host = host_name(), .finished = {}};
+  StageRun context(stage, std::move(inputs), working, scratch, cost.threads, console);
   stage.stage->run(context);
   context.check_interrupted();
   check_inputs_stayed(stage, fresh, stamps, options.out);
-  fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
-  fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
+  cost.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
+  cost.cpu_seconds = cpu_seconds_so_far() - cpu_start;
+  cost.finished = utc_now();
+  cost.timings = context.timings;
   fresh.outputs = fingerprint_directory(working, true);
   fresh.warnings = context.warnings;
   fresh.failed_checks = context.failed_checks;
-  fresh.timings = context.timings;
   if (!context.log_text().empty()) write_file(working / "log.txt", context.log_text());
+  write_file(working / cost_name, dump(cost.to_json()));
   write_file(working / record_name, dump(fresh.to_json()));
   publish(working, place);
   // Finished: nothing of it, nor of what was begun with other options, is needed any more.
   fs::remove_all(scratch.parent_path(), ignored);
   fs::remove(options.out / scratch_name, ignored);
-  return fresh;
+  return {std::move(fresh), std::move(cost)};
 }
 
 }  // namespace
@@ -409,6 +415,7 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
     if (!selected[i]) {
       result.state = StageState::not_selected;
       result.record = std::move(found);
+      result.cost = read_cost(place);
       if (result.record) {  // used as it is, with what it had to say
         for (const std::string& warning : result.record->warnings) {
           outcome.warnings.push_back(fmt::format("{}: {}", stage.id, warning));
@@ -440,6 +447,7 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
         }
         result.state = StageState::kept;
         result.record = std::move(found);
+        result.cost = read_cost(place);
         if (console != nullptr) console->message(fmt::format("{}: up to date", stage.id));
         if (console != nullptr) {
           for (const std::string& warning : result.record->warnings)
@@ -451,11 +459,13 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
                                  : fmt::format("{}: runs", stage.id));
           console->progress(stage.id, 0);
         }
-        result.record = run_stage(stage, std::move(fresh), stamps, std::move(inputs), options, console);
+        Finished finished = run_stage(stage, std::move(fresh), stamps, std::move(inputs), options, console);
+        result.record = std::move(finished.record);
+        result.cost = std::move(finished.cost);
         result.state = StageState::ran;
         if (console != nullptr) {
           console->end_progress();
-          console->message(fmt::format("{}: done in {}", stage.id, duration_text(result.record->wall_seconds)));
+          console->message(fmt::format("{}: done in {}", stage.id, duration_text(result.cost->wall_seconds)));
         }
       }
     } catch (const Interrupted&) {
@@ -491,11 +501,10 @@ Json summary_json(const Plan& plan, const RunOutcome& outcome) {
     const fs::path path = outcome.out / plan.stages[i].id / row.result;
     std::error_code error;
     if (!fs::is_regular_file(path, error)) continue;
-    // Numbers only: long tables stay in the stage's own file. Times and speeds are the manifest's.
+    // Numbers only: long tables stay in the stage's own file.
     const Json result = read_json(path);
     Json kept = Json::object();
     for (const auto& [key, value] : result.items()) {
-      if (key == "cpu_seconds" || key == "collisions_per_second") continue;
       if (value.is_array() && value.size() > 64) continue;
       kept[key] = value;
     }

@@ -29,6 +29,7 @@ struct StageOutcome {
   StageState state = StageState::waiting;
   std::vector<std::string> reasons{};   // why it ran (or would)
   std::optional<StageRecord> record{};  // what is there now
+  std::optional<StageCost> cost{};      // what it took to make that
   std::string error{};
 };
 

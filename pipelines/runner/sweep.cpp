@@ -64,15 +64,6 @@ std::string value_text(const Json& value) {
   return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : dump_canonical(value);
 }
 
-// A point's state, in its folder: what it is made from and how it ended.
-struct PointResult {
-  bool done = false;
-  ExitCode code = exit_ok;
-  std::string error;
-  std::vector<std::string> cells;  // of the collected numbers: value and std_error each
-  double seconds = 0;
-};
-
 // The numbers to gather; all top-level quantities of fit and check results where the recipe names none.
 std::vector<std::string> collected(const Plan& plan) {
   if (!plan.sweep->collect.empty()) return plan.sweep->collect;
@@ -501,7 +492,6 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   std::atomic<std::size_t> next{0}, finished{0}, failed{0}, checks{0}, busy{0};
   std::mutex failures_mutex;
   std::vector<std::string> failures;
-  std::string stop;  // what ends the whole sweep: a full disk, say
   const std::size_t to_run = arguments.gather ? 0 : points.size() - kept;
   const auto work = [&] {
     while (to_run > 0 && !interrupt_requested()) {
@@ -537,7 +527,6 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
           fs::remove_all(one.out / scratch_name);
         }
         shared.prepare(at, keys[i], one.out);
-        const auto point_start = std::chrono::steady_clock::now();
         run_stages(at, one, nullptr, outcome);
         if (outcome.code == exit_interrupted) return;
         Json record;
@@ -548,7 +537,6 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
         record["failed_checks"] = outcome.failed_checks;
         record["cells"] = gather_cells(at, one.out, pointers);
         record["pointers"] = pointers;
-        record["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - point_start).count();
         write_file_atomically(one.out / point_record, dump(record));
       } catch (const std::exception& error) {
         outcome.code = exit_stage_failed;

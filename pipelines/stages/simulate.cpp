@@ -761,14 +761,11 @@ void Simulate::run(RunContext& context) const {
     measurements[0]->write_densities(context, lab, joined_density(measurements, true), covariance, blocks);
     write_file(context.output("replicas.csv"), replicas_text(results));
   }
-  Json out = replicas_ > 1 ? joined(results) : results[0];
-  out["collisions_per_second"] = collisions / cpu;
-  out["cpu_seconds"] = cpu;
-  write_file(context.output("observables.json"), dump(out));
+  write_file(context.output("observables.json"), dump(replicas_ > 1 ? joined(results) : results[0]));
   BedDescription description = bed_.description();
   if (!annealing_.empty()) description.bath_temperature = annealing_.back().temperature / bed_.length_unit();
   write_file(context.output("bed.json"), dump(description.to_json()));
-  context.timing("cpu_seconds", cpu);
+  context.timing("simulation_cpu_seconds", cpu);
   context.timing("collisions_per_second", collisions / cpu);
   context.progress(1, "measured");
 }
