@@ -16,6 +16,7 @@
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/run.hpp"
+#include "pipelines/runner/slurm.hpp"
 #include "pipelines/runner/sweep.hpp"
 #include "pipelines/stages/theory.hpp"
 
@@ -40,7 +41,7 @@ std::vector<Setting> settings_of(const RunArguments& run) {
   return settings;
 }
 
-// --data: the user's points go into every figure stage of the recipe.
+// --data: the user's points go into every stage of the recipe that draws them.
 void add_data(JsonNode& document, const std::string& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw InputError(fmt::format("--data {}: there is no such file", file));
@@ -49,15 +50,16 @@ void add_data(JsonNode& document, const std::string& file) {
   if (JsonNode* stages = document.find("stages"); stages != nullptr && stages->is_array()) {
     for (JsonNode& stage : stages->items) {
       const JsonNode* kind = stage.find("stage");
-      if (kind == nullptr || !kind->is_string() || kind->text != "figure") continue;
+      const StageRow* row = kind != nullptr && kind->is_string() ? find_stage(kind->text) : nullptr;
+      if (row == nullptr || row->data_option.empty()) continue;
       found = true;
       JsonNode path;
       path.kind = JsonNode::Kind::string;
       path.text = fs::absolute(file).string();
-      set_pointer(stage, "/data", std::move(path));
+      set_pointer(stage, pointer_join("", row->data_option), std::move(path));
     }
   }
-  if (!found) throw UsageError("--data: the recipe has no figure stage to draw the points into");
+  if (!found) throw UsageError("--data: no stage of the recipe draws the points (a figure stage does)");
 }
 
 // A recipe read with --preset, --set and --data applied.
@@ -116,36 +118,6 @@ Json explanation_json(const std::vector<StageOutcome>& stages) {
   return out;
 }
 
-// What people look for first: the temperature of every fit.
-std::string temperatures_text(const Plan& plan, const RunOutcome& outcome) {
-  std::string text;
-  for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
-    const PlannedStage& stage = plan.stages[i];
-    const fs::path path = outcome.out / stage.id / stage.row->result;
-    std::error_code error;
-    if (stage.row->name != "fit" || !outcome.stages[i].record || !fs::is_regular_file(path, error)) continue;
-    const Json fit = read_json(path);
-    std::string numbers;
-    const auto add = [&](const char* key, const char* label, double factor, const char* unit) {
-      const Json* value = find_pointer(fit, fmt::format("/{}/value", key));
-      const Json* spread = find_pointer(fit, fmt::format("/{}/std_error", key));
-      if (value == nullptr || !value->is_number()) return false;
-      numbers += fmt::format("{}{} = {:.4g}", numbers.empty() ? "" : ", ", label, factor * value->get<double>());
-      if (spread != nullptr && spread->is_number() && spread->get<double>() > 0)
-        numbers += fmt::format(" ± {:.2g}", factor * spread->get<double>());
-      numbers += unit;
-      return true;
-    };
-    const Json* unit = find_pointer(fit, "/temperature_over_mg/unit");
-    if (unit == nullptr || *unit != "m" || !add("temperature_over_mg", "T/(m g)", 1e3, " mm"))
-      add("temperature", "T", 1, " m g D");
-    add("reduced_temperature", "T/T_c", 1, "");
-    add("solid_height", "solid", 1, " D high");
-    if (!numbers.empty()) text += fmt::format("{}: {}\n", stage.id, numbers);
-  }
-  return text;
-}
-
 // Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
 int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result = nullptr) {
   const RunOptions options = run_options(arguments, plan);
@@ -158,7 +130,7 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
   };
   if (plan.sweep) {
     SweepArguments sweep{arguments.run.shard, arguments.run.gather, arguments.run.dry_run, arguments.common.json, {}};
-    const int code = run_sweep_command(plan, options, sweep, console);
+    const int code = run_sweep_command(plan, options, sweep, report_pages(), console);
     if (arguments.common.json) answer(std::move(sweep.result));
     return code;
   }
@@ -173,14 +145,13 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
     return exit_ok;
   }
   install_interrupt_handler();
-  const RunOutcome outcome = run_pipeline(plan, options, console);
+  const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
   if (arguments.common.json) {
     answer(outcome_json(plan, outcome));
   } else {
-    std::string text = published_text(plan, outcome);
-    text = text.empty() ? temperatures_text(plan, outcome) : "\n" + text + "\n";
+    std::string text = terminal_text(plan, outcome);
     text += fmt::format("results: {}\nreport:  {}\n", outcome.out.string(), (outcome.out / "report.html").string());
     print(text);
   }
@@ -601,7 +572,7 @@ int command_status(const Arguments& arguments) {
     }
     json["stages"].push_back(Json{{"id", id},
                                   {"stage", record.stage},
-                                  {"version", record.version},
+                                  {"code", record.code},
                                   {"wall_seconds", cost ? Json(cost->wall_seconds) : Json()},
                                   {"files", record.outputs.size()},
                                   {"bytes", bytes},
@@ -654,13 +625,13 @@ int command_rerun(const Arguments& arguments) {
   install_interrupt_handler();
   if (plan.sweep) {
     SweepArguments whole;
-    const int code = run_sweep_command(plan, options, whole, console);
+    const int code = run_sweep_command(plan, options, whole, report_pages(), console);
     if (code != exit_ok && code != exit_check_failed) return code;
     const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
     print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
     return same ? exit_ok : exit_check_failed;
   }
-  const RunOutcome outcome = run_pipeline(plan, options, console);
+  const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   if (!outcome.error.empty()) console.error(outcome.error);
   if (outcome.code != exit_ok && outcome.code != exit_check_failed) return outcome.code;
   // Everything the first run made, file by file.

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/runner/stage_code.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -44,7 +45,7 @@ Json StageRecord::to_json() const {
   Json out;
   out["stage"] = stage;
   out["id"] = id;
-  out["version"] = version;
+  out["code"] = code;
   out["seed"] = seed;
   out["reduced"] = reduced;
   out["options"] = options;
@@ -60,7 +61,7 @@ StageRecord StageRecord::from_json(const Json& json, const std::string& file) {
     StageRecord record;
     record.stage = json.at("stage").get<std::string>();
     record.id = json.at("id").get<std::string>();
-    record.version = json.at("version").get<int>();
+    record.code = json.value("code", std::string());
     record.seed = json.at("seed").get<std::uint64_t>();
     record.reduced = json.at("reduced").get<bool>();
     record.options = json.at("options");
@@ -120,7 +121,7 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
   StageRecord record;
   record.stage = stage.row->name;
   record.id = stage.id;
-  record.version = stage.row->version;
+  record.code = code_of(stage);
   record.seed = stage.row->uses_seed ? stage.seed : 0;
   record.reduced = stage.reduced;
   record.options = stage.options;
@@ -138,7 +139,7 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
 }
 
 std::string work_key(const StageRecord& record) {
-  std::string text = fmt::format("{} {} {} {} ", record.stage, record.version, record.seed, record.reduced);
+  std::string text = fmt::format("{} {} {} {} ", record.stage, record.code, record.seed, record.reduced);
   text += dump_canonical(record.options);
   for (const Fingerprint& input : record.inputs) text += input.file + " " + input.fast + "\n";
   return fast_hash(text);
@@ -167,8 +168,11 @@ std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::opt
   if (!found) return {"it has not run yet"};
   std::vector<std::string> reasons;
   if (found->stage != fresh.stage) return {fmt::format("it was a {} stage before", found->stage)};
-  if (found->version != fresh.version)
-    reasons.push_back(fmt::format("the stage's version changed {} → {}", found->version, fresh.version));
+  if (found->code != fresh.code) {
+    const std::optional<StageCost> cost = read_cost(stage_directory);
+    reasons.push_back(fmt::format("the code of {} changed{}", fresh.stage,
+                                  cost ? " since " + cost->finished.substr(0, 10) : std::string()));
+  }
   if (found->seed != fresh.seed) reasons.push_back(fmt::format("seed changed {} → {}", found->seed, fresh.seed));
   if (found->reduced != fresh.reduced) reasons.push_back("units changed");
   if (dump_canonical(found->options) != dump_canonical(fresh.options)) {

@@ -1,9 +1,9 @@
 // What a finished stage leaves behind, and whether it still counts: by content, never by time stamps.
 //
-// OUT/<id>/.record says what the stage was made from (kind, version, options, seed, fingerprints of all inputs) and
-// what it made (fingerprints of all outputs). A stage is up to date when what it would be made from now is the same and
-// its outputs are still what it made. OUT/<id>/cost.json says what the work cost on this machine: it is no result, so
-// it has no fingerprint and no later stage reads it.
+// OUT/<id>/.record says what the stage was made from (kind, code, options, seed, fingerprints of all inputs) and what
+// it made (fingerprints of all outputs). A stage is up to date when what it would be made from now is the same and its
+// outputs are still what it made. OUT/<id>/cost.json says what the work cost on this machine: it is no result, so it
+// has no fingerprint and no later stage reads it.
 #pragma once
 
 #include <filesystem>
@@ -27,7 +27,7 @@ struct Fingerprint {
 
 struct StageRecord {
   std::string stage, id;
-  int version = 0;
+  std::string code;  // fingerprint of the code that made it
   std::uint64_t seed = 0;
   bool reduced = false;
   Json options;
@@ -57,7 +57,7 @@ std::optional<StageCost> read_cost(const std::filesystem::path& stage_directory)
 // What a stage would be made from now; `upstream` are the records of the stages it reads from, in order.
 StageRecord fresh_record(const PlannedStage& stage, const std::vector<const StageRecord*>& upstream);
 
-// One hash of all that decides what a stage makes: kind, version, options, seed, inputs. `record` from fresh_record().
+// One hash of all that decides what a stage makes: kind, code, options, seed, inputs. `record` from fresh_record().
 std::string work_key(const StageRecord& record);
 
 // Why the stage must run again, one sentence each; empty: `found` counts. `upstream_ids` name the stages of fresh's

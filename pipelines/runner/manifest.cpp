@@ -70,7 +70,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
     Json entry;
     entry["id"] = stage.id;
     entry["stage"] = stage.kind;
-    entry["version"] = plan.stages[i].row->version;
+    if (stage.record) entry["code"] = stage.record->code;
     if (plan.stages[i].row->uses_seed) entry["seed"] = plan.stages[i].seed;
     entry["state"] = to_string(stage.state);
     if (!stage.reasons.empty()) entry["why"] = stage.reasons;

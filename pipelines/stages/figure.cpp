@@ -513,12 +513,13 @@ void Figure::run(RunContext& context) const {
 
 StageRow figure_stage() {
   return {.name = "figure",
-          .version = 4,
           .summary = "draws profiles, fits and published curves",
           .accepts = {"extract", "simulate", "fit"},
           .fewest_inputs = 1,
           .most_inputs = 3,
           .result = "figure.json",
+          .data_option = "data",
+          .pages = figure_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Figure>(); }};
 }
 

@@ -791,12 +791,13 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 21,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,
           .uses_seed = true,
           .result = "observables.json",
+          .headline = {"center_of_mass_rise", "temperature_x", "temperature_z"},
+          .pages = simulate_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Simulate>(); }};
 }
 

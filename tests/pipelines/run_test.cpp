@@ -85,6 +85,24 @@ TEST_F(Pipeline, SaysWhyAStageRunsAgain) {
   EXPECT_EQ(run({"explain", "r.json", "--out", "o"}).out, dry_run());
 }
 
+// The fingerprints themselves: tests/house/stage_code_test.cpp.
+TEST_F(Pipeline, RunsAgainWhatOtherCodeHasMade) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  Json record = read_json(folder_ / "o/fit/.record");
+  EXPECT_EQ(record["code"].get<std::string>().size(), 32u);
+  EXPECT_NE(record["code"], read_json(folder_ / "o/bed/.record")["code"]);
+  record["code"] = std::string(32, '0');
+  write_text(folder_ / "o/fit/.record", record.dump());
+  const std::string next = dry_run();
+  const std::string day = read_json(folder_ / "o/fit/cost.json")["finished"].get<std::string>().substr(0, 10);
+  EXPECT_THAT(next, HasSubstr("bed: up to date"));
+  EXPECT_THAT(next, HasSubstr("fit: runs: the code of fit changed since " + day));
+  EXPECT_THAT(next, HasSubstr("check: runs: fit runs before it"));
+  // The new code gives the same numbers: what follows rests.
+  EXPECT_THAT(run_recipe().err, HasSubstr("check: up to date"));
+  EXPECT_THAT(dry_run(), HasSubstr("fit: up to date"));
+}
+
 TEST_F(Pipeline, NoticesOutputsThatWereTouched) {
   ASSERT_EQ(run_recipe().exit_code, 0);
   write_text(folder_ / "o/bed/profile.csv", read_text(folder_ / "o/bed/profile.csv") + "# mine\n");
