@@ -1,4 +1,5 @@
 // The weights of a window's bins: by their errors, or by their covariance as far as the samples behind it allow.
+// implements: fit/profile_fit/window.hpp
 #include <algorithm>
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// implements: fit/profile_fit/fit_profile.hpp
 #include <gsl/gsl_cdf.h>
 
 #include <algorithm>

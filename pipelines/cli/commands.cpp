@@ -17,6 +17,7 @@
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/run.hpp"
+#include "pipelines/runner/slurm.hpp"
 #include "pipelines/runner/sweep.hpp"
 #include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/theory.hpp"
@@ -42,7 +43,7 @@ std::vector<Setting> settings_of(const RunArguments& run) {
   return settings;
 }
 
-// --data: the user's points go into every figure stage of the recipe.
+// --data: the user's points go into every stage of the recipe that draws them.
 void add_data(JsonNode& document, const std::string& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw InputError(fmt::format("--data {}: there is no such file", file));
@@ -51,15 +52,16 @@ void add_data(JsonNode& document, const std::string& file) {
   if (JsonNode* stages = document.find("stages"); stages != nullptr && stages->is_array()) {
     for (JsonNode& stage : stages->items) {
       const JsonNode* kind = stage.find("stage");
-      if (kind == nullptr || !kind->is_string() || kind->text != "figure") continue;
+      const StageRow* row = kind != nullptr && kind->is_string() ? find_stage(kind->text) : nullptr;
+      if (row == nullptr || row->data_option.empty()) continue;
       found = true;
       JsonNode path;
       path.kind = JsonNode::Kind::string;
       path.text = fs::absolute(file).string();
-      set_pointer(stage, "/data", std::move(path));
+      set_pointer(stage, pointer_join("", row->data_option), std::move(path));
     }
   }
-  if (!found) throw UsageError("--data: the recipe has no figure stage to draw the points into");
+  if (!found) throw UsageError("--data: no stage of the recipe draws the points (a figure stage does)");
 }
 
 // A recipe read with --preset, --set and --data applied.
@@ -118,36 +120,6 @@ Json explanation_json(const std::vector<StageOutcome>& stages) {
   return out;
 }
 
-// What people look for first: the temperature of every fit.
-std::string temperatures_text(const Plan& plan, const RunOutcome& outcome) {
-  std::string text;
-  for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
-    const PlannedStage& stage = plan.stages[i];
-    const fs::path path = outcome.out / stage.id / stage.row->result;
-    std::error_code error;
-    if (stage.row->name != "fit" || !outcome.stages[i].record || !fs::is_regular_file(path, error)) continue;
-    const Json fit = read_json(path);
-    std::string numbers;
-    const auto add = [&](const char* key, const char* label, double factor, const char* unit) {
-      const Json* value = find_pointer(fit, fmt::format("/{}/value", key));
-      const Json* spread = find_pointer(fit, fmt::format("/{}/std_error", key));
-      if (value == nullptr || !value->is_number()) return false;
-      numbers += fmt::format("{}{} = {:.4g}", numbers.empty() ? "" : ", ", label, factor * value->get<double>());
-      if (spread != nullptr && spread->is_number() && spread->get<double>() > 0)
-        numbers += fmt::format(" ± {:.2g}", factor * spread->get<double>());
-      numbers += unit;
-      return true;
-    };
-    const Json* unit = find_pointer(fit, "/temperature_over_mg/unit");
-    if (unit == nullptr || *unit != "m" || !add("temperature_over_mg", "T/(m g)", 1e3, " mm"))
-      add("temperature", "T", 1, " m g D");
-    add("reduced_temperature", "T/T_c", 1, "");
-    add("solid_height", "solid", 1, " D high");
-    if (!numbers.empty()) text += fmt::format("{}: {}\n", stage.id, numbers);
-  }
-  return text;
-}
-
 // Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
 int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result = nullptr) {
   const RunOptions options = run_options(arguments, plan);
@@ -160,7 +132,7 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
   };
   if (plan.sweep) {
     SweepArguments sweep{arguments.run.shard, arguments.run.gather, arguments.run.dry_run, arguments.common.json, {}};
-    const int code = run_sweep_command(plan, options, sweep, console);
+    const int code = run_sweep_command(plan, options, sweep, report_pages(), console);
     if (arguments.common.json) answer(std::move(sweep.result));
     return code;
   }
@@ -175,14 +147,13 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
     return exit_ok;
   }
   install_interrupt_handler();
-  const RunOutcome outcome = run_pipeline(plan, options, console);
+  const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
   if (arguments.common.json) {
     answer(outcome_json(plan, outcome));
   } else {
-    std::string text = published_text(plan, outcome);
-    text = text.empty() ? temperatures_text(plan, outcome) : "\n" + text + "\n";
+    std::string text = terminal_text(plan, outcome);
     text += fmt::format("results: {}\nreport:  {}\n", outcome.out.string(), (outcome.out / "report.html").string());
     print(text);
   }
@@ -576,19 +547,20 @@ int command_status(const Arguments& arguments) {
   for (const auto& [id, record] : records) {
     std::uint64_t bytes = 0;
     std::vector<std::string> damaged;
+    const std::optional<StageCost> cost = read_cost(out / id);
     for (const Fingerprint& file : record.outputs) {
       bytes += file.bytes;
       if (fs::file_size(out / id / file.file, error) != file.bytes || error) damaged.push_back(file.file);
     }
     json["stages"].push_back(Json{{"id", id},
                                   {"stage", record.stage},
-                                  {"version", record.version},
-                                  {"wall_seconds", record.wall_seconds},
+                                  {"code", record.code},
+                                  {"wall_seconds", cost ? Json(cost->wall_seconds) : Json()},
                                   {"files", record.outputs.size()},
                                   {"bytes", bytes},
                                   {"damaged", damaged}});
     text += fmt::format("  {:<16} {:<10} {:>5} files {:>12} bytes  {:>10}{}\n", id, record.stage, record.outputs.size(),
-                        bytes, duration_text(record.wall_seconds),
+                        bytes, cost ? duration_text(cost->wall_seconds) : "",
                         damaged.empty() ? "" : fmt::format("  damaged: {}", fmt::join(damaged, ", ")));
   }
   if (records.empty()) text += "  no finished stage\n";
@@ -617,17 +589,6 @@ int command_verify(const Arguments& arguments) {
   return result.problems.empty() ? exit_ok : exit_check_failed;
 }
 
-// Whether two result files differ in nothing but the time the work took.
-bool same_but_for_timings(const fs::path& before, const fs::path& after) {
-  std::error_code error;
-  if (before.extension() != ".json" || !fs::is_regular_file(before, error)) return false;
-  Json first = read_json(before), second = read_json(after);
-  for (Json* json : {&first, &second}) {
-    for (const char* key : {"cpu_seconds", "collisions_per_second"}) json->erase(key);
-  }
-  return first == second;
-}
-
 int command_rerun(const Arguments& arguments) {
   const fs::path before = arguments.recipe;
   const Json manifest = read_json(before / "manifest.json");
@@ -646,13 +607,13 @@ int command_rerun(const Arguments& arguments) {
   install_interrupt_handler();
   if (plan.sweep) {
     SweepArguments whole;
-    const int code = run_sweep_command(plan, options, whole, console);
+    const int code = run_sweep_command(plan, options, whole, report_pages(), console);
     if (code != exit_ok && code != exit_check_failed) return code;
     const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
     print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
     return same ? exit_ok : exit_check_failed;
   }
-  const RunOutcome outcome = run_pipeline(plan, options, console);
+  const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   if (!outcome.error.empty()) console.error(outcome.error);
   if (outcome.code != exit_ok && outcome.code != exit_check_failed) return outcome.code;
   // Everything the first run made, file by file.
@@ -664,8 +625,7 @@ int command_rerun(const Arguments& arguments) {
       const std::string name = entry.value("file", std::string());
       ++files;
       if (!fs::is_regular_file(options.out / name, error) ||
-          (sha256_of_file(options.out / name) != entry.value("sha256", std::string()) &&
-           !same_but_for_timings(before / name, options.out / name)))
+          sha256_of_file(options.out / name) != entry.value("sha256", std::string()))
         different.push_back(name);
     }
   }
@@ -673,9 +633,9 @@ int command_rerun(const Arguments& arguments) {
     print(dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}}));
   } else {
     for (const std::string& name : different) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
-    print(different.empty() ? fmt::format("the same: all {} files of {} came out byte for byte, timings aside\n", files,
-                                          before.string())
-                            : fmt::format("{} of {} files differ\n", different.size(), files));
+    print(different.empty()
+              ? fmt::format("the same: all {} files of {} came out byte for byte\n", files, before.string())
+              : fmt::format("{} of {} files differ\n", different.size(), files));
   }
   return different.empty() ? exit_ok : exit_check_failed;
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/runner/stage_code.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -44,7 +45,7 @@ Json StageRecord::to_json() const {
   Json out;
   out["stage"] = stage;
   out["id"] = id;
-  out["version"] = version;
+  out["code"] = code;
   out["seed"] = seed;
   out["reduced"] = reduced;
   out["options"] = options;
@@ -52,9 +53,6 @@ Json StageRecord::to_json() const {
   out["outputs"] = pipelines::to_json(outputs);
   out["warnings"] = warnings;
   out["failed_checks"] = failed_checks;
-  out["wall_seconds"] = wall_seconds;
-  out["cpu_seconds"] = cpu_seconds;
-  out["timings"] = timings;
   return out;
 }
 
@@ -63,7 +61,7 @@ StageRecord StageRecord::from_json(const Json& json, const std::string& file) {
     StageRecord record;
     record.stage = json.at("stage").get<std::string>();
     record.id = json.at("id").get<std::string>();
-    record.version = json.at("version").get<int>();
+    record.code = json.value("code", std::string());
     record.seed = json.at("seed").get<std::uint64_t>();
     record.reduced = json.at("reduced").get<bool>();
     record.options = json.at("options");
@@ -71,9 +69,6 @@ StageRecord StageRecord::from_json(const Json& json, const std::string& file) {
     record.outputs = fingerprints_from(json.at("outputs"));
     record.warnings = json.at("warnings").get<std::vector<std::string>>();
     record.failed_checks = json.at("failed_checks").get<std::vector<std::string>>();
-    record.wall_seconds = json.at("wall_seconds").get<double>();
-    record.cpu_seconds = json.at("cpu_seconds").get<double>();
-    record.timings = json.at("timings");
     return record;
   } catch (const nlohmann::json::exception&) {
     throw InputError(file + ": is not the record of a stage");
@@ -91,11 +86,42 @@ std::optional<StageRecord> read_record(const std::filesystem::path& stage_direct
   }
 }
 
+Json StageCost::to_json() const {
+  Json out{{"wall_seconds", wall_seconds},
+           {"cpu_seconds", cpu_seconds},
+           {"threads", threads},
+           {"host", host},
+           {"finished", finished}};
+  out.update(timings);
+  return out;
+}
+
+std::optional<StageCost> read_cost(const std::filesystem::path& stage_directory) {
+  const std::filesystem::path path = stage_directory / cost_name;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  try {
+    Json json = read_json(path);
+    StageCost cost{.wall_seconds = json.at("wall_seconds").get<double>(),
+                   .cpu_seconds = json.at("cpu_seconds").get<double>(),
+                   .threads = json.at("threads").get<int>(),
+                   .host = json.at("host").get<std::string>(),
+                   .finished = json.at("finished").get<std::string>()};
+    for (const char* key : {"wall_seconds", "cpu_seconds", "threads", "host", "finished"}) json.erase(key);
+    cost.timings = std::move(json);
+    return cost;
+  } catch (const InputError&) {
+    return std::nullopt;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
 StageRecord fresh_record(const PlannedStage& stage, const std::vector<const StageRecord*>& upstream) {
   StageRecord record;
   record.stage = stage.row->name;
   record.id = stage.id;
-  record.version = stage.row->version;
+  record.code = code_of(stage);
   record.seed = stage.row->uses_seed ? stage.seed : 0;
   record.reduced = stage.reduced;
   record.options = stage.options;
@@ -113,7 +139,7 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
 }
 
 std::string work_key(const StageRecord& record) {
-  std::string text = fmt::format("{} {} {} {} ", record.stage, record.version, record.seed, record.reduced);
+  std::string text = fmt::format("{} {} {} {} ", record.stage, record.code, record.seed, record.reduced);
   text += dump_canonical(record.options);
   for (const Fingerprint& input : record.inputs) text += input.file + " " + input.fast + "\n";
   return fast_hash(text);
@@ -142,8 +168,11 @@ std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::opt
   if (!found) return {"it has not run yet"};
   std::vector<std::string> reasons;
   if (found->stage != fresh.stage) return {fmt::format("it was a {} stage before", found->stage)};
-  if (found->version != fresh.version)
-    reasons.push_back(fmt::format("the stage's version changed {} → {}", found->version, fresh.version));
+  if (found->code != fresh.code) {
+    const std::optional<StageCost> cost = read_cost(stage_directory);
+    reasons.push_back(fmt::format("the code of {} changed{}", fresh.stage,
+                                  cost ? " since " + cost->finished.substr(0, 10) : std::string()));
+  }
   if (found->seed != fresh.seed) reasons.push_back(fmt::format("seed changed {} → {}", found->seed, fresh.seed));
   if (found->reduced != fresh.reduced) reasons.push_back("units changed");
   if (dump_canonical(found->options) != dump_canonical(fresh.options)) {
@@ -192,7 +221,7 @@ std::vector<Fingerprint> fingerprint_directory(const std::filesystem::path& dire
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(directory)) {
     if (!entry.is_regular_file()) continue;
     const std::string name = entry.path().lexically_relative(directory).generic_string();
-    if (name == record_name || name == "log.txt") continue;
+    if (name == record_name || name == cost_name || name == "log.txt") continue;
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());

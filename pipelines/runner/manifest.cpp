@@ -24,6 +24,12 @@ std::string compiler_text() {
 }
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
+std::string host_name() {
+  char host[256] = "?";
+  ::gethostname(host, sizeof host - 1);
+  return host;
+}
+
 namespace {
 Json file_entry(const std::string& name, std::uint64_t bytes, const std::string& sha) {
   return Json{{"file", name}, {"bytes", bytes}, {"sha256", sha}};
@@ -37,9 +43,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
   out["git"] = source_revision();
   out["compiler"] = compiler_text();
   out["build_type"] = SHAKEBED_BUILD_TYPE;
-  char host[256] = "?";
-  ::gethostname(host, sizeof host - 1);
-  out["host"] = host;
+  out["host"] = host_name();
   out["command_line"] = options.command_line;
   out["started"] = started;
   out["finished"] = utc_now();
@@ -66,15 +70,13 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
     Json entry;
     entry["id"] = stage.id;
     entry["stage"] = stage.kind;
-    entry["version"] = plan.stages[i].row->version;
+    if (stage.record) entry["code"] = stage.record->code;
     if (plan.stages[i].row->uses_seed) entry["seed"] = plan.stages[i].seed;
     entry["state"] = to_string(stage.state);
     if (!stage.reasons.empty()) entry["why"] = stage.reasons;
     if (!stage.error.empty()) entry["error"] = stage.error;
     if (stage.record) {
-      entry["wall_seconds"] = stage.record->wall_seconds;
-      entry["cpu_seconds"] = stage.record->cpu_seconds;
-      if (!stage.record->timings.empty()) entry["timings"] = stage.record->timings;
+      if (stage.cost) entry["cost"] = stage.cost->to_json();
       entry["warnings"] = stage.record->warnings;
       entry["inputs"] = Json::array();
       for (const Fingerprint& file : stage.record->inputs) {

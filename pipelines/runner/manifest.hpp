@@ -12,6 +12,7 @@ std::string program_version();  // "0.1.0"
 std::string source_revision();  // git commit of the build, "-dirty" if changed; "" outside git
 std::string compiler_text();
 std::string utc_now();  // 2026-11-21T02:27:48Z
+std::string host_name();
 
 Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome& outcome, const std::string& started);
 

@@ -26,7 +26,6 @@ bool good_id(std::string_view id) {
 struct CommonOptions {
   std::string stage, id;
   std::vector<std::string> from;
-  std::optional<int> version;
   std::uint64_t seed = 1;
   bool reduced = false;
 };
@@ -35,15 +34,11 @@ void describe_common(Fields& fields, CommonOptions& common, const StageRow& row)
   fields.text("stage", common.stage, {.help = "kind of the stage", .required = true});
   fields.text("id", common.id, {.help = "name of the stage and of its folder in OUT; its kind if left out"});
   fields.texts("from", common.from, {.help = "ids of the stages whose results it reads"});
-  fields.integer("version", common.version, {.help = "refuse to run with another version of this stage"});
   if (row.uses_seed) fields.integer("seed", common.seed, {.help = "of its random numbers"});
-  if (fields.mode() != Fields::Mode::encode || row.name == "simulate" || common.reduced) {
-    const std::vector<Choice<bool>> units{{false, "SI"}, {true, "reduced"}};
-    fields.choice(
-        "units", common.reduced, units,
-        {.help = "SI: quantities are strings with a unit or numbers in SI. reduced: plain numbers, lengths in D, "
-                 "masses in m, g or the starting T equal to 1"});
-  }
+  const std::vector<Choice<bool>> units{{false, "SI"}, {true, "reduced"}};
+  fields.choice("units", common.reduced, units,
+                {.help = "SI: quantities are strings with a unit or numbers in SI. reduced: plain numbers, lengths in "
+                         "D, masses in m, g or the starting T equal to 1"});
 }
 
 void describe_report(Fields& fields, ReportOptions& report) {
@@ -263,6 +258,15 @@ void check_presets(const JsonNode& root, const Fields::Source& source) {
         problem(change.value, pointer_join(where, change.key), "a preset cannot change the presets", "Remove it");
     }
   }
+}
+
+// The recipe inside of a stage that runs others.
+std::vector<ChainStage> read_chain(const JsonNode& recipe) {
+  const Plan plan = make_plan(recipe, "(chain)", std::filesystem::current_path());
+  std::vector<ChainStage> stages;
+  for (const PlannedStage& stage : plan.stages)
+    stages.push_back({stage.id, std::string(stage.row->name), !stage.input_files.empty()});
+  return stages;
 }
 
 struct Draft {  // a stage before its place in the order is known
@@ -578,14 +582,11 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     common.id = draft.common.id;
     Fields fields = Fields::decode(*draft.node, planned.pointer, stage_source);
     describe_common(fields, common, *draft.row);
-    fields.require(!common.version || *common.version == draft.row->version, "version",
-                   fmt::format("the recipe asks for version {} of {}, this program has {}", common.version.value_or(0),
-                               draft.row->name, draft.row->version),
-                   "Use the program it was written for, or remove \"version\"");
     fields.set_reduced(common.reduced);
     planned.reduced = common.reduced;
     planned.seed = common.seed;
     planned.stage->describe(fields);
+    if (problems.empty()) planned.stage->check_chains(fields, read_chain);
     fields.finish();
     if (problems.size() == problems_before) {
       if (auto bed = planned.stage->bed())
@@ -616,7 +617,6 @@ Plan make_plan(JsonNode document, const std::string& file, const std::filesystem
     Json out;
     out["stage"] = stage.row->name;
     out["id"] = stage.id;
-    out["version"] = stage.row->version;
     if (!stage.from.empty()) {
       out["from"] = Json::array();
       for (const std::size_t k : stage.from) out["from"].push_back(plan.stages[k].id);

@@ -1,25 +1,19 @@
 #include "pipelines/runner/run.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/file.h>
-#include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
-#include <mutex>
 #include <optional>
 #include <thread>
 
 #include "pipelines/formats/files.hpp"
-#include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "pipelines/runner/pages.hpp"
+#include "pipelines/runner/run_stage.hpp"
 
 namespace shakebed::pipelines {
 
@@ -63,142 +57,9 @@ void install_interrupt_handler() {
 }
 bool interrupt_requested() { return interrupt_flag.load(std::memory_order_relaxed); }
 
-// --- the lock
-
-FolderLock::FolderLock(const fs::path& folder) : path_(folder / ".lock") {
-  while (true) {
-    descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (descriptor_ < 0)
-      throw StageError(fmt::format("{}: cannot be written: {}", folder.string(), std::strerror(errno)));
-    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      char owner[256] = {};
-      const ssize_t size = ::read(descriptor_, owner, sizeof owner - 1);
-      ::close(descriptor_);
-      throw StageError(fmt::format("{}: another shakebed works there{}{}; wait for it, or choose another --out",
-                                   folder.string(), size > 0 ? ": " : "", size > 0 ? owner : ""));
-    }
-    // The file may have been removed between opening and locking: then this lock is on nothing.
-    struct stat held {
-    }, named{};
-    if (::fstat(descriptor_, &held) == 0 && ::stat(path_.c_str(), &named) == 0 && held.st_ino == named.st_ino) break;
-    ::close(descriptor_);
-  }
-  char host[128] = "?";
-  ::gethostname(host, sizeof host - 1);
-  const std::string owner = fmt::format("process {} on {}", ::getpid(), host);
-  if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, owner.data(), owner.size(), 0) < 0) {
-    // Only a courtesy to whoever finds the folder locked; the lock itself holds.
-  }
-}
-
-FolderLock::~FolderLock() {
-  if (descriptor_ < 0) return;
-  ::unlink(path_.c_str());
-  ::close(descriptor_);
-}
-
 // --- running
 
 namespace {
-
-constexpr std::string_view partial_prefix = ".partial-";
-
-double cpu_seconds_so_far() {
-  rusage own{}, children{};
-  getrusage(RUSAGE_SELF, &own);
-  getrusage(RUSAGE_CHILDREN, &children);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(own.ru_utime) + seconds(own.ru_stime) + seconds(children.ru_utime) + seconds(children.ru_stime);
-}
-
-// Puts a finished folder in its place in one step; what stood there before is removed.
-void publish(const fs::path& finished, const fs::path& place) {
-  std::error_code error;
-  if (fs::exists(place, error)) {
-    if (::renameat2(AT_FDCWD, finished.c_str(), AT_FDCWD, place.c_str(), RENAME_EXCHANGE) == 0) {
-      fs::remove_all(finished, error);
-      return;
-    }
-    // File systems without an exchange: for a moment neither is there, never half of one.
-    const fs::path old = finished.string() + "-old";
-    fs::rename(place, old);
-    fs::rename(finished, place);
-    fs::remove_all(old, error);
-    return;
-  }
-  fs::rename(finished, place);
-}
-
-class StageRun : public RunContext {
- public:
-  StageRun(const PlannedStage& stage, std::vector<Input> inputs, fs::path directory, fs::path scratch, int jobs,
-           Console* console)
-      : stage_(stage),
-        inputs_(std::move(inputs)),
-        directory_(std::move(directory)),
-        scratch_(std::move(scratch)),
-        jobs_(jobs),
-        console_(console) {}
-
-  const std::vector<Input>& inputs() const override { return inputs_; }
-  std::uint64_t seed() const override { return stage_.seed; }
-  int jobs() const override { return jobs_; }
-  const fs::path& output_directory() const override { return directory_; }
-  const fs::path& scratch() override {
-    const std::lock_guard lock(mutex_);
-    try {
-      fs::create_directories(scratch_);
-    } catch (const fs::filesystem_error& error) {
-      throw StageError(fmt::format("{}: cannot be made: {}", scratch_.string(), error.code().message()));
-    }
-    return scratch_;
-  }
-  void progress(double fraction, std::string_view what) override {
-    if (console_ == nullptr) return;
-    // At most every 50 ms, whatever the stage does.
-    const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
-    auto last = last_progress_.load(std::memory_order_relaxed);
-    if (now - last < 50'000'000 || !last_progress_.compare_exchange_strong(last, now)) return;
-    console_->progress(stage_.id, fraction, what);
-  }
-  bool interrupted() const override { return interrupt_requested(); }
-  void log(std::string_view line) override {
-    const std::lock_guard lock(mutex_);
-    log_ += line;
-    log_ += '\n';
-    if (console_ != nullptr) console_->detail(fmt::format("  {}: {}", stage_.id, line));
-  }
-  void warning(std::string_view sentence) override {
-    const std::lock_guard lock(mutex_);
-    if (std::find(warnings.begin(), warnings.end(), sentence) != warnings.end()) return;
-    warnings.emplace_back(sentence);
-    if (console_ != nullptr) console_->warning(fmt::format("{}: {}", stage_.id, sentence));
-  }
-  void timing(std::string_view name, double value) override {
-    const std::lock_guard lock(mutex_);
-    timings[std::string(name)] = value;
-  }
-  void check_failed(std::string_view sentence) override {
-    const std::lock_guard lock(mutex_);
-    failed_checks.emplace_back(sentence);
-  }
-  const std::string& log_text() const { return log_; }
-
-  std::vector<std::string> warnings, failed_checks;
-  Json timings = Json::object();
-
- private:
-  const PlannedStage& stage_;
-  std::vector<Input> inputs_;
-  fs::path directory_, scratch_;
-  int jobs_;
-  Console* console_;
-  std::mutex mutex_;
-  std::string log_;
-  std::atomic<std::int64_t> last_progress_{0};
-};
 
 // Which stages take part.
 std::vector<bool> selection(const Plan& plan, const RunOptions& options) {
@@ -230,101 +91,14 @@ std::vector<bool> selection(const Plan& plan, const RunOptions& options) {
   return selected;
 }
 
-int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
-
-// When a file was last touched. Equal stamps mean equal bytes, without reading a film of many GB a second time: writing
-// sets both times, and the second one (ctime) cannot be set back. A clock's tick (2 s at most, on FAT) could hide a
-// change right after another one, so a file touched just before, or in a clock's future, has no stamp.
-struct Stamp {
-  dev_t device;
-  ino_t inode;
-  off_t bytes;
-  std::int64_t modified, changed;  // [ns]
-  bool operator==(const Stamp&) const = default;
-};
-std::optional<Stamp> stamp_of(const fs::path& path) {
-  const auto nanoseconds = [](const timespec& t) { return t.tv_sec * std::int64_t{1'000'000'000} + t.tv_nsec; };
-  timespec now{};
-  struct stat found {};
-  if (::clock_gettime(CLOCK_REALTIME, &now) != 0 || ::stat(path.c_str(), &found) != 0) return std::nullopt;
-  const Stamp stamp{found.st_dev, found.st_ino, found.st_size, nanoseconds(found.st_mtim), nanoseconds(found.st_ctim)};
-  if (std::max(stamp.modified, stamp.changed) > nanoseconds(now) - 3'000'000'000) return std::nullopt;
-  return stamp;
-}
-
-// Stamps of a stage's external files, taken before they are read for their fingerprints.
-using Stamps = std::vector<std::optional<Stamp>>;
-Stamps stamps_of(const PlannedStage& stage) {
-  Stamps stamps;
-  for (const auto& [pointer, path] : stage.input_files) stamps.push_back(stamp_of(path));
-  return stamps;
-}
-
-// What a stage read must be there at its end as it was at its beginning: files that vanish or change meanwhile give a
-// result that belongs to neither, and its record would say that it counts. Results of other stages are read here for
-// the first time (their fingerprints are those of their records), external files only if they were touched.
-void check_inputs_stayed(const PlannedStage& stage, const StageRecord& fresh, const Stamps& stamps,
-                         const fs::path& out) {
-  const std::size_t first_external = fresh.inputs.size() - stage.input_files.size();
-  for (std::size_t i = 0; i < fresh.inputs.size(); ++i) {
-    const Fingerprint& was = fresh.inputs[i];
-    const bool external = i >= first_external;
-    const fs::path path = external ? fs::path(stage.input_files[i - first_external].second) : out / was.file;
-    std::error_code error;
-    const auto bytes = fs::file_size(path, error);
-    if (error) throw StageError(fmt::format("{}: vanished while it was read; run again", path.string()));
-    if (external && stamps[i - first_external] && stamp_of(path) == stamps[i - first_external]) continue;
-    if (bytes != was.bytes || fast_hash_of_file(path) != was.fast)
-      throw StageError(
-          fmt::format("{}: changed while it was read, or is not what its record says; run again", path.string()));
-  }
-}
-
-StageRecord run_stage(const PlannedStage& stage, StageRecord fresh, const Stamps& stamps, std::vector<Input> inputs,
-                      const RunOptions& options, Console* console) {
-  const fs::path place = options.out / stage.id;
-  const fs::path working = options.out / fmt::format("{}{}-{}", partial_prefix, stage.id, ::getpid());
-  const fs::path scratch = scratch_folder(options.out, fresh);
-  std::error_code ignored;
-  fs::remove_all(working, ignored);
-  if (options.force) fs::remove_all(scratch, ignored);
-  struct Remover {
-    const fs::path& path;
-    ~Remover() {
-      std::error_code error;
-      fs::remove_all(path, error);
-    }
-  } remover{working};
-  try {
-    fs::create_directories(working);
-  } catch (const fs::filesystem_error& error) {
-    throw StageError(fmt::format("{}: cannot be written: {}", options.out.string(), error.code().message()));
-  }
-  const auto wall_start = std::chrono::steady_clock::now();
-  const double cpu_start = cpu_seconds_so_far();
-  StageRun context(stage, std::move(inputs), working, scratch, options.jobs > 0 ? options.jobs : processors(), console);
-  stage.stage->run(context);
-  context.check_interrupted();
-  check_inputs_stayed(stage, fresh, stamps, options.out);
-  fresh.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
-  fresh.cpu_seconds = cpu_seconds_so_far() - cpu_start;
-  fresh.outputs = fingerprint_directory(working, true);
-  fresh.warnings = context.warnings;
-  fresh.failed_checks = context.failed_checks;
-  fresh.timings = context.timings;
-  if (!context.log_text().empty()) write_file(working / "log.txt", context.log_text());
-  write_file(working / record_name, dump(fresh.to_json()));
-  publish(working, place);
-  // Finished: nothing of it, nor of what was begun with other options, is needed any more.
-  fs::remove_all(scratch.parent_path(), ignored);
-  fs::remove(options.out / scratch_name, ignored);
-  return fresh;
-}
-
 }  // namespace
 
+Input input_of(const PlannedStage& stage, const fs::path& out) {
+  return {stage.id, std::string(stage.row->name), out / stage.id, std::string(stage.row->result)};
+}
+
 fs::path scratch_folder(const fs::path& out, const StageRecord& fresh) {
-  return out / scratch_name / fresh.id / fast_hash(work_key(fresh) + source_revision());
+  return out / scratch_name / fresh.id / work_key(fresh);
 }
 
 void remove_leftovers(const fs::path& out) {
@@ -386,95 +160,144 @@ std::string explanation_text(const std::vector<StageOutcome>& stages) {
   return out;
 }
 
-void run_stages(const Plan& plan, const RunOptions& options, Console* console, RunOutcome& outcome) {
-  const std::vector<bool> selected = selection(plan, options);
-  const auto stop = [&](StageOutcome& stage, StageState state, ExitCode code, const std::string& what) {
-    stage.state = state;
-    stage.error = what;
-    outcome.code = code;
-    outcome.error = fmt::format("{} ({}): {}", stage.id, stage.kind, what);
-    if (console != nullptr) console->end_progress();
-  };
-  for (const PlannedStage& stage : plan.stages) {
-    outcome.stages.push_back({.id = stage.id, .kind = std::string(stage.row->name)});
+namespace {
+
+// The stages of a plan, one after another.
+class StagesRun {
+ public:
+  StagesRun(const Plan& plan, const RunOptions& options, Console* console, RunOutcome& outcome)
+      : plan_(plan), options_(options), console_(console), outcome_(outcome), selected_(selection(plan, options)) {
+    for (const PlannedStage& stage : plan.stages)
+      outcome.stages.push_back({.id = stage.id, .kind = std::string(stage.row->name)});
+    std::error_code error;
+    has_scratch_ = fs::exists(options.out / scratch_name, error);
   }
-  std::error_code no_scratch;
-  const bool has_scratch = fs::exists(options.out / scratch_name, no_scratch);
-  for (std::size_t i = 0; i < plan.stages.size(); ++i) {
-    const PlannedStage& stage = plan.stages[i];
-    StageOutcome& result = outcome.stages[i];
-    const fs::path place = options.out / stage.id;
-    if (interrupt_requested()) return stop(result, StageState::interrupted, exit_interrupted, "interrupted");
-    std::optional<StageRecord> found = read_record(place);
-    if (!selected[i]) {
-      result.state = StageState::not_selected;
-      result.record = std::move(found);
-      if (result.record) {  // used as it is, with what it had to say
-        for (const std::string& warning : result.record->warnings) {
-          outcome.warnings.push_back(fmt::format("{}: {}", stage.id, warning));
-        }
-      }
-      continue;
+
+  void operator()() {
+    for (std::size_t i = 0; i < plan_.stages.size(); ++i) {
+      if (!finish(i)) return;
+      keep_warnings(i);
     }
-    std::vector<const StageRecord*> upstream;
-    std::vector<Input> inputs;
-    for (const std::size_t k : stage.from) {
-      if (!outcome.stages[k].record) {
-        return stop(result, StageState::failed, exit_input,
+    if (!outcome_.failed_checks.empty()) outcome_.code = exit_check_failed;
+  }
+
+ private:
+  // False: it did not finish, and what follows does not run.
+  bool finish(std::size_t i) {
+    if (interrupt_requested()) return stop(i, StageState::interrupted, exit_interrupted, "interrupted");
+    StageOutcome& result = outcome_.stages[i];
+    std::optional<StageRecord> found = read_record(options_.out / result.id);
+    if (!selected_[i]) {
+      keep(i, StageState::not_selected, std::move(found));
+      return true;
+    }
+    for (const std::size_t k : plan_.stages[i].from) {
+      if (!outcome_.stages[k].record)
+        return stop(i, StageState::failed, exit_input,
                     fmt::format("it reads from \"{}\", which has not run here; run without --only and --from first",
-                                plan.stages[k].id));
-      }
-      upstream.push_back(&*outcome.stages[k].record);
-      inputs.push_back({plan.stages[k].id, std::string(plan.stages[k].row->name), options.out / plan.stages[k].id,
-                        std::string(plan.stages[k].row->result)});
+                                plan_.stages[k].id));
     }
     try {
-      const Stamps stamps = stamps_of(stage);
-      StageRecord fresh = fresh_record(stage, upstream);
-      result.reasons = reasons_to_run(fresh, found, place);
-      if (result.reasons.empty() && options.force) result.reasons.push_back("--force asks for it");
-      if (result.reasons.empty()) {
-        if (has_scratch) {  // killed between publishing and tidying up
-          std::error_code ignored;
-          fs::remove_all(scratch_folder(options.out, fresh), ignored);
-        }
-        result.state = StageState::kept;
-        result.record = std::move(found);
-        if (console != nullptr) console->message(fmt::format("{}: up to date", stage.id));
-        if (console != nullptr) {
-          for (const std::string& warning : result.record->warnings)
-            console->warning(fmt::format("{}: {}", stage.id, warning));
-        }
-      } else {
-        if (console != nullptr) {
-          console->message(found ? fmt::format("{}: runs: {}", stage.id, fmt::join(result.reasons, "; "))
-                                 : fmt::format("{}: runs", stage.id));
-          console->progress(stage.id, 0);
-        }
-        result.record = run_stage(stage, std::move(fresh), stamps, std::move(inputs), options, console);
-        result.state = StageState::ran;
-        if (console != nullptr) {
-          console->end_progress();
-          console->message(fmt::format("{}: done in {}", stage.id, duration_text(result.record->wall_seconds)));
-        }
-      }
+      make(i, std::move(found));
+      return true;
     } catch (const Interrupted&) {
-      return stop(result, StageState::interrupted, exit_interrupted, "interrupted");
+      return stop(i, StageState::interrupted, exit_interrupted, "interrupted");
     } catch (const Error& error) {
-      return stop(result, StageState::failed, error.code(), error.what());
+      return stop(i, StageState::failed, error.code(), error.what());
     } catch (const fs::filesystem_error& error) {
-      return stop(result, StageState::failed, exit_stage_failed,
+      return stop(i, StageState::failed, exit_stage_failed,
                   fmt::format("{}: {}", error.path1().string(), error.code().message()));
     } catch (const std::bad_alloc&) {
-      return stop(result, StageState::failed, exit_stage_failed, "out of memory");
+      return stop(i, StageState::failed, exit_stage_failed, "out of memory");
     } catch (const std::exception& error) {
-      return stop(result, StageState::failed, exit_stage_failed, error.what());
+      return stop(i, StageState::failed, exit_stage_failed, error.what());
     }
-    for (const std::string& warning : result.record->warnings)
-      outcome.warnings.push_back(fmt::format("{}: {}", stage.id, warning));
-    for (const std::string& check : result.record->failed_checks) outcome.failed_checks.push_back(check);
   }
-  if (!outcome.failed_checks.empty()) outcome.code = exit_check_failed;
+
+  bool stop(std::size_t i, StageState state, ExitCode code, const std::string& what) {
+    StageOutcome& stage = outcome_.stages[i];
+    stage.state = state;
+    stage.error = what;
+    outcome_.code = code;
+    outcome_.error = fmt::format("{} ({}): {}", stage.id, stage.kind, what);
+    if (console_ != nullptr) console_->end_progress();
+    return false;
+  }
+
+  void keep(std::size_t i, StageState state, std::optional<StageRecord> found) {
+    StageOutcome& result = outcome_.stages[i];
+    result.state = state;
+    result.record = std::move(found);
+    result.cost = read_cost(options_.out / result.id);
+  }
+
+  StageWork work(std::size_t i) const {
+    std::vector<const StageRecord*> upstream;
+    std::vector<Input> inputs;
+    for (const std::size_t k : plan_.stages[i].from) {
+      upstream.push_back(&*outcome_.stages[k].record);
+      inputs.push_back(input_of(plan_.stages[k], options_.out));
+    }
+    return work_of(plan_.stages[i], upstream, std::move(inputs));
+  }
+
+  // Runs the stage, unless what is there is up to date.
+  void make(std::size_t i, std::optional<StageRecord> found) {
+    StageOutcome& result = outcome_.stages[i];
+    StageWork to_do = work(i);
+    result.reasons = reasons_to_run(to_do.fresh, found, options_.out / result.id);
+    if (result.reasons.empty() && options_.force) result.reasons.push_back("--force asks for it");
+    if (result.reasons.empty()) {
+      std::error_code ignored;  // what a kill between publishing and tidying up has left
+      if (has_scratch_) fs::remove_all(scratch_folder(options_.out, to_do.fresh), ignored);
+      keep(i, StageState::kept, std::move(found));
+      say_kept(result);
+      return;
+    }
+    if (console_ != nullptr) {
+      console_->message(found ? fmt::format("{}: runs: {}", result.id, fmt::join(result.reasons, "; "))
+                              : fmt::format("{}: runs", result.id));
+      console_->progress(result.id, 0);
+    }
+    FinishedWork done = run_stage(std::move(to_do), options_, console_);
+    result.record = std::move(done.record);
+    result.cost = std::move(done.cost);
+    result.state = StageState::ran;
+    if (console_ != nullptr) {
+      console_->end_progress();
+      console_->message(fmt::format("{}: done in {}", result.id, duration_text(result.cost->wall_seconds)));
+    }
+  }
+
+  void say_kept(const StageOutcome& result) const {
+    if (console_ == nullptr) return;
+    console_->message(fmt::format("{}: up to date", result.id));
+    for (const std::string& warning : result.record->warnings)
+      console_->warning(fmt::format("{}: {}", result.id, warning));
+  }
+
+  // Also those of a stage that was not selected and is used as it is; its checks were those of another run.
+  void keep_warnings(std::size_t i) {
+    const StageOutcome& result = outcome_.stages[i];
+    if (!result.record) return;
+    for (const std::string& warning : result.record->warnings)
+      outcome_.warnings.push_back(fmt::format("{}: {}", result.id, warning));
+    if (result.state == StageState::not_selected) return;
+    for (const std::string& check : result.record->failed_checks) outcome_.failed_checks.push_back(check);
+  }
+
+  const Plan& plan_;
+  const RunOptions& options_;
+  Console* console_;
+  RunOutcome& outcome_;
+  std::vector<bool> selected_;
+  bool has_scratch_ = false;
+};
+
+}  // namespace
+
+void run_stages(const Plan& plan, const RunOptions& options, Console* console, RunOutcome& outcome) {
+  StagesRun(plan, options, console, outcome)();
 }
 
 Json summary_json(const Plan& plan, const RunOutcome& outcome) {
@@ -491,11 +314,10 @@ Json summary_json(const Plan& plan, const RunOutcome& outcome) {
     const fs::path path = outcome.out / plan.stages[i].id / row.result;
     std::error_code error;
     if (!fs::is_regular_file(path, error)) continue;
-    // Numbers only: long tables stay in the stage's own file. Times and speeds are the manifest's.
+    // Numbers only: long tables stay in the stage's own file.
     const Json result = read_json(path);
     Json kept = Json::object();
     for (const auto& [key, value] : result.items()) {
-      if (key == "cpu_seconds" || key == "collisions_per_second") continue;
       if (value.is_array() && value.size() > 64) continue;
       kept[key] = value;
     }
@@ -504,7 +326,25 @@ Json summary_json(const Plan& plan, const RunOutcome& outcome) {
   return summary;
 }
 
-RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& console) {
+namespace {
+
+// OUT/<kind>/... also where a stage has another id, as long as it is the only one of its kind.
+void link_kinds(const Plan& plan, const fs::path& out) {
+  for (const PlannedStage& stage : plan.stages) {
+    const std::string kind(stage.row->name);
+    if (stage.id == kind || plan.find(kind) != nullptr) continue;
+    const auto same = std::count_if(plan.stages.begin(), plan.stages.end(),
+                                    [&](const PlannedStage& s) { return s.row == stage.row; });
+    std::error_code error;
+    const fs::path link = out / kind;
+    if (fs::is_symlink(link, error)) fs::remove(link, error);
+    if (same == 1 && !fs::exists(link, error)) fs::create_directory_symlink(stage.id, link, error);
+  }
+}
+
+}  // namespace
+
+RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, const Pages& pages, Console& console) {
   const auto start = std::chrono::steady_clock::now();
   const std::string started = utc_now();
   RunOutcome outcome;
@@ -520,23 +360,11 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& co
   run_stages(plan, options, &console, outcome);
   outcome.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   console.end_progress();
-
-  // OUT/<kind>/... also where a stage has another id, as long as it is the only one of its kind.
-  for (const PlannedStage& stage : plan.stages) {
-    const std::string kind(stage.row->name);
-    if (stage.id == kind || plan.find(kind) != nullptr) continue;
-    const auto same = std::count_if(plan.stages.begin(), plan.stages.end(),
-                                    [&](const PlannedStage& s) { return s.row == stage.row; });
-    std::error_code error;
-    const fs::path link = options.out / kind;
-    if (fs::is_symlink(link, error)) fs::remove(link, error);
-    if (same == 1 && !fs::exists(link, error)) fs::create_directory_symlink(stage.id, link, error);
-  }
+  link_kinds(plan, options.out);
   try {
     write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
     write_file_atomically(options.out / "summary.json", dump(summary_json(plan, outcome)));
-    write_file_atomically(options.out / "report.html", report_html(plan, outcome));
-    write_file_atomically(options.out / "summary.md", summary_markdown(plan, outcome));
+    pages.write(plan, outcome);
     write_file_atomically(options.out / "manifest.json", dump(manifest_json(plan, options, outcome, started)));
   } catch (const Error& error) {
     if (outcome.error.empty()) throw;

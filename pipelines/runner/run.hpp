@@ -8,6 +8,7 @@
 
 #include "pipelines/runner/cache.hpp"
 #include "pipelines/runner/console.hpp"
+#include "pipelines/runner/folder_lock.hpp"
 #include "pipelines/runner/plan.hpp"
 
 namespace shakebed::pipelines {
@@ -29,6 +30,7 @@ struct StageOutcome {
   StageState state = StageState::waiting;
   std::vector<std::string> reasons{};   // why it ran (or would)
   std::optional<StageRecord> record{};  // what is there now
+  std::optional<StageCost> cost{};      // what it took to make that
   std::string error{};
 };
 
@@ -42,11 +44,16 @@ struct RunOutcome {
 };
 
 // Runs the stages of a plan below out. Stops at the first that fails; everything finished before is kept. Does not
-// throw for what goes wrong in a stage. `label` stands before messages (the point of a sweep); no console: silent.
+// throw for what goes wrong in a stage. No console: silent.
 void run_stages(const Plan& plan, const RunOptions& options, Console* console, RunOutcome& outcome);
 
-// The whole: takes the lock on OUT, runs the stages, writes resolved.json, summary.json, report.html and manifest.json.
-RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& console);
+class Pages;  // pages.hpp
+
+// The whole: takes the lock on OUT, runs the stages, writes resolved.json, summary.json, the pages and manifest.json.
+RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, const Pages& pages, Console& console);
+
+// A stage of a plan that has finished, as those see it that read its files.
+Input input_of(const PlannedStage& stage, const std::filesystem::path& out);
 
 // What a run would do, without doing it: stages with state `kept` or `waiting` and the reasons.
 std::vector<StageOutcome> explain(const Plan& plan, const RunOptions& options);
@@ -56,21 +63,6 @@ std::string explanation_text(const std::vector<StageOutcome>& stages);
 // Ctrl-C and SIGTERM ask running stages to stop; a second one ends the program at once.
 void install_interrupt_handler();
 bool interrupt_requested();
-
-// An exclusive lock on a folder, held by the kernel for as long as this process lives: a killed run leaves none behind.
-class FolderLock {
- public:
-  // Throws StageError naming the process that works there.
-  explicit FolderLock(const std::filesystem::path& folder);
-  FolderLock(FolderLock&& other) noexcept : descriptor_(other.descriptor_), path_(other.path_) {
-    other.descriptor_ = -1;
-  }
-  ~FolderLock();
-
- private:
-  int descriptor_ = -1;
-  std::filesystem::path path_;
-};
 
 // summary.json: the numbers of every stage under its id.
 Json summary_json(const Plan& plan, const RunOutcome& outcome);

@@ -1,26 +1,20 @@
 #include "pipelines/runner/sweep.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <chrono>
-#include <cmath>
-#include <map>
-#include <memory>
 #include <mutex>
 #include <thread>
 
+#include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
-#include "pipelines/formats/process.hpp"
-#include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
-#include "pipelines/stages/figure.hpp"
-#include "pipelines/stages/replica_seed.hpp"
+#include "pipelines/runner/pages.hpp"
+#include "pipelines/runner/shared_stages.hpp"
+#include "pipelines/runner/sweep_record.hpp"
 
 namespace shakebed::pipelines {
 
@@ -28,10 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The points of a random sweep are the same everywhere.
-double uniform(std::uint64_t seed, std::uint64_t a, std::uint64_t b) {
-  return static_cast<double>(mixed(mixed(mixed(seed) ^ a) ^ b) >> 11) * 0x1.0p-53;
-}
+constexpr std::size_t most_failures = 20;  // that are told one by one
 
 struct Shard {
   std::uint64_t number = 1, of = 1;  // 1 to of
@@ -60,600 +51,308 @@ std::string csv_cell(const std::string& text) {
   }
   return out + "\"";
 }
-std::string value_text(const Json& value) {
-  return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : dump_canonical(value);
-}
 
-// A point's state, in its folder: what it is made from and how it ended.
-struct PointResult {
-  bool done = false;
-  ExitCode code = exit_ok;
-  std::string error;
-  std::vector<std::string> cells;  // of the collected numbers: value and std_error each
-  double seconds = 0;
-};
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// The numbers to gather; all top-level quantities of fit and check results where the recipe names none.
-std::vector<std::string> collected(const Plan& plan) {
-  if (!plan.sweep->collect.empty()) return plan.sweep->collect;
-  std::vector<std::string> pointers;
-  for (const PlannedStage& stage : plan.stages) {
-    if (stage.row->name == "fit") {
-      for (const char* key :
-           {"temperature", "temperature_over_mg", "solid_height", "reduced_temperature", "chi2_per_dof"})
-        pointers.push_back("/" + stage.id + "/" + key);
-    } else if (stage.row->name == "simulate") {
-      for (const char* key : {"center_of_mass_rise", "temperature_x", "temperature_z"})
-        pointers.push_back("/" + stage.id + "/" + key);
-    }
-  }
-  return pointers;
-}
-
-std::vector<std::string> gather_cells(const Plan& plan, const fs::path& directory,
-                                      const std::vector<std::string>& pointers) {
-  std::vector<std::string> cells;
-  std::map<std::string, Json> results;
-  for (const std::string& pointer : pointers) {
-    const std::vector<std::string> tokens = split_pointer(pointer);
-    std::string value, error;
-    if (const PlannedStage* stage = tokens.empty() ? nullptr : plan.find(tokens.front());
-        stage != nullptr && !stage->row->result.empty()) {
-      if (!results.contains(stage->id)) {
-        std::error_code ignored;
-        const fs::path path = directory / stage->id / stage->row->result;
-        results[stage->id] = fs::is_regular_file(path, ignored) ? read_json(path) : Json();
-      }
-      const Json* found = find_pointer(
-          results[stage->id], std::string_view(pointer).substr(1 + escape_pointer_token(tokens.front()).size()));
-      if (found != nullptr && found->is_object() && found->contains("value")) {
-        value = value_text((*found)["value"]);
-        if (found->contains("std_error")) error = value_text((*found)["std_error"]);
-      } else if (found != nullptr && !found->is_structured()) {
-        value = value_text(*found);
-      }
-    }
-    cells.push_back(value), cells.push_back(error);
-  }
-  return cells;
-}
-
-// A point is done when this file says so for the same recipe at the same values.
-constexpr std::string_view point_record = ".point";
-
-// What decides the results of a point, and of each of its stages: kind, version, options, seed, external files and what
-// it reads from.
-struct PointKeys {
-  std::string point;
-  std::vector<std::string> stages;
-};
-
-PointKeys keys_of(const Plan& at) {
-  PointKeys keys;
-  std::string whole;
-  for (const PlannedStage& stage : at.stages) {
-    std::string text = fmt::format("{} {} {} {} ", stage.row->name, stage.row->version,
-                                   stage.row->uses_seed ? stage.seed : 0, stage.reduced);
-    text += dump_canonical(stage.options);
-    for (const auto& [pointer, path] : stage.input_files) text += pointer + fast_hash_of_file(path);
-    for (const std::size_t k : stage.from) text += at.stages[k].id + keys.stages[k];
-    keys.stages.push_back(fast_hash(text));
-    whole += stage.id + keys.stages.back();
-  }
-  keys.point = fast_hash(whole);
-  return keys;
-}
-
-// Stages that several points have in common (one simulation under a sweep of fits, say) are run once, in
-// OUT/shared/<key>/<id>; the points hold links to them.
-class SharedStages {
+// One command on a sweep: finds the points of its shard, runs those that are missing, gathers all that are there.
+class SweepRun {
  public:
-  SharedStages(fs::path out, const RunOptions& options) : root_(std::move(out) / "shared"), options_(options) {}
-
-  void count(const PointKeys& keys) {
-    for (const std::string& key : keys.stages) ++uses_[key];
+  SweepRun(const Plan& plan, const RunOptions& options, SweepArguments& arguments, const Pages& pages, Console& console)
+      : plan_(plan),
+        options_(options),
+        arguments_(arguments),
+        pages_(pages),
+        console_(console),
+        shard_(parse_shard(arguments.shard)),
+        points_dir_(options.out / "points"),
+        all_(sweep_points(plan)),
+        pointers_(collected(plan)),
+        shared_(options.out, options.force) {
+    if (arguments.gather && arguments.shard)
+      throw UsageError("--gather: looks at the whole sweep, so there is no --shard");
+    if (all_.empty()) throw UsageError("the sweep has no points");
   }
-  bool is_shared(const std::string& key) const {
-    const auto found = uses_.find(key);
-    return found != uses_.end() && found->second > 1;
-  }
 
-  // Makes the shared stages of a point and links them into its folder. What fails here is left to the point itself,
-  // which then fails in the same way and says so.
-  void prepare(const Plan& at, const PointKeys& keys, const fs::path& directory) {
-    for (std::size_t i = 0; i < at.stages.size(); ++i) {
-      if (!is_shared(keys.stages[i]) || !make(at, keys, i)) continue;
-      link("../../shared/" + keys.stages[i] + "/" + at.stages[i].id, directory / at.stages[i].id);
+  int operator()() {
+    find_points();
+    if (arguments_.dry_run) return say_what_would_run();
+    try {
+      fs::create_directories(points_dir_);
+    } catch (const fs::filesystem_error& error) {
+      throw StageError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.code().message()));
     }
+    install_interrupt_handler();
+    start_ = Clock::now();
+    run_points();
+    interrupted_ = interrupt_requested();
+    gather();
+    write_results();
+    say_failures();
+    return finish();
   }
 
  private:
-  struct Entry {
-    std::mutex mutex;
-    bool tried = false, good = false;
+  struct Mine {  // a point of this shard
+    const SweepPoint* point = nullptr;
+    PointKeys keys;
+    std::optional<int> earlier;  // how it ended before
+    bool done = false;
   };
 
-  static void link(const fs::path& target, const fs::path& place) {
-    std::error_code error;
-    if (fs::is_symlink(place, error) && fs::read_symlink(place, error) == target) return;
-    fs::remove_all(place, error);
-    fs::create_directory_symlink(target, place);
-  }
-
-  bool make(const Plan& at, const PointKeys& keys, std::size_t i) {
-    const std::string& key = keys.stages[i];
-    std::shared_ptr<Entry> entry;
-    {
-      const std::lock_guard lock(mutex_);
-      std::shared_ptr<Entry>& found = entries_[key];
-      if (!found) found = std::make_shared<Entry>();
-      entry = found;
-    }
-    const std::lock_guard lock(entry->mutex);  // one thread makes it, the others wait
-    if (entry->tried) return entry->good;
-    const fs::path directory = root_ / key;
-    fs::create_directories(directory);
-    std::optional<FolderLock> folder_lock;
-    while (!folder_lock) {  // so do other shards
-      try {
-        folder_lock.emplace(directory);
-      } catch (const StageError&) {
-        if (interrupt_requested()) return false;
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      }
-    }
-    if (options_.force) {
-      std::error_code error;
-      fs::remove_all(directory / at.stages[i].id, error);
-      fs::remove_all(directory / scratch_name, error);
-    }
-    remove_leftovers(directory);
-    for (const std::size_t k : at.stages[i].from) {
-      link("../" + keys.stages[k] + "/" + at.stages[k].id, directory / at.stages[k].id);
-    }
-    RunOptions one;
-    one.out = directory;
-    one.only = at.stages[i].id;
-    one.jobs = 1;
-    RunOutcome outcome;
-    outcome.out = directory;
-    run_stages(at, one, nullptr, outcome);
-    entry->tried = outcome.code != exit_interrupted;
-    entry->good = outcome.stages[i].state == StageState::ran || outcome.stages[i].state == StageState::kept;
-    return entry->good;
-  }
-
-  fs::path root_;
-  RunOptions options_;
-  std::map<std::string, std::size_t> uses_;
-  std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<Entry>> entries_;
-};
-
-std::optional<Json> read_point(const fs::path& directory) {
-  const fs::path path = directory / point_record;
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return std::nullopt;
-  try {
-    Json json = read_json(path);
-    if (json.is_object() && json.contains("key") && json.contains("code")) return json;
-  } catch (const InputError&) {}
-  return std::nullopt;
-}
-
-// How a point ended when it was last run with this key; nothing when it was not.
-std::optional<int> code_of_point(const fs::path& directory, const std::string& key) {
-  const auto record = read_point(directory);
-  if (!record || (*record)["key"] != key || !(*record)["code"].is_number_integer()) return std::nullopt;
-  return (*record)["code"].get<int>();
-}
-
-}  // namespace
-
-std::vector<SweepPoint> sweep_points(const Plan& plan) {
-  const SweepOptions& sweep = *plan.sweep;
-  std::vector<std::vector<Json>> values;
-  std::vector<Problem> problems;
-  for (const SweepAxis& axis : sweep.axes) {
-    const std::string where = "/sweep/over/" + escape_pointer_token(axis.pointer);
-    try {
-      // The pointer must lead to a stage; what is below it is checked when the point's recipe is read.
-      const auto tokens = split_pointer(axis.pointer);
-      if (tokens.size() < 3 || tokens[0] != "stages" ||
-          find_pointer(plan.document, "/stages/" + escape_pointer_token(tokens[1])) == nullptr) {
-        problems.push_back({plan.file,
-                            {},
-                            where,
-                            fmt::format("\"{}\" leads to no stage of this recipe", axis.pointer),
-                            "Write /stages/<id or number>/<key>"});
-      }
-    } catch (const UsageError& error) {
-      problems.push_back({plan.file, {}, where, error.what(), ""});
-    }
-  }
-  double total = 1;
-  if (sweep.kind == SweepKind::grid) {
-    for (const SweepAxis& axis : sweep.axes) total *= static_cast<double>(axis.values.size());
-  } else if (sweep.kind == SweepKind::random) {
-    total = static_cast<double>(sweep.count);
-  } else {
-    total = sweep.axes.empty() ? 0 : static_cast<double>(sweep.axes.front().values.size());
-  }
-  if (total * static_cast<double>(sweep.replicas) > 1e7) {
-    problems.push_back(
-        {plan.file,
-         {},
-         "/sweep",
-         fmt::format("{:.3g} points are too many (at most 10,000,000)", total * static_cast<double>(sweep.replicas)),
-         ""});
-  }
-  if (!problems.empty()) throw ConfigError(std::move(problems));
-  const auto count = static_cast<std::uint64_t>(total);
-  for (std::uint64_t i = 0; i < count; ++i) {
-    std::vector<Json> row(sweep.axes.size());
-    std::uint64_t rest = i;
-    for (std::size_t a = sweep.axes.size(); a-- > 0;) {  // the last axis runs fastest
-      const SweepAxis& axis = sweep.axes[a];
-      if (sweep.kind == SweepKind::grid) {
-        row[a] = axis.values[rest % axis.values.size()];
-        rest /= axis.values.size();
-      } else if (sweep.kind == SweepKind::random) {
-        if (!axis.values.empty()) {
-          row[a] = axis.values[static_cast<std::size_t>(uniform(sweep.seed, i, a) *
-                                                        static_cast<double>(axis.values.size()))];
-        } else {
-          const double u = uniform(sweep.seed, i, a);
-          const double value =
-              axis.logarithmic ? axis.low * std::pow(axis.high / axis.low, u) : axis.low + (axis.high - axis.low) * u;
-          row[a] = axis.unit.empty() ? Json(value) : Json(number_text(value) + " " + axis.unit);
-        }
-      } else {
-        row[a] = axis.values[i];
-      }
-    }
-    values.push_back(std::move(row));
-  }
-  std::vector<SweepPoint> points;
-  points.reserve(values.size() * sweep.replicas);
-  for (const auto& row : values) {
-    for (std::uint64_t replica = 0; replica < sweep.replicas; ++replica) {
-      points.push_back({points.size(), fmt::format("{:06d}", points.size()), replica, row});
-    }
-  }
-  return points;
-}
-
-Plan plan_at(const Plan& plan, const SweepPoint& point) {
-  JsonNode document = plan.document;
-  document.members.erase(std::remove_if(document.members.begin(), document.members.end(),
-                                        [](const JsonMember& m) { return m.key == "sweep"; }),
-                         document.members.end());
-  for (std::size_t a = 0; a < plan.sweep->axes.size(); ++a) {
-    if (!point.values[a].is_null()) set_pointer(document, plan.sweep->axes[a].pointer, to_node(point.values[a]));
-  }
-  if (plan.sweep->replicas > 1) {
-    // Replicas differ in the seeds of all stages that have one; the first keeps the recipe's own.
-    JsonNode* stages = document.find("stages");
-    for (JsonNode& stage : stages->items) {
-      const JsonNode* kind = stage.find("stage");
-      const StageRow* row = kind != nullptr ? find_stage(kind->text) : nullptr;
-      if (row == nullptr || !row->uses_seed || point.replica == 0) continue;
-      const JsonNode* seed = stage.find("seed");
-      const auto own = seed != nullptr && seed->is_number() ? static_cast<std::uint64_t>(seed->number) : 1u;
-      set_pointer(stage, "/seed", to_node(Json(replica_seed(own, point.replica))));
-    }
-  }
-  return make_plan(std::move(document), plan.file, plan.directory);
-}
-
-namespace {
-
-// Figures of a sweep: every gathered number against the first axis that has numbers, one series for each combination of
-// the other axes (six at most).
-std::vector<fs::path> draw_sweep(const Plan& plan, const std::vector<SweepPoint>& points,
-                                 const std::vector<std::vector<std::string>>& table,
-                                 const std::vector<std::string>& pointers, const fs::path& folder) {
-  const auto number = [](const std::string& text, double& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size();
-  };
-  // "/stages/bed/floor/amplitude" → "bed floor amplitude"; short = only its last word.
-  const auto words = [](const std::string& pointer, bool only_last) {
-    std::string text;
-    for (const std::string& token : split_pointer(pointer)) {
-      if (token == "stages" && text.empty()) continue;
-      text = only_last || text.empty() ? token : text + " " + token;
-    }
-    std::replace(text.begin(), text.end(), '_', ' ');
-    return text;
-  };
-  const auto rounded = [](const Json& value) {
-    return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : value_text(value);
-  };
-  const std::vector<SweepAxis>& axes = plan.sweep->axes;
-  std::size_t along = axes.size();
-  std::string unit;
-  for (std::size_t a = 0; a < axes.size() && along == axes.size(); ++a) {
-    const Json& value = points.front().values[a];
-    try {
-      if (value.is_number()) along = a;
-      if (value.is_string() && parse_quantity(value.get<std::string>()).has_unit) {
-        along = a;
-        unit = si_unit(parse_quantity(value.get<std::string>()).dimension);
-      }
-    } catch (const std::invalid_argument&) {}
-  }
-  std::vector<fs::path> figures;
-  if (along == axes.size()) return figures;
-  const std::size_t first = 3 + axes.size();  // column of the first number
-  for (std::size_t k = 0; k < pointers.size(); ++k) {
-    Picture picture{.x_label = words(axes[along].pointer, false) + (unit.empty() ? "" : "  [" + unit + "]"),
-                    .y_label = words(pointers[k], false)};
-    std::map<std::string, std::size_t> groups;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const std::vector<std::string>& row = table[i + 1];
-      double x = 0, y = 0, error = 0;
-      const Json& at = points[i].values[along];
-      try {
-        if (at.is_number())
-          x = at.get<double>();
-        else if (at.is_string())
-          x = parse_quantity(at.get<std::string>()).value;
-        else
-          continue;
-      } catch (const std::invalid_argument&) {
-        continue;
-      }
-      if (!number(row[first + 2 * k], y)) continue;
-      const bool has_error = number(row[first + 2 * k + 1], error);
-      std::string label;
-      for (std::size_t a = 0; a < axes.size(); ++a) {
-        if (a == along || plan.sweep->kind == SweepKind::random) continue;
-        label += (label.empty() ? "" : ", ") + words(axes[a].pointer, true) + " = " + rounded(points[i].values[a]);
-      }
-      const auto [group, fresh] = groups.emplace(label, groups.size());
-      if (group->second >= 6) continue;
-      if (fresh)
-        picture.series.push_back(
-            {label.empty() ? "points" : label, Series::Style::points, static_cast<int>(group->second), {}, {}, {}});
-      Series& series = picture.series[group->second];
-      series.x.push_back(x), series.y.push_back(y);
-      if (has_error) series.error.push_back(error);
-    }
-    for (Series& series : picture.series) {
-      if (series.error.size() != series.x.size()) series.error.clear();
-    }
-    if (picture.series.empty()) continue;
-    const std::string name = fmt::format("sweep-{}", k + 1);
-    fs::create_directories(folder);
-    draw_picture(picture, folder, name);
-    figures.push_back(folder / (name + ".svg"));
-  }
-  return figures;
-}
-
-}  // namespace
-
-int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, Console& console) {
-  const Shard shard = parse_shard(arguments.shard);
-  if (arguments.gather && arguments.shard)
-    throw UsageError("--gather: looks at the whole sweep, so there is no --shard");
-  const std::vector<SweepPoint> all = sweep_points(plan);
-  if (all.empty()) throw UsageError("the sweep has no points");
-  const std::vector<std::string> pointers = collected(plan);
-  std::vector<const SweepPoint*> points;
-  for (const SweepPoint& point : all) {
-    if (point.index % shard.of == shard.number - 1) points.push_back(&point);
-  }
   // Every point's recipe is read before any runs: a mistake in the last one is found now, not tomorrow.
-  const fs::path root = options.out / "points";
-  std::vector<PointKeys> keys(points.size());
-  std::vector<std::uint8_t> done(points.size(), 0);
-  std::vector<std::optional<int>> earlier(points.size());
-  std::size_t kept = 0;
-  SharedStages shared(options.out, options);
-  for (std::size_t i = 0, mine = 0; i < all.size(); ++i) {
-    PointKeys point_keys = keys_of(plan_at(plan, all[i]));
-    shared.count(point_keys);
-    if (mine < points.size() && points[mine] == &all[i]) keys[mine++] = std::move(point_keys);
-  }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    earlier[i] = code_of_point(root / points[i]->name, keys[i].point);
-    done[i] = !options.force && earlier[i] && (*earlier[i] == exit_ok || *earlier[i] == exit_check_failed);
-    kept += done[i];
-  }
-  if (arguments.dry_run) {
-    if (arguments.json) {
-      Json rows = Json::array();
-      for (std::size_t i = 0; i < points.size(); ++i)
-        rows.push_back(Json{{"point", points[i]->name}, {"runs", done[i] == 0}, {"values", points[i]->values}});
-      arguments.result = std::move(rows);
-    } else {
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        std::string values;
-        for (std::size_t a = 0; a < plan.sweep->axes.size(); ++a)
-          values += fmt::format(" {}={}", plan.sweep->axes[a].pointer, value_text(points[i]->values[a]));
-        fmt::print("{}:{}: {}\n", points[i]->name, values,
-                   done[i]      ? "up to date"
-                   : earlier[i] ? "runs again: it failed or was asked for"
-                                : "runs");
-      }
-      fmt::print("{} of {} points to run\n", points.size() - kept, points.size());
+  void find_points() {
+    for (const SweepPoint& point : all_) {
+      PointKeys keys = keys_of(plan_at(plan_, point));
+      shared_.count(keys);
+      if (point.index % shard_.of == shard_.number - 1) mine_.push_back({&point, std::move(keys), {}, false});
     }
+    for (Mine& one : mine_) {
+      one.earlier = code_of_point(points_dir_ / one.point->name, one.keys.point);
+      one.done = !options_.force && is_done(one.earlier);
+      kept_ += one.done;
+    }
+  }
+
+  int say_what_would_run() {
+    if (arguments_.json) {
+      arguments_.result = Json::array();
+      for (const Mine& one : mine_)
+        arguments_.result.push_back(
+            Json{{"point", one.point->name}, {"runs", !one.done}, {"values", one.point->values}});
+      return exit_ok;
+    }
+    for (const Mine& one : mine_) {
+      std::string values;
+      for (std::size_t a = 0; a < plan_.sweep->axes.size(); ++a)
+        values += fmt::format(" {}={}", plan_.sweep->axes[a].pointer, value_text(one.point->values[a]));
+      fmt::print("{}:{}: {}\n", one.point->name, values,
+                 one.done      ? "up to date"
+                 : one.earlier ? "runs again: it failed or was asked for"
+                               : "runs");
+    }
+    fmt::print("{} of {} points to run\n", mine_.size() - kept_, mine_.size());
     return exit_ok;
   }
-  try {
-    fs::create_directories(root);
-  } catch (const fs::filesystem_error& error) {
-    throw StageError(fmt::format("{}: cannot be made: {}", options.out.string(), error.code().message()));
-  }
-  install_interrupt_handler();
-  const auto start = std::chrono::steady_clock::now();
-  const int workers =
-      std::max(1, options.jobs > 0 ? options.jobs : static_cast<int>(std::thread::hardware_concurrency()));
-  if (arguments.gather) {
-    console.message(fmt::format("{} points, {} up to date: gathered, none is run", points.size(), kept));
-  } else {
-    console.message(fmt::format("{} points, {} up to date, {} to run on {} threads", points.size(), kept,
-                                points.size() - kept, workers));
+
+  void run_points() {
+    if (arguments_.gather) {
+      console_.message(fmt::format("{} points, {} up to date: gathered, none is run", mine_.size(), kept_));
+      return;
+    }
+    const int workers =
+        std::max(1, options_.jobs > 0 ? options_.jobs : static_cast<int>(std::thread::hardware_concurrency()));
+    to_run_ = mine_.size() - kept_;
+    console_.message(
+        fmt::format("{} points, {} up to date, {} to run on {} threads", mine_.size(), kept_, to_run_, workers));
+    std::vector<std::jthread> threads;
+    for (int i = 1; i < workers && static_cast<std::size_t>(i) < to_run_; ++i) threads.emplace_back([this] { work(); });
+    work();
+    threads.clear();
+    console_.end_progress();
   }
 
-  std::atomic<std::size_t> next{0}, finished{0}, failed{0}, checks{0}, busy{0};
-  std::mutex failures_mutex;
-  std::vector<std::string> failures;
-  std::string stop;  // what ends the whole sweep: a full disk, say
-  const std::size_t to_run = arguments.gather ? 0 : points.size() - kept;
-  const auto work = [&] {
-    while (to_run > 0 && !interrupt_requested()) {
-      const std::size_t i = next++;
-      if (i >= points.size()) return;
-      if (done[i]) continue;
-      const SweepPoint& point = *points[i];
+  void work() {
+    while (to_run_ > 0 && !interrupt_requested()) {
+      const std::size_t i = next_++;
+      if (i >= mine_.size()) return;
+      if (mine_[i].done) continue;
       RunOutcome outcome;
       try {
-        const Plan at = plan_at(plan, point);
-        RunOptions one = options;
-        one.out = outcome.out = root / point.name;
-        one.jobs = 1;
-        fs::create_directories(one.out);
-        std::optional<FolderLock> lock;
-        try {
-          lock.emplace(one.out);
-        } catch (const StageError&) {
-          ++busy;  // another shard or run is at it
+        const PointEnd end = run_point(mine_[i], outcome);
+        if (end == PointEnd::interrupted) return;
+        if (end == PointEnd::busy) {
+          ++busy_;
           continue;
         }
-        // It may have been finished by whoever held the lock a moment ago.
-        if (const auto record = read_point(one.out);
-            !options.force && record && (*record)["key"] == keys[i].point &&
-            ((*record)["code"] == 0 || (*record)["code"] == exit_check_failed)) {
-          ++finished;
-          continue;
-        }
-        remove_leftovers(one.out);
-        if (options.force) {  // everything anew, but what is shared only once
-          one.force = false;
-          for (const PlannedStage& stage : at.stages) fs::remove_all(one.out / stage.id);
-          fs::remove_all(one.out / scratch_name);
-        }
-        shared.prepare(at, keys[i], one.out);
-        const auto point_start = std::chrono::steady_clock::now();
-        run_stages(at, one, nullptr, outcome);
-        if (outcome.code == exit_interrupted) return;
-        Json record;
-        record["key"] = keys[i].point;
-        record["code"] = static_cast<int>(outcome.code);
-        if (!outcome.error.empty()) record["error"] = outcome.error;
-        record["warnings"] = outcome.warnings;
-        record["failed_checks"] = outcome.failed_checks;
-        record["cells"] = gather_cells(at, one.out, pointers);
-        record["pointers"] = pointers;
-        record["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - point_start).count();
-        write_file_atomically(one.out / point_record, dump(record));
       } catch (const std::exception& error) {
         outcome.code = exit_stage_failed;
         outcome.error = error.what();
       }
-      ++finished;
-      if (outcome.code == exit_check_failed) ++checks;
-      if (outcome.code != exit_ok && outcome.code != exit_check_failed) {
-        ++failed;
-        const std::lock_guard lock(failures_mutex);
-        if (failures.size() < 20) failures.push_back(fmt::format("point {}: {}", point.name, outcome.error));
-      }
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      console.progress("points", static_cast<double>(finished) / static_cast<double>(to_run),
-                       fmt::format("({}/{}, {:.3g}/s{})", finished.load(), to_run,
-                                   static_cast<double>(finished) / std::max(seconds, 1e-3),
-                                   failed > 0 ? fmt::format(", {} failed", failed.load()) : ""));
+      count(*mine_[i].point, outcome);
     }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < workers && static_cast<std::size_t>(i) < to_run; ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  console.end_progress();
+  }
 
-  // Gather: every point of the whole sweep that is there, whoever ran it.
-  std::vector<std::vector<std::string>> table{{"point", "replica", "status"}};
-  for (const SweepAxis& axis : plan.sweep->axes) table[0].push_back(axis.pointer);
-  for (const std::string& pointer : pointers) table[0].push_back(pointer), table[0].push_back(pointer + "/std_error");
-  std::size_t there = 0;
-  for (const SweepPoint& point : all) {
-    const auto record = read_point(root / point.name);
-    const bool counts = record && (*record)["code"].is_number() && (*record)["pointers"] == Json(pointers) &&
-                        (*record)["key"] == (shard.of == 1 ? Json(keys[point.index].point) : (*record)["key"]);
+  enum class PointEnd { finished, interrupted, busy };  // busy: another shard or run is at it
+
+  PointEnd run_point(const Mine& one, RunOutcome& outcome) {
+    const Plan at = plan_at(plan_, *one.point);
+    RunOptions alone = options_;
+    alone.out = outcome.out = points_dir_ / one.point->name;
+    alone.jobs = 1;
+    fs::create_directories(alone.out);
+    std::optional<FolderLock> lock;
+    try {
+      lock.emplace(alone.out);
+    } catch (const StageError&) {
+      return PointEnd::busy;
+    }
+    // It may have been finished by whoever held the lock a moment ago.
+    if (!options_.force && is_done(code_of_point(alone.out, one.keys.point))) return PointEnd::finished;
+    remove_leftovers(alone.out);
+    if (options_.force) {  // everything anew, but what is shared only once
+      alone.force = false;
+      for (const PlannedStage& stage : at.stages) fs::remove_all(alone.out / stage.id);
+      fs::remove_all(alone.out / scratch_name);
+    }
+    shared_.prepare(at, one.keys, alone.out);
+    run_stages(at, alone, nullptr, outcome);
+    if (outcome.code == exit_interrupted) return PointEnd::interrupted;
+    Json record;
+    record["key"] = one.keys.point;
+    record["code"] = static_cast<int>(outcome.code);
+    if (!outcome.error.empty()) record["error"] = outcome.error;
+    record["warnings"] = outcome.warnings;
+    record["failed_checks"] = outcome.failed_checks;
+    record["cells"] = gather_cells(at, alone.out, pointers_);
+    record["pointers"] = pointers_;
+    write_file_atomically(alone.out / point_record, dump(record));
+    return PointEnd::finished;
+  }
+
+  void count(const SweepPoint& point, const RunOutcome& outcome) {
+    ++finished_;
+    if (outcome.code == exit_check_failed) ++checks_;
+    if (!is_done(outcome.code)) {
+      ++failed_;
+      const std::lock_guard lock(failures_mutex_);
+      if (failures_.size() < most_failures) failures_.push_back(fmt::format("point {}: {}", point.name, outcome.error));
+    }
+    console_.progress("points", static_cast<double>(finished_) / static_cast<double>(to_run_),
+                      fmt::format("({}/{}, {:.3g}/s{})", finished_.load(), to_run_,
+                                  static_cast<double>(finished_) / std::max(seconds_since(start_), 1e-3),
+                                  failed_ > 0 ? fmt::format(", {} failed", failed_.load()) : ""));
+  }
+
+  // Every point of the whole sweep that is there, whoever ran it.
+  void gather() {
+    std::vector<std::string> header{"point", "replica", "status"};
+    for (const SweepAxis& axis : plan_.sweep->axes) header.push_back(axis.pointer);
+    for (const std::string& pointer : pointers_) header.push_back(pointer), header.push_back(pointer + "/std_error");
+    table_.push_back(std::move(header));
+    for (const SweepPoint& point : all_) table_.push_back(row_of(point));
+    for (const std::vector<std::string>& row : table_) {
+      for (std::size_t i = 0; i < row.size(); ++i) csv_ += (i == 0 ? "" : ",") + csv_cell(row[i]);
+      csv_ += '\n';
+    }
+  }
+
+  std::vector<std::string> row_of(const SweepPoint& point) {
+    const auto record = read_point(points_dir_ / point.name);
+    // A shard does not know the keys of the others' points.
+    const bool counts = record && (*record)["code"].is_number() && (*record)["pointers"] == Json(pointers_) &&
+                        (shard_.of > 1 || (*record)["key"] == Json(mine_[point.index].keys.point));
     std::string status = "missing";
     if (counts)
       status = (*record)["code"] == 0 ? "ok" : (*record)["code"] == exit_check_failed ? "check failed" : "failed";
-    there += counts && status != "failed";
+    const bool good = counts && status != "failed";
+    there_ += good;
     std::vector<std::string> row{point.name, std::to_string(point.replica), status};
     for (const Json& value : point.values) row.push_back(value_text(value));
-    for (std::size_t k = 0; k < 2 * pointers.size(); ++k) {
-      row.push_back(counts && status != "failed" ? (*record)["cells"][k].get<std::string>() : std::string());
-    }
-    table.push_back(std::move(row));
+    for (std::size_t k = 0; k < 2 * pointers_.size(); ++k)
+      row.push_back(good ? (*record)["cells"][k].get<std::string>() : std::string());
+    return row;
   }
-  std::string csv;
-  for (const std::vector<std::string>& row : table) {
-    for (std::size_t i = 0; i < row.size(); ++i) csv += (i == 0 ? "" : ",") + csv_cell(row[i]);
-    csv += '\n';
-  }
-  const bool interrupted = interrupt_requested();
+
   // Shards that end at the same time write the same bytes; the last one sees all points.
-  write_file_atomically(options.out / "sweep.csv", csv);
-  write_file_atomically(options.out / "resolved.json", dump(plan.resolved));
-  write_file_atomically(options.out / "summary.md", sweep_summary_markdown(plan, table, failures));
-  for (const std::string& failure : failures) console.error(failure);
-  // Pictures and page when the whole sweep is there: a shard alone has nothing to show yet.
-  if (!interrupted && there == all.size()) {
+  void write_results() {
+    write_file_atomically(options_.out / "sweep.csv", csv_);
+    write_file_atomically(options_.out / "resolved.json", dump(plan_.resolved));
     try {
-      const auto figures = draw_sweep(plan, all, table, pointers, options.out / "figures");
-      write_file_atomically(options.out / "report.html", sweep_report_html(plan, table, figures, failures));
+      pages_.write(plan_, SweepOutcome{.out = options_.out,
+                                       .points = all_,
+                                       .collected = pointers_,
+                                       .table = table_,
+                                       .problems = failures_,
+                                       .complete = !interrupted_ && there_ == all_.size()});
     } catch (const StageError& error) {
-      console.warning(fmt::format("the sweep is done, but its report is not: {}", error.what()));
+      console_.warning(fmt::format("the sweep is done, but its report is not: {}", error.what()));
     }
   }
-  if (failed > failures.size()) console.error(fmt::format("and {} more points", failed - failures.size()));
-  if (busy > 0) console.warning(fmt::format("{} points are being run by somebody else", busy.load()));
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const ExitCode code = interrupted                              ? exit_interrupted
-                        : failed > 0                             ? exit_stage_failed
-                        : arguments.gather && there < all.size() ? exit_stage_failed
-                        : checks > 0                             ? exit_check_failed
-                                                                 : exit_ok;
-  Json summary;
-  summary["pipeline"] = plan.name;
-  summary["points"] = all.size();
-  summary["done"] = there;
-  summary["missing"] = all.size() - there;
-  summary["failed"] = failed.load();
-  summary["failed_checks"] = checks.load();
-  write_file_atomically(options.out / "summary.json", dump(summary));
-  Json manifest;
-  manifest["pipeline"] = plan.name;
-  manifest["shakebed"] = program_version();
-  manifest["git"] = source_revision();
-  manifest["compiler"] = compiler_text();
-  manifest["command_line"] = options.command_line;
-  manifest["finished"] = utc_now();
-  manifest["wall_seconds"] = seconds;
-  manifest["exit_code"] = static_cast<int>(code);
-  if (!plan.preset.empty()) manifest["preset"] = plan.preset;
-  manifest["document"] = plan.document.to_json();
-  manifest["stages"] = Json::array();
-  manifest["outputs"] = Json::array({Json{{"file", "sweep.csv"}, {"bytes", csv.size()}, {"sha256", sha256(csv)}}});
-  write_file_atomically(options.out / "manifest.json", dump(manifest));
-  if (arguments.json) {
-    summary["exit_code"] = static_cast<int>(code);
-    summary["table"] = (options.out / "sweep.csv").string();
-    arguments.result = std::move(summary);
-  } else {
-    fmt::print("{} of {} points done{} in {}\ntable: {}\n", there, all.size(),
-               failed > 0 ? fmt::format(", {} failed: run again to retry them alone", failed.load()) : "",
-               duration_text(seconds), (options.out / "sweep.csv").string());
+
+  void say_failures() {
+    for (const std::string& failure : failures_) console_.error(failure);
+    if (failed_ > failures_.size()) console_.error(fmt::format("and {} more points", failed_ - failures_.size()));
+    if (busy_ > 0) console_.warning(fmt::format("{} points are being run by somebody else", busy_.load()));
   }
-  return code;
+
+  ExitCode exit_code() const {
+    const bool missing = arguments_.gather && there_ < all_.size();
+    return interrupted_             ? exit_interrupted
+           : failed_ > 0 || missing ? exit_stage_failed
+           : checks_ > 0            ? exit_check_failed
+                                    : exit_ok;
+  }
+
+  int finish() {
+    const double seconds = seconds_since(start_);
+    const ExitCode code = exit_code();
+    Json summary;
+    summary["pipeline"] = plan_.name;
+    summary["points"] = all_.size();
+    summary["done"] = there_;
+    summary["missing"] = all_.size() - there_;
+    summary["failed"] = failed_.load();
+    summary["failed_checks"] = checks_.load();
+    write_file_atomically(options_.out / "summary.json", dump(summary));
+    write_file_atomically(options_.out / "manifest.json", dump(manifest(seconds, code)));
+    if (arguments_.json) {
+      summary["exit_code"] = static_cast<int>(code);
+      summary["table"] = (options_.out / "sweep.csv").string();
+      arguments_.result = std::move(summary);
+    } else {
+      fmt::print("{} of {} points done{} in {}\ntable: {}\n", there_, all_.size(),
+                 failed_ > 0 ? fmt::format(", {} failed: run again to retry them alone", failed_.load()) : "",
+                 duration_text(seconds), (options_.out / "sweep.csv").string());
+    }
+    return code;
+  }
+
+  Json manifest(double seconds, ExitCode code) const {
+    Json out;
+    out["pipeline"] = plan_.name;
+    out["shakebed"] = program_version();
+    out["git"] = source_revision();
+    out["compiler"] = compiler_text();
+    out["command_line"] = options_.command_line;
+    out["finished"] = utc_now();
+    out["wall_seconds"] = seconds;
+    out["exit_code"] = static_cast<int>(code);
+    if (!plan_.preset.empty()) out["preset"] = plan_.preset;
+    out["document"] = plan_.document.to_json();
+    out["stages"] = Json::array();
+    out["outputs"] = Json::array({Json{{"file", "sweep.csv"}, {"bytes", csv_.size()}, {"sha256", sha256(csv_)}}});
+    return out;
+  }
+
+  const Plan& plan_;
+  const RunOptions& options_;
+  SweepArguments& arguments_;
+  const Pages& pages_;
+  Console& console_;
+  const Shard shard_;
+  const fs::path points_dir_;
+  const std::vector<SweepPoint> all_;
+  const std::vector<std::string> pointers_;
+  SharedStages shared_;
+  std::vector<Mine> mine_;
+  std::size_t kept_ = 0, to_run_ = 0;
+  Clock::time_point start_;
+  std::atomic<std::size_t> next_{0}, finished_{0}, failed_{0}, checks_{0}, busy_{0};
+  std::mutex failures_mutex_;
+  std::vector<std::string> failures_;
+  bool interrupted_ = false;
+
+  std::vector<std::vector<std::string>> table_;
+  std::string csv_;
+  std::size_t there_ = 0;
+};
+
+}  // namespace
+
+int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, const Pages& pages,
+                      Console& console) {
+  return SweepRun(plan, options, arguments, pages, console)();
 }
 
 Json sweep_status(const fs::path& out) {
@@ -674,124 +373,6 @@ Json sweep_status(const fs::path& out) {
   if (fs::is_regular_file(out / "summary.json", error))
     points = std::max(points, read_json(out / "summary.json").value("points", std::uint64_t{0}));
   return Json{{"points", points}, {"done", done}, {"failed", failed}};
-}
-
-namespace {
-// For a POSIX shell.
-std::string shell_quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? "'\\''" : std::string(1, c);
-  return out + "'";
-}
-}  // namespace
-
-int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console) {
-  if (!plan.sweep)
-    throw UsageError("this recipe has no \"sweep\": there is only one point, and nothing to spread over a cluster");
-  const std::vector<SweepPoint> points = sweep_points(plan);
-  if (points.empty()) throw UsageError("the sweep has no points");
-  const std::size_t shards = std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size());
-  const fs::path folder = options.out / "slurm";
-  const fs::path submitted = folder / "submitted.json";
-  std::error_code error;
-
-  // What an earlier submission still has in the queue would be run twice.
-  if (fs::is_regular_file(submitted, error) && !options.dry_run) {
-    const Json before = read_json(submitted);
-    const std::string ids = before.value("job", std::string()) + "," + before.value("gather_job", std::string());
-    const ProcessResult queue =
-        run_process({"squeue", "--noheader", "--format=%i %T", "--jobs=" + ids}, fs::current_path());
-    if (queue.exit_code == 0 && queue.output.find_first_not_of(" \n") != std::string::npos) {
-      throw StageError(
-          fmt::format("jobs {} of this sweep are still in the queue; wait for them, or end them first: "
-                      "scancel {}",
-                      ids, before.value("job", std::string()) + " " + before.value("gather_job", std::string())));
-    }
-  }
-
-  // Only shards with something left to do become tasks.
-  std::vector<std::uint8_t> waiting(shards, 0);
-  std::size_t missing = 0;
-  for (const SweepPoint& point : points) {
-    const auto code = code_of_point(options.out / "points" / point.name, keys_of(plan_at(plan, point)).point);
-    if (code && (*code == exit_ok || *code == exit_check_failed)) continue;
-    waiting[point.index % shards] = 1;
-    ++missing;
-  }
-  std::string tasks;  // "1-3,7"
-  std::size_t task_count = 0;
-  for (std::size_t i = 0; i < shards; ++i) {
-    if (!waiting[i]) continue;
-    std::size_t last = i;
-    while (last + 1 < shards && waiting[last + 1]) ++last;
-    tasks +=
-        (tasks.empty() ? "" : ",") + (last == i ? fmt::format("{}", i + 1) : fmt::format("{}-{}", i + 1, last + 1));
-    task_count += last - i + 1;
-    i = last;
-  }
-
-  try {
-    fs::create_directories(folder);
-  } catch (const fs::filesystem_error& problem) {
-    throw StageError(fmt::format("{}: cannot be made: {}", folder.string(), problem.code().message()));
-  }
-  const std::string program = fs::read_symlink("/proc/self/exe", error).string();
-  std::string command =
-      fmt::format("{} run {} --out {}", shell_quoted(program), shell_quoted(fs::absolute(plan.file).string()),
-                  shell_quoted(fs::absolute(options.out).string()));
-  if (options.preset) command += " --preset " + shell_quoted(*options.preset);
-  for (const std::string& setting : options.settings) command += " --set " + shell_quoted(setting);
-  const std::string head = "#!/bin/sh\n#SBATCH --job-name=shakebed-" + plan.name + "\n";
-  write_file_atomically(
-      folder / "array.sh",
-      head + fmt::format("# One task is one shard. What is up to date is skipped, so submitting again runs only what "
-                         "is missing.\nexec {} --quiet --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\" "
-                         "--shard \"$SLURM_ARRAY_TASK_ID/{}\"\n",
-                         command, shards));
-  write_file_atomically(folder / "gather.sh",
-                        head + fmt::format("# Runs when all shards have ended, however they ended: gathers the points "
-                                           "that are there, and fails when some are missing.\nexec {} --gather\n",
-                                           command));
-  std::vector<std::string> array{"sbatch", "--parsable", "--array=" + tasks,
-                                 "--output=" + (fs::absolute(folder) / "%x-%A-%a.log").string()};
-  std::vector<std::string> gather{"sbatch", "--parsable",
-                                  "--output=" + (fs::absolute(folder) / "%x-%j-gather.log").string()};
-  array.insert(array.end(), options.sbatch.begin(), options.sbatch.end());
-  gather.insert(gather.end(), options.sbatch.begin(), options.sbatch.end());
-  array.push_back((fs::absolute(folder) / "array.sh").string());
-  const std::string gather_script = (fs::absolute(folder) / "gather.sh").string();
-  if (options.dry_run) {
-    if (missing > 0) fmt::print("{}\n", fmt::join(array, " "));
-    fmt::print("{}{} {}\n", fmt::join(gather, " "), missing > 0 ? " --dependency=afterany:JOB" : "", gather_script);
-    return exit_ok;
-  }
-  const auto submit = [&](const std::vector<std::string>& arguments) {
-    const ProcessResult result = run_process(arguments, fs::current_path());
-    std::string id = result.output.substr(0, result.output.find_first_of(";\n"));
-    if (result.exit_code != 0 || id.empty() ||
-        !std::all_of(id.begin(), id.end(), [](unsigned char c) { return std::isdigit(c); })) {
-      throw StageError(fmt::format("sbatch refused (exit code {}): {}", result.exit_code, result.output));
-    }
-    return id;
-  };
-  Json record{{"job", ""}, {"gather_job", ""}, {"tasks", task_count}, {"points", points.size()}, {"to_run", missing}};
-  if (missing > 0) {
-    record["job"] = submit(array);
-    write_file_atomically(submitted, dump(record));
-    gather.push_back("--dependency=afterany:" + record["job"].get<std::string>());
-  }
-  gather.push_back(gather_script);
-  record["gather_job"] = submit(gather);
-  write_file_atomically(submitted, dump(record));
-  console.message(fmt::format("{} points, {} to run in {} tasks", points.size(), missing, task_count));
-  if (options.json) {
-    fmt::print("{}", dump(record));
-  } else {
-    if (missing > 0) fmt::print("job {} (array {}), then ", record["job"].get<std::string>(), tasks);
-    fmt::print("job {} gathers\nlogs: {}\nlook: shakebed status {}\n", record["gather_job"].get<std::string>(),
-               folder.string(), options.out.string());
-  }
-  return exit_ok;
 }
 
 }  // namespace shakebed::pipelines

@@ -12,19 +12,9 @@
 #include "pipelines/runner/console.hpp"
 #include "pipelines/runner/plan.hpp"
 #include "pipelines/runner/run.hpp"
+#include "pipelines/runner/sweep_points.hpp"
 
 namespace shakebed::pipelines {
-
-struct SweepPoint {
-  std::size_t index = 0;
-  std::string name;  // of its folder: "000012"
-  std::uint64_t replica = 0;
-  std::vector<Json> values;  // one an axis; null: as the recipe has it
-};
-// All points of a plan with a sweep, in order. Throws ConfigError (a pointer that leads nowhere).
-std::vector<SweepPoint> sweep_points(const Plan& plan);
-// The plan of one point.
-Plan plan_at(const Plan& plan, const SweepPoint& point);
 
 struct SweepArguments {
   std::optional<std::string> shard;  // "2/8"
@@ -33,21 +23,11 @@ struct SweepArguments {
   bool json = false;  // no text on stdout
   Json result{};      // set: what --json prints
 };
-int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, Console& console);
+// Runs what is missing of a sweep, gathers what is there, has the pages written. Returns the exit code.
+int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, const Pages& pages,
+                      Console& console);
 
 // {"points", "done", "failed"} of a folder with a sweep, null of any other.
 Json sweep_status(const std::filesystem::path& out);
-
-struct SlurmOptions {
-  int shards = 1;
-  std::vector<std::string> sbatch;    // more options
-  std::optional<std::string> preset;  // --preset and --set of the submission
-  std::vector<std::string> settings;
-  bool dry_run = false, json = false;
-  std::filesystem::path out;
-};
-// Submits a job array, one task a shard that has something left to do, and a job that gathers when all have ended.
-// Throws StageError when jobs of this sweep are still in the queue, or sbatch refuses.
-int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console);
 
 }  // namespace shakebed::pipelines

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/trajectory.hpp"
 
 namespace shakebed::pipelines {
@@ -93,23 +94,6 @@ std::string still_picture(const TrajectoryFrame& frame, double low, double high)
 }
 
 }  // namespace
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](std::size_t k) -> unsigned {
-      return i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u;
-    };
-    const unsigned word = byte(0) << 16 | byte(1) << 8 | byte(2);
-    out += digits[word >> 18];
-    out += digits[word >> 12 & 63];
-    out += i + 1 < bytes.size() ? digits[word >> 6 & 63] : '=';
-    out += i + 2 < bytes.size() ? digits[word & 63] : '=';
-  }
-  return out;
-}
 
 std::string animation_html(const std::filesystem::path& trajectory, double period) {
   // The first frames, as many as a page can carry.

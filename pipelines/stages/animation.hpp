@@ -14,6 +14,4 @@ namespace shakebed::pipelines {
 // is damaged.
 std::string animation_html(const std::filesystem::path& trajectory, double period);
 
-std::string base64(std::string_view bytes);
-
 }  // namespace shakebed::pipelines

@@ -453,12 +453,12 @@ void Chart::run(RunContext& context) const {
 
 StageRow chart_stage() {
   return {.name = "chart",
-          .version = 6,
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
           .accepts = {"study", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "chart.json",
+          .pages = figure_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Chart>(); }};
 }
 

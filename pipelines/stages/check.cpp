@@ -5,38 +5,9 @@
 #include <cmath>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/markup.hpp"
 
 namespace shakebed::pipelines {
-
-std::string escape_markup(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        // Control characters are not allowed in XML.
-        if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t')
-          out += ' ';
-        else
-          out += c;
-    }
-  }
-  return out;
-}
 
 namespace {
 
@@ -269,12 +240,12 @@ class Check : public Stage {
 
 StageRow check_stage() {
   return {.name = "check",
-          .version = 1,
           .summary = "compares results with expected values; exit code 6 when one is off",
           .accepts = {"simulate", "infer", "study", "render", "extract", "fit", "map", "figure", "chart", "claims"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "check.json",
+          .pages = check_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Check>(); }};
 }
 

@@ -8,8 +8,6 @@
 namespace shakebed::pipelines {
 
 StageRow check_stage();
-
-// Text inside XML and HTML.
-std::string escape_markup(std::string_view text);
+StagePages check_pages();  // check_report.cpp
 
 }  // namespace shakebed::pipelines

@@ -146,12 +146,12 @@ class Claims : public Stage {
 
 StageRow claims_stage() {
   return {.name = "claims",
-          .version = 4,
           .summary = "sets a paper's claims beside what was measured, with verdicts",
           .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "claims.json",
+          .pages = claims_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Claims>(); }};
 }
 

@@ -9,5 +9,6 @@
 namespace shakebed::pipelines {
 
 StageRow claims_stage();
+StagePages claims_pages();  // claims_report.cpp
 
 }  // namespace shakebed::pipelines

@@ -98,7 +98,6 @@ class Critical : public Stage {
 
 StageRow critical_stage() {
   return {.name = "critical",
-          .version = 1,
           .summary = "measures T_c and T_c' from a study over temperature, against the threshold",
           .accepts = {"study"},
           .fewest_inputs = 1,

@@ -123,13 +123,13 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 16,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,
           .most_inputs = 2,
           .uses_images = true,
           .result = "extract.json",
+          .pages = extract_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Extract>(); }};
 }
 

@@ -101,11 +101,22 @@ Sheet picture_sheet(std::size_t entries, std::size_t columns, int key_width, dou
                               1 - (0.022 * plots + 1.04 * row * rows) / height, left)};
 }
 
+// Equal data give equal bytes: cairo 1.16 writes the date into the PDF whatever SOURCE_DATE_EPOCH says. Blanks of the
+// same length in its place leave the table of byte offsets at the end of the file valid.
+void remove_date(const std::filesystem::path& pdf) {
+  std::string bytes = read_file(pdf);
+  const std::size_t begin = bytes.find("/CreationDate (");
+  const std::size_t end = begin == std::string::npos ? begin : bytes.find(')', begin);
+  if (end == std::string::npos) return;
+  std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(begin), bytes.begin() + static_cast<std::ptrdiff_t>(end) + 1,
+            ' ');
+  write_file(pdf, bytes);
+}
+
 void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script) {
   write_file(directory / (name + ".gp"), script);
   ProcessResult result;
   try {
-    // Without a time of making in the PDF: the same data give the same bytes.
     result = run_process({"env", "SOURCE_DATE_EPOCH=0", "gnuplot", name + ".gp"}, directory);
   } catch (const StageError& error) {
     throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", error.what()));
@@ -120,6 +131,7 @@ void run_gnuplot(const std::filesystem::path& directory, const std::string& name
           fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
     }
   }
+  remove_date(directory / (name + ".pdf"));
 }
 
 // The series as "plot" elements, their data at `index` and after in NAME.dat.
@@ -500,12 +512,13 @@ void Figure::run(RunContext& context) const {
 
 StageRow figure_stage() {
   return {.name = "figure",
-          .version = 4,
           .summary = "draws profiles, fits and published curves",
           .accepts = {"extract", "simulate", "fit"},
           .fewest_inputs = 1,
           .most_inputs = 3,
           .result = "figure.json",
+          .data_option = "data",
+          .pages = figure_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Figure>(); }};
 }
 

@@ -428,12 +428,13 @@ void Fit::run(RunContext& context) const {
 
 StageRow fit_stage() {
   return {.name = "fit",
-          .version = 9,
           .summary = "fits temperature and solid height to a density profile",
           .accepts = {"extract", "simulate"},
           .fewest_inputs = 0,
           .most_inputs = 64,
           .result = "fit.json",
+          .headline = {"temperature", "temperature_over_mg", "solid_height", "reduced_temperature", "chi2_per_dof"},
+          .pages = fit_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Fit>(); }};
 }
 

@@ -13,5 +13,6 @@
 namespace shakebed::pipelines {
 
 StageRow fit_stage();
+StagePages fit_pages();  // fit_report.cpp
 
 }  // namespace shakebed::pipelines

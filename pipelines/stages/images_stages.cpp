@@ -1,5 +1,6 @@
 // The images module: the bodies of the stages that touch images. Compiled into libshakebed_images.so, never into the
 // program (see images_module.hpp).
+// implements: pipelines/stages/images_module.hpp
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -410,7 +410,6 @@ Json Infer::results(const std::vector<Point>& points) const {
 
 StageRow infer_stage() {
   return {.name = "infer",
-          .version = 10,
           .summary = "searches the restitution and friction with which a simulated bed comes nearest to a measured one",
           .uses_seed = true,
           .result = "infer.json",

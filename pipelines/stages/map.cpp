@@ -261,12 +261,12 @@ class Map : public Stage {
 
 StageRow map_stage() {
   return {.name = "map",
-          .version = 3,
           .summary = "maps Gamma to T/T_c by every named reading",
           .accepts = {"fit", "simulate", "extract", "study"},
           .fewest_inputs = 0,
           .most_inputs = 4,
           .result = "map.json",
+          .pages = map_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Map>(); }};
 }
 

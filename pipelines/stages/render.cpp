@@ -47,7 +47,6 @@ class Render : public Stage {
 
 StageRow render_stage() {
   return {.name = "render",
-          .version = 1,
           .summary = "photographs a simulated bed: frames with blur, noise, uneven light, and the true centres",
           .accepts = {"simulate"},
           .fewest_inputs = 1,

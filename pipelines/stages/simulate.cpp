@@ -778,12 +778,9 @@ void Simulate::run(RunContext& context) const {
     measurements[0]->write_densities(context, lab, joined_density(measurements, true), covariance, blocks);
     replicas_table(results).write(context.output("replicas.csv"));
   }
-  Json out = replicas_ > 1 ? joined(results) : results[0];
-  out["collisions_per_second"] = collisions / cpu;
-  out["cpu_seconds"] = cpu;
-  write_file(context.output("observables.json"), dump(out));
+  write_file(context.output("observables.json"), dump(replicas_ > 1 ? joined(results) : results[0]));
   write_file(context.output("bed.json"), dump(bed()->to_json()));
-  context.timing("cpu_seconds", cpu);
+  context.timing("simulation_cpu_seconds", cpu);
   context.timing("collisions_per_second", collisions / cpu);
   context.progress(1, "measured");
 }
@@ -809,12 +806,13 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 21,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,
           .uses_seed = true,
           .result = "observables.json",
+          .headline = {"center_of_mass_rise", "temperature_x", "temperature_z"},
+          .pages = simulate_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Simulate>(); }};
 }
 

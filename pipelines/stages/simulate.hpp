@@ -28,6 +28,7 @@
 namespace shakebed::pipelines {
 
 StageRow simulate_stage();
+StagePages simulate_pages();  // simulate_report.cpp
 
 // What a run is gone on from after a kill: a state behind its hash.
 void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);

@@ -1,4 +1,5 @@
-// The stages: a table with one row each. Command line, schema, defaults, order, cache and report derive from the row.
+// The stages: a table with one row each. Command line, schema, defaults, order, cache and report derive from the row;
+// what is above this folder (runner, report, command line) knows no stage by name.
 //
 // How to add a stage
 //   1. pipelines/stages/<name>.hpp declares one function, `StageRow <name>_stage();`.
@@ -28,17 +29,18 @@
 //        };
 //        }  // namespace
 //        StageRow shake_stage() {
-//          return {.name = "shake", .version = 1, .summary = "shakes the bed", .accepts = {"simulate"}, .fewest_inputs
-//          = 1,
+//          return {.name = "shake", .summary = "shakes the bed", .accepts = {"simulate"}, .fewest_inputs = 1,
 //                  .most_inputs = 1, .result = "shake.json", .make = [] { return std::make_unique<Shake>(); }};
 //        }
 //        }
 //
-//   3. one line in stages.cpp puts the row into the table; one in CMakeLists.txt compiles the file.
+//   3. one line in stage_table.cpp puts the row into the table; one in CMakeLists.txt compiles the file.
+//   4. what its pages and the terminal show stands in pipelines/stages/<name>_report.cpp (StagePages, below).
 //
 // A stage is a pure function: options + the inputs' files → files in its output folder. It reads no clock, no
 // environment and no other file; its random numbers come from seed(). The same options, inputs and seed give the same
-// bytes. When what it computes changes, raise `version`: cached results of the old one are then not used again.
+// bytes. Results of other code are not used again: the build takes a fingerprint of the files a stage is made of
+// (pipelines/stage_code.cmake), without its *_report.cpp.
 //
 // The output folder is a temporary one, renamed to OUT/<id> when run() returns: whoever looks sees either all of a
 // stage's files or none. On an exception or Ctrl-C it is removed.
@@ -50,12 +52,13 @@
 // Common keys of every stage, read by the plan: "stage", "id", "from", "units", and "seed" where `uses_seed` is set.
 //
 // Result files: JSON with quantities as {"value", "std_error", "unit"} (quantity_json); `result` in the row names the
-// one that summary.json repeats under the stage's id and that "/<id>/..." pointers of a check look into. Time and host
-// do not belong into it: wall and CPU time are in manifest.json (context.timing() adds a number there).
+// one that summary.json repeats under the stage's id and that "/<id>/..." pointers of a check look into. Times, speeds
+// and the host are no result: they are in OUT/<id>/cost.json (context.timing() adds a number there).
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -114,9 +117,23 @@ class RunContext {
   }
   virtual void log(std::string_view line) = 0;          // into OUT/<id>/log.txt, and to stderr with --verbose
   virtual void warning(std::string_view sentence) = 0;  // shown at once, kept in the manifest and first in the report
-  virtual void timing(std::string_view name, double value) = 0;  // a measured speed or time: into manifest.json only
+  virtual void timing(std::string_view name, double value) = 0;  // a measured speed or time: into cost.json only
   virtual void check_failed(std::string_view sentence) = 0;      // the stage is done, but the run ends with exit 6
+
+  // --- stages inside of a stage. May be called from several threads, with a folder each.
+  // Runs a recipe in a folder, on one thread; what is up to date there is kept. Its stages, finished, in the order of
+  // the work. Throws ConfigError, StageError with the words of the stage that failed, Interrupted. A failed check is no
+  // failure.
+  virtual std::vector<Input> run_chain(const JsonNode& recipe, const std::filesystem::path& folder) = 0;
 };
+
+// A stage of a chain, as far as whoever holds the chain must know it.
+struct ChainStage {
+  std::string id, stage;  // its kind
+  bool reads_files = false;
+};
+// Reads the recipe of a chain without running it. Throws ConfigError.
+using ChainReader = std::function<std::vector<ChainStage>(const JsonNode& recipe)>;
 
 // Options, and the work. One object for each stage of a recipe.
 class Stage {
@@ -128,17 +145,46 @@ class Stage {
   // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
   // state it again, and may not state it otherwise.
   virtual std::optional<BedDescription> bed() const { return std::nullopt; }
+
+  // For a stage that runs others. After decoding: whether its chains are good recipes.
+  virtual void check_chains(Fields& fields, const ChainReader& read) const { (void)fields, (void)read; }
+  // The kinds of stages that it runs: their code is part of what its result is made from.
+  virtual std::vector<std::string> chain_kinds() const { return {}; }
+};
+
+// --- what a stage adds to the pages for people
+
+// A finished stage, with its result file read: an empty object where it has none.
+struct FinishedStage {
+  Input files;
+  Json result;
+};
+// Where on the page; in this order, with the sections of the page itself between them.
+enum class ReportPlace { banner, claims, figures, checks, motion, frames, fits, maps };
+struct ReportSection {
+  ReportPlace place;
+  std::string_view heading = {};  // once above all sections of this place; none: the section has its own
+  // "": nothing to show. `pictures` counts the SVG pictures of the page.
+  std::string (*html)(const FinishedStage& stage, int& pictures) = nullptr;
+  bool once = false;  // of all sections of this place only the first is shown
+};
+struct StagePages {
+  std::vector<ReportSection> sections{};                          // of report.html
+  std::string (*markdown)(const FinishedStage& stage) = nullptr;  // of summary.md
+  std::string (*terminal)(const FinishedStage& stage) = nullptr;  // a line on stdout
 };
 
 struct StageRow {
   std::string_view name;
-  int version = 1;
   std::string_view summary;                 // for `shakebed schema`, `--help` and the report
   std::vector<std::string_view> accepts{};  // kinds of stages that "from" may name
   int fewest_inputs = 0, most_inputs = 0;
   bool uses_seed = false;
-  bool uses_images = false;      // loads the images module when it runs
-  std::string_view result = {};  // the JSON file with its numbers
+  bool uses_images = false;                  // loads the images module when it runs
+  std::string_view result = {};              // the JSON file with its numbers
+  std::vector<std::string_view> headline{};  // the numbers in it that a sweep gathers where its recipe names none
+  std::string_view data_option = {};         // the option that takes the user's points (--data)
+  StagePages pages{};
   std::unique_ptr<Stage> (*make)() = nullptr;
 };
 

@@ -18,17 +18,9 @@
 namespace shakebed::pipelines {
 
 const std::vector<StageRow>& stage_table() {
-  static const std::vector<StageRow> table = [] {
-    std::vector<StageRow> rows = {simulate_stage(), infer_stage(),  render_stage(),   extract_stage(),
-                                  fit_stage(),      map_stage(),    critical_stage(), figure_stage(),
-                                  chart_stage(),    claims_stage(), check_stage()};
-    int versions = 0;  // of what a study's chain may hold
-    for (const StageRow& row : rows) {
-      if (row.name != "chart" && row.name != "claims") versions += row.version;
-    }
-    rows.insert(rows.begin() + 2, study_stage(versions));
-    return rows;
-  }();
+  static const std::vector<StageRow> table = {simulate_stage(), infer_stage(), study_stage(),  render_stage(),
+                                              extract_stage(),  fit_stage(),   map_stage(),    critical_stage(),
+                                              figure_stage(),   chart_stage(), claims_stage(), check_stage()};
   return table;
 }
 

@@ -12,8 +12,6 @@
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
-#include "pipelines/runner/plan.hpp"
-#include "pipelines/runner/run.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 
 namespace shakebed::pipelines {
@@ -82,6 +80,8 @@ struct Mean {
 class Study : public Stage {
  public:
   void describe(Fields& fields) override;
+  void check_chains(Fields& fields, const ChainReader& read) const override;
+  std::vector<std::string> chain_kinds() const override;
   void run(RunContext& context) const override;
 
  private:
@@ -90,8 +90,9 @@ class Study : public Stage {
     std::uint32_t replica;
   };
   std::vector<Point> points() const;
-  Plan plan_of(const Point& point, std::uint64_t seed) const;
-  std::vector<Number> numbers(const Plan& plan, const fs::path& folder) const;
+  JsonNode recipe_at(const Point& point, std::uint64_t seed) const;
+  void check_pointers(Fields& fields, const std::vector<ChainStage>& chain) const;
+  std::vector<Number> numbers(const std::vector<Input>& chain) const;
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
   std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
@@ -151,33 +152,53 @@ void Study::describe(Fields& fields) {
   if (!fields.decoding() || fields.problem_count() > 0) return;
   fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
   fields.require(!collect_.empty(), "collect", "nothing is collected");
-  if (parameter_.values.empty()) return;
-  // Every series is read now, so that a mistake in the last one is found before the first has run.
+}
+
+std::vector<std::string> Study::chain_kinds() const {
+  std::vector<std::string> kinds;
+  if (!chain_.is_array()) return kinds;
+  for (const Json& stage : chain_) {
+    if (stage.is_object() && stage.contains("stage") && stage["stage"].is_string())
+      kinds.push_back(stage["stage"].get<std::string>());
+  }
+  return kinds;
+}
+
+void Study::check_pointers(Fields& fields, const std::vector<ChainStage>& chain) const {
+  const auto has = [&](const std::string& id) {
+    return std::any_of(chain.begin(), chain.end(), [&](const ChainStage& stage) { return stage.id == id; });
+  };
+  for (const ChainStage& stage : chain) {
+    // Pictures and verdicts are for people: no number of theirs is collected.
+    for (const char* kind : {"chart", "claims", "study"}) {
+      if (stage.stage == kind)
+        fields.problem("/stages", fmt::format("a chain holds no {} stage", kind), "Put it after the study");
+    }
+    if (stage.reads_files) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
+  }
+  for (const auto& [name, collected] : collect_) {
+    const auto tokens = split_pointer(collected.at);
+    if (tokens.size() < 2 || !has(tokens.front()))
+      fields.problem("/collect/" + escape_pointer_token(name) + "/at",
+                     "\"" + collected.at + "\" leads to no stage of the chain", "Write /<stage id>/<number>");
+  }
+  for (const auto& [name, table] : tables_) {
+    const auto tokens = split_pointer(table.at);
+    if (tokens.size() != 2 || !has(tokens.front()))
+      fields.problem("/tables/" + escape_pointer_token(name) + "/at",
+                     "\"" + table.at + "\" leads to no file of the chain", "Write /<stage id>/<file>.csv");
+    if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
+      fields.problem("/tables/" + escape_pointer_token(name), "\"" + name + "\" cannot be the name of its file");
+  }
+}
+
+// Every series is read before any runs, so that a mistake in the last one is found now.
+void Study::check_chains(Fields& fields, const ChainReader& read) const {
   for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
     const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[k].first);
     for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
       try {
-        const Plan plan = plan_of({k, v, 0}, 1);
-        for (const PlannedStage& stage : plan.stages) {
-          for (const char* name : {"chart", "claims", "study"})  // their versions are not part of a study's
-            if (stage.row->name == name)
-              fields.problem("/stages", fmt::format("a chain holds no {} stage", name), "Put it after the study");
-          if (!stage.input_files.empty()) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
-        }
-        for (const auto& [name, collected] : collect_) {
-          const auto tokens = split_pointer(collected.at);
-          if (tokens.size() < 2 || plan.find(tokens.front()) == nullptr)
-            fields.problem("/collect/" + escape_pointer_token(name) + "/at",
-                           "\"" + collected.at + "\" leads to no stage of the chain", "Write /<stage id>/<number>");
-        }
-        for (const auto& [name, table] : tables_) {
-          const auto tokens = split_pointer(table.at);
-          if (tokens.size() != 2 || plan.find(tokens.front()) == nullptr)
-            fields.problem("/tables/" + escape_pointer_token(name) + "/at",
-                           "\"" + table.at + "\" leads to no file of the chain", "Write /<stage id>/<file>.csv");
-          if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
-            fields.problem("/tables/" + escape_pointer_token(name), "\"" + name + "\" cannot be the name of its file");
-        }
+        check_pointers(fields, read(recipe_at({k, v, 0}, 1)));
       } catch (const ConfigError& error) {
         for (const Problem& problem : error.problems())
           fields.problem(
@@ -201,7 +222,7 @@ std::vector<Study::Point> Study::points() const {
 }
 
 // Seeds differ between all runs, also between values and series: their errors are independent.
-Plan Study::plan_of(const Point& point, std::uint64_t seed) const {
+JsonNode Study::recipe_at(const Point& point, std::uint64_t seed) const {
   JsonNode document = to_node(Json{{"name", "study"}, {"stages", chain_}});
   if (!series_.empty()) {
     for (const auto& [pointer, value] : series_[point.series].second.set)
@@ -223,15 +244,16 @@ Plan Study::plan_of(const Point& point, std::uint64_t seed) const {
       if (row != nullptr && row->uses_seed) set_pointer(stage, "/seed", to_node(Json(own)));
     }
   }
-  return make_plan(std::move(document), "study", fs::current_path());
+  return document;
 }
 
-std::vector<Number> Study::numbers(const Plan& plan, const fs::path& folder) const {
+std::vector<Number> Study::numbers(const std::vector<Input>& chain) const {
   std::map<std::string, Json> results;
   std::vector<Number> out;
   for (const auto& [name, collected] : collect_) {
     const std::string id = split_pointer(collected.at).front();
-    if (!results.contains(id)) results[id] = read_json(folder / id / plan.find(id)->row->result);
+    if (!results.contains(id))
+      results[id] = std::find_if(chain.begin(), chain.end(), [&](const Input& i) { return i.id == id; })->result();
     const Json& result = results[id];
     Number number;
     // What says of itself that it did not succeed has no numbers.
@@ -265,21 +287,15 @@ std::string cell(double value) { return std::isfinite(value) ? number_text(value
 
 // Runs the chain at one point: {"numbers": [[value, error], ...], "tables": [{"header", "rows"}, ...]}.
 Json Study::run_once(RunContext& context, const Point& point, const fs::path& folder) const {
-  const Plan plan = plan_of(point, context.seed());
-  RunOptions options;
-  options.out = folder;
-  options.jobs = 1;
-  fs::create_directories(folder);
-  remove_leftovers(folder);
-  RunOutcome outcome;
-  outcome.out = folder;
-  run_stages(plan, options, nullptr, outcome);
-  if (outcome.code == exit_interrupted) throw Interrupted();
-  if (outcome.code != exit_ok && outcome.code != exit_check_failed)
+  std::vector<Input> chain;
+  try {
+    chain = context.run_chain(recipe_at(point, context.seed()), folder);
+  } catch (const StageError& error) {
     throw StageError(fmt::format("{}, {} = {}, replica {}: {}", series_name(point.series), parameter_.name,
-                                 parameter_.values[point.value], point.replica, outcome.error));
+                                 parameter_.values[point.value], point.replica, error.what()));
+  }
   Json found{{"numbers", Json::array()}, {"tables", Json::array()}};
-  for (const Number& n : numbers(plan, folder)) found["numbers"].push_back(Json::array({n.value, n.std_error}));
+  for (const Number& n : numbers(chain)) found["numbers"].push_back(Json::array({n.value, n.std_error}));
   for (const auto& [name, table] : tables_) {
     const auto tokens = split_pointer(table.at);
     const Rows rows = read_rows(folder / tokens[0] / tokens[1]);
@@ -419,9 +435,8 @@ void Study::run(RunContext& context) const {
 
 }  // namespace
 
-StageRow study_stage(int inner_versions) {
+StageRow study_stage() {
   return {.name = "study",
-          .version = 100 + inner_versions,
           .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
           .uses_seed = true,
           .result = "study.json",

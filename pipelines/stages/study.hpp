@@ -10,8 +10,6 @@
 
 namespace shakebed::pipelines {
 
-// The inner chain reads what other stages write: `inner_versions` is the sum of those stages' versions, so that a study
-// runs again when one of them changes.
-StageRow study_stage(int inner_versions);
+StageRow study_stage();
 
 }  // namespace shakebed::pipelines

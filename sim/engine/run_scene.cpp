@@ -1,4 +1,5 @@
 // The one place where a scene becomes a specialised engine: 4 spaces x 3 rules x 2 sizes.
+// implements: sim/engine/simulation.hpp
 #include <sstream>
 #include <stdexcept>
 

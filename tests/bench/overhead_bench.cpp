@@ -62,7 +62,7 @@ TEST(Speed, ValidatingAMegabyteTakesAtMost100Milliseconds) {
   EXPECT_LE(seconds, 0.100);
 }
 
-// The points' own work is what their stages took by themselves (wall_seconds and cpu_seconds of their records); the
+// The points' own work is what their stages took by themselves (their cost.json); the
 // rest is reading the recipe at every point, fingerprints, records, folders, locks and gathering.
 TEST(Speed, TenThousandPointsCostAtMost2MillisecondsEachAnd200Megabytes) {
   ScratchFolder folder;
@@ -81,8 +81,8 @@ TEST(Speed, TenThousandPointsCostAtMost2MillisecondsEachAnd200Megabytes) {
   double own_wall = 0, own_cpu = 0;
   int found = 0;
   for (const auto& point : std::filesystem::directory_iterator(folder / "o/points")) {
-    const auto record = shakebed::pipelines::read_json(point.path() / "bed/.record");
-    own_wall += record["wall_seconds"].get<double>(), own_cpu += record["cpu_seconds"].get<double>();
+    const auto cost = shakebed::pipelines::read_json(point.path() / "bed/cost.json");
+    own_wall += cost["wall_seconds"].get<double>(), own_cpu += cost["cpu_seconds"].get<double>();
     ++found;
   }
   ASSERT_EQ(found, points);

@@ -8,6 +8,7 @@
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/runner/run.hpp"
+#include "pipelines/runner/stage_code.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -52,6 +53,33 @@ Plan plan_of(End end, int option, const std::string& id = "count") {
   stage.options = Json{{"option", option}};
   plan.stages.push_back(std::move(stage));
   return plan;
+}
+
+// Runs stages of these kinds inside of itself.
+class Chained : public Counting {
+ public:
+  explicit Chained(std::vector<std::string> kinds) : Counting(End::well), kinds_(std::move(kinds)) {}
+  std::vector<std::string> chain_kinds() const override { return kinds_; }
+
+ private:
+  std::vector<std::string> kinds_;
+};
+
+std::string code_with_chain(std::vector<std::string> kinds) {
+  Plan plan = plan_of(End::well, 1);
+  plan.stages[0].stage = std::make_unique<Chained>(std::move(kinds));
+  return code_of(plan.stages[0]);
+}
+
+TEST(StageCode, IsKnownOfEveryStage) {
+  for (const StageRow& row : stage_table()) EXPECT_EQ(stage_code(row.name).size(), 32u) << row.name;
+  EXPECT_EQ(stage_code("counting"), "");
+}
+
+TEST(StageCode, HoldsThatOfTheStagesInside) {
+  EXPECT_NE(code_with_chain({"fit"}), code_with_chain({"simulate"}));
+  EXPECT_NE(code_with_chain({"fit"}), code_with_chain({"fit", "simulate"}));
+  EXPECT_EQ(code_with_chain({"simulate", "fit"}), code_with_chain({"fit", "simulate", "fit"}));
 }
 
 class Scratch : public testing::Test {

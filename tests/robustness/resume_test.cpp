@@ -15,7 +15,6 @@ namespace {
 
 using namespace shakebed::tests;
 namespace fs = std::filesystem;
-using shakebed::pipelines::Json;
 
 // Everything that a checkpoint has to hold: annealing, every observer, frames, spins, contact clocks, a bath's numbers.
 std::string recipe(int replicas) {
@@ -32,18 +31,13 @@ std::string recipe(int replicas) {
          std::to_string(replicas) + " } ] }";
 }
 
-// Every file of the bed, the trajectory too; in observables.json without the speed of this machine.
+// Every file of the bed, the trajectory too.
 std::map<std::string, std::string> results_of(const fs::path& out) {
   std::map<std::string, std::string> texts;
   for (const fs::directory_entry& entry : fs::directory_iterator(out / "bed")) {
     const std::string name = entry.path().filename().string();
-    if (name == "log.txt" || name.starts_with(".")) continue;
+    if (name == "log.txt" || name == "cost.json" || name.starts_with(".")) continue;
     texts[name] = read_text(entry.path());
-    if (name == "observables.json") {
-      Json json = Json::parse(texts[name]);
-      json.erase("cpu_seconds"), json.erase("collisions_per_second");
-      texts[name] = json.dump();
-    }
   }
   return texts;
 }

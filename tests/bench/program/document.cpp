@@ -12,10 +12,10 @@
 #include <thread>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/process.hpp"
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
-#include "pipelines/stages/check.hpp"
 
 namespace shakebed::pipelines::bench {
 

@@ -9,7 +9,7 @@ namespace shakebed::pipelines::bench {
 
 double RecipeRun::cpu(std::string_view id) const {
   for (const StageOutcome& stage : outcome.stages) {
-    if (stage.id == id && stage.record) return stage.record->cpu_seconds;
+    if (stage.id == id && stage.cost) return stage.cost->cpu_seconds;
   }
   throw StageError(fmt::format("bench: stage \"{}\" has not run", id));
 }

@@ -1,0 +1,51 @@
+// What the page shows of a stage that draws (figure, chart): its pictures with their captions.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/figure.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The SVG files, in the order of the recipe where there is one, else by name.
+std::vector<fs::path> pictures_of(const FinishedStage& stage) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(stage.files.directory, error)) {
+    if (entry.path().extension() == ".svg") files.push_back(entry.path());
+  }
+  const Json& result = stage.result;
+  const auto place = [&](const fs::path& path) {
+    const auto found = result.is_object() ? result.find(path.stem().string()) : result.end();
+    return std::pair(std::distance(result.begin(), found), path);
+  };
+  std::sort(files.begin(), files.end(), [&](const auto& a, const auto& b) { return place(a) < place(b); });
+  return files;
+}
+
+std::string figures_html(const FinishedStage& stage, int& pictures) {
+  std::string out;
+  for (const fs::path& path : pictures_of(stage)) {
+    const std::string name = path.stem().string();
+    const Json* own = find_pointer(stage.result, "/" + escape_pointer_token(name) + "/caption");
+    const std::string caption =
+        own != nullptr && own->is_string() ? own->get<std::string>()
+        : name == "profile" ? "Density against height. Error bars: one standard error, correlated frames "
+                              "allowed for."
+        : name == "windows" ? "The fitted temperature against the lower edge of the window it is fitted in."
+                            : words(name);
+    out +=
+        fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", inline_svg(path, ++pictures), prose(caption));
+  }
+  return out;
+}
+
+}  // namespace
+
+StagePages figure_pages() { return {.sections = {{ReportPlace::figures, "Figures", figures_html}}}; }
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,58 @@
+// What the page shows of a map stage: the readings of Gamma → T/T_c, and what simulated beds say.
+#include <fmt/format.h>
+
+#include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/map.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+// What the map between simulated beds says of this one.
+std::string simulated_beds(const Json& simulated) {
+  const Json asked = simulated.value("at", Json::object());
+  std::string at;
+  for (const auto& [name, place] : asked.items())
+    at += fmt::format("{}{} = {:.4g}{}", at.empty() ? "" : ", ", name, place.get<double>(),
+                      name == "frequency"        ? " Hz"
+                      : name == "initial_height" ? " D"
+                                                 : "");
+  const std::string beds = fmt::format("{} simulated beds", simulated.value("beds", 0));
+  const Json* reduced = find_pointer(simulated, "/reduced_temperature");
+  const Json* over_mg = find_pointer(simulated, "/temperature_over_mg");
+  if (reduced == nullptr || !reduced->is_object())
+    return fmt::format("<p>The {} give no temperature at {}.</p>\n", escape_markup(beds), escape_markup(at));
+  return fmt::format("<p>Interpolated between {} at {}: T/T_c = <strong>{}</strong>{}{}.</p>\n", escape_markup(beds),
+                     escape_markup(at), shown(*reduced),
+                     over_mg != nullptr && over_mg->is_object() ? ", T/(m g) = " + shown(*over_mg) : "",
+                     simulated.value("inside", true) ? "" : "; this bed lies outside the table");
+}
+
+std::string readings_html(const FinishedStage& stage, int&) {
+  const Json& map = stage.result;
+  if (!map.contains("readings")) return "";
+  std::string out = fmt::format(
+      "<h2>Γ → T/T_c ({})</h2>\n<p class=\"soft\">Γ = {}. The paper's relation can be read in several ways; none "
+      "is claimed. A reading out of its formula's range is marked so.</p>\n",
+      escape_markup(stage.files.id), map.contains("gamma") ? shown(map["gamma"]) : "?");
+  if (map.contains("measured_reduced_temperature"))
+    out += fmt::format("<p>Measured T/T_c = <strong>{}</strong></p>\n", shown(map["measured_reduced_temperature"]));
+  if (map.contains("simulated")) out += simulated_beds(map["simulated"]);
+  out += "<div class=\"scroll\"><table>\n<tr><th>reading</th><th>H₀ / D</th><th>T/T_c</th><th>in range</th></tr>\n";
+  for (const Json& row : map["readings"]) {
+    const bool in_range = row.value("in_range", false);
+    const auto cell = [&](const char* key) {
+      return row.contains(key) && row[key].is_object() ? shown(row[key]) : std::string("–");
+    };
+    out += fmt::format(
+        "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"{}\">{}</td></tr>\n",
+        escape_markup(row.value("name", "")), cell("jump"), cell("reduced_temperature"), in_range ? "good" : "bad",
+        in_range ? "yes" : "no");
+  }
+  return out + "</table></div>\n";
+}
+
+}  // namespace
+
+StagePages map_pages() { return {.sections = {{ReportPlace::maps, "", readings_html}}}; }
+
+}  // namespace shakebed::pipelines

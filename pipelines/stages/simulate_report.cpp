@@ -1,0 +1,30 @@
+// What the page shows of a simulate stage: the bed in motion.
+#include <cmath>
+
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/stages/animation.hpp"
+#include "pipelines/stages/simulate.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+std::string motion_html(const FinishedStage& stage, int&) {
+  const char* name = stage.files.has("trajectory.extxyz.zst") ? "trajectory.extxyz.zst" : "trajectory.extxyz";
+  if (!stage.files.has(name)) return "";
+  try {
+    const BedDescription bed = BedDescription::read(stage.files.file("bed.json"));
+    const double gravity = bed.gravity.value_or(0), frequency = bed.frequency.value_or(0);
+    const double unit = bed.reduced || !(gravity > 0) ? 1 : std::sqrt(bed.diameter / gravity);
+    return animation_html(stage.files.file(name), frequency > 0 ? 1 / (frequency * unit) : 0);
+  } catch (const InputError&) {
+    return "";  // a damaged trajectory: the page is shown without it
+  }
+}
+
+}  // namespace
+
+StagePages simulate_pages() {
+  return {.sections = {{.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}}};
+}
+
+}  // namespace shakebed::pipelines
