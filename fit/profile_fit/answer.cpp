@@ -1,0 +1,311 @@
+#include "fit/profile_fit/answer.hpp"
+
+#include <gsl/gsl_cdf.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/profile_fit/thermometers.hpp"
+
+namespace shakebed::fit {
+
+namespace {
+
+// Temperatures that differ by less than this part of the smaller are one.
+constexpr double same_temperature = 0.20;
+// A difference counts from so many standard errors on; between the kinetic T_x and T_z, whose own errors are told by
+// fewer samples, from two.
+constexpr double significant = 3.0, significant_kinetic = 2.0;
+// A reading checks the answer where its uncertainty is below this part of it.
+constexpr double admissible_uncertainty = 0.15;
+// A model fits that misses the densities by up to so many times what it misses on equilibrium beds.
+constexpr double admissible_misfit = 2.0;
+// A thermometer is preferred to one before it in the list where its scatter is less than this part of the other's.
+constexpr double clearly_less = 0.8;
+// Steps in which the known bias and the temperature at which it is looked up settle.
+constexpr int bias_steps = 4;
+// The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
+constexpr double tail_density = 0.6;
+
+std::string number(double value, int digits = 3) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+std::string per_cent(double part) { return number(100.0 * part, 2) + " %"; }
+
+double ratio_above_one(double a, double b) { return std::max(a, b) / std::min(a, b) - 1.0; }
+
+class AnswerFinder {
+ public:
+  explicit AnswerFinder(const AnswerInput& input) : input_(input) {}
+
+  Answer run() {
+    answer_.temperature_x = input_.temperature_x;
+    answer_.temperature_z = input_.temperature_z;
+    if (!read_thermometers()) return answer_;
+    choose();
+    compare_readings();
+    judge();
+    combine();
+    find_solid_height();
+    return answer_;
+  }
+
+ private:
+  [[nodiscard]] FitOptions options_of(const Thermometer& thermometer) const {
+    FitOptions options;
+    options.model = thermometer.model;
+    options.kernel = input_.kernel;
+    options.base = input_.base;
+    if (thermometer.column_known) options.column_number = input_.column_number;
+    options.window.floor_exclusion = thermometer.floor_exclusion;
+    if (thermometer.below_density > 0.0) options.window.below_density = thermometer.below_density;
+    options.confidence = input_.confidence;
+    options.interval = options.sweep = options.compare = false;
+    options.curve_points = 0;
+    return options;
+  }
+
+  // False when none gives a temperature; the answer then says why.
+  bool read_thermometers() {
+    for (const Thermometer& thermometer : thermometers()) {
+      if (thermometer.column_known && !input_.column_number) continue;
+      const FitResult fit = fit_profile(input_.profile, options_of(thermometer));
+      Reading reading;
+      reading.thermometer = thermometer.name;
+      reading.model = thermometer.model;
+      reading.status = fit.status;
+      if (fit.ok()) {
+        fill(reading, thermometer, fit);
+        reading.admissible = thermometer.votes && reading.std_error <= admissible_uncertainty * reading.temperature;
+      } else if (answer_.why.empty()) {
+        answer_.status = fit.status;
+        answer_.why = fit.message;
+      }
+      answer_.readings.push_back(std::move(reading));
+      votes_.push_back(&thermometer);
+      if (fit.status == FitStatus::bad_input) {
+        answer_.advice = "Correct the profile and fit it again.";
+        return false;
+      }
+    }
+    for (std::size_t i = 0; i < votes_.size(); ++i) {
+      if (!votes_[i]->votes || answer_.readings[i].status != FitStatus::ok) continue;
+      answer_.status = FitStatus::ok;
+      answer_.why.clear();
+      return true;
+    }
+    answer_.advice = "Look at the profile: it must fall from a plateau to nothing over several heights.";
+    return false;
+  }
+
+  static void fill(Reading& reading, const Thermometer& thermometer, const FitResult& fit) {
+    reading.fitted = fit.temperature;
+    reading.chi2_per_dof = fit.chi2_per_dof;
+    reading.model_error = fit.model_error;
+    reading.window_low = fit.window_low;
+    reading.window_high = fit.window_high;
+    KnownBias bias;
+    reading.temperature = fit.temperature.value;
+    for (int step = 0; step < bias_steps; ++step) {
+      bias = known_bias(thermometer, reading.temperature);
+      reading.temperature = fit.temperature.value * std::exp(-bias.mean);
+    }
+    reading.bias = std::expm1(bias.mean);
+    reading.bias_uncertainty = bias.scatter;
+    reading.std_error =
+        reading.temperature * std::hypot(fit.temperature.std_error / fit.temperature.value, bias.scatter);
+  }
+
+  // The one whose bias scatters least from bed to bed at the temperature that the first says.
+  void choose() {
+    double least = 0.0, temperature = 0.0;
+    for (std::size_t i = 0; i < votes_.size(); ++i) {
+      const Reading& reading = answer_.readings[i];
+      if (!votes_[i]->votes || reading.status != FitStatus::ok) continue;
+      if (temperature == 0.0) temperature = reading.temperature;
+      const double scatter = known_bias(*votes_[i], temperature).scatter;
+      if (chosen_ == nullptr || scatter < clearly_less * least) {
+        chosen_ = &reading;
+        least = scatter;
+      }
+    }
+    answer_.thermometer = chosen_->thermometer;
+    answer_.model = chosen_->model;
+    answer_.temperature = chosen_->temperature;
+    answer_.bias = chosen_->bias;
+    answer_.statistical_error = chosen_->temperature * statistical(*chosen_);
+    answer_.bias_uncertainty = chosen_->temperature * chosen_->bias_uncertainty;
+  }
+
+  static double statistical(const Reading& reading) { return reading.fitted.std_error / reading.fitted.value; }
+
+  // How far the admissible readings are from the chosen one, in ln T.
+  void compare_readings() {
+    double all = 0.0, beyond = 0.0;
+    int count = 0;
+    for (const Reading& reading : answer_.readings) {
+      if (!reading.admissible || &reading == chosen_) continue;
+      const double apart = std::log(reading.temperature / chosen_->temperature);
+      const double expected =
+          std::pow(reading.std_error / reading.temperature, 2) + std::pow(chosen_->std_error / chosen_->temperature, 2);
+      all += apart * apart;
+      beyond += std::max(0.0, apart * apart - expected);
+      ++count;
+      if (std::abs(apart) > std::log1p(same_temperature) && apart * apart > significant * significant * expected &&
+          (farthest_ == nullptr || std::abs(apart) > std::abs(std::log(farthest_->temperature / chosen_->temperature))))
+        farthest_ = &reading;
+    }
+    if (count == 0) return;
+    spread_of_all_ = std::sqrt(all / count);
+    spread_beyond_ = std::sqrt(beyond / count);
+    compared_ = count;
+  }
+
+  // Whether two temperatures are more than the same_temperature apart, significantly.
+  static bool differ(const Estimate& a, const Estimate& b, double errors) {
+    return ratio_above_one(a.value, b.value) > same_temperature &&
+           std::abs(a.value - b.value) >= errors * std::hypot(a.std_error, b.std_error);
+  }
+
+  void judge() {
+    const std::optional<Estimate>&x = input_.temperature_x, &z = input_.temperature_z;
+    answer_.verdict = Verdict::no_single_temperature;
+    if (x && z && differ(*x, *z, significant_kinetic)) {
+      answer_.why = "The disks' velocities have two temperatures: T_x = " + number(x->value) +
+                    " and T_z = " + number(z->value) + " m g D, " + per_cent(ratio_above_one(x->value, z->value)) +
+                    " apart.";
+      answer_.advice = "Quote the range, or T_x and T_z by name; no equilibrium curve holds for this bed.";
+      return;
+    }
+    const Estimate profile{chosen_->temperature, chosen_->std_error, false};
+    for (const std::optional<Estimate>& kinetic : {x, z}) {
+      if (!kinetic || !differ(profile, *kinetic, significant)) continue;
+      answer_.why = "The profile's T = " + number(profile.value) + " m g D is " +
+                    per_cent(ratio_above_one(profile.value, kinetic->value)) +
+                    " away from that of the disks' velocities, " + number(kinetic->value) + " m g D.";
+      answer_.advice = "Quote the range; check that floor, diameter and gravity are the bed's own.";
+      return;
+    }
+    if (farthest_ != nullptr) {
+      answer_.why = "T depends on the part of the profile it is read from: " + number(chosen_->temperature) +
+                    " m g D from the " + chosen_->thermometer + ", " + number(farthest_->temperature) + " from the " +
+                    farthest_->thermometer + ".";
+      answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
+      return;
+    }
+    const Reading& whole = whole_column();
+    const double misfit = known_misfit(whole.temperature);
+    answer_.verdict = Verdict::model_does_not_fit;
+    if (whole.model_error > admissible_misfit * misfit) {
+      answer_.why = "The best model misses the densities by " + number(whole.model_error, 2) + " per D^2, " +
+                    number(whole.model_error / misfit, 2) +
+                    " times as much as it does on beds in equilibrium at this temperature.";
+      answer_.advice = "Look at the residuals; check the diameter, the origin of the heights and the kernel.";
+      return;
+    }
+    answer_.verdict = Verdict::one_temperature;
+    answer_.why = compared_ == 0
+                      ? "Only one reading of the profile can be trusted here, and its model fits."
+                      : "All " + std::to_string(compared_ + 1) +
+                            " readings of the profile agree within 20 % or their errors, and the model fits.";
+    answer_.advice = chosen_->bias_uncertainty > statistical(*chosen_)
+                         ? "Most of the uncertainty is the model's: measuring longer does not lessen it."
+                         : "Most of the uncertainty is statistical: measure longer to lessen it.";
+  }
+
+  // The whole column's reading whose misfit is known.
+  [[nodiscard]] const Reading& whole_column() const {
+    for (const Reading& reading : answer_.readings) {
+      if (reading.thermometer == "whole column" && reading.status == FitStatus::ok) return reading;
+    }
+    return *chosen_;
+  }
+
+  void combine() {
+    Answer& a = answer_;
+    a.spread = a.temperature * (a.verdict == Verdict::one_temperature ? spread_beyond_ : spread_of_all_);
+    a.std_error = std::hypot(a.statistical_error, a.bias_uncertainty, a.spread);
+    a.interval.confidence = input_.confidence;
+    a.interval.status = FitStatus::ok;
+    if (a.verdict == Verdict::no_single_temperature) {
+      take_the_range();
+      return;
+    }
+    const double far = quantile() * a.std_error / a.temperature;
+    a.interval.low = a.temperature * std::exp(-far);
+    a.interval.high = a.temperature * std::exp(far);
+  }
+
+  // Student's, with the degrees of freedom that the statistical part leaves the whole uncertainty [Welch1947].
+  [[nodiscard]] double quantile() const {
+    const double upper = 0.5 + 0.5 * input_.confidence;
+    const double statistical_part = answer_.statistical_error / answer_.std_error;
+    const int samples = input_.profile.covariance.empty() ? 0 : input_.profile.covariance_samples;
+    if (samples < 2 || !(statistical_part > 0.0)) return gsl_cdf_ugaussian_Pinv(upper);
+    return gsl_cdf_tdist_Pinv(upper, (samples - 1.0) / std::pow(statistical_part, 4));
+  }
+
+  // From the least to the greatest temperature that anything says.
+  void take_the_range() {
+    double low = answer_.temperature, high = low;
+    const auto include = [&](double temperature) {
+      low = std::min(low, temperature);
+      high = std::max(high, temperature);
+    };
+    for (const Reading& reading : answer_.readings) {
+      if (reading.admissible) include(reading.temperature);
+    }
+    if (input_.temperature_x) include(input_.temperature_x->value);
+    if (input_.temperature_z) include(input_.temperature_z->value);
+    answer_.interval.low = low;
+    answer_.interval.high = high;
+    answer_.temperature = 0.5 * (low + high);
+    answer_.std_error = 0.5 * (high - low);
+  }
+
+  void find_solid_height() {
+    FitOptions options;
+    options.kernel = input_.kernel;
+    options.base = input_.base;
+    options.window.below_density = tail_density;
+    options.interval = options.sweep = options.compare = false;
+    options.curve_points = 0;
+    options.fixed_temperature = answer_.temperature;
+    const FitResult best = fit_profile(input_.profile, options);
+    options.fixed_temperature = answer_.temperature + answer_.std_error;
+    const FitResult warmer = fit_profile(input_.profile, options);
+    if (!best.ok() || !warmer.ok()) return;
+    answer_.solid_height = best.solid_height;
+    answer_.solid_height.std_error =
+        std::hypot(best.solid_height.std_error, warmer.solid_height.value - best.solid_height.value);
+  }
+
+  const AnswerInput& input_;
+  Answer answer_;
+  std::vector<const Thermometer*> votes_;  // of the readings
+  const Reading* chosen_ = nullptr;
+  const Reading* farthest_ = nullptr;                 // of those that contradict the chosen one
+  double spread_of_all_ = 0.0, spread_beyond_ = 0.0;  // in ln T
+  int compared_ = 0;
+};
+
+}  // namespace
+
+std::string_view to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::one_temperature:
+      return "one temperature";
+    case Verdict::model_does_not_fit:
+      return "model does not fit";
+    case Verdict::no_single_temperature:
+      return "no single temperature";
+  }
+  return "unknown";
+}
+
+Answer find_answer(const AnswerInput& input) { return AnswerFinder(input).run(); }
+
+}  // namespace shakebed::fit

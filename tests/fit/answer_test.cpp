@@ -1,0 +1,209 @@
+#include "fit/profile_fit/answer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fit/profile_fit/thermometers.hpp"
+#include "fit/theory/expansion.hpp"
+#include "tests/fit/simulated_bed.hpp"
+#include "tests/fit/synthetic.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+const Kernel kernel{KernelKind::gaussian, 0.5};
+
+// A column of the accurate equation of state, of 20 D, with noise: what a bed would be without layers.
+AnswerInput column(double temperature, double noise = 0.003, std::uint64_t seed = 5) {
+  const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {20.0, close_packing_density});
+  AnswerInput input;
+  input.kernel = kernel;
+  input.base = 0.0;
+  const int bins = static_cast<int>(4.0 * synthetic::top_of(truth));
+  input.profile = synthetic::profile_of(truth, kernel, bins, synthetic::top_of(truth), noise, seed);
+  return input;
+}
+
+TEST(Answer, OfABedInEquilibriumIsItsTemperature) {
+  // Simulated, 6 T_c and 20 T_c; a bath holds T.
+  for (const double reduced : {6.0, 20.0}) {
+    simulated::BedRun run;
+    run.bed = {231, 20.2};
+    run.temperature = reduced * run.bed.critical();
+    run.spacing = 0.25, run.frames = 150, run.interval = 2, run.seed = 8;
+    run.kernel = {sim::KernelKind::gaussian, 0.5};
+    AnswerInput input;
+    input.kernel = kernel;
+    input.profile = average_frames(simulated::profiles_of(run)).profile;
+    input.column_number = run.bed.column().column_number;
+    const Answer answer = find_answer(input);
+    ASSERT_TRUE(answer.ok()) << answer.why;
+    EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+    EXPECT_LT(answer.interval.low, run.temperature);
+    EXPECT_GT(answer.interval.high, run.temperature);
+    EXPECT_LT(answer.std_error, 0.06 * run.temperature);
+    EXPECT_EQ(answer.readings.size(), thermometers().size());
+    EXPECT_THAT(answer.why, testing::EndsWith("."));
+    EXPECT_FALSE(answer.advice.empty());
+  }
+}
+
+// The whole uncertainty is made of its parts, and the interval of that.
+TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
+  const Answer answer = find_answer(column(1.0));
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+  EXPECT_NEAR(answer.std_error, std::hypot(answer.statistical_error, answer.bias_uncertainty, answer.spread), 1e-15);
+  EXPECT_GT(answer.bias_uncertainty, 0.0);
+  // Errors that are known: normal, 1.96 of them in ln T.
+  EXPECT_NEAR(std::log(answer.interval.high / answer.temperature) * answer.temperature / answer.std_error, 1.959964,
+              1e-4);
+  EXPECT_NEAR(answer.interval.low * answer.interval.high, answer.temperature * answer.temperature, 1e-9);
+}
+
+TEST(Answer, TakesTheKnownBiasOff) {
+  const Answer answer = find_answer(column(1.0));
+  ASSERT_TRUE(answer.ok());
+  for (const Reading& reading : answer.readings) {
+    if (reading.status != FitStatus::ok) continue;
+    EXPECT_NEAR(reading.temperature * (1.0 + reading.bias), reading.fitted.value, 1e-9) << reading.thermometer;
+  }
+  const auto chosen = std::find_if(answer.readings.begin(), answer.readings.end(),
+                                   [&](const Reading& r) { return r.thermometer == answer.thermometer; });
+  ASSERT_NE(chosen, answer.readings.end());
+  EXPECT_EQ(chosen->temperature, answer.temperature);
+}
+
+// Few samples behind the errors widen the interval as Student's t does.
+TEST(Answer, WidensItsIntervalWhereTheErrorsComeFromFewSamples) {
+  AnswerInput input = column(1.0, 0.1);
+  const std::size_t n = input.profile.height.size();
+  input.profile.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i)
+    input.profile.covariance[i * n + i] = input.profile.std_error[i] * input.profile.std_error[i];
+  input.profile.covariance_samples = 5;
+  const Answer few = find_answer(input);
+  ASSERT_TRUE(few.ok());
+  const double factor = std::log(few.interval.high / few.temperature) * few.temperature / few.std_error;
+  // Student's t of 4 degrees of freedom, were all of it statistical; 1.96, were nothing.
+  EXPECT_GT(factor, 2.3);
+  EXPECT_LT(factor, 2.777);
+}
+
+TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
+  AnswerInput input = column(0.5);
+  input.temperature_x = Estimate{0.3, 0.01, false};
+  input.temperature_z = Estimate{0.6, 0.01, false};
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
+  EXPECT_THAT(answer.why, testing::HasSubstr("T_x = 0.3 and T_z = 0.6 m g D, 1e+02 % apart"));
+  EXPECT_EQ(answer.interval.low, 0.3);
+  EXPECT_EQ(answer.interval.high, 0.6);
+  EXPECT_NEAR(answer.temperature, 0.45, 1e-12);
+  // As far apart, but within their errors: no reason to say so.
+  input.temperature_x = Estimate{0.42, 0.1, false};
+  input.temperature_z = Estimate{0.55, 0.1, false};
+  EXPECT_EQ(find_answer(input).verdict, Verdict::one_temperature);
+}
+
+TEST(Answer, IsARangeWhereProfileAndVelocitiesDisagree) {
+  AnswerInput input = column(0.5);
+  input.temperature_x = Estimate{0.30, 0.003, false};
+  input.temperature_z = Estimate{0.31, 0.003, false};
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
+  EXPECT_THAT(answer.why, testing::HasSubstr("that of the disks' velocities"));
+  EXPECT_EQ(answer.interval.low, 0.30);
+  EXPECT_GT(answer.interval.high, 0.45);
+}
+
+// Two temperatures on top of one another: a dense bed at 0.4 under a tail that falls as at 1.2.
+TEST(Answer, IsARangeWhereTheDepthDecides) {
+  AnswerInput input = column(0.4);
+  const auto hot = HydrostaticProfile::of_column(best_of(), 1.2, {20.0, close_packing_density});
+  const auto cold = HydrostaticProfile::of_column(best_of(), 0.4, {20.0, close_packing_density});
+  double joint = 0.0;
+  while (cold.density(joint) > 0.45) joint += 0.01;
+  double same = 0.0;
+  while (hot.density(same) > 0.45) same += 0.01;
+  input.profile = {};
+  for (double z = 0.125; z < joint + 15.0; z += 0.25) {
+    const double density = z < joint ? cold.density(z) : hot.density(z - joint + same);
+    input.profile.height.push_back(z);
+    input.profile.number_density.push_back(density);
+    input.profile.std_error.push_back(synthetic::bin_error(density, 0.003));
+  }
+  input.kernel = {};
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature) << answer.why;
+  EXPECT_THAT(answer.why, testing::HasSubstr("depends on the part of the profile"));
+  EXPECT_LT(answer.interval.low, 0.9);
+  EXPECT_GT(answer.interval.high, 1.0);
+}
+
+// A gap in the middle of the bed: every reading may agree, and yet no curve of the model has it.
+TEST(Answer, SaysWhereTheModelDoesNotFit) {
+  AnswerInput input = column(2.0);
+  for (std::size_t i = 0; i < input.profile.height.size(); ++i) {
+    const double z = input.profile.height[i];
+    if (z > 8.0 && z < 30.0) input.profile.number_density[i] += 0.06 * std::sin(1.5 * z);
+  }
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::model_does_not_fit) << answer.why;
+  EXPECT_THAT(answer.why, testing::HasSubstr("misses the densities"));
+  const Answer fits = find_answer(column(2.0));
+  EXPECT_EQ(fits.verdict, Verdict::one_temperature);
+  EXPECT_GT(answer.std_error, fits.std_error);
+}
+
+TEST(Answer, FindsTheSolidOfAColdBed) {
+  const double critical = critical_temperature(enskog(), {20.0, close_packing_density}).value;
+  const Answer answer = find_answer(column(0.6 * critical));
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  const double mu = 20.0 / close_packing_density;
+  EXPECT_NEAR(answer.solid_height.value / mu, 0.4, 0.03);
+  EXPECT_GT(answer.solid_height.std_error, 0.0);
+}
+
+TEST(Answer, WithoutATemperatureSaysWhy) {
+  AnswerInput input = column(1.0);
+  for (double& density : input.profile.number_density) density = 0.0;
+  EXPECT_EQ(find_answer(input).status, FitStatus::no_signal);
+  input.profile.number_density[3] = std::nan("");
+  const Answer broken = find_answer(input);
+  EXPECT_EQ(broken.status, FitStatus::bad_input);
+  EXPECT_FALSE(broken.why.empty());
+  EXPECT_FALSE(broken.advice.empty());
+  EXPECT_EQ(find_answer({}).status, FitStatus::bad_input);
+}
+
+TEST(Answer, IsTheSameTwice) {
+  const AnswerInput input = column(0.3);
+  const Answer one = find_answer(input), two = find_answer(input);
+  EXPECT_EQ(one.temperature, two.temperature);
+  EXPECT_EQ(one.interval.low, two.interval.low);
+  EXPECT_EQ(one.interval.high, two.interval.high);
+}
+
+TEST(KnownBias, IsInterpolatedBetweenTheRowsOfTheTable) {
+  const auto rows = known_biases();
+  ASSERT_GE(rows.size(), 3U);
+  for (std::size_t t = 0; t < thermometer_count; ++t) {
+    const Thermometer& thermometer = thermometers()[t];
+    EXPECT_NEAR(known_bias(thermometer, rows[1].temperature).mean, rows[1].of[t].mean, 1e-12);
+    const double middle = std::sqrt(rows[1].temperature * rows[2].temperature);
+    EXPECT_NEAR(known_bias(thermometer, middle).mean, 0.5 * (rows[1].of[t].mean + rows[2].of[t].mean), 1e-12);
+    EXPECT_NEAR(known_bias(thermometer, middle).scatter, 0.5 * (rows[1].of[t].scatter + rows[2].of[t].scatter), 1e-12);
+    EXPECT_EQ(known_bias(thermometer, 1e3).mean, rows.back().of[t].mean);
+    EXPECT_NEAR(known_bias(thermometer, 0.5 * rows[0].temperature).scatter, 2.0 * rows[0].of[t].scatter, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace shakebed::fit
