@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "fit/theory/equation_of_state.hpp"
-#include "statistics/kernel.hpp"
 #include "fit/theory/tail.hpp"
+#include "statistics/kernel.hpp"
 
 // The curves a fit can draw, with their derivatives. Internal to fit.
 //

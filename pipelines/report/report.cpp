@@ -33,6 +33,7 @@ th, td { text-align: left; padding: 6px 10px; border-top: 1px solid var(--line);
 tr:first-child th { border-top: 0; background: var(--card); } td.number { white-space: nowrap; }
 .warnings, .banner { background: var(--warn); color: var(--warn-text); border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
 .warnings ul { margin: 0; padding-left: 1.2em; } .banner strong { display: block; }
+.answer { border: 1px solid currentColor; border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
 .good { color: var(--good); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
 .tag { display: inline-block; border: 1px solid currentColor; border-radius: 4px; padding: 0 6px; font-size: 0.8rem; color: var(--bad); }
 figure { margin: 14px 0; } figure > svg, figure img { max-width: 100%; height: auto; display: block; border-radius: 6px; }

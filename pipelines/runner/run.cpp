@@ -300,8 +300,30 @@ void run_stages(const Plan& plan, const RunOptions& options, Console* console, R
   StagesRun(plan, options, console, outcome)();
 }
 
+namespace {
+
+// The answer of the first stage that has one, with the stage's id; null where there is none.
+Json answer_of(const Plan& plan, const RunOutcome& outcome) {
+  for (std::size_t i = 0; i < plan.stages.size() && i < outcome.stages.size(); ++i) {
+    const StageRow& row = *plan.stages[i].row;
+    std::error_code error;
+    const fs::path path = outcome.out / plan.stages[i].id / row.result;
+    if (row.answer.empty() || !outcome.stages[i].record || !fs::is_regular_file(path, error)) continue;
+    const Json result = read_json(path);
+    const Json* answer = find_pointer(result, row.answer);
+    if (answer == nullptr) continue;
+    Json out = *answer;
+    out["stage"] = plan.stages[i].id;
+    return out;
+  }
+  return {};
+}
+
+}  // namespace
+
 Json summary_json(const Plan& plan, const RunOutcome& outcome) {
   Json summary;
+  if (Json answer = answer_of(plan, outcome); !answer.is_null()) summary["answer"] = std::move(answer);
   summary["pipeline"] = plan.name;
   summary["status"] = outcome.code == exit_ok             ? "ok"
                       : outcome.code == exit_check_failed ? "check failed"

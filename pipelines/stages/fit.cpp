@@ -13,6 +13,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/bed_facts.hpp"
 #include "pipelines/stages/kernel_options.hpp"
 #include "pipelines/stages/measured_profile.hpp"
@@ -96,6 +97,9 @@ class Fit : public Stage {
     fields.boolean("robust", options_.robust, {.help = "Huber's loss: outliers count linearly"});
     fields.boolean("sweep", options_.sweep, {.help = "also T against window"});
     fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
+    fields.boolean("answer", answer_,
+                   {.help = "also one answer from several models and windows: the temperature with its whole "
+                            "uncertainty, and whether the bed has one temperature"});
     fields.integer(
         "bootstrap", bootstrap_,
         {.help = "resamples over windows of frames, for the error of T that frames show by themselves: of an "
@@ -141,6 +145,9 @@ class Fit : public Stage {
   void run(RunContext& context) const override;
 
  private:
+  Json answer_of(const fit::Profile& profile, const fit::FitOptions& options, const RunContext& context,
+                 std::optional<double> diameter) const;
+
   InputFiles profile_;
   fit::FitOptions options_;
   std::optional<double> diameter_;
@@ -148,6 +155,7 @@ class Fit : public Stage {
   WindowChoice window_;
   ErrorSource errors_ = ErrorSource::automatic;
   bool temperature_measured_ = false;
+  bool answer_ = true;
   std::uint32_t bootstrap_ = 0;
 };
 
@@ -341,6 +349,19 @@ void write_tables(RunContext& context, const fit::FitResult& result) {
   windows.write(context.output("windows.csv"));
 }
 
+// From the profile alone, whatever model the stage fits, and the kinetic temperatures of the first input that has some.
+Json Fit::answer_of(const fit::Profile& profile, const fit::FitOptions& options, const RunContext& context,
+                    std::optional<double> diameter) const {
+  fit::AnswerInput input;
+  input.profile = profile, input.kernel = options.kernel, input.base = options.base;
+  input.column_number = options.column_number;
+  for (const Input& upstream : context.inputs()) {
+    const KineticTemperatures kinetic = kinetic_temperatures(upstream, diameter);
+    if (!input.temperature_x) input.temperature_x = kinetic.x, input.temperature_z = kinetic.z;
+  }
+  return answer_json(fit::find_answer(input), diameter);
+}
+
 void Fit::run(RunContext& context) const {
   fit::FitOptions options = options_;
   std::optional<double> diameter = diameter_;
@@ -407,6 +428,7 @@ void Fit::run(RunContext& context) const {
     json["interpolation_error"] = quantity_json(matched.interpolation_error, "m g D");
     json["library_scatter"] = matched.scatter ? Json(*matched.scatter) : Json();
   }
+  if (answer_ && options.model != simulation) json["answer"] = answer_of(profile, options, context, diameter);
   if (bootstrap_ > 0) {
     context.progress(0.3, "resampling");
     fit::BootstrapOptions how;
@@ -434,6 +456,7 @@ StageRow fit_stage() {
           .most_inputs = 64,
           .result = "fit.json",
           .headline = {"temperature", "temperature_over_mg", "solid_height", "reduced_temperature", "chi2_per_dof"},
+          .answer = "/answer",
           .pages = fit_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Fit>(); }};
 }

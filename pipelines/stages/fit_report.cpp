@@ -3,10 +3,25 @@
 #include <fmt/format.h>
 
 #include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/fit.hpp"
 
 namespace shakebed::pipelines {
 namespace {
+
+// The answer first, then what to do about it.
+std::string answer_html(const FinishedStage& stage, int&) {
+  const Json* answer = find_pointer(stage.result, "/answer");
+  if (answer == nullptr) return "";
+  return fmt::format("<div class=\"answer\"><strong>{}: {}</strong><br>{}</div>\n", escape_markup(stage.files.id),
+                     escape_markup(answer_text(*answer)), escape_markup(answer->value("advice", "")));
+}
+
+std::string answer_markdown(const FinishedStage& stage) {
+  const Json* answer = find_pointer(stage.result, "/answer");
+  if (answer == nullptr) return "";
+  return fmt::format("**{}**: {} {}\n\n", stage.files.id, answer_text(*answer), answer->value("advice", ""));
+}
 
 std::string banner_html(const FinishedStage& stage, int&) {
   if (stage.result.value("describes_data", true)) return "";
@@ -70,13 +85,22 @@ std::string numbers_text(const FinishedStage& stage) {
     add("temperature", "T", 1, " m g D");
   add("reduced_temperature", "T/T_c", 1, "");
   add("solid_height", "solid", 1, " D high");
-  return numbers.empty() ? "" : fmt::format("{}: {}\n", stage.files.id, numbers);
+  const Json* answer = find_pointer(fit, "/answer");
+  std::string text;
+  if (answer != nullptr)
+    text = fmt::format("{}: {} {}\n", stage.files.id, answer_text(*answer), answer->value("advice", ""));
+  if (!numbers.empty())
+    text += fmt::format("{} ({} alone): {}\n", stage.files.id, fit.value("model", "model"), numbers);
+  return text;
 }
 
 }  // namespace
 
 StagePages fit_pages() {
-  return {.sections = {{ReportPlace::banner, "", banner_html}, {ReportPlace::fits, "", fit_html}},
+  return {.sections = {{ReportPlace::banner, "", answer_html},
+                       {ReportPlace::banner, "", banner_html},
+                       {ReportPlace::fits, "", fit_html}},
+          .markdown = answer_markdown,
           .terminal = numbers_text};
 }
 

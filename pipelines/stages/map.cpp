@@ -131,7 +131,9 @@ class Map : public Stage {
                     {"in_range", "1", "1 where the formula applies at this Gamma, else 0"}});
     std::size_t in_range = 0;
     for (const Json& row : json["readings"]) {
-      const auto value = [&](const char* key) { return row[key].is_null() ? no_number : row[key]["value"].get<double>(); };
+      const auto value = [&](const char* key) {
+        return row[key].is_null() ? no_number : row[key]["value"].get<double>();
+      };
       readings.add({row["name"].get<std::string>(), row["jump_height"].get<std::string>(),
                     row["expansion"].get<std::string>(), row["constants"].get<std::string>(), value("jump"),
                     value("rise"), value("reduced_temperature"), count_cell(row["in_range"].get<bool>() ? 1 : 0)});

@@ -183,6 +183,7 @@ struct StageRow {
   bool uses_images = false;                  // loads the images module when it runs
   std::string_view result = {};              // the JSON file with its numbers
   std::vector<std::string_view> headline{};  // the numbers in it that a sweep gathers where its recipe names none
+  std::string_view answer = {};              // where in it the answer is that summary.json begins with: "/answer"
   std::string_view data_option = {};         // the option that takes the user's points (--data)
   StagePages pages{};
   std::unique_ptr<Stage> (*make)() = nullptr;

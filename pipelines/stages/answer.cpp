@@ -1,0 +1,113 @@
+#include "pipelines/stages/answer.hpp"
+
+#include <fmt/format.h>
+
+#include <cctype>
+
+namespace shakebed::pipelines {
+namespace {
+
+// The estimate at a pointer, its value and error multiplied by a factor.
+std::optional<fit::Estimate> estimate_at(const Json& json, const std::string& pointer, double factor) {
+  const Json *value = find_pointer(json, pointer + "/value"), *error = find_pointer(json, pointer + "/std_error");
+  if (value == nullptr || !value->is_number() || !(value->get<double>() > 0)) return std::nullopt;
+  const double spread = error != nullptr && error->is_number() ? error->get<double>() : 0;
+  return fit::Estimate{factor * value->get<double>(), factor * spread};
+}
+
+// T in m g D and as T/(m g).
+void put_temperature(Json& out, const std::string& name, double value, double std_error,
+                     std::optional<double> diameter) {
+  out[name] = quantity_json(value, "m g D", std_error);
+  if (diameter) out[name + "_over_mg"] = quantity_json(value * *diameter, "m", std_error * *diameter);
+}
+
+std::string sentence(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+// A number for people: T/(m g) in mm where the diameter is known, else T in m g D.
+struct Scale {
+  const char *name, *unit;
+  double factor;  // from m g D
+};
+Scale scale_of(const Json& answer) {
+  const Json *length = find_pointer(answer, "/temperature_over_mg/value"),
+             *plain = find_pointer(answer, "/temperature/value");
+  if (length == nullptr || plain == nullptr || !(plain->get<double>() > 0)) return {"T", "m g D", 1};
+  return {"T/(m g)", "mm", 1e3 * length->get<double>() / plain->get<double>()};
+}
+
+}  // namespace
+
+KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter) {
+  const Json result = input.result();
+  KineticTemperatures found{estimate_at(result, "/temperature_x", 1), estimate_at(result, "/temperature_z", 1)};
+  if (!found.x && diameter) {
+    found.x = estimate_at(result, "/velocities/temperature_x_over_mg", 1 / *diameter);
+    found.z = estimate_at(result, "/velocities/temperature_z_over_mg", 1 / *diameter);
+  }
+  return found;
+}
+
+Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
+  Json out;
+  out["verdict"] = fit::to_string(answer.verdict);
+  out["why"] = answer.why;
+  out["advice"] = answer.advice;
+  out["status"] = fit::to_string(answer.status);
+  if (!answer.ok()) return out;
+  put_temperature(out, "temperature", answer.temperature, answer.std_error, diameter);
+  out["interval"] = Json{{"low", quantity_json(answer.interval.low, "m g D")},
+                         {"high", quantity_json(answer.interval.high, "m g D")},
+                         {"confidence", answer.interval.confidence}};
+  out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
+  out["bias_uncertainty"] = quantity_json(answer.bias_uncertainty, "m g D");
+  out["spread"] = quantity_json(answer.spread, "m g D");
+  out["bias"] = answer.bias;
+  out["thermometer"] = answer.thermometer;
+  out["model"] = answer.model;
+  out["solid_height"] = quantity_json(answer.solid_height.value, "D", answer.solid_height.std_error);
+  if (answer.temperature_x)
+    put_temperature(out, "temperature_x", answer.temperature_x->value, answer.temperature_x->std_error, diameter);
+  if (answer.temperature_z)
+    put_temperature(out, "temperature_z", answer.temperature_z->value, answer.temperature_z->std_error, diameter);
+  out["readings"] = Json::array();
+  for (const fit::Reading& reading : answer.readings) {
+    out["readings"].push_back(Json{{"thermometer", reading.thermometer},
+                                   {"model", reading.model},
+                                   {"status", fit::to_string(reading.status)},
+                                   {"admissible", reading.admissible},
+                                   {"temperature", quantity_json(reading.temperature, "m g D", reading.std_error)},
+                                   {"bias", reading.bias},
+                                   {"bias_uncertainty", reading.bias_uncertainty},
+                                   {"chi2_per_dof", reading.chi2_per_dof}});
+  }
+  return out;
+}
+
+std::string answer_text(const Json& answer) {
+  const Json* value = find_pointer(answer, "/temperature/value");
+  const std::string verdict = sentence(answer.value("verdict", "")) + ": " + answer.value("why", "");
+  if (value == nullptr) return "no temperature. " + verdict;
+  const Scale scale = scale_of(answer);
+  const auto number = [&](const char* pointer) {
+    const Json* found = find_pointer(answer, pointer);
+    return found != nullptr && found->is_number() ? scale.factor * found->get<double>() : 0;
+  };
+  std::string text;
+  if (answer.value("verdict", "") == fit::to_string(fit::Verdict::no_single_temperature))
+    text = fmt::format("{} between {:.3g} and {:.3g} {}", scale.name, number("/interval/low/value"),
+                       number("/interval/high/value"), scale.unit);
+  else
+    text = fmt::format("{} = {:.4g} ± {:.2g} {} (95 %: {:.3g} to {:.3g})", scale.name, number("/temperature/value"),
+                       number("/temperature/std_error"), scale.unit, number("/interval/low/value"),
+                       number("/interval/high/value"));
+  if (find_pointer(answer, "/temperature_x/value") != nullptr)
+    text += fmt::format("; kinetic T_x {:.3g}, T_z {:.3g} {}", number("/temperature_x/value"),
+                        number("/temperature_z/value"), scale.unit);
+  return text + ". " + verdict;
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,28 @@
+// The answer of a fit stage: one temperature with its whole uncertainty and a verdict [fit/profile_fit/answer.hpp], as
+// JSON and as one line for people.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fit/profile_fit/answer.hpp"
+#include "pipelines/formats/json.hpp"
+#include "pipelines/stages/stage.hpp"
+
+namespace shakebed::pipelines {
+
+// Kinetic temperatures that an input stage measured, in m g D: from a simulation, or from the velocities in a film,
+// whose T/(m g) is a length. Nothing where it measured none.
+struct KineticTemperatures {
+  std::optional<fit::Estimate> x, z;
+};
+KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter);
+
+// Temperatures in m g D and, with the diameter [m], as T/(m g) in m.
+Json answer_json(const fit::Answer& answer, std::optional<double> diameter);
+
+// "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why." Ends without a line break.
+std::string answer_text(const Json& answer);
+
+}  // namespace shakebed::pipelines
