@@ -261,12 +261,12 @@ void check_presets(const JsonNode& root, const Fields::Source& source) {
 }
 
 // The recipe inside of a stage that runs others.
-std::vector<ChainStage> read_chain(const JsonNode& recipe) {
+Chain read_chain(const JsonNode& recipe) {
   const Plan plan = make_plan(recipe, "(chain)", std::filesystem::current_path());
-  std::vector<ChainStage> stages;
+  Chain chain;
   for (const PlannedStage& stage : plan.stages)
-    stages.push_back({stage.id, std::string(stage.row->name), !stage.input_files.empty()});
-  return stages;
+    chain.stages.push_back({stage.id, std::string(stage.row->name), !stage.input_files.empty()});
+  return chain;
 }
 
 struct Draft {  // a stage before its place in the order is known

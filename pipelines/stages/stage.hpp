@@ -103,8 +103,8 @@ class RunContext {
   // --- what comes out
   virtual const std::filesystem::path& output_directory() const = 0;
   std::filesystem::path output(std::string_view name) const { return output_directory() / name; }
-  // A folder for what must outlive a kill -9, Ctrl-C or an error: checkpoints. The same work (stage version, options,
-  // seed, inputs' bytes, program) started again under the same OUT finds the same folder with what was left in it;
+  // A folder for what must outlive a kill -9, Ctrl-C or an error: checkpoints. The same work (code, options, seed,
+  // inputs' bytes) started again under the same OUT finds the same folder with what was left in it;
   // other work never does. It is made on the first call, may be read from any thread, and is removed when the stage has
   // finished. Write files there atomically (write_file_atomically): whoever comes next sees whole ones only.
   virtual const std::filesystem::path& scratch() = 0;
@@ -127,13 +127,16 @@ class RunContext {
   virtual std::vector<Input> run_chain(const JsonNode& recipe, const std::filesystem::path& folder) = 0;
 };
 
-// A stage of a chain, as far as whoever holds the chain must know it.
+// A chain of stages inside of a stage, as far as the stage that holds it must know it.
 struct ChainStage {
   std::string id, stage;  // its kind
   bool reads_files = false;
 };
+struct Chain {
+  std::vector<ChainStage> stages;
+};
 // Reads the recipe of a chain without running it. Throws ConfigError.
-using ChainReader = std::function<std::vector<ChainStage>(const JsonNode& recipe)>;
+using ChainReader = std::function<Chain(const JsonNode& recipe)>;
 
 // Options, and the work. One object for each stage of a recipe.
 class Stage {
@@ -146,8 +149,8 @@ class Stage {
   // state it again, and may not state it otherwise.
   virtual std::optional<BedDescription> bed() const { return std::nullopt; }
 
-  // For a stage that runs others. After decoding: whether its chains are good recipes.
-  virtual void check_chains(Fields& fields, const ChainReader& read) const { (void)fields, (void)read; }
+  // For a stage that runs others. Called once after decoding: whether its chains are good recipes.
+  virtual void check_chains(Fields& /*fields*/, const ChainReader& /*read*/) {}
   // The kinds of stages that it runs: their code is part of what its result is made from.
   virtual std::vector<std::string> chain_kinds() const { return {}; }
 };

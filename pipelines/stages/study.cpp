@@ -80,7 +80,7 @@ struct Mean {
 class Study : public Stage {
  public:
   void describe(Fields& fields) override;
-  void check_chains(Fields& fields, const ChainReader& read) const override;
+  void check_chains(Fields& fields, const ChainReader& read) override;
   std::vector<std::string> chain_kinds() const override;
   void run(RunContext& context) const override;
 
@@ -91,7 +91,7 @@ class Study : public Stage {
   };
   std::vector<Point> points() const;
   JsonNode recipe_at(const Point& point, std::uint64_t seed) const;
-  void check_pointers(Fields& fields, const std::vector<ChainStage>& chain) const;
+  void check_pointers(Fields& fields, const Chain& chain) const;
   std::vector<Number> numbers(const std::vector<Input>& chain) const;
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
@@ -164,11 +164,12 @@ std::vector<std::string> Study::chain_kinds() const {
   return kinds;
 }
 
-void Study::check_pointers(Fields& fields, const std::vector<ChainStage>& chain) const {
+void Study::check_pointers(Fields& fields, const Chain& chain) const {
   const auto has = [&](const std::string& id) {
-    return std::any_of(chain.begin(), chain.end(), [&](const ChainStage& stage) { return stage.id == id; });
+    return std::any_of(chain.stages.begin(), chain.stages.end(),
+                       [&](const ChainStage& stage) { return stage.id == id; });
   };
-  for (const ChainStage& stage : chain) {
+  for (const ChainStage& stage : chain.stages) {
     // Pictures and verdicts are for people: no number of theirs is collected.
     for (const char* kind : {"chart", "claims", "study"}) {
       if (stage.stage == kind)
@@ -193,7 +194,7 @@ void Study::check_pointers(Fields& fields, const std::vector<ChainStage>& chain)
 }
 
 // Every series is read before any runs, so that a mistake in the last one is found now.
-void Study::check_chains(Fields& fields, const ChainReader& read) const {
+void Study::check_chains(Fields& fields, const ChainReader& read) {
   for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
     const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[k].first);
     for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
