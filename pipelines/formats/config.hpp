@@ -38,6 +38,7 @@
 
 #include "pipelines/formats/json.hpp"
 #include "pipelines/formats/quantity.hpp"
+#include "pipelines/formats/results.hpp"
 
 namespace shakebed::pipelines {
 
@@ -99,9 +100,11 @@ class Fields {
     std::string file;                      // for messages
     std::filesystem::path directory = {};  // relative paths are resolved against it
     std::vector<Problem>* problems = nullptr;
+    std::vector<Warning>* warnings = nullptr;  // what is odd but not wrong; may be left out
     // Every input file that was named: pointer and file.
     std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
     std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
+    std::vector<StatedStage> from = {};      // the same stages, and what each will give
   };
 
   // Reads an object. After describing, call finish(): it reports the keys that nobody asked for.
@@ -122,6 +125,11 @@ class Fields {
   // Kinds of the stages that "from" names, in its order (decoding only).
   const std::vector<std::string>& upstream() const { return source_.upstream; }
   bool has_upstream(std::string_view kind) const;
+  // What the stages in "from" will give (decoding only).
+  const std::vector<StatedStage>& from() const { return source_.from; }
+  // Checks a pointer into the results of the stages in "from", "/fit/temperature"; what is wrong is a problem at
+  // `pointer_below`. Returns what is stated of the result, where that is known.
+  const StatedResult* check_result(std::string_view pointer_below, const std::string& pointer);
 
   // --- one method a type. `value` holds the default before and what was read after.
   void number(std::string_view key, double& value, const About& about = {});
@@ -140,6 +148,11 @@ class Fields {
   void text(std::string_view key, std::optional<std::string>& value, const About& about = {});
   template <class Integer>
   void integer(std::string_view key, std::optional<Integer>& value, const About& about = {});
+
+  // Exactly one of two keys that were read must be written.
+  void either(std::string_view one, std::string_view other, const std::string& suggestion);
+  // When writing: "$comment", which says what follows from the options. Reading ignores it.
+  void comment(const std::string& text);
 
   void numbers(std::string_view key, std::vector<double>& values, const About& about = {});
   void quantities(std::string_view key, std::vector<double>& values, const Dimension& dimension,
@@ -181,6 +194,11 @@ class Fields {
   void require(bool holds, std::string_view key, const std::string& what, const std::string& suggestion = {});
   // The same for whoever knows the pointer below this object ("/disks/diameter").
   void problem(std::string_view pointer_below, const std::string& what, const std::string& suggestion = {});
+  // The same for what is odd but not wrong; warnings of one kind are counted together in a sweep.
+  void warn(std::string_view kind, std::string_view pointer_below, const std::string& what,
+            const std::string& suggestion = {});
+  // What was written under a key, nullptr where nothing was (decoding only).
+  const JsonNode* written(std::string_view key) const { return node_ != nullptr ? node_->find(key) : nullptr; }
   // Whether the key was written (decoding only).
   bool has(std::string_view key) const;
   // Number of problems so far in the whole document.
@@ -195,6 +213,7 @@ class Fields {
   };
 
   const JsonNode* take(std::string_view key, const About& about, std::string_view expected);
+  Problem located(std::string_view pointer_below, const std::string& what, const std::string& suggestion) const;
   void complain(const JsonNode& node, std::string_view key, const std::string& what, const std::string& suggestion = {},
                 bool is_input = false);
   void wrong_type(const JsonNode& node, std::string_view key, std::string_view expected, const About& about);
@@ -229,9 +248,6 @@ class Fields {
   bool unknown_keys_matter_ = true;
   std::vector<std::string> known_;
 };
-
-// "did you mean": the nearest of the names, or "" when none is near.
-std::string nearest_name(std::string_view word, const std::vector<std::string>& names);
 
 // ---------------------------------------------------------------------------------------------------------------------
 

@@ -718,6 +718,13 @@ std::string sweep_report_html(const Plan& plan, const std::vector<std::vector<st
     for (const std::string& problem : problems) out += fmt::format("<li>{}</li>\n", html(problem));
     out += "</ul></div>\n";
   }
+  if (!plan.warnings.empty()) {
+    out += "<div class=\"warnings\"><strong>Warnings</strong><ul>\n";
+    for (const Warning& warning : plan.warnings)
+      out += fmt::format("<li>{}: {}. {}</li>\n", html(warning.problem.pointer), html(warning.problem.what),
+                         html(warning.problem.suggestion));
+    out += "</ul></div>\n";
+  }
   int number = 0;
   for (const fs::path& figure : figures) {
     out += fmt::format("<figure>{}</figure>\n", inline_svg(figure, ++number));

@@ -1,5 +1,6 @@
 #include "pipelines/stages/extract.hpp"
 
+#include "pipelines/stages/extract_results.hpp"
 #include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
@@ -82,6 +83,7 @@ class Extract : public Stage {
       fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
     fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
   }
+  void results(ResultList& list) const override { state_extract_results(list, options_); }
   void run(RunContext& context) const override { images_module().extract(options_, context); }
 
  private:

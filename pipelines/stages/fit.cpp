@@ -12,6 +12,7 @@
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/fit_results.hpp"
 #include "pipelines/stages/theory.hpp"
 #include "sim/measure/observables.hpp"
 
@@ -143,6 +144,9 @@ class Fit : public Stage {
                                    : fmt::format("Did you mean \"{}\"?", nearest));
   }
 
+  void results(ResultList& list) const override {
+    state_fit_results(list, {.matched = options_.model == simulation, .bootstrap = bootstrap_ > 0});
+  }
   void run(RunContext& context) const override;
 
  private:
