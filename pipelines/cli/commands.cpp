@@ -20,6 +20,7 @@
 #include "pipelines/runner/recipe_schema.hpp"
 #include "pipelines/runner/run.hpp"
 #include "pipelines/runner/sweep.hpp"
+#include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {
@@ -189,12 +190,25 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
   return outcome.code;
 }
 
+void require_positive(const char* name, double value) {
+  if (!(value > 0)) throw UsageError(fmt::format("{}: must be above 0, got {}", name, number_text(value)));
+}
+
 double quantity_argument(const std::string& name, const std::string& text, const Dimension& wanted) {
   try {
     return parse_quantity(text, wanted);
   } catch (const std::invalid_argument& problem) {
     throw UsageError(fmt::format("{}: {}", name, problem.what()));
   }
+}
+
+// A bead's diameter; one of metres is worth a word.
+double diameter_argument(const std::string& text) {
+  const double diameter = quantity_argument("--diameter", text, dimension::length);
+  require_positive("--diameter", diameter);
+  if (const auto odd = odd_bead(diameter))
+    std::fputs(fmt::format("warning: --diameter: {}. {}\n", odd->what, odd->suggestion).c_str(), stderr);
+  return diameter;
 }
 
 // A length with its unit, or a plain number of diameters.
@@ -210,10 +224,6 @@ double diameters_argument(const std::string& name, const std::string& text, std:
   } catch (const std::invalid_argument& problem) {
     throw UsageError(fmt::format("{}: {}", name, problem.what()));
   }
-}
-
-void require_positive(const char* name, double value) {
-  if (!(value > 0)) throw UsageError(fmt::format("{}: must be above 0, got {}", name, number_text(value)));
 }
 
 double checked_plateau(std::optional<double> given) {
@@ -256,7 +266,8 @@ int command_reproduce(const Arguments& arguments) {
                                                  : fmt::format("did you mean \"{}\"?", nearest)));
   }
   const auto read = [&](const EmbeddedFile& file) {
-    return read_recipe_text(std::string(file.text), std::string(file.name), fs::current_path(), changes_of(arguments.run));
+    return read_recipe_text(std::string(file.text), std::string(file.name), fs::current_path(),
+                            changes_of(arguments.run));
   };
   if (wanted != "all") {
     const auto chosen =
@@ -369,7 +380,8 @@ int command_fit_images(const Arguments& arguments) {
                             {"text",
                              "Disks were found in the frames given, the scale follows from the bead's diameter, the "
                              "profile is that of the disks' centres above the floor."}};
-  return run_plan_command(arguments, read_recipe_text(dump(document), "(command line)", fs::current_path(), changes_of(arguments.run)));
+  return run_plan_command(
+      arguments, read_recipe_text(dump(document), "(command line)", fs::current_path(), changes_of(arguments.run)));
 }
 
 int command_fit_profile(const Arguments& arguments) {
@@ -383,8 +395,7 @@ int command_fit_profile(const Arguments& arguments) {
   if (!p.window.empty()) options.window.low = p.window[0], options.window.high = p.window[1];
   std::optional<double> diameter;
   if (p.diameter) {
-    diameter = quantity_argument("--diameter", *p.diameter, dimension::length);
-    require_positive("--diameter", *diameter);
+    diameter = diameter_argument(*p.diameter);
   }
   fit::Profile profile{
       .height = table.height, .number_density = table.number_density, .std_error = {}, .covariance = {}};
@@ -428,8 +439,7 @@ int command_theory(const Arguments& arguments) {
   question.equation = t.equation;
   question.plateau_density = checked_plateau(t.plateau_density);
   if (t.diameter) {
-    question.diameter = quantity_argument("--diameter", *t.diameter, dimension::length);
-    require_positive("--diameter", *question.diameter);
+    question.diameter = diameter_argument(*t.diameter);
   }
   if (t.initial_height && t.column_number)
     throw UsageError("--initial-height and --column-number say the same thing: give one");
@@ -453,10 +463,9 @@ int command_map(const Arguments& arguments) {
   question.equation = m.equation;
   question.plateau_density = checked_plateau(m.plateau_density);
   question.frequency = quantity_argument("--frequency", m.frequency, dimension::frequency);
-  question.diameter = quantity_argument("--diameter", m.diameter, dimension::length);
+  question.diameter = diameter_argument(m.diameter);
   question.gravity = quantity_argument("--gravity", m.gravity.value_or("9.81 m/s^2"), dimension::acceleration);
-  require_positive("--frequency", question.frequency), require_positive("--diameter", question.diameter),
-      require_positive("--gravity", question.gravity);
+  require_positive("--frequency", question.frequency), require_positive("--gravity", question.gravity);
   question.initial_height = diameters_argument("--initial-height", m.initial_height, question.diameter);
   require_positive("--initial-height", question.initial_height);
   if (m.restitution < 0 || m.restitution > 0.99) throw UsageError("--restitution: must be from 0 to 0.99");
@@ -506,12 +515,8 @@ int command_schema(const Arguments& arguments) {
 }
 
 Json problem_json(const Problem& problem) {
-  return Json{{"file", problem.file},
-              {"line", problem.at.line},
-              {"column", problem.at.column},
-              {"pointer", problem.pointer},
-              {"problem", problem.what},
-              {"suggestion", problem.suggestion}};
+  return Json{{"file", problem.file},       {"line", problem.at.line}, {"column", problem.at.column},
+              {"pointer", problem.pointer}, {"problem", problem.what}, {"suggestion", problem.suggestion}};
 }
 
 int command_validate(const Arguments& arguments) {
@@ -527,10 +532,8 @@ int command_validate(const Arguments& arguments) {
     }
     Json warnings = Json::array();
     for (const Warning& warning : plan.warnings) warnings.push_back(problem_json(warning.problem));
-    print(dump(Json{{"valid", true},
-                    {"name", plan.name},
-                    {"stages", plan.stages.size()},
-                    {"warnings", std::move(warnings)}}));
+    print(dump(
+        Json{{"valid", true}, {"name", plan.name}, {"stages", plan.stages.size()}, {"warnings", std::move(warnings)}}));
     return exit_ok;
   } catch (const ConfigError& error) {
     if (!arguments.common.json) throw;

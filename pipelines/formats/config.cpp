@@ -492,11 +492,8 @@ Problem Fields::located(std::string_view pointer_below, const std::string& what,
     if (next == nullptr) break;
     node = next;
   }
-  return {node->from_command_line ? "--set" : source_.file,
-          node->from_command_line ? Position{} : node->at,
-          pointer_ + std::string(pointer_below),
-          what,
-          suggestion};
+  return {node->from_command_line ? "--set" : source_.file, node->from_command_line ? Position{} : node->at,
+          pointer_ + std::string(pointer_below), what, suggestion};
 }
 
 std::optional<std::size_t> Fields::read_tag(const std::string& tag, const std::vector<RowText>& rows,

@@ -45,9 +45,8 @@ std::string filled(const std::string& stated, const std::vector<std::string>& as
 }
 
 std::string listed(const std::vector<std::string>& names) {
-  const std::vector<std::string> first(names.begin(),
-                                       names.begin() + static_cast<std::ptrdiff_t>(
-                                                           std::min(names.size(), most_names_listed)));
+  const std::vector<std::string> first(
+      names.begin(), names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), most_names_listed)));
   return fmt::format("{}{}", fmt::join(first, ", "), names.size() > first.size() ? ", ..." : "");
 }
 
@@ -62,12 +61,12 @@ bool file_fits(std::string_view stated, std::string_view asked) {
 }  // namespace
 
 void ResultList::quantity(std::string pointer, std::string unit, std::string meaning, Given given, bool may_be_null) {
-  results_.push_back({std::move(pointer), ResultKind::quantity, std::move(unit), std::move(meaning), std::move(given),
-                      may_be_null});
+  results_.push_back(
+      {std::move(pointer), ResultKind::quantity, std::move(unit), std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::number(std::string pointer, std::string unit, std::string meaning, Given given, bool may_be_null) {
-  results_.push_back({std::move(pointer), ResultKind::number, std::move(unit), std::move(meaning), std::move(given),
-                      may_be_null});
+  results_.push_back(
+      {std::move(pointer), ResultKind::number, std::move(unit), std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::text(std::string pointer, std::string meaning, Given given) {
   results_.push_back({std::move(pointer), ResultKind::text, "", std::move(meaning), std::move(given), false});
@@ -83,8 +82,8 @@ const StatedResult* ResultList::find(std::string_view pointer) const {
   for (const StatedResult& result : results_) {
     const std::vector<std::string> stated = split_pointer(result.pointer);
     const bool whole = stated.size() == asked.size();
-    const bool part = result.kind == ResultKind::quantity && asked.size() == stated.size() + 1 &&
-                      is_part_of_quantity(asked.back());
+    const bool part =
+        result.kind == ResultKind::quantity && asked.size() == stated.size() + 1 && is_part_of_quantity(asked.back());
     if (!whole && !part) continue;
     if (!std::equal(stated.begin(), stated.end(), asked.begin(), token_fits)) continue;
     if (found == nullptr || (result.given.possible && !found->given.possible)) found = &result;
@@ -133,9 +132,9 @@ std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, 
   const auto stage = std::find_if(stages.begin(), stages.end(), [&](const auto& s) { return s.id == tokens[0]; });
   if (stage == stages.end()) {
     const std::string nearest = nearest_name(tokens[0], ids);
-    return Misfit{fmt::format("\"{}\": {} names no stage \"{}\"", pointer, called, tokens[0]),
-                  nearest.empty() ? fmt::format("It names {}", listed(ids))
-                                  : fmt::format("Did you mean \"{}\"?", nearest)};
+    return Misfit{
+        fmt::format("\"{}\": {} names no stage \"{}\"", pointer, called, tokens[0]),
+        nearest.empty() ? fmt::format("It names {}", listed(ids)) : fmt::format("Did you mean \"{}\"?", nearest)};
   }
   if (stage->results == nullptr) return std::nullopt;
   const std::vector<std::string> inside(tokens.begin() + 1, tokens.end());
@@ -171,9 +170,9 @@ std::optional<Misfit> misfit_of_table(const StatedStage& stage, const std::strin
     if (table.given.possible) names.push_back(table.file);
   }
   const std::string nearest = nearest_name(file, names);
-  return Misfit{fmt::format("\"{}\" ({}) writes no table \"{}\"", stage.id, stage.kind, file),
-                nearest.empty() ? fmt::format("It writes {}", listed(names))
-                                : fmt::format("Did you mean \"{}\"?", nearest)};
+  return Misfit{
+      fmt::format("\"{}\" ({}) writes no table \"{}\"", stage.id, stage.kind, file),
+      nearest.empty() ? fmt::format("It writes {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
 }
 
 std::optional<Misfit> misfit_of_column(const StatedTable& table, const std::string& column) {
@@ -181,9 +180,9 @@ std::optional<Misfit> misfit_of_column(const StatedTable& table, const std::stri
   for (const StatedColumn& one : table.columns) names.push_back(one.name);
   if (std::find(names.begin(), names.end(), column) != names.end()) return std::nullopt;
   const std::string nearest = nearest_name(column, names);
-  return Misfit{fmt::format("{} has no column \"{}\"", table.file, column),
-                nearest.empty() ? fmt::format("It has {}", listed(names))
-                                : fmt::format("Did you mean \"{}\"?", nearest)};
+  return Misfit{
+      fmt::format("{} has no column \"{}\"", table.file, column),
+      nearest.empty() ? fmt::format("It has {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
 }
 
 }  // namespace shakebed::pipelines

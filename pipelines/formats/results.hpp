@@ -12,9 +12,9 @@ namespace shakebed::pipelines {
 
 // When something is given.
 struct Given {
-  bool possible = true;      // with the options of this stage
-  bool always = true;        // whenever the stage succeeds
-  std::string condition{};   // else, in words: "\"observe\" names \"order\"", "the fit succeeds"
+  bool possible = true;     // with the options of this stage
+  bool always = true;       // whenever the stage succeeds
+  std::string condition{};  // else, in words: "\"observe\" names \"order\"", "the fit succeeds"
 };
 // Known from the options.
 inline Given given_if(bool holds, std::string condition) { return {holds, holds, std::move(condition)}; }
@@ -23,7 +23,9 @@ inline Given given_when(std::string condition) { return {true, false, std::move(
 // Both.
 inline Given both(const Given& a, const Given& b) {
   return {a.possible && b.possible, a.always && b.always,
-          a.condition.empty() ? b.condition : b.condition.empty() ? a.condition : a.condition + ", and " + b.condition};
+          a.condition.empty()   ? b.condition
+          : b.condition.empty() ? a.condition
+                                : a.condition + ", and " + b.condition};
 }
 
 enum class ResultKind { quantity, number, text, truth };

@@ -139,10 +139,10 @@ class PlanBuilder {
     }
     const auto same = std::find_if(drafts_.begin(), drafts_.end(), [&](const Draft& d) { return d.id == draft.id; });
     if (same != drafts_.end())
-      return problem(id != nullptr ? *id : item, id != nullptr ? pointer + "/id" : pointer,
-                     fmt::format("two stages would write to the folder \"{}\": this one and /stages/{}", draft.id,
-                                 same->index),
-                     "Give one of them an \"id\" of its own");
+      return problem(
+          id != nullptr ? *id : item, id != nullptr ? pointer + "/id" : pointer,
+          fmt::format("two stages would write to the folder \"{}\": this one and /stages/{}", draft.id, same->index),
+          "Give one of them an \"id\" of its own");
     drafts_.push_back(std::move(draft));
   }
 
@@ -165,8 +165,8 @@ class PlanBuilder {
   }
 
   void check_id(const JsonNode& id, const std::string& pointer) {
-    const bool reserved = std::find(reserved_ids.begin(), reserved_ids.end(), id.text.substr(0, id.text.find('.'))) !=
-                          reserved_ids.end();
+    const bool reserved =
+        std::find(reserved_ids.begin(), reserved_ids.end(), id.text.substr(0, id.text.find('.'))) != reserved_ids.end();
     if (good_id(id.text) && !reserved) return;
     problem(id, pointer + "/id",
             reserved ? fmt::format("the id \"{}\" is one that OUT uses itself", id.text)
@@ -310,8 +310,7 @@ class PlanBuilder {
     }
     const std::vector<PublishedNumber>& published = plan_.report.published;
     for (std::size_t i = 0; i < published.size(); ++i)
-      if (!published[i].pointer.empty())
-        check(pointer_join("/report/published", i) + "/number", published[i].pointer);
+      if (!published[i].pointer.empty()) check(pointer_join("/report/published", i) + "/number", published[i].pointer);
     for (std::size_t i = 0; i < plan_.report.assumed.size(); ++i) check_assumed(i);
   }
 
@@ -381,7 +380,7 @@ class PlanBuilder {
   std::vector<Problem> problems_;
   Fields::Source source_;
   std::vector<Draft> drafts_;
-  std::vector<std::size_t> order_;                // of drafts
+  std::vector<std::size_t> order_;               // of drafts
   std::map<std::size_t, std::size_t> position_;  // of a draft in Plan::stages
 };
 

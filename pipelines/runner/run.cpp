@@ -518,8 +518,8 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, Console& co
   const FolderLock lock(options.out);
   remove_leftovers(options.out);
   for (const Warning& warning : plan.warnings) {
-    outcome.warnings.push_back(to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what,
-                                                 warning.problem.suggestion}));
+    outcome.warnings.push_back(
+        to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what, warning.problem.suggestion}));
     console.warning(to_string(warning.problem));
   }
   run_stages(plan, options, &console, outcome);

@@ -521,8 +521,8 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   summary["pipeline"] = plan.name;
   summary["warnings"] = Json::array();
   for (const Warning& warning : plan.warnings)
-    summary["warnings"].push_back(to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what,
-                                                    warning.problem.suggestion}));
+    summary["warnings"].push_back(
+        to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what, warning.problem.suggestion}));
   summary["points"] = all.size();
   summary["done"] = there;
   summary["missing"] = all.size() - there;

@@ -117,8 +117,7 @@ class SweepReader {
     const JsonNode* count = range.find("count");
     const bool counted = count != nullptr && count->is_number() && count->number == std::floor(count->number) &&
                          count->number >= 1 && count->number <= static_cast<double>(most_values);
-    if (!counted)
-      return bad(where + "/count", "a range needs \"count\", a whole number from 1 to 10,000,000"), false;
+    if (!counted) return bad(where + "/count", "a range needs \"count\", a whole number from 1 to 10,000,000"), false;
     const auto n = static_cast<std::int64_t>(count->number);
     axis.places.assign(static_cast<std::size_t>(n), axis.places.front());
     for (std::int64_t i = 0; i < n; ++i) {
@@ -174,9 +173,8 @@ class SweepReader {
     const SweepAxis& first = sweep_.axes.front();
     for (const SweepAxis& axis : sweep_.axes) {
       if (axis.values.size() == first.values.size()) continue;
-      bad(pointer_join("/over", axis.pointer),
-          fmt::format("has {} values, {} has {}: zip needs as many of each", axis.values.size(), first.pointer,
-                      first.values.size()));
+      bad(pointer_join("/over", axis.pointer), fmt::format("has {} values, {} has {}: zip needs as many of each",
+                                                           axis.values.size(), first.pointer, first.values.size()));
     }
   }
 

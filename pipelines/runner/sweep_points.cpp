@@ -57,9 +57,9 @@ std::string described(const Plan& plan, const SweepPoint& point) {
   std::string text;
   for (std::size_t a = 0; a < plan.sweep->axes.size(); ++a) {
     if (point.values[a].is_null()) continue;
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", plan.sweep->axes[a].pointer,
-                        point.values[a].is_string() ? point.values[a].get<std::string>()
-                                                    : dump_canonical(point.values[a]));
+    text +=
+        fmt::format("{}{} = {}", text.empty() ? "" : ", ", plan.sweep->axes[a].pointer,
+                    point.values[a].is_string() ? point.values[a].get<std::string>() : dump_canonical(point.values[a]));
   }
   return fmt::format("point {} of the sweep: {}", point.name, text);
 }

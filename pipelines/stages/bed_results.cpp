@@ -110,7 +110,8 @@ class BedStatement {
 
   void tables() {
     const StatedColumn height{"height", "D", "middle of the layer"};
-    list_.table({"layers.csv", "temperatures by layers of 1 D",
+    list_.table({"layers.csv",
+                 "temperatures by layers of 1 D",
                  {height,
                   {"temperature_x", energy_, "kinetic temperature across"},
                   {"temperature_z", energy_, "kinetic temperature upwards"},

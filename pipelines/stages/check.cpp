@@ -207,7 +207,8 @@ class Check : public Stage {
     if (!fields.decoding()) return;
     for (const auto& [pointer, expectation] : expect_) {
       const std::string where = "/expect/" + escape_pointer_token(pointer);
-      if (const StatedResult* stated = fields.check_result(where, pointer)) check_unit(fields, where, expectation, *stated);
+      if (const StatedResult* stated = fields.check_result(where, pointer))
+        check_unit(fields, where, expectation, *stated);
     }
     fields.require(!expect_.empty() || !fields.has("expect"), "expect", "nothing is expected");
   }

@@ -2,6 +2,7 @@
 
 #include "pipelines/stages/extract_results.hpp"
 #include "pipelines/stages/images_module.hpp"
+#include "pipelines/stages/scene_options.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -82,6 +83,7 @@ class Extract : public Stage {
     if (o.left_wall && o.right_wall)
       fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
     fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
+    if (o.diameter > 0) warn_of_bead(fields, "/diameter", o.diameter);
   }
   void results(ResultList& list) const override { state_extract_results(list, options_); }
   void run(RunContext& context) const override { images_module().extract(options_, context); }

@@ -96,27 +96,43 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
       y{"y_px", "px", "row of the centre"};
   list.table({"disks.csv",
               "the disks found",
-              {frame, x, y, {"radius_px", "px", "radius"}, {"x", "D", "distance from the left wall"},
+              {frame,
+               x,
+               y,
+               {"radius_px", "px", "radius"},
+               {"x", "D", "distance from the left wall"},
                {"z", "D", "height above the floor's mean position"},
                {"quality", "1", "1 for a bead like all the others"}}});
   list.table({"disk_details.csv",
               "more about the disks found",
-              {frame, x, y, {"std_error_x_px", "px", "standard error of the column"},
-               {"std_error_y_px", "px", "standard error of the row"}, {"correlation", "1", "correlation of the two"},
-               {"contrast", "1", "contrast of the bead over that of all"}, {"cut", "1", "1 at the frame's edge"},
-               {"half_hidden", "1", "1 when partly covered"}, {"species", "1", "1 or 2"}}});
+              {frame,
+               x,
+               y,
+               {"std_error_x_px", "px", "standard error of the column"},
+               {"std_error_y_px", "px", "standard error of the row"},
+               {"correlation", "1", "correlation of the two"},
+               {"contrast", "1", "contrast of the bead over that of all"},
+               {"cut", "1", "1 at the frame's edge"},
+               {"half_hidden", "1", "1 when partly covered"},
+               {"species", "1", "1 or 2"}}});
   list.table({"frames.csv",
               "the frames read",
-              {frame, {"file", "", "file"}, {"page", "1", "page of the file"}, {"status", "", "whether it was used"},
-               {"disks", "1", "disks found"}, {"second", "1", "disks of the second species"},
-               {"rejected", "1", "places rejected"}, {"residual_level", "1", "rms of what the model leaves"},
+              {frame,
+               {"file", "", "file"},
+               {"page", "1", "page of the file"},
+               {"status", "", "whether it was used"},
+               {"disks", "1", "disks found"},
+               {"second", "1", "disks of the second species"},
+               {"rejected", "1", "places rejected"},
+               {"residual_level", "1", "rms of what the model leaves"},
                {"contrast_gain", "1", "light of the frame over that of the first"}}});
   list.table({"quality.csv",
               "number of disks by quality",
               {{"from", "1", "lower bound"}, {"to", "1", "upper bound"}, {"disks", "1", "disks"}}});
   list.table({"bead.csv",
               "the bead as learned from the frames",
-              {{"radius_px", "px", "distance from the centre"}, {"contrast", "1", "level: 1 inside, 0 outside"},
+              {{"radius_px", "px", "distance from the centre"},
+               {"contrast", "1", "level: 1 inside, 0 outside"},
                {"fourth_harmonic", "1", "fourth harmonic of the rim"}}});
 }
 

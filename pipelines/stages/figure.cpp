@@ -358,7 +358,8 @@ class Figure : public Stage {
     const Given both_drawn = both(given_if(list.from("extract") != nullptr && list.from("simulate") != nullptr,
                                            "\"from\" names an extract and a simulate stage"),
                                   given_when("the profiles overlap"));
-    list.quantity("/frames_against_simulation", "1/D^2", "rms difference of the frames from the simulation", both_drawn);
+    list.quantity("/frames_against_simulation", "1/D^2", "rms difference of the frames from the simulation",
+                  both_drawn);
     list.quantity("/frames_against_simulation_same_moments", "1/D^2",
                   "rms difference of the frames from the simulation at the moments of the frames", both_drawn);
     const Given compared = given_when("two profiles are drawn"), overlap = given_when("the two overlap");

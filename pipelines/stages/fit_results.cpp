@@ -70,7 +70,8 @@ class FitStatement {
     list_.text("/window/rule", "the rule that chose them");
     list_.text("/kernel/kind", "the window through which density was measured");
     list_.number("/kernel/width", "D", "its width");
-    const Given several = given_when("several windows are compared"), good = given_when("the fit of the window succeeds");
+    const Given several = given_when("several windows are compared"),
+                good = given_when("the fit of the window succeeds");
     const std::string row = "/temperature_by_window/#/";
     list_.number(row + "low", "D", "lowest height of the window", several);
     list_.number(row + "high", "D", "highest height of the window", several);

@@ -6,7 +6,7 @@
 namespace shakebed::pipelines {
 
 struct FitOutput {
-  bool matched = false;        // against simulated beds
+  bool matched = false;  // against simulated beds
   bool bootstrap = false;
 };
 void state_fit_results(ResultList& list, const FitOutput& fit);

@@ -371,8 +371,7 @@ void Infer::results(ResultList& list) const {
   for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error", "collisions"})
     columns.push_back({key, "1", "as in infer.json"});
   columns.push_back({"status", "", "whether the fits succeeded"});
-  for (const char* key :
-       {"temperature", "temperature_error", "temperature_x", "temperature_z", "temperature_z_local"})
+  for (const char* key : {"temperature", "temperature_error", "temperature_x", "temperature_z", "temperature_z_local"})
     columns.push_back({key, "m g D", "as in infer.json"});
   for (const char* key : {"solid_height", "rise"}) columns.push_back({key, "D", "as in infer.json"});
   for (const char* key : {"density", "density_error"}) columns.push_back({key, "1/D^2", "as in infer.json"});

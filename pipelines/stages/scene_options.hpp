@@ -106,6 +106,11 @@ struct FloorTable {
 };
 FloorTable read_floor_table(const std::filesystem::path& path);
 
+// Says where a bead [m] is larger or smaller than those of experiments (decoding only).
+void warn_of_bead(Fields& fields, std::string_view pointer_below, double diameter);
+// The words for it, and what to do; nothing about an ordinary bead.
+std::optional<Misfit> odd_bead(double diameter);
+
 class SceneOptions {
  public:
   // Names every option of the bed; when decoding, also checks that such a bed can be and reports what cannot.

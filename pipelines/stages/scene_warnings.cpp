@@ -20,11 +20,12 @@ constexpr double least_width = 5;  // [D]
 // A bed forgets its start over tens of periods; fewer than ten are certainly too few.
 constexpr double least_settle_periods = 10;
 // A width so near n D, or (n + 1/2) D where rows alternate, lets rows of disks lock between hard sides. The second
-// window is half as wide as the first, so that 30.6 D lies outside of it: 40 beds of that width did not lock.
-constexpr double whole_window = 0.005, half_window = 0.0025;         // of the width
+// window is half as wide as the first, so that 30.6 D, the width of beds measured beside soft spheres, lies outside.
+// Both are bounded, since in wide boxes 0.5 % of the width would be everywhere.
+constexpr double whole_window = 0.005, half_window = 0.0025;           // of the width
 constexpr double widest_whole_window = 0.2, widest_half_window = 0.1;  // [D]
 // Places between the windows, whatever the width.
-constexpr std::array safe_fractions{0.3, 0.7};  // [D]
+constexpr std::array safe_fractions{0.3, 0.7};            // [D]
 constexpr double row_distance = std::numbers::sqrt3 / 2;  // of hexagonal packing [D]
 
 struct Commensurate {
@@ -53,6 +54,18 @@ std::pair<double, double> safe_widths(double width) {
 
 }  // namespace
 
+std::optional<Misfit> odd_bead(double diameter) {
+  if (diameter < largest_bead && diameter >= smallest_bead) return std::nullopt;
+  return Misfit{
+      fmt::format("a bead of {}: beads of experiments are 50 um to some cm", handy_text(diameter, dimension::length)),
+      diameter >= largest_bead ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", diameter)
+                               : "Check its unit"};
+}
+
+void warn_of_bead(Fields& fields, std::string_view pointer_below, double diameter) {
+  if (const auto odd = odd_bead(diameter)) fields.warn("bead", pointer_below, odd->what, odd->suggestion);
+}
+
 double SceneOptions::gamma() const {
   // As written, where it was: what follows from the amplitude differs from it in the last digit.
   const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion);
@@ -78,12 +91,11 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
   const double value = gamma();
   if (value >= least_gamma && value <= most_gamma) return;
   const double omega = 2 * std::numbers::pi * sine->frequency;
-  const std::string here = fmt::format("Gamma = {:.3g}: the floor's amplitude is {} at {}", value,
-                                       length_text(sine->amplitude),
-                                       reduced_ ? fmt::format("{:.6g}", sine->frequency)
-                                                : handy_text(sine->frequency, dimension::frequency));
-  const std::string four = fmt::format("Gamma = 4 needs an amplitude of {}",
-                                       length_text(4 * *gravity_ / (omega * omega)));
+  const std::string here = fmt::format(
+      "Gamma = {:.3g}: the floor's amplitude is {} at {}", value, length_text(sine->amplitude),
+      reduced_ ? fmt::format("{:.6g}", sine->frequency) : handy_text(sine->frequency, dimension::frequency));
+  const std::string four =
+      fmt::format("Gamma = 4 needs an amplitude of {}", length_text(4 * *gravity_ / (omega * omega)));
   if (value < least_gamma)
     fields.warn("gamma below 1", sine->gamma ? "/floor/gamma" : "/floor/amplitude",
                 here + ". Below Gamma = 1 the floor never throws the bed, which stays at rest on it", four);
@@ -96,13 +108,7 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
 }
 
 void SceneOptions::warn_of_size(Fields& fields) const {
-  if (!reduced_ && (disks_.diameter >= largest_bead || disks_.diameter < smallest_bead))
-    fields.warn("bead", "/disks/diameter",
-                fmt::format("a bead of {}: beads of experiments are 50 um to some cm",
-                            handy_text(disks_.diameter, dimension::length)),
-                disks_.diameter >= largest_bead
-                    ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", disks_.diameter)
-                    : "Check its unit");
+  if (!reduced_) warn_of_bead(fields, "/disks/diameter", disks_.diameter);
   const double width = box_.width / length_unit();
   if (gravity_ && width < least_width)
     fields.warn("narrow box", "/box/width",
@@ -147,8 +153,9 @@ void SceneOptions::warn(Fields& fields, double settle) const {
               fmt::format("the bed settles for {:.3g} periods of the floor before it is measured: its start is still "
                           "in the means",
                           settle / shaken),
-              "Settle for " + (reduced_ ? fmt::format("{:.6g}", least_settle_periods * shaken)
-                                        : handy_text(least_settle_periods * shaken, dimension::time)) +
+              "Settle for " +
+                  (reduced_ ? fmt::format("{:.6g}", least_settle_periods * shaken)
+                            : handy_text(least_settle_periods * shaken, dimension::time)) +
                   " or longer");
 }
 

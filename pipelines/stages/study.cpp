@@ -92,6 +92,7 @@ class Study : public Stage {
   };
   std::vector<Point> points() const;
   Plan plan_of(const Point& point, std::uint64_t seed) const;
+  void check_points(Fields& fields) const;
   void check_chain(Fields& fields, const Plan& plan) const;
   std::vector<Number> numbers(const Plan& plan, const fs::path& folder) const;
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
@@ -154,7 +155,11 @@ void Study::describe(Fields& fields) {
   fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
   fields.require(!collect_.empty(), "collect", "nothing is collected");
   if (parameter_.values.empty()) return;
-  // Every series is read now, so that a mistake in the last one is found before the first has run.
+  check_points(fields);
+}
+
+// Every series is read now, so that a mistake in the last one is found before the first has run.
+void Study::check_points(Fields& fields) const {
   std::map<std::pair<std::string, std::string>, std::pair<Warning, std::size_t>> warnings;  // by kind and pointer
   std::size_t points_read = 0;
   for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
@@ -162,12 +167,6 @@ void Study::describe(Fields& fields) {
     for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
       try {
         const Plan plan = plan_of({k, v, 0}, 1);
-        for (const PlannedStage& stage : plan.stages) {
-          for (const char* name : {"chart", "claims", "study"})  // their versions are not part of a study's
-            if (stage.row->name == name)
-              fields.problem("/stages", fmt::format("a chain holds no {} stage", name), "Put it after the study");
-          if (!stage.input_files.empty()) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
-        }
         check_chain(fields, plan);
         ++points_read;
         for (const Warning& warning : plan.warnings)
@@ -190,8 +189,15 @@ void Study::describe(Fields& fields) {
                 counted.first.problem.suggestion);
 }
 
-// What is collected must be what the chain gives.
+// What the chain may hold, and that it gives what is collected.
 void Study::check_chain(Fields& fields, const Plan& plan) const {
+  for (const PlannedStage& stage : plan.stages) {
+    for (const char* name : {"chart", "claims", "study"})  // their versions are not part of a study's
+      if (stage.row->name == name)
+        fields.problem("/stages", fmt::format("a chain holds no {} stage", name), "Put it after the study");
+    if (!stage.input_files.empty())
+      fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "Put it after the study");
+  }
   const std::vector<StatedStage> stated = plan.stated();
   for (const auto& [name, collected] : collect_) {
     const auto misfit = misfit_of_pointer(stated, collected.at, "the chain");
@@ -208,7 +214,8 @@ void Study::check_chain(Fields& fields, const Plan& plan) const {
     const auto stage = std::find_if(stated.begin(), stated.end(),
                                     [&](const StatedStage& s) { return !tokens.empty() && s.id == tokens.front(); });
     if (tokens.size() != 2 || stage == stated.end()) {
-      fields.problem(where + "/at", "\"" + table.at + "\" leads to no file of the chain", "Write /<stage id>/<file>.csv");
+      fields.problem(where + "/at", "\"" + table.at + "\" leads to no file of the chain",
+                     "Write /<stage id>/<file>.csv");
       continue;
     }
     auto misfit = misfit_of_table(*stage, tokens[1]);
@@ -234,8 +241,9 @@ void Study::results(ResultList& list) const {
   for (const auto& [name, collected] : collect_) {
     const auto tokens = split_pointer(collected.at);
     const PlannedStage* stage = plan.find(tokens.front());
-    const StatedResult* number = stage == nullptr ? nullptr : stage->results->find(collected.at.substr(
-        1 + escape_pointer_token(tokens.front()).size()));
+    const StatedResult* number =
+        stage == nullptr ? nullptr
+                         : stage->results->find(collected.at.substr(1 + escape_pointer_token(tokens.front()).size()));
     const bool scaled = collected.times != 1 || collected.plus != 0;
     const std::string unit = number == nullptr || scaled ? "" : number->unit;
     const std::string meaning = number == nullptr ? "" : number->meaning;

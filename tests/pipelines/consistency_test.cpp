@@ -63,11 +63,12 @@ TEST_P(WrongRecipe, IsRefusedBeforeAnythingRuns) {
   }
   EXPECT_FALSE(fs::exists(folder / "o")) << "nothing may be made of a recipe that is wrong";
 }
-INSTANTIATE_TEST_SUITE_P(All, WrongRecipe, testing::ValuesIn(refused), [](const testing::TestParamInfo<Refused>& given) {
-  std::string name = given.param.name;
-  std::erase(name, '-');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, WrongRecipe, testing::ValuesIn(refused),
+                         [](const testing::TestParamInfo<Refused>& given) {
+                           std::string name = given.param.name;
+                           std::erase(name, '-');
+                           return name;
+                         });
 
 struct Odd {
   const char* name;     // of the recipe
@@ -150,10 +151,9 @@ TEST(Gamma, IsWrittenIntoResolvedAsTheUserWroteIt) {
        {std::tuple{"/stages/bed/seed=1", "\"amplitude\": \"0.0015 m\"", "gamma 2.41458"},
         std::tuple{"/stages/bed/floor={\"motion\": \"sinusoidal\", \"gamma\": 4, \"frequency\": \"20 Hz\"}",
                    "\"gamma\": 4", "amplitude 2.4849"}}) {
-    const ProgramResult result =
-        run_shakebed({"run", recipe("width-between").string(), "--set", set, "--set", "/stages/bed/measure=0.1 s",
-                      "--out", "o"},
-                     folder.path());
+    const ProgramResult result = run_shakebed(
+        {"run", recipe("width-between").string(), "--set", set, "--set", "/stages/bed/measure=0.1 s", "--out", "o"},
+        folder.path());
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const std::string resolved = read_text(folder / "o/resolved.json");
     EXPECT_NE(resolved.find(written), std::string::npos) << resolved;
@@ -169,6 +169,9 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   const ProgramResult result = run_shakebed({"fit-images", "photo.png", "--diameter", "3"}, folder.path());
   EXPECT_EQ(result.exit_code, 3) << result.err;
   EXPECT_NE(result.err.find("Write \"3 mm\""), std::string::npos) << result.err;
+  const ProgramResult mapped = run_shakebed(
+      {"map", "--gamma", "4", "--frequency", "20 Hz", "--diameter", "3", "--initial-height", "10"}, folder.path());
+  EXPECT_NE(mapped.err.find("did you mean \"3 mm\"?"), std::string::npos) << mapped.err;
   write_text(folder / "r.json", small_recipe());
   for (const auto& [set, says] : {std::pair{"/stages/bed/floor/frequency=\"20\"", "Write \"20 Hz\""},
                                   {"/stages/bed/box/width=\"0.06\"", "Write \"0.06 m\""},

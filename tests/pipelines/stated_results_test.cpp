@@ -1,4 +1,5 @@
-// What each stage states before it runs against what it writes: no number and no column more, none less, the same units.
+// What each stage states before it runs against what it writes: no number and no column more, none less, the same
+// units.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -27,7 +28,8 @@ class Comparison {
     const Json result = read_json(folder_ / stage_.row->result);
     walk(result, "");
     for (const StatedResult& one : stage_.results->all()) {
-      const bool needed = one.given.possible && one.given.always && one.pointer.find_first_of("#*") == std::string::npos;
+      const bool needed =
+          one.given.possible && one.given.always && one.pointer.find_first_of("#*") == std::string::npos;
       if (needed && !seen_.contains(one.pointer)) fail("states " + one.pointer + ", which is not in its result");
       if (!one.given.possible && seen_.contains(one.pointer))
         fail("gives " + one.pointer + " although its options forbid it: " + one.given.condition);
@@ -91,13 +93,15 @@ class Comparison {
 
   void compare_table(const fs::path& path) {
     const StatedTable* table = stage_.results->find_table(path.filename().string());
-    if (table == nullptr || !table->given.possible) return fail("writes " + path.string() + ", which it does not state");
+    if (table == nullptr || !table->given.possible)
+      return fail("writes " + path.string() + ", which it does not state");
     std::vector<std::string> header;
     each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t) {
       if (header.empty()) header = cells;
     });
     for (const std::string& column : header)
-      if (misfit_of_column(*table, column)) fail("writes " + path.string() + " with the column " + column + ", which it does not state");
+      if (misfit_of_column(*table, column))
+        fail("writes " + path.string() + " with the column " + column + ", which it does not state");
   }
 
   const PlannedStage& stage_;
@@ -149,6 +153,18 @@ TEST(StatedResults, OfABedWithEverythingObserved) {
     { "stage": "check", "from": ["bed", "claims"],
       "expect": { "/bed/gamma": { "value": 3, "relative": 1e-9, "note": "as written" },
                   "/claims/claims/0/verdict": { "value": "holds" } } } ] })");
+}
+
+TEST(StatedResults, OfAFilm) {
+  compare(R"({ "name": "r", "stages": [
+    { "stage": "simulate", "id": "bed", "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.8 },
+      "box": { "width": "18.9 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
+      "floor": { "motion": "sinusoidal", "gamma": 3, "frequency": "20 Hz", "restitution": 0.8 },
+      "settle": "0.5 s", "measure": "0.4 s", "frames": { "count": 256, "phases": 32 } },
+    { "stage": "render", "from": "bed", "scale": "0.2 mm/px" },
+    { "stage": "extract", "from": "render", "diameter": "3 mm", "frame_rate": "640 Hz", "frequency": "20 Hz",
+      "bead_number": 60, "kernel": "top_hat", "kernel_width": 1 },
+    { "stage": "figure", "from": ["bed", "extract"], "reference": "clement-rajchenbach-1991" } ] })");
 }
 
 TEST(StatedResults, OfReducedUnitsAndOfAFluidWithoutGravity) {

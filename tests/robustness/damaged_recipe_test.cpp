@@ -1,5 +1,5 @@
-// 300 recipes damaged at random places, with fixed seeds: each is refused by `validate` and `run` alike, with exit code 3
-// or 4 and the file, the line and the pointer; or accepted by both.
+// 300 recipes damaged at random places, with fixed seeds: each is refused by `validate` and `run` alike, with exit code
+// 3 or 4 and the file, the line and the pointer; or accepted by both.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,15 +85,17 @@ Json other_value(Random& random, const Json& value) {
   if (value.is_boolean()) return !value.get<bool>();
   if (value.is_number()) {
     const double number = value.get<double>();
-    const Json all[] = {Json(-number), Json(0), Json(number + 0.5), Json(1e300), Json(number * 1e-9),
-                        Json(number_text(number) + " mm")};
+    const Json all[] = {Json(-number),       Json(0),
+                        Json(number + 0.5),  Json(1e300),
+                        Json(number * 1e-9), Json(number_text(number) + " mm")};
     return all[below(random, std::size(all))];
   }
   if (!value.is_string()) return other_type(random, value);
   const std::string text = value.get<std::string>();
   if (text.empty() || std::isdigit(static_cast<unsigned char>(text[0])) == 0) return misspelled(random, text);
   const std::string number = text.substr(0, text.find(' '));
-  const std::string all[] = {number, "-" + text, number + " Hz", number + " kg", number + " m", misspelled(random, text)};
+  const std::string all[] = {number,         "-" + text,    number + " Hz",
+                             number + " kg", number + " m", misspelled(random, text)};
   return all[below(random, std::size(all))];
 }
 
@@ -106,7 +108,8 @@ std::string damage(Random& random, Json& root) {
   if (below(random, 4) == 0) {
     std::vector<std::string> rare;
     for (const std::string& one : all)
-      if (one.starts_with("/presets/") || one.starts_with("/sweep/") || one.starts_with("/report/")) rare.push_back(one);
+      if (one.starts_with("/presets/") || one.starts_with("/sweep/") || one.starts_with("/report/"))
+        rare.push_back(one);
     if (!rare.empty()) pointer = rare[below(random, rare.size())];
   }
   const std::size_t slash = pointer.rfind('/');
