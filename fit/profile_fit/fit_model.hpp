@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fit/theory/equation_of_state.hpp"
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 #include "fit/theory/tail.hpp"
 
 // The curves a fit can draw, with their derivatives. Internal to fit.

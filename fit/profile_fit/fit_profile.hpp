@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "fit/theory/equation_of_state.hpp"
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 
 // From a measured density profile to temperature, solid height and plateau density.
 //

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <span>
 
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 #include "fit/theory/quadrature.hpp"
 
 // A curve seen through a kernel. Internal to fit.

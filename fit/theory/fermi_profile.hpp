@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 #include "fit/theory/value.hpp"
 
 // The Fermi profile of Hayakawa and Hong, for comparison. [HayakawaHong1997]

@@ -4,7 +4,7 @@
 
 #include "fit/theory/equation_of_state.hpp"
 #include "fit/theory/expansion.hpp"
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 
 // Density profiles in hydrostatic balance, heights in D above the floor's mean position.
 namespace shakebed::fit {

@@ -8,7 +8,7 @@
 #include "fit/theory/convolution.hpp"
 #include "fit/theory/equation_of_state.hpp"
 #include "fit/theory/inverse_table.hpp"
-#include "fit/theory/kernel.hpp"
+#include "statistics/kernel.hpp"
 
 // A hydrostatic tail over a rectangle, with the derivatives a fit needs. Internal to fit.
 //

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -12,53 +13,14 @@
 
 namespace shakebed::ingest {
 
-namespace {
-
-// Height of the kernel at a distance from its middle, 1/D. Area 1.
-double kernel_value(const Kernel& kernel, double distance) {
-  const double size = std::abs(distance);
-  switch (kernel.kind) {
-    case KernelKind::top_hat:
-      return size < 0.5 * kernel.width ? 1 / kernel.width : 0;
-    case KernelKind::gaussian:
-      return std::exp(-0.5 * size * size / (kernel.width * kernel.width)) /
-             (kernel.width * std::sqrt(2 * std::numbers::pi));
-    case KernelKind::disk_chord: {
-      const double radius = 0.5 * kernel.width;
-      return size < radius ? 2 * std::sqrt(radius * radius - size * size) / (std::numbers::pi * radius * radius) : 0;
-    }
-  }
-  return 0;
-}
-
-double kernel_reach(const Kernel& kernel) {
-  return kernel.kind == KernelKind::gaussian ? 6 * kernel.width : 0.5 * kernel.width;
-}
-
-}  // namespace
-
 std::vector<double> density_of_frame(std::span<const double> heights, double bed_width, const HeightBins& bins,
                                      const Kernel& kernel) {
   if (!(bed_width > 0) || !(bins.width > 0) || !(kernel.width > 0))
     throw std::invalid_argument("density_of_frame: bed width, bin width and kernel width must be positive");
   std::vector<double> density(bins.count, 0.0);
-  const double reach = kernel_reach(kernel);
-  const double last = static_cast<double>(bins.count) - 1;
-  for (const double height : heights) {
-    if (!std::isfinite(height)) continue;
-    const double low = std::ceil((height - reach - bins.lowest) / bins.width - 0.5);
-    const double high = std::floor((height + reach - bins.lowest) / bins.width - 0.5);
-    if (high < 0 || low > last) continue;
-    if (kernel.kind == KernelKind::top_hat && std::abs(kernel.width - bins.width) < 1e-12 * bins.width) {
-      const double place = std::floor((height - bins.lowest) / bins.width);  // each centre in one bin exactly
-      if (place >= 0 && place <= last) density[static_cast<std::size_t>(place)] += 1 / bins.width;
-      continue;
-    }
-    const auto first = static_cast<std::size_t>(std::max(0.0, low)),
-               end = static_cast<std::size_t>(std::min(last, high)) + 1;
-    for (std::size_t bin = first; bin < end; ++bin) density[bin] += kernel_value(kernel, bins.middle(bin) - height);
-  }
-  for (double& value : density) value /= bed_width;
+  std::vector<double> known;
+  std::copy_if(heights.begin(), heights.end(), std::back_inserter(known), [](double z) { return std::isfinite(z); });
+  add_density({bins.middle(0), bins.width, bins.count}, kernel, bed_width, known, 0, density);
   return density;
 }
 
@@ -95,7 +57,7 @@ DensityProfile average_profile(const std::vector<std::vector<double>>& densities
   profile.covariance = statistics::covariance_by_windows(densities, 0, bins.count, windows);
   for (std::size_t bin = 0; bin < bins.count; ++bin) {
     double& variance = profile.covariance[bin * bins.count + bin];
-    if (frames == 1) variance = std::max(profile.number_density[bin], 0.0) * kernel_value(kernel, 0);
+    if (frames == 1) variance = std::max(profile.number_density[bin], 0.0) * kernel_density(kernel, 0);
     // A bin in which hardly anything was ever seen still is uncertain by about one bead in all frames: `densities`
     // carry the bed's width, the smallest step seen in a bin tells one bead's share.
     double step = 0;

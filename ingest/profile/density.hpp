@@ -8,19 +8,9 @@
 #include <vector>
 
 #include "ingest/frames/frames.hpp"
+#include "statistics/kernel.hpp"
 
 namespace shakebed::ingest {
-
-// The window through which heights are seen. Every kernel has area 1.
-enum class KernelKind {
-  top_hat,     // width = full width
-  gaussian,    // width = sigma
-  disk_chord,  // the chord of a disk of diameter `width` (1 D: what covered area sees)
-};
-struct Kernel {
-  KernelKind kind = KernelKind::top_hat;
-  double width = 0.25;  // D
-};
 
 // Equal bins from `lowest` upwards, heights in D above the floor.
 struct HeightBins {
@@ -39,7 +29,7 @@ std::vector<double> density_of_frame(std::span<const double> heights, double bed
 // A density profile averaged over frames.
 struct DensityProfile {
   HeightBins bins;
-  Kernel kernel;
+  Kernel kernel{KernelKind::top_hat, 0.25};
   std::vector<double> number_density;   // n D^2, one a bin
   std::vector<double> std_error;        // of number_density
   std::vector<double> area_fraction;    // pi/4 n D^2 from centres; covered fraction from coverage

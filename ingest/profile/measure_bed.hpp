@@ -55,7 +55,7 @@ struct MeasureOptions {
   std::optional<double> pixel_aspect;
   std::optional<double> lens_radial;
   FindOptions find;                            // polarity, radius, roi, ...
-  Kernel kernel;                               // widths in D
+  Kernel kernel{KernelKind::top_hat, 0.25};    // widths in D
   double bin_width = 0.25;                     // D
   std::optional<double> highest;               // D; else just above the highest centre
   std::optional<double> lowest;                // D; else 0

@@ -13,6 +13,7 @@
 
 #include "pipelines/formats/embedded.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/profile_csv.hpp"
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/plan_graph.hpp"
@@ -20,6 +21,7 @@
 #include "pipelines/runner/recipe_schema.hpp"
 #include "pipelines/runner/run.hpp"
 #include "pipelines/runner/sweep.hpp"
+#include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/theory.hpp"
 
@@ -326,22 +328,16 @@ int command_fit_images(const Arguments& arguments) {
   if (!image.roi.empty()) extract["roi"] = image.roi;
   if (image.polarity) extract["polarity"] = *image.polarity;
   if (image.second_diameter) extract["second_diameter"] = *image.second_diameter;
+  if (image.gravity) extract["gravity"] = *image.gravity;
   if (image.pixel_aspect) extract["pixel_aspect"] = *image.pixel_aspect;
   if (image.lens) extract["lens"] = *image.lens;
   if (image.bead_number) extract["bead_number"] = *image.bead_number;
   if (image.kernel) {
-    const std::size_t colon = image.kernel->find(':');
-    std::string kind = image.kernel->substr(0, colon);
-    std::replace(kind.begin(), kind.end(), '-', '_');
-    extract["kernel"] = kind;
-    if (colon != std::string::npos) {
-      const std::string width = image.kernel->substr(colon + 1);
-      char* end = nullptr;
-      extract["kernel_width"] = std::strtod(width.c_str(), &end);
-      if (width.empty() || *end != 0)
-        throw UsageError(
-            fmt::format("--kernel: expected a kind and its width in D, gaussian:0.5, got {}", *image.kernel));
-    }
+    const auto kernel = kernel_from(*image.kernel);
+    if (!kernel || kernel->kind == KernelKind::none)
+      throw UsageError(fmt::format(
+          "--kernel: expected gaussian:WIDTH, top_hat:WIDTH or disk_chord:WIDTH (in D), got \"{}\"", *image.kernel));
+    extract["kernel"] = Json{{"kind", to_string(kernel->kind)}, {"width", kernel->width}};
   }
   if (image.frame_rate) {
     extract["frame_rate"] = *image.frame_rate;
@@ -364,9 +360,7 @@ int command_fit_images(const Arguments& arguments) {
     document["stages"].push_back(Json{{"stage", "map"},
                                       {"from", Json::array({"fit", "extract"})},
                                       {"gamma", amplitude * omega * omega / gravity},
-                                      {"frequency", *image.frequency},
-                                      {"diameter", image.diameter},
-                                      {"gravity", gravity}});
+                                      {"frequency", *image.frequency}});
     if (image.initial_height) {
       const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
       const double height = diameters_argument("--initial-height", *image.initial_height, diameter);
@@ -386,7 +380,7 @@ int command_fit_images(const Arguments& arguments) {
 
 int command_fit_profile(const Arguments& arguments) {
   const ProfileArguments& p = arguments.profile;
-  const ProfileTable table = read_profile_csv(p.file);
+  const MeasuredProfile measured = read_measured_profile(p.file);
   fit::FitOptions options;
   if (p.model) options.model = *p.model;
   options.plateau_density = checked_plateau(p.plateau_density);
@@ -397,34 +391,22 @@ int command_fit_profile(const Arguments& arguments) {
   if (p.diameter) {
     diameter = diameter_argument(*p.diameter);
   }
-  fit::Profile profile{
-      .height = table.height, .number_density = table.number_density, .std_error = {}, .covariance = {}};
-  const bool has_errors = std::all_of(table.std_error.begin(), table.std_error.end(), [](double e) { return e > 0; });
-  if (has_errors) profile.std_error = table.std_error;
-  // The kernel: from the command line, else from the file's comments.
-  std::string kind = table.comment("kernel"), width = table.comment("kernel_width");
   if (p.kernel) {
-    const std::size_t colon = p.kernel->find(':');
-    kind = p.kernel->substr(0, colon);
-    width = colon == std::string::npos ? "" : p.kernel->substr(colon + 1);
+    const auto kernel = kernel_from(*p.kernel);
+    if (!kernel)
+      throw UsageError(fmt::format(
+          "--kernel: there is no kernel \"{}\"; write none, gaussian:0.5, top_hat:1 or disk_chord:1 (widths "
+          "in D)",
+          *p.kernel));
+    options.kernel = *kernel;
+  } else {
+    options.kernel = measured.kernel.value_or(Kernel{});
   }
-  if (!kind.empty()) {
-    std::replace(kind.begin(), kind.end(), '_', '-');
-    if (!fit::kernel_kind_from_string(kind, options.kernel.kind))
-      throw UsageError(
-          fmt::format("--kernel: there is no kernel \"{}\"; there are none, gaussian, top_hat, disk_chord", kind));
-    if (options.kernel.kind != fit::KernelKind::none)
-      options.kernel.width = width.empty() ? 0 : quantity_argument("--kernel", width, dimension::none);
-    if (!fit::kernel_is_valid(options.kernel))
-      throw UsageError("--kernel: its width must be a number of diameters, as in gaussian:0.5");
-  }
-  if (!options.column_number && !table.comment("column_number").empty()) {
-    options.column_number = quantity_argument("column_number", table.comment("column_number"), dimension::none);
-  }
-  const fit::FitResult result = fit::fit_profile(profile, options);
+  if (!options.column_number) options.column_number = measured.column_number;
+  const fit::FitResult result = fit::fit_profile(measured.profile, options);
   if (result.status == fit::FitStatus::bad_input) throw InputError(fmt::format("{}: {}", p.file, result.message));
   Json json = fit_json(result, diameter);
-  if (!table.note.empty()) json["warnings"].push_back(table.note);
+  for (const std::string& warning : measured.warnings) json["warnings"].push_back(warning);
   if (arguments.common.out) {
     fs::create_directories(*arguments.common.out);
     write_file_atomically(fs::path(*arguments.common.out) / "fit.json", dump(json));

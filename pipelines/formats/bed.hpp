@@ -1,37 +1,52 @@
-// bed.json: what a stage that made a bed (simulate, or the user for photographs) tells those that follow. SI units with
-// `reduced` false, else lengths in D, masses in m, times in sqrt(D/g).
+// What is known of a bed: stated once, by the stage that makes it (simulate) or that measures it (extract, for the
+// user's own photographs), and carried in bed.json beside every trajectory, frame set and profile. Later stages read it
+// from there; one that states another value is refused (see same_as_bed).
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "pipelines/formats/json.hpp"
 
 namespace shakebed::pipelines {
 
+// SI units; with `reduced` lengths in D, masses in m, times in sqrt(D/g). Heights of its profiles are above the mean
+// position of the floor. Nothing where it is not known, as the mass in photographs.
 struct BedDescription {
   bool reduced = false;
-  std::uint64_t count = 0;      // N
-  double diameter = 1;          // D, of the first species
-  double mass = 1;              // m
-  double gravity = 1;           // g; 0 for a weightless scene
-  double width = 0;             // W, between the sides
-  bool periodic = false;        // sides
-  double amplitude = 0;         // a of the floor, 0 when it stands still
-  double frequency = 0;         // f of the floor
-  double bath_temperature = 0;  // T of the reservoir [m g D], 0 without
-  double restitution = 1;       // disk on disk
-  double friction = 0;          // disk on disk
+  double count = 0;                       // N: disks in the box, or the mean number seen in photographs
+  double diameter = 1;                    // D, of the first species
+  std::optional<double> second_diameter;  // of the second species, where there is one
+  std::optional<double> mass;             // m
+  std::optional<double> gravity;          // g; 0 for a weightless scene
+  double width = 0;                       // W, between the sides
+  bool periodic = false;                  // sides
+  std::optional<double> amplitude;        // a of the floor, 0 when it stands still
+  std::optional<double> frequency;        // f of the floor
+  double bath_temperature = 0;            // T of the reservoir [m g D], 0 without
+  std::optional<double> restitution;      // disk on disk
+  std::optional<double> friction;         // disk on disk
 
   // N D/W: disks per diameter of width.
-  double column_number() const { return static_cast<double>(count) * diameter / width; }
-  // Gamma = a (2 pi f)^2/g, 0 for a floor that stands still.
+  double column_number() const { return count * diameter / width; }
+  // Gamma = a (2 pi f)^2/g, 0 for a floor that stands still or where g is not known.
   double gamma() const;
 
   Json to_json() const;
   static BedDescription from_json(const Json& json, const std::string& file);  // throws InputError
   static BedDescription read(const std::filesystem::path& path);               // throws InputError
 };
+
+// A bed that an earlier stage of a recipe has described, and where.
+struct KnownBed {
+  BedDescription bed;
+  std::string place;  // "stage \"bed\" (/stages/0)"
+};
+
+// Whether two statements of one fact agree: to 1e-9.
+bool same_fact(double one, double other);
 
 }  // namespace shakebed::pipelines

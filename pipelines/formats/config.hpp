@@ -73,6 +73,7 @@ struct InputFiles {
 };
 
 class Fields;
+struct KnownBed;  // formats/bed.hpp
 
 // One row of a tagged choice.
 template <class T>
@@ -105,6 +106,7 @@ class Fields {
     std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
     std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
     std::vector<StatedStage> from = {};      // the same stages, and what each will give
+    const KnownBed* bed = nullptr;           // what those stages know of the bed
   };
 
   // Reads an object. After describing, call finish(): it reports the keys that nobody asked for.
@@ -130,6 +132,8 @@ class Fields {
   // Checks a pointer into the results of the stages in "from", "/fit/temperature"; what is wrong is a problem at
   // `pointer_below`. Returns what is stated of the result, where that is known.
   const StatedResult* check_result(std::string_view pointer_below, const std::string& pointer);
+  // What the stages that "from" names know of the bed; nullptr where they know none (decoding only).
+  const KnownBed* known_bed() const { return source_.bed; }
 
   // --- one method a type. `value` holds the default before and what was read after.
   void number(std::string_view key, double& value, const About& about = {});

@@ -44,23 +44,4 @@ std::string compress(std::string_view bytes, int level = 3);
 // Throws InputError with `name` when the bytes are no zstd frame.
 std::string decompress(std::string_view bytes, const std::string& name);
 
-// --- the profile format: '#' lines, then height,number_density,std_error,area_fraction,samples
-// Heights in D, densities n D^2; std_error < 0 is never written, an unknown one is left empty.
-struct ProfileTable {
-  std::vector<std::string> comments;  // without the '#'
-  std::string note;                   // which of several densities was read; empty where there was one
-  std::vector<double> height;         // bin centres, rising [D]
-  std::vector<double> number_density, std_error, area_fraction;
-  std::vector<double> samples;  // disk positions that fell into the bin
-  std::size_t size() const { return height.size(); }
-  // The value of a comment line "key: value", "" if none.
-  std::string comment(std::string_view key) const;
-};
-std::string profile_text(const ProfileTable& profile);
-void write_profile_csv(const std::filesystem::path& path, const ProfileTable& profile);
-// Reads what write_profile_csv writes, and what people have: any CSV with a header that names at least height (or z)
-// and number_density (or phi, density), comma, semicolon, tab or blank separated; std_error, area_fraction and samples
-// are optional, a missing area_fraction is pi/4 phi. Rows are sorted by height. Throws InputError naming the line.
-ProfileTable read_profile_csv(const std::filesystem::path& path);
-
 }  // namespace shakebed::pipelines

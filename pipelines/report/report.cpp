@@ -385,8 +385,9 @@ class Report {
       if (!fs::is_regular_file(path, error)) continue;
       try {
         const BedDescription bed = BedDescription::read(directory(stage) / "bed.json");
-        const double unit = bed.reduced || bed.gravity <= 0 ? 1 : std::sqrt(bed.diameter / bed.gravity);
-        const std::string animation = animation_html(path, bed.frequency > 0 ? 1 / (bed.frequency * unit) : 0);
+        const double unit = bed.reduced || !(bed.gravity.value_or(0) > 0) ? 1 : std::sqrt(bed.diameter / bed.gravity.value_or(1));
+        const double frequency = bed.frequency.value_or(0);
+        const std::string animation = animation_html(path, frequency > 0 ? 1 / (frequency * unit) : 0);
         if (!animation.empty()) return "<h2>The bed</h2>\n" + animation;
       } catch (const InputError&) {
         continue;

@@ -266,7 +266,9 @@ class PlanBuilder {
       const PlannedStage& before = plan_.stages[position_[k]];
       source.upstream.emplace_back(before.row->name);
       source.from.push_back({before.id, before.row->name, before.results.get()});
+      if (!planned.bed) planned.bed = before.bed;
     }
+    if (planned.bed) source.bed = &*planned.bed;
     const std::size_t problems_before = problems_.size();
     CommonOptions common;
     common.id = draft.id;
@@ -281,6 +283,10 @@ class PlanBuilder {
     planned.seed = common.seed;
     planned.stage->describe(fields);
     fields.finish();
+    if (problems_.size() == problems_before) {
+      if (auto bed = planned.stage->bed())
+        planned.bed = KnownBed{std::move(*bed), fmt::format("stage \"{}\" ({})", planned.id, planned.pointer)};
+    }
     for (auto& [pointer, path] : planned.input_files) pointer.erase(0, planned.pointer.size());
     planned.options = Json::object();
     Fields encoder = Fields::encode(planned.options);

@@ -23,6 +23,7 @@ struct PlannedStage {
   bool reduced = false;
   std::uint64_t seed = 1;
   std::vector<std::size_t> from;  // indices into Plan::stages, all smaller than its own
+  std::optional<KnownBed> bed;    // that it makes or measures, else that of the stages it reads from
   Json options;                   // every option, defaults included; the same options give the same JSON
   // Files outside the pipeline that it reads: pointer below the stage, path (a string: a film can be many thousand
   // pictures, and fs::path keeps a list of each one's parts).

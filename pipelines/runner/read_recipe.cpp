@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/profile_csv.hpp"
 #include "pipelines/runner/sweep_points.hpp"
 
 namespace shakebed::pipelines {

@@ -27,10 +27,8 @@ Rows filled_rows(const sim::Profile& profile) {
 
 namespace {
 
-ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
-                      const std::vector<std::string>& comments) {
+ProfileTable table_of(const sim::Profile& profile, double width, double spacing) {
   ProfileTable table;
-  table.comments = comments;
   const Rows rows = filled_rows(profile);
   for (std::size_t i = rows.first; i < rows.last; ++i) {
     const double phi = profile.number_density[i];
@@ -43,134 +41,163 @@ ProfileTable table_of(const sim::Profile& profile, double width, double spacing,
   return table;
 }
 
-// Of the lab profile: height_i,height_j,covariance for j >= i, only what is not 0. `covariance` is that of its filled
-// rows.
-std::string covariance_text(const sim::Profile& profile, const std::vector<double>& covariance,
-                            std::size_t independent_blocks) {
+// Of the lab profile; `covariance` is that of its filled rows.
+void write_covariance(RunContext& context, const sim::Profile& profile, const std::vector<double>& covariance,
+                      std::size_t independent_blocks) {
   const Rows rows = filled_rows(profile);
-  const std::size_t n = rows.last - rows.first;
-  std::string text = fmt::format(
-      "# covariance of number_density in profile.csv\n# independent_blocks: {}\nheight_i,height_j,covariance\n",
-      independent_blocks);
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i; j < n; ++j) {
-      if (covariance[i * n + j] != 0)
-        text += fmt::format("{},{},{}\n", profile.height[rows.first + i], profile.height[rows.first + j],
-                            covariance[i * n + j]);
-    }
-  }
-  return text;
+  const std::vector<double> heights(profile.height.begin() + static_cast<std::ptrdiff_t>(rows.first),
+                                    profile.height.begin() + static_cast<std::ptrdiff_t>(rows.last));
+  write_covariance_csv(context.output("covariance.csv"), heights, covariance, independent_blocks);
 }
 
-// A field of a CSV; empty where the value is not known.
-std::string field(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
-std::string fields_of(const sim::Measured& m) { return field(m.value) + "," + field(m.std_error); }
+const Column layer_height{"height", "D", "middle of the layer above the floor's mean position"};
 
-std::string layers_text(const sim::BedObserver& observer) {
-  std::string text =
-      "# layers of 1 D by the height of their middle above the floor's mean [D]; temperatures in m g D, "
-      "velocities in sqrt(g D)\nheight,temperature_x,temperature_z,mean_velocity_z,share,spin_temperature\n";
+Table layers_table(const sim::BedObserver& observer) {
+  Table table("layers of 1 D above the floor's mean position, lab frame, all phases together",
+              {layer_height,
+               {"temperature_x", "m g D", "m <v_x^2>"},
+               {"temperature_z", "m g D", "m <(v_z - mean of v_z)^2>, the mean of the phase taken off"},
+               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
+               {"share", "1", "fraction of all disks in the layer"},
+               {"spin_temperature", "m g D", "I <spin^2>"}});
   for (const sim::BedObserver::Layer& layer : observer.layers())
-    text += fmt::format("{},{},{},{},{},{}\n", layer.height, layer.temperature_x, layer.temperature_z,
-                        layer.mean_velocity_z, layer.share, layer.spin_temperature);
-  return text;
+    table.add({layer.height, layer.temperature_x, layer.temperature_z, layer.mean_velocity_z, layer.share,
+               layer.spin_temperature});
+  return table;
 }
 
-std::string order_text(const sim::OrderObserver& order) {
-  std::string text =
-      "# layers of 1 D; psi6: mean of |psi_6| of their disks; neighbours closer than (1 + sqrt 3)/2 contact distances\n"
-      "height,psi6,neighbours,share\n";
+Table order_table(const sim::OrderObserver& order) {
+  Table table("order in layers of 1 D; neighbours are disks closer than (1 + sqrt 3)/2 contact distances",
+              {layer_height,
+               {"psi6", "1", "mean of |psi_6| of the layer's disks"},
+               {"neighbours", "1", "mean number of neighbours"},
+               {"share", "1", "fraction of all disks in the layer"}});
   for (const sim::OrderObserver::Layer& layer : order.layers())
-    text += fmt::format("{},{},{},{}\n", layer.height, layer.psi6_local, layer.neighbours, layer.share);
-  return text;
+    table.add({layer.height, layer.psi6_local, layer.neighbours, layer.share});
+  return table;
 }
 
-std::string rows_text(const sim::OrderObserver& order) {
-  std::string text =
-      "# rows of disks from the floor up, without the surface; heights above the floor in D\nrow,height,disks\n";
-  int number = 0;
-  for (const sim::OrderObserver::Row& row : order.rows())
-    text += fmt::format("{},{},{}\n", ++number, row.height, row.disks);
-  return text;
+Table rows_table(const sim::OrderObserver& order) {
+  Table table("rows of disks from the floor up, without the surface", {{"row", "1", "number of the row, from 1"},
+                                                                       {"height", "D", "mean height above the floor"},
+                                                                       {"disks", "1", "mean number of disks"}});
+  std::int64_t number = 0;
+  for (const sim::OrderObserver::Row& row : order.rows()) table.add({++number, row.height, row.disks});
+  return table;
 }
 
-std::string velocities_text(const sim::VelocityObserver& velocities) {
-  std::string text =
-      "# layers of 1 D above the floor's mean, all phases together; temperatures in m g D without the layer's mean "
-      "velocity; a2: fourth cumulant, 0 for a Maxwellian\n"
-      "height,number_density,mean_velocity_x,mean_velocity_z,temperature_x,temperature_z,spin_temperature,a2,samples\n";
+Table velocities_table(const sim::VelocityObserver& velocities) {
+  Table table("layers of 1 D above the floor's mean position, lab frame, all phases together",
+              {layer_height,
+               {"number_density", "1/D^2", "disks per area"},
+               {"mean_velocity_x", "sqrt(g D)", "mean horizontal velocity"},
+               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
+               {"temperature_x", "m g D", "without the layer's mean velocity"},
+               {"temperature_z", "m g D", "without the layer's mean velocity"},
+               {"spin_temperature", "m g D", "I <spin^2>"},
+               {"a2", "1", "fourth cumulant of the velocities, 0 for a Maxwellian"},
+               {"samples", "1", "disks seen in the layer"}});
   for (std::size_t k = 0; k < velocities.grid().count; ++k) {
     const sim::VelocityMoments layer = velocities.layer(k);
     if (layer.count == 0) continue;
-    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", velocities.height(k), velocities.number_density(layer, false),
-                        layer.mean_vx(), layer.mean_vz(), layer.temperature_x(), layer.temperature_z(),
-                        layer.spin_temperature(), sim::fourth_cumulant(layer.square(), layer.fourth()), layer.count);
+    table.add({velocities.height(k), velocities.number_density(layer, false), layer.mean_vx(), layer.mean_vz(),
+               layer.temperature_x(), layer.temperature_z(), layer.spin_temperature(),
+               sim::fourth_cumulant(layer.square(), layer.fourth()), count_cell(layer.count)});
   }
-  return text;
+  return table;
 }
 
-std::string histogram_text(const sim::VelocityObserver& velocities) {
-  std::string text = fmt::format(
-      "# velocities in units of sqrt(T/m), T = {}; z without the bed's mean; the outermost bins hold what lies beyond\n"
-      "velocity,density_x,density_z,maxwellian\n",
-      velocities.histogram_unit() * velocities.histogram_unit());
+Table histogram_table(const sim::VelocityObserver& velocities) {
+  Table table("distribution of the velocities in units of sqrt(T/m); the outermost classes hold what lies beyond",
+              {{"velocity", "sqrt(T/m)", "middle of the class"},
+               {"density_x", "1/sqrt(T/m)", "probability density of v_x"},
+               {"density_z", "1/sqrt(T/m)", "probability density of v_z without the bed's mean"},
+               {"maxwellian", "1/sqrt(T/m)", "standard normal density"}});
+  table.note("temperature", velocities.histogram_unit() * velocities.histogram_unit());
   for (int bin = 0; bin < sim::VelocityObserver::histogram_bins; ++bin) {
     const double u = velocities.histogram_place(bin);
-    text += fmt::format("{:.1f},{},{},{}\n", u, velocities.histogram_x(bin), velocities.histogram_z(bin),
-                        std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi));
+    table.add({std::round(u * 10) / 10, velocities.histogram_x(bin), velocities.histogram_z(bin),
+               std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi)});
   }
-  return text;
+  return table;
 }
 
-std::string phases_text(const sim::VelocityObserver& velocities, bool floor_frame) {
-  std::string text = fmt::format(
-      "# layers of 1 D {}; temperatures without the mean velocity of the layer at the phase\n"
-      "phase,height,number_density,mean_velocity_x,mean_velocity_z,temperature_x,temperature_z,samples\n",
-      floor_frame ? "above the moving floor, velocities relative to it" : "above the floor's mean, lab frame");
+Table phases_table(const sim::VelocityObserver& velocities, bool floor_frame) {
+  const char* frame = floor_frame ? "above the moving floor; velocities relative to the floor"
+                                  : "above the floor's mean position; velocities in the lab frame";
+  Table table(std::string("layers of 1 D by phase of the shaking, ") + frame,
+              {{"phase", "1", "phase in periods, 0 where the floor rises through its mean"},
+               {"height", "D", std::string("middle of the layer ") + frame},
+               {"number_density", "1/D^2", "disks per area"},
+               {"mean_velocity_x", "sqrt(g D)", "mean horizontal velocity"},
+               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
+               {"temperature_x", "m g D", "without the mean velocity of the layer at the phase"},
+               {"temperature_z", "m g D", "without the mean velocity of the layer at the phase"},
+               {"samples", "1", "disks seen in the layer at the phase"}});
   for (std::uint32_t phase = 0; phase < velocities.phases(); ++phase) {
     for (std::size_t k = 0; k < velocities.grid().count; ++k) {
       const sim::VelocityMoments& cell = velocities.cell(phase, k);
       if (cell.count == 0) continue;
-      text += fmt::format("{},{},{},{},{},{},{},{}\n", static_cast<double>(phase) / velocities.phases(),
-                          velocities.height(k), velocities.number_density(cell, true), cell.mean_vx(), cell.mean_vz(),
-                          cell.temperature_x(), cell.temperature_z(), cell.count);
+      table.add({static_cast<double>(phase) / velocities.phases(), velocities.height(k),
+                 velocities.number_density(cell, true), cell.mean_vx(), cell.mean_vz(), cell.temperature_x(),
+                 cell.temperature_z(), count_cell(cell.count)});
     }
   }
-  return text;
+  return table;
 }
 
-std::string displacement_text(const sim::DisplacementObserver& displacement, double look) {
-  std::string text =
-      "# mean square displacements [D^2] against the time between two looks\n"
-      "lag,msd_x,std_error_x,msd_z,std_error_z,origins\n";
+Table displacement_table(const sim::DisplacementObserver& displacement, double look) {
+  Table table("mean square displacements against the time between two looks",
+              {{"lag", "sqrt(D/g)", "time between the two looks"},
+               {"msd_x", "D^2", "mean square displacement in x"},
+               {"std_error_x", "D^2", "standard error of msd_x"},
+               {"msd_z", "D^2", "mean square displacement in z"},
+               {"std_error_z", "D^2", "standard error of msd_z"},
+               {"origins", "1", "pairs of looks"}});
   for (const auto& lag : displacement.lags())
-    text += fmt::format("{},{},{},{}\n", static_cast<double>(lag.looks) * look, fields_of(lag.x), fields_of(lag.z),
-                        lag.origins);
-  return text;
+    table.add({static_cast<double>(lag.looks) * look, lag.x.value, lag.x.std_error, lag.z.value, lag.z.std_error,
+               count_cell(lag.origins)});
+  return table;
 }
 
-std::string pressure_text(const sim::FlightObserver& flights) {
-  std::string text =
-      "# exact averages over time along the trajectories, lab frame; pressure in m g/D, T in m g D, rates in contacts "
-      "a "
-      "D^2 and time unit\n"
-      "height,number_density,number_density_error,temperature_x,temperature_x_error,temperature_z,temperature_z_error,"
-      "mean_velocity_z,mean_velocity_z_error,pressure_zz,pressure_zz_error,pressure_xx,pressure_xx_error,weight_above,"
-      "weight_above_error,collision_rate,collision_rate_error\n";
-  for (const auto& layer : flights.layers())
-    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", layer.height, fields_of(layer.number_density),
-                        fields_of(layer.temperature_x), fields_of(layer.temperature_z),
-                        fields_of(layer.mean_velocity_z), fields_of(layer.pressure_zz), fields_of(layer.pressure_xx),
-                        fields_of(layer.weight_above), fields_of(layer.collision_rate));
-  return text;
+Table pressure_table(const sim::FlightObserver& flights) {
+  struct Quantity {
+    const char *name, *unit, *description;
+    sim::Measured sim::FlightObserver::Layer::*value;
+  };
+  using Layer = sim::FlightObserver::Layer;
+  const Quantity quantities[] = {
+      {"number_density", "1/D^2", "disks per area", &Layer::number_density},
+      {"temperature_x", "m g D", "m <v_x^2>", &Layer::temperature_x},
+      {"temperature_z", "m g D", "m <v_z^2> without the mean", &Layer::temperature_z},
+      {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity", &Layer::mean_velocity_z},
+      {"pressure_zz", "m g/D", "vertical momentum flux, kinetic and by contacts", &Layer::pressure_zz},
+      {"pressure_xx", "m g/D", "horizontal momentum flux, kinetic and by contacts", &Layer::pressure_xx},
+      {"weight_above", "m g/D", "weight of the disks above, per width", &Layer::weight_above},
+      {"collision_rate", "sqrt(g/D)/D^2", "contacts between disks per area and time", &Layer::collision_rate}};
+  std::vector<Column> columns{layer_height};
+  for (const Quantity& q : quantities) {
+    columns.push_back({q.name, q.unit, q.description});
+    columns.push_back({std::string(q.name) + "_error", q.unit, std::string("standard error of ") + q.name});
+  }
+  Table table("exact averages over time along the trajectories, lab frame", columns);
+  for (const auto& layer : flights.layers()) {
+    std::vector<Cell> cells{layer.height};
+    for (const Quantity& q : quantities) {
+      cells.emplace_back((layer.*q.value).value);
+      cells.emplace_back((layer.*q.value).std_error);
+    }
+    table.add(std::move(cells));
+  }
+  return table;
 }
 
 // Layers of 1 D, and those of the pressure: at most 4,000.
-sim::LayerGrid coarse_layers(const sim::ProfileGrid& grid) {
+sim::LayerGrid coarse_layers(const HeightGrid& grid) {
   const double height = static_cast<double>(grid.points) * grid.spacing;
   return {std::floor(grid.lowest), 1, static_cast<std::size_t>(std::ceil(height)) + 1};
 }
-sim::LayerGrid fine_layers(const sim::ProfileGrid& grid) {
+sim::LayerGrid fine_layers(const HeightGrid& grid) {
   const double height = static_cast<double>(grid.points) * grid.spacing;
   const double thickness = std::max(grid.spacing, height / 4000);
   return {grid.lowest, thickness, static_cast<std::size_t>(std::ceil(height / thickness)) + 1};
@@ -287,47 +314,45 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
 }
 
 void BedMeasurement::write_profile(RunContext& context, const char* file, const sim::Profile& density,
-                                   const std::string& frame) const {
-  const std::string kernel = plan_.kernel.kind == sim::KernelKind::gaussian ? "gaussian" : "top-hat";
-  const std::vector<std::string> comments{"heights in D above " + frame, "kernel: " + kernel,
-                                          "kernel_width: " + number_text(plan_.kernel.width),
-                                          "column_number: " + number_text(disk_count_ / width_)};
-  write_profile_csv(context.output(file), table_of(density, width_, plan_.grid.spacing, comments));
+                                   const std::string& origin) const {
+  ProfileTable table = table_of(density, width_, plan_.grid.spacing);
+  table.origin = origin;
+  table.kernel = plan_.kernel;
+  table.column_number = disk_count_ / width_;
+  write_profile_csv(context.output(file), table);
 }
 
 void BedMeasurement::write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor,
                                      const std::vector<double>& covariance, std::size_t independent_blocks) const {
   write_profile(context, "profile.csv", lab, "the floor's mean position");
   write_profile(context, "profile_floor_frame.csv", floor, "the moving floor");
-  write_file(context.output("covariance.csv"), covariance_text(lab, covariance, independent_blocks));
+  write_covariance(context, lab, covariance, independent_blocks);
 }
 
 void BedMeasurement::write(RunContext& context, bool frames) const {
-  write_profile(context, "profile.csv", bed_.density(false), "the floor's mean position");
   const sim::Profile lab = bed_.density(false);
   const Rows rows = filled_rows(lab);
-  write_file(context.output("covariance.csv"),
-             covariance_text(lab, bed_.density_covariance(rows.first, rows.last), bed_.covariance_blocks()));
-  write_profile(context, "profile_floor_frame.csv", bed_.density(true), "the moving floor");
+  write_densities(context, lab, bed_.density(true), bed_.density_covariance(rows.first, rows.last),
+                  bed_.covariance_blocks());
   if (frames)
     write_profile(context, "profile_frames.csv", frames_.density(false),
                   "the floor's mean position, at the moments of the frames only");
-  write_file(context.output("layers.csv"), layers_text(bed_));
+  layers_table(bed_).write(context.output("layers.csv"));
   if (order_) {
-    write_file(context.output("order.csv"), order_text(*order_));
-    write_file(context.output("rows.csv"), rows_text(*order_));
+    order_table(*order_).write(context.output("order.csv"));
+    rows_table(*order_).write(context.output("rows.csv"));
   }
   if (plan_.observe.velocities) {
-    write_file(context.output("velocities.csv"), velocities_text(*lab_));
-    write_file(context.output("velocity_histogram.csv"), histogram_text(*lab_));
+    velocities_table(*lab_).write(context.output("velocities.csv"));
+    histogram_table(*lab_).write(context.output("velocity_histogram.csv"));
   }
   if (plan_.observe.phases) {
-    write_file(context.output("phases.csv"), phases_text(*lab_, false));
-    if (floor_) write_file(context.output("phases_floor_frame.csv"), phases_text(*floor_, true));
+    phases_table(*lab_, false).write(context.output("phases.csv"));
+    if (floor_) phases_table(*floor_, true).write(context.output("phases_floor_frame.csv"));
   }
   if (displacement_)
-    write_file(context.output("displacement.csv"), displacement_text(*displacement_, plan_.period / plan_.phases));
-  if (flights_) write_file(context.output("pressure.csv"), pressure_text(*flights_));
+    displacement_table(*displacement_, plan_.period / plan_.phases).write(context.output("displacement.csv"));
+  if (flights_) pressure_table(*flights_).write(context.output("pressure.csv"));
 }
 
 }  // namespace shakebed::pipelines

@@ -9,6 +9,8 @@
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/profile_csv.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/stage.hpp"
 #include "sim/engine/simulation.hpp"
@@ -29,8 +31,8 @@ struct ObserveOptions {
 struct MeasurementPlan {
   std::uint32_t phases = 1;  // looks a period
   double period = 1;         // between looks at phase 0, reduced
-  sim::ProfileGrid grid;
-  sim::Kernel kernel;
+  HeightGrid grid;
+  Kernel kernel;
   ObserveOptions observe;
 };
 
@@ -76,7 +78,7 @@ class BedMeasurement {
  private:
   void end_period(const sim::Simulation& simulation);
   void write_profile(RunContext& context, const char* file, const sim::Profile& density,
-                     const std::string& frame) const;
+                     const std::string& origin) const;
   double width_, disk_count_;
   bool floor_frame_;
   MeasurementPlan plan_;

@@ -175,9 +175,9 @@ class BedStatement {
     list_.table({"velocity_histogram.csv",
                  "histogram of the velocities",
                  {{"velocity", "sqrt(T/m)", "middle of the bin"},
-                  {"density_x", "1", "probability density across"},
-                  {"density_z", "1", "probability density upwards"},
-                  {"maxwellian", "1", "that of a Maxwellian"}},
+                  {"density_x", "1/sqrt(T/m)", "probability density across"},
+                  {"density_z", "1/sqrt(T/m)", "probability density upwards"},
+                  {"maxwellian", "1/sqrt(T/m)", "that of a Maxwellian"}},
                  velocities});
     const Given by_phase = observed(bed_.observe.phases, "phases");
     list_.table({"phases.csv", "velocities by phase and layer", phases, by_phase});

@@ -6,6 +6,7 @@
 
 #include "fit/profile_fit/critical_temperature.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/stages/study_table.hpp"
 
 namespace shakebed::pipelines {
@@ -66,7 +67,13 @@ class Critical : public Stage {
       const std::string name = table.series(r);
       if (std::find(series.begin(), series.end(), name) == series.end()) series.push_back(name);
     }
-    std::string csv = "series,quantity,threshold,temperature,std_error,status\n";
+    Table crossings("temperatures at which a quantity crosses thresholds",
+                    {{"series", "", "series of the study"},
+                     {"quantity", "", "T_c: by the density of the bottom row; T_c_prime: by the order"},
+                     {"threshold", "1", "threshold of the quantity"},
+                     {"temperature", unit_, "temperature of the crossing"},
+                     {"std_error", unit_, "standard error of the temperature"},
+                     {"status", "", "ok, or why there is no crossing"}});
     Json out;
     std::size_t found = 0, asked = 0;
     const auto look = [&](const char* name, const std::string& column, const std::vector<double>& thresholds) {
@@ -84,9 +91,9 @@ class Critical : public Stage {
                                         : quantity_json(c.temperature.value, unit_)
                                   : Json();
           rows.push_back(std::move(row));
-          csv += fmt::format(
-              "\"{}\",{},{},{},{},{}\n", one, name, c.threshold, ok ? number_text(c.temperature.value) : "",
-              ok && c.temperature.std_error > 0 ? number_text(c.temperature.std_error) : "", fit::to_string(c.status));
+          crossings.add({one, std::string(name), c.threshold, ok ? c.temperature.value : no_number,
+                         ok && c.temperature.std_error > 0 ? c.temperature.std_error : no_number,
+                         std::string(fit::to_string(c.status))});
         }
         quantity["series"][one.empty() ? "all" : one] = std::move(rows);
       }
@@ -97,7 +104,7 @@ class Critical : public Stage {
       context.warning(
           fmt::format("{} of {} thresholds are not crossed within the study's temperatures", asked - found, asked));
     write_file(context.output("critical.json"), dump(out));
-    write_file(context.output("critical.csv"), csv);
+    crossings.write(context.output("critical.csv"));
   }
 
  private:

@@ -1,7 +1,9 @@
 #include "pipelines/stages/extract.hpp"
 
+#include "pipelines/stages/bed_facts.hpp"
 #include "pipelines/stages/extract_results.hpp"
 #include "pipelines/stages/images_module.hpp"
+#include "pipelines/stages/kernel_options.hpp"
 #include "pipelines/stages/scene_options.hpp"
 
 namespace shakebed::pipelines {
@@ -11,12 +13,19 @@ class Extract : public Stage {
  public:
   void describe(Fields& fields) override {
     ExtractOptions& o = options_;
-    fields.quantity("diameter", o.diameter, dimension::length,
-                    {.help = "diameter of a bead", .required = true, .range = positive, .example = "\"2.99 mm\""});
+    fields.quantity("diameter", diameter_, dimension::length,
+                    {.help = "diameter of a bead; needed for photographs of your own, else that of the simulated bed",
+                     .range = positive,
+                     .example = "\"2.99 mm\""});
     fields.quantity("second_diameter", o.second_diameter, dimension::length,
                     {.help = "diameter of beads of another size that are to be found too; left out, they are counted "
                              "as rejected",
                      .range = positive});
+    fields.quantity(
+        "gravity", gravity_, dimension::acceleration,
+        {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "
+                 "m/s^2",
+         .range = positive});
     fields.input_files("images", o.images,
                        {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
                         .example = "\"photos/*.tif\""});
@@ -47,14 +56,8 @@ class Extract : public Stage {
     fields.number("radius", o.radius,
                   {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
     fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
-    fields.choice("kernel", o.kernel,
-                  {{DensityKernel::gaussian, "gaussian"},
-                   {DensityKernel::top_hat, "top_hat"},
-                   {DensityKernel::disk_chord, "disk_chord"}},
-                  {.help = "the window through which density is measured"});
-    fields.number("kernel_width", o.kernel_width,
-                  {.help = "standard deviation (gaussian), full width (top_hat) or diameter (disk_chord) in D",
-                   .range = from_to(1e-3, 100)});
+    fields.object<Kernel>("kernel", o.kernel, describe_measuring_kernel,
+                          {.help = "the window through which density is measured"});
     fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
     fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
     fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
@@ -70,6 +73,7 @@ class Extract : public Stage {
     fields.integer("overlays", o.overlays,
                    {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
     if (!fields.decoding()) return;
+    take_bed_facts(fields);
     const bool from_render = fields.has_upstream("render");
     fields.require(from_render != fields.has("images"), from_render ? "images" : "",
                    from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
@@ -83,13 +87,40 @@ class Extract : public Stage {
     if (o.left_wall && o.right_wall)
       fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
     fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
-    if (o.diameter > 0) warn_of_bead(fields, "/diameter", o.diameter);
+    if (fields.has("diameter") && o.diameter > 0) warn_of_bead(fields, "/diameter", o.diameter);
   }
   void results(ResultList& list) const override { state_extract_results(list, options_); }
   void run(RunContext& context) const override { images_module().extract(options_, context); }
+  // Of photographs; that of a simulated bed is the simulate stage's.
+  std::optional<BedDescription> bed() const override {
+    if (options_.images.empty()) return std::nullopt;
+    BedDescription bed;
+    bed.diameter = options_.diameter, bed.second_diameter = options_.second_diameter;
+    bed.gravity = options_.gravity;
+    return bed;
+  }
 
  private:
+  // What the simulated bed knows need not be stated again, and may not be stated otherwise.
+  void take_bed_facts(Fields& fields) {
+    if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->bed.reduced) {
+      const BedDescription& bed = known->bed;
+      require_same_as_bed(fields, "diameter", diameter_, bed.diameter, dimension::length);
+      require_same_as_bed(fields, "second_diameter", options_.second_diameter, bed.second_diameter, dimension::length);
+      require_same_as_bed(fields, "gravity", gravity_, bed.gravity, dimension::acceleration);
+      if (!diameter_) diameter_ = bed.diameter;
+      if (!options_.second_diameter) options_.second_diameter = bed.second_diameter;
+      if (!gravity_) gravity_ = bed.gravity;
+    }
+    if (!gravity_) gravity_ = standard_gravity;
+    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: how large is a bead?",
+                   "Write \"diameter\": \"2.99 mm\"");
+    options_.diameter = diameter_.value_or(1), options_.gravity = *gravity_;
+  }
+
+  static constexpr double standard_gravity = 9.81;  // [m/s^2]
   ExtractOptions options_;
+  std::optional<double> diameter_, gravity_;
 };
 
 }  // namespace

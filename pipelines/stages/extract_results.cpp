@@ -124,7 +124,7 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
                {"disks", "1", "disks found"},
                {"second", "1", "disks of the second species"},
                {"rejected", "1", "places rejected"},
-               {"residual_level", "1", "rms of what the model leaves"},
+               {"residual_level_grey_levels", "grey levels", "rms difference of the frame and its model"},
                {"contrast_gain", "1", "light of the frame over that of the first"}}});
   list.table({"quality.csv",
               "number of disks by quality",

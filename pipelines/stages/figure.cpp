@@ -12,6 +12,7 @@
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/process.hpp"
+#include "pipelines/formats/profile_csv.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -294,11 +295,7 @@ std::optional<double> at(const Curve& curve, double x) {
   return curve.y[i - 1] + u * (curve.y[i] - curve.y[i - 1]);
 }
 
-Curve curve_of(const ProfileTable& table) {
-  Curve curve{table.height, table.number_density, table.std_error};
-  if (std::any_of(curve.error.begin(), curve.error.end(), [](double e) { return e < 0; })) curve.error.clear();
-  return curve;
-}
+Curve curve_of(const ProfileTable& table) { return {table.height, table.number_density, table.std_error}; }
 
 // Two columns of one of our own CSV files.
 Curve read_columns(const std::filesystem::path& path, const std::string& x, const std::string& y,
@@ -464,7 +461,9 @@ void Figure::run(RunContext& context) const {
   }
   int color = green;
   for (const std::string& path : data_.paths) {
-    const Curve data = curve_of(read_profile_csv(path));
+    const ProfileTable points = read_profile_csv(path);
+    for (const std::string& note : points.notes) context.warning(note);
+    const Curve data = curve_of(points);
     const std::string label = std::filesystem::path(path).filename().string();
     picture.series.push_back({label, Series::Style::points, color, data.x, data.y, data.error});
     color = color == green ? purple : color == purple ? orange : green;

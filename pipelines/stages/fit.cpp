@@ -11,16 +11,19 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/bed_facts.hpp"
 #include "pipelines/stages/fit_results.hpp"
+#include "pipelines/stages/kernel_options.hpp"
+#include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/theory.hpp"
-#include "sim/measure/observables.hpp"
+#include "statistics/kernel.hpp"
 
 namespace shakebed::pipelines {
 namespace {
 
 enum class ErrorSource { automatic, diagonal, covariance };
-enum class KernelChoice { measured, none, gaussian, top_hat, disk_chord };
 
 struct WindowChoice {
   std::optional<double> low, high;
@@ -28,10 +31,6 @@ struct WindowChoice {
   double plateau_fraction = fit::WindowOptions{}.plateau_fraction;
   double lowest_fraction = fit::WindowOptions{}.lowest_fraction;
   double lowest_significance = fit::WindowOptions{}.lowest_significance;
-};
-struct KernelOptions {
-  KernelChoice kind = KernelChoice::measured;
-  double width = 0.5;
 };
 
 const std::string simulation = "simulation";
@@ -66,19 +65,9 @@ class Fit : public Stage {
     fields.number("base", options_.base, {.help = "lower edge of the bed in D"});
     fields.quantity("diameter", diameter_, dimension::length,
                     {.help = "D, for T/(m g) as a length; left out, what the measurement says", .range = positive});
-    fields.object<KernelOptions>(
-        "kernel", kernel_,
-        [](Fields& f, KernelOptions& k) {
-          f.choice("kind", k.kind,
-                   {{KernelChoice::measured, "measured"},
-                    {KernelChoice::none, "none"},
-                    {KernelChoice::gaussian, "gaussian"},
-                    {KernelChoice::top_hat, "top_hat"},
-                    {KernelChoice::disk_chord, "disk_chord"}},
-                   {.help = "what the profile was measured through; measured: as the profile itself says"});
-          f.number("width", k.width, {.help = "in D; not for measured and none", .range = from_to(0, 100)});
-        },
-        {.help = "the model is put through it before it is compared"});
+    fields.object<Kernel>("kernel", kernel_, describe_kernel,
+                          {.help = "the window through which the profile was measured: the model is put through it "
+                                   "before the two are compared; left out, what the profile itself says"});
     fields.object<WindowChoice>(
         "window", window_,
         [](Fields& f, WindowChoice& w) {
@@ -114,6 +103,12 @@ class Fit : public Stage {
                  "extract stage, or of a simulate stage that kept its frames; 0: none",
          .range = from_to(0, 100'000)});
     if (!fields.decoding()) return;
+    if (const KnownBed* known = fields.known_bed()) {
+      require_same_as_bed(fields, "diameter", diameter_, known->bed.diameter, dimension::length);
+      if (fields.has_upstream("simulate") && !known->bed.reduced)
+        require_same_as_bed(fields, "column_number", options_.column_number, known->bed.column_number(),
+                            dimension::none);
+    }
     fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
                    "there are no frames to resample: no extract or simulate stage in \"from\"");
     fields.require(bootstrap_ == 0 || options_.model != simulation, "bootstrap",
@@ -153,66 +148,22 @@ class Fit : public Stage {
   InputFiles profile_;
   fit::FitOptions options_;
   std::optional<double> diameter_;
-  KernelOptions kernel_;
+  std::optional<Kernel> kernel_;
   WindowChoice window_;
   ErrorSource errors_ = ErrorSource::automatic;
   bool temperature_measured_ = false;
   std::uint32_t bootstrap_ = 0;
 };
 
-// Covariance between the heights of a profile, from covariance.csv, and how many independent samples are behind it.
-// Heights that are not in the file keep their own variance.
-void read_covariance(const Input& source, fit::Profile& profile) {
-  const std::filesystem::path path = source.file("covariance.csv");
-  const std::vector<double>& heights = profile.height;
-  const std::size_t n = heights.size();
-  profile.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < profile.std_error.size(); ++i)
-    profile.covariance[i * n + i] = profile.std_error[i] * profile.std_error[i];
-  const std::string text = read_file(path);
-  const auto index_of = [&](double height) -> std::optional<std::size_t> {
-    const auto at = std::lower_bound(heights.begin(), heights.end(), height - 1e-9);
-    if (at == heights.end() || std::abs(*at - height) > 1e-9) return std::nullopt;
-    return static_cast<std::size_t>(at - heights.begin());
-  };
-  constexpr std::string_view blocks = "# independent_blocks: ";
-  if (const std::size_t at = text.find(blocks); at != std::string::npos)
-    profile.covariance_samples = std::atoi(text.c_str() + at + blocks.size());
-  each_csv_line(text, [&](const std::vector<std::string>& cells, std::size_t) {
-    if (cells[0] == "height_i") return;
-    if (cells.size() != 3) throw InputError(path.string() + ": expected height_i,height_j,covariance");
-    const auto i = index_of(std::strtod(cells[0].c_str(), nullptr)),
-               j = index_of(std::strtod(cells[1].c_str(), nullptr));
-    if (!i || !j) return;
-    const double value = std::strtod(cells[2].c_str(), nullptr);
-    profile.covariance[*i * n + *j] = profile.covariance[*j * n + *i] = value;
-  });
-}
-
-fit::Profile profile_of(const ProfileTable& table) {
-  fit::Profile profile;
-  profile.height = table.height;
-  profile.number_density = table.number_density;
-  // Errors where every bin has one; a bin without samples has an error of 0, which says nothing about it.
-  double smallest = 0;
-  for (const double error : table.std_error) {
-    if (!(error >= 0)) return profile;
-    if (error > 0) smallest = smallest == 0 ? error : std::min(smallest, error);
-  }
-  if (smallest > 0)
-    for (const double error : table.std_error) profile.std_error.push_back(error > 0 ? error : smallest);
-  return profile;
-}
-
 // A bed of the library: its temperature is that of its reservoir, or else its kinetic one.
 struct LibraryBed {
   std::string id;
   fit::SimulatedProfile profile;
-  std::string kernel;
+  Kernel kernel;
 };
 LibraryBed library_bed(const Input& input) {
-  const ProfileTable table = read_profile_csv(input.file("profile.csv"));
-  LibraryBed bed{input.id, {0, profile_of(table), 0}, table.comment("kernel") + " " + table.comment("kernel_width")};
+  const MeasuredProfile measured = read_measured_profile(input.file("profile.csv"));
+  LibraryBed bed{input.id, {0, measured.profile, 0}, measured.kernel.value_or(Kernel{})};
   bed.profile.temperature = BedDescription::read(input.file("bed.json")).bath_temperature;
   if (!(bed.profile.temperature > 0)) {
     const Json observed = input.result();
@@ -304,20 +255,19 @@ Matched match(const fit::Profile& measured, const std::vector<LibraryBed>& beds,
 }
 
 // The profile of each frame by itself, in the order of time: from disks.csv or from a trajectory.
-fit::ProfileFrames frames_of(const Input& source, const ProfileTable& table, const fit::Kernel& kernel) {
-  if (kernel.kind != fit::KernelKind::gaussian && kernel.kind != fit::KernelKind::top_hat)
-    throw InputError("\"bootstrap\": profiles of single frames are counted with a gaussian or a top_hat kernel only");
-  const sim::Kernel counted{
-      kernel.kind == fit::KernelKind::gaussian ? sim::KernelKind::gaussian : sim::KernelKind::top_hat, kernel.width};
-  if (table.size() < 3) throw InputError("\"bootstrap\": the profile has fewer than three heights");
-  const double spacing = (table.height.back() - table.height.front()) / static_cast<double>(table.size() - 1);
-  const sim::ProfileGrid grid{table.height.front(), spacing, table.size()};
+fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& heights, const Kernel& kernel) {
+  if (kernel.kind == KernelKind::none)
+    throw InputError(
+        "\"bootstrap\": profiles of single frames are counted through a kernel, and this profile has none");
+  if (heights.size() < 3) throw InputError("\"bootstrap\": the profile has fewer than three heights");
+  const double spacing = (heights.back() - heights.front()) / static_cast<double>(heights.size() - 1);
+  const HeightGrid grid{heights.front(), spacing, heights.size()};
   fit::ProfileFrames frames;
-  frames.height = table.height;
-  std::vector<double> density(table.size());
+  frames.height = heights;
+  std::vector<double> density(heights.size());
   const auto add = [&](const std::vector<double>& z, double width) {
     std::fill(density.begin(), density.end(), 0.0);
-    sim::add_density(grid, counted, width, z, 0.0, density);
+    add_density(grid, kernel, width, z, 0.0, density);
     frames.number_density.insert(frames.number_density.end(), density.begin(), density.end());
   };
   if (source.stage == "simulate") {
@@ -364,6 +314,37 @@ Json bootstrap_json(const fit::BootstrapResult& result, std::uint32_t resamples)
   return out;
 }
 
+// curve.csv (the model), residuals.csv (every height of the profile), windows.csv (temperature against window).
+void write_tables(RunContext& context, const fit::FitResult& result) {
+  const Column height{"height", "D", "height above the floor's mean position"};
+  Table curve("the fitted model " + result.model,
+              {height,
+               {"number_density", "1/D^2", "density of the model"},
+               {"smoothed_density", "1/D^2", "density of the model through the kernel of the measurement"}});
+  for (const fit::CurvePoint& point : result.curve) curve.add({point.height, point.density, point.smoothed_density});
+  curve.write(context.output("curve.csv"));
+  Table residuals("measured and fitted densities", {height,
+                                                    {"number_density", "1/D^2", "measured density"},
+                                                    {"std_error", "1/D^2", "standard error of the measured density"},
+                                                    {"model", "1/D^2", "fitted density through the kernel"},
+                                                    {"used", "1", "1 inside the window of the fit, else 0"}});
+  for (const fit::Residual& r : result.residuals)
+    residuals.add({r.height, r.density, r.std_error, r.model, count_cell(r.used ? 1 : 0)});
+  residuals.write(context.output("residuals.csv"));
+  Table windows("fits in other windows", {{"low", "D", "lower end of the window"},
+                                          {"high", "D", "upper end of the window"},
+                                          {"bins", "1", "heights in the window"},
+                                          {"temperature", "m g D", "fitted temperature T"},
+                                          {"std_error", "m g D", "standard error of T"},
+                                          {"shift", "D", "fitted shift of the profile"},
+                                          {"chi2_per_dof", "1", "chi-square per degree of freedom"},
+                                          {"status", "", "ok, or why there is no fit"}});
+  for (const fit::WindowFit& w : result.window_sweep)
+    windows.add({w.low, w.high, count_cell(w.bins), w.temperature.value, w.temperature.std_error, w.shift.value,
+                 w.chi2_per_dof, std::string(fit::to_string(w.status))});
+  windows.write(context.output("windows.csv"));
+}
+
 void Fit::run(RunContext& context) const {
   fit::FitOptions options = options_;
   std::optional<double> diameter = diameter_;
@@ -371,8 +352,14 @@ void Fit::run(RunContext& context) const {
   const Input* source = context.inputs().empty() ? nullptr : &context.inputs().front();
   const std::filesystem::path path =
       !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : source->file("profile.csv");
-  const ProfileTable table = read_profile_csv(path);
-  if (!table.note.empty()) context.warning(table.note);
+  const bool has_covariance = source != nullptr && profile_.empty() && source->has("covariance.csv");
+  if (errors_ == ErrorSource::covariance && !has_covariance)
+    throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
+  const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options.model != simulation;
+  const MeasuredProfile measured =
+      read_measured_profile(path, use_covariance ? std::optional(source->file("covariance.csv")) : std::nullopt);
+  for (const std::string& warning : measured.warnings) context.warning(warning);
+  const fit::Profile& profile = measured.profile;
   for (const Input& input : context.inputs()) {
     if (input.has("bed.json")) {
       const BedDescription bed = BedDescription::read(input.file("bed.json"));
@@ -380,13 +367,8 @@ void Fit::run(RunContext& context) const {
       if (!options.column_number && input.stage == "simulate") options.column_number = bed.column_number();
       write_file(context.output("bed.json"), dump(bed.to_json()));
     }
-    if (!diameter && input.stage == "extract") {
-      const Json extracted = input.result();
-      if (const Json* found = find_pointer(extracted, "/diameter/value"); found != nullptr && found->is_number())
-        diameter = found->get<double>();
-    }
   }
-  if (!options.column_number) options.column_number = number_in(table.comment("column_number"));
+  if (!options.column_number) options.column_number = measured.column_number;
   if (temperature_measured_) {
     const Json bed = context.input("simulate").result();
     const Json *x = find_pointer(bed, "/temperature_x/value"), *z = find_pointer(bed, "/temperature_z/value");
@@ -394,41 +376,7 @@ void Fit::run(RunContext& context) const {
       throw InputError("the simulated bed has no kinetic temperature at which T could be held");
     options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
   }
-  fit::Profile profile = profile_of(table);
-  if (profile.std_error.empty())
-    context.warning("the profile has no standard errors: those of the fit follow from the scatter about it");
-  const bool has_covariance = source != nullptr && profile_.empty() && source->has("covariance.csv");
-  if (errors_ == ErrorSource::covariance && !has_covariance)
-    throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
-  if (errors_ != ErrorSource::diagonal && has_covariance && options.model != simulation)
-    read_covariance(*source, profile);
-  switch (kernel_.kind) {
-    case KernelChoice::none:
-      options.kernel = {fit::KernelKind::none, 0};
-      break;
-    case KernelChoice::gaussian:
-      options.kernel = {fit::KernelKind::gaussian, kernel_.width};
-      break;
-    case KernelChoice::top_hat:
-      options.kernel = {fit::KernelKind::top_hat, kernel_.width};
-      break;
-    case KernelChoice::disk_chord:
-      options.kernel = {fit::KernelKind::disk_chord, kernel_.width};
-      break;
-    case KernelChoice::measured: {
-      std::string name = table.comment("kernel");
-      std::replace(name.begin(), name.end(), '_', '-');
-      if (name.empty()) {
-        options.kernel = {fit::KernelKind::none, 0};
-        context.warning("the profile does not say through which kernel it was measured: taken as densities at points");
-      } else if (!fit::kernel_kind_from_string(name, options.kernel.kind)) {
-        throw InputError(fmt::format("{}: there is no kernel \"{}\"", path.string(), name));
-      } else {
-        options.kernel.width = number_in(table.comment("kernel_width")).value_or(0);
-      }
-      break;
-    }
-  }
+  options.kernel = kernel_ ? *kernel_ : measured.kernel.value_or(Kernel{});
   options.window.low = window_.low, options.window.high = window_.high;
   options.window.floor_exclusion = window_.floor_exclusion, options.window.plateau_fraction = window_.plateau_fraction;
   options.window.lowest_fraction = window_.lowest_fraction,
@@ -439,15 +387,14 @@ void Fit::run(RunContext& context) const {
   fit::FitResult result;
   if (options.model == simulation) {
     std::vector<LibraryBed> beds;
-    const std::string kernel = table.comment("kernel") + " " + table.comment("kernel_width");
     for (const Input& input : context.inputs()) {
       if (input.stage != "simulate" || (profile_.empty() && &input == source)) continue;
       beds.push_back(library_bed(input));
-      if (beds.back().kernel != kernel)
+      if (beds.back().kernel != options.kernel)
         throw InputError(
-            fmt::format("{}: its profile went through the kernel \"{}\", the measured one through \"{}\"; "
-                        "the simulation is a model only through the same",
-                        input.id, beds.back().kernel, kernel));
+            fmt::format("{}: its profile was measured through the kernel {}, the one to be fitted through {}. Measure "
+                        "both through the same kernel.",
+                        input.id, to_string(beds.back().kernel), to_string(options.kernel)));
     }
     matched = match(profile, beds, window_, options);
     result = std::move(matched.fit);
@@ -468,7 +415,8 @@ void Fit::run(RunContext& context) const {
     context.progress(0.3, "resampling");
     fit::BootstrapOptions how;
     how.resamples = static_cast<int>(bootstrap_);
-    const fit::BootstrapResult found = fit::bootstrap_fit(frames_of(*source, table, options.kernel), options, how);
+    const fit::BootstrapResult found =
+        fit::bootstrap_fit(frames_of(*source, profile.height, options.kernel), options, how);
     if (found.status != fit::FitStatus::ok) context.warning("bootstrap: " + found.message);
     json["bootstrap"] = bootstrap_json(found, bootstrap_);
   }
@@ -477,26 +425,7 @@ void Fit::run(RunContext& context) const {
         fmt::format("{} does not describe this profile: {}", result.model, json["why_not"].get<std::string>()));
   }
   write_file(context.output("fit.json"), dump(json));
-  std::string curve = "# " + result.model +
-                      "; smoothed: through the kernel of the measurement\nheight,number_density,smoothed_density\n";
-  for (const fit::CurvePoint& point : result.curve) {
-    curve += fmt::format("{},{},{}\n", number_text(point.height), number_text(point.density),
-                         number_text(point.smoothed_density));
-  }
-  write_file(context.output("curve.csv"), curve);
-  std::string residuals = "height,number_density,std_error,model,used\n";
-  for (const fit::Residual& r : result.residuals) {
-    residuals += fmt::format("{},{},{},{},{}\n", number_text(r.height), number_text(r.density),
-                             number_text(r.std_error), number_text(r.model), r.used ? 1 : 0);
-  }
-  write_file(context.output("residuals.csv"), residuals);
-  std::string windows = "low,high,bins,temperature,std_error,shift,chi2_per_dof,status\n";
-  for (const fit::WindowFit& w : result.window_sweep) {
-    windows += fmt::format("{},{},{},{},{},{},{},{}\n", number_text(w.low), number_text(w.high), w.bins,
-                           number_text(w.temperature.value), number_text(w.temperature.std_error),
-                           number_text(w.shift.value), number_text(w.chi2_per_dof), fit::to_string(w.status));
-  }
-  write_file(context.output("windows.csv"), windows);
+  write_tables(context, result);
 }
 
 }  // namespace

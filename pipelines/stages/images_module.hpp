@@ -10,6 +10,7 @@
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/frame_geometry.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "statistics/kernel.hpp"
 
 namespace shakebed::pipelines {
 
@@ -32,11 +33,11 @@ struct RenderOptions {
 };
 
 enum class BeadPolarity { automatic, dark, bright };
-enum class DensityKernel { gaussian, top_hat, disk_chord };
 
 // Pixels count from the centre of the top-left one, x to the right, y downwards.
 struct ExtractOptions {
   double diameter = 0;                          // of a bead [m]
+  double gravity = 9.81;                        // [m/s^2]
   InputFiles images;                            // photographs or films; else the frames of a render stage
   bool use_geometry = true;                     // of a render stage: take scale, floor and walls from it
   std::optional<double> scale;                  // [m/px]
@@ -50,8 +51,7 @@ struct ExtractOptions {
   BeadPolarity polarity = BeadPolarity::automatic;
   std::optional<double> radius;  // first value [px]
   bool keep_half_hidden = false;
-  DensityKernel kernel = DensityKernel::gaussian;
-  double kernel_width = 0.5;                    // sigma, full width or diameter [D]
+  Kernel kernel{KernelKind::gaussian, 0.5};
   double spacing = 0.25;                        // of the profile's heights [D]
   std::optional<double> lowest, highest;        // of the profile [D]
   std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles; the first is found

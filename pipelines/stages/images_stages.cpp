@@ -21,6 +21,8 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/profile_csv.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/images_module.hpp"
 #include "pipelines/version.hpp"
@@ -42,7 +44,8 @@ void render_frames(const RenderOptions& options, RunContext& context) {
         "the bed is in reduced units and has no size: a camera needs metres. Give the simulate stage a diameter in SI "
         "units");
   }
-  if (!(bed.gravity > 0)) throw InputError("the bed has no gravity, so no floor and no time scale for a camera");
+  if (!(bed.gravity.value_or(0) > 0))
+    throw InputError("the bed has no gravity, so no floor and no time scale for a camera");
   const std::filesystem::path path = trajectory_of(input);
 
   // First pass: what the view must hold.
@@ -65,7 +68,7 @@ void render_frames(const RenderOptions& options, RunContext& context) {
     throw InputError(path.string() + ": holds no frame. Ask the simulate stage for some: \"frames\": {\"count\": 640}");
   const double pixels_per_diameter = bed.diameter / options.scale;
   if (options.height) highest = *options.height / bed.diameter;
-  const double below = std::max(0.0, bed.amplitude / bed.diameter);
+  const double below = std::max(0.0, bed.amplitude.value_or(0) / bed.diameter);
   const double floor_depth = std::ceil(below * pixels_per_diameter) + options.margin;
   ingest::Camera camera;
   const double columns = std::ceil(width * pixels_per_diameter) + 2 * options.margin;
@@ -90,7 +93,7 @@ void render_frames(const RenderOptions& options, RunContext& context) {
   geometry.floor = camera.height - 0.5 - floor_depth;
   geometry.lowest = lowest;
   geometry.width = camera.width, geometry.height = camera.height;
-  const double velocity_px = std::sqrt(bed.gravity * bed.diameter) / options.scale;
+  const double velocity_px = std::sqrt(*bed.gravity * bed.diameter) / options.scale;
 
   // Second pass: read in order, draw on all threads, write the truth in order.
   std::filesystem::create_directory(context.output("frames"));
@@ -98,8 +101,14 @@ void render_frames(const RenderOptions& options, RunContext& context) {
   std::mutex reading, failing;
   std::size_t next = 0;
   std::ofstream truth(context.output("truth.csv"), std::ios::binary);
-  truth << "# true centres at the middle of the exposure; pixels from the centre of the top-left one, y downwards\n"
-           "frame,disk,x_px,y_px,radius_px\n";
+  const Table truth_head("true centres at the middle of the exposure",
+                         {{"frame", "1", "number of the frame, from 0"},
+                          {"disk", "1", "number of the disk, from 0"},
+                          {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
+                          {"y_px", "px", "centre, from the centre of the top-left pixel downwards"},
+                          {"radius_px", "px", "radius"}});
+  truth << truth_head.csv();
+  write_file(metadata_path(context.output("truth.csv")), dump(truth_head.metadata("truth.csv")));
   std::map<std::size_t, std::string> drawn;  // truth of frames that wait for one before them
   std::size_t written = 0;
   std::exception_ptr failure;
@@ -175,9 +184,10 @@ Json profile_numbers(const ingest::DensityProfile& profile) {
               {"independent_samples", profile.independent_samples}};
 }
 
-ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::vector<std::string> comments) {
+ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::string description) {
   ProfileTable table;
-  table.comments = std::move(comments);
+  table.description = std::move(description);
+  table.kernel = profile.kernel;
   // Without the empty rows at both ends.
   std::size_t first = 0, last = profile.number_density.size();
   while (first < last && profile.number_density[first] < 1e-12) ++first;
@@ -194,6 +204,30 @@ ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::
   return table;
 }
 
+// The columns of disks.csv and disk_details.csv, whose rows are written frame by frame.
+void describe_tables(RunContext& context) {
+  const std::vector<Column> place{{"frame", "1", "number of the frame, from 0"},
+                                  {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
+                                  {"y_px", "px", "centre, from the centre of the top-left pixel downwards"}};
+  std::vector<Column> disks = place, details = place;
+  disks.insert(disks.end(), {{"radius_px", "px", "radius"},
+                             {"x", "D", "centre, from the left wall"},
+                             {"z", "D", "height of the centre above the floor's mean position"},
+                             {"quality", "1", "1 is a bead that looks like all the others, 0 is none"}});
+  details.insert(details.end(), {{"std_error_x_px", "px", "standard error of x_px"},
+                                 {"std_error_y_px", "px", "standard error of y_px"},
+                                 {"correlation", "1", "correlation of the two errors"},
+                                 {"contrast", "1", "contrast relative to that of the mean bead"},
+                                 {"cut", "1", "1 where the border of the frame cuts the bead"},
+                                 {"half_hidden", "1", "1 where something covers part of the bead"},
+                                 {"species", "1", "1: the first diameter, 2: the second"}});
+  write_file(metadata_path(context.output("disks.csv")),
+             dump(Table("disks found in each frame", disks).metadata("disks.csv")));
+  write_file(metadata_path(context.output("disk_details.csv")),
+             dump(Table("errors and marks of the disks found, row by row as in disks.csv", details)
+                      .metadata("disk_details.csv")));
+}
+
 // What is done with each frame's disks as they come, so that memory does not grow with the film.
 class DisksOnTheWay {
  public:
@@ -204,9 +238,11 @@ class DisksOnTheWay {
         truth_(truth) {
     disks_ << ingest::disks_csv_head;
     details_ << ingest::disk_details_csv_head;
+    describe_tables(context);
     if (options.frame_rate) {
       ingest::VelocityOptions velocity;
       velocity.frame_rate_hz = *options.frame_rate / static_cast<double>(options.stride);
+      velocity.gravity_m_per_s2 = options.gravity;
       meter_.emplace(options.diameter, velocity);
     }
   }
@@ -273,12 +309,14 @@ class DisksOnTheWay {
     }
     return json;
   }
-  [[nodiscard]] std::string quality_table() const {
-    std::string text = "# number of disks by quality: 1 is a bead like all the others\nfrom,to,disks\n";
+  [[nodiscard]] Table quality_table() const {
+    Table table("number of disks by quality; 1 is a bead that looks like all the others",
+                {{"from", "1", "lowest quality of the class"},
+                 {"to", "1", "highest quality of the class"},
+                 {"disks", "1", "disks in all frames"}});
     for (std::size_t k = 0; k < quality_.size(); ++k)
-      text += fmt::format("{:.2f},{:.2f},{}\n", 0.02 * static_cast<double>(k), 0.02 * static_cast<double>(k + 1),
-                          quality_[k]);
-    return text;
+      table.add({static_cast<double>(k) / 50, static_cast<double>(k + 1) / 50, count_cell(quality_[k])});
+    return table;
   }
   // The same as a histogram; its height goes with the logarithm, so that a few odd disks among thousands show.
   [[nodiscard]] std::string quality_figure() const {
@@ -369,14 +407,75 @@ class DisksOnTheWay {
   std::map<std::size_t, std::vector<ingest::MeasuredDisk>> to_draw_;
 };
 
-std::string bead_table(const ingest::FinderCalibration& finder) {
-  std::string text =
-      "# the bead as learned from the frames: 1 inside a flat bead, 0 far "
-      "outside\nradius_px,contrast,fourth_harmonic\n";
+Table bead_table(const ingest::FinderCalibration& finder) {
+  Table table("the bead as learned from the frames, by distance from its centre",
+              {{"radius_px", "px", "distance from the centre"},
+               {"contrast", "1", "1 inside a flat bead, 0 far outside"},
+               {"fourth_harmonic", "1", "amplitude of the dependence on direction with four-fold symmetry"}});
   for (std::size_t k = 0; k < finder.profile.level.size(); ++k)
-    text += fmt::format("{:.4f},{:.6f},{:.6f}\n", static_cast<double>(k) * finder.profile.step_px,
-                        finder.profile.level[k], finder.profile.fourth_harmonic[k]);
-  return text;
+    table.add(
+        {static_cast<double>(k) * finder.profile.step_px, finder.profile.level[k], finder.profile.fourth_harmonic[k]});
+  return table;
+}
+
+// What was found in each frame.
+Table frames_table(const std::vector<ingest::FrameReport>& frames) {
+  Table table("what was found in each frame",
+              {{"frame", "1", "number of the frame, from 0"},
+               {"file", "", "file that holds it"},
+               {"page", "1", "page of the file or frame of the film, from 0"},
+               {"status", "", "good, nothing_found, unreadable or size_changed"},
+               {"disks", "1", "disks found"},
+               {"second", "1", "disks of the second diameter among them"},
+               {"rejected", "1", "places that were looked at and rejected"},
+               {"residual_level_grey_levels", "grey levels", "rms difference of the frame and its model"},
+               {"contrast_gain", "1", "contrast relative to that of all frames"}});
+  constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
+  for (const ingest::FrameReport& frame : frames)
+    table.add({count_cell(frame.index), std::filesystem::path(frame.origin.path).filename().string(),
+               count_cell(frame.origin.page), std::string(names[static_cast<std::size_t>(frame.status)]),
+               count_cell(frame.disks), count_cell(frame.second), count_cell(frame.rejected), frame.residual_level,
+               frame.light.gain});
+  return table;
+}
+
+// What photographs show of their bed.
+BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement& found) {
+  const ingest::BedCalibration& seen = found.calibration;
+  BedDescription bed;
+  bed.count = found.disk_count_mean;
+  bed.diameter = options.diameter, bed.second_diameter = options.second_diameter;
+  bed.gravity = options.gravity;
+  bed.width = seen.width * options.diameter;
+  if (seen.shaking_frequency_hz > 0) {
+    bed.frequency = seen.shaking_frequency_hz;
+    bed.amplitude = seen.floor_amplitude_px * seen.scale_m_per_px;
+  }
+  return bed;
+}
+
+// profile.csv with its covariance; profiles of a second species, from covered area and by phase where there are some.
+void write_profiles(RunContext& context, const ingest::Measurement& found, double column_number) {
+  const double width = found.calibration.width;
+  ProfileTable profile = table_of(found.profile, width, "density profile of the disks found, mean over the frames");
+  profile.column_number = column_number;
+  write_profile_csv(context.output("profile.csv"), profile);
+  if (found.second_profile)
+    write_profile_csv(context.output("second_profile.csv"),
+                      table_of(*found.second_profile, width,
+                               "density profile of the beads of the second diameter; D is the first diameter"));
+  if (found.coverage_profile)
+    write_profile_csv(context.output("coverage_profile.csv"),
+                      table_of(*found.coverage_profile, width, "density profile from the covered area"));
+  for (std::size_t i = 0; i < found.phases.size(); ++i) {
+    ProfileTable phase = table_of(found.phases[i].profile, width, "density profile at one phase of the shaking");
+    phase.phase = found.phases[i].phase;
+    write_profile_csv(context.output(fmt::format("profile_phase_{:02d}.csv", i)), phase);
+  }
+  std::vector<double> heights, covariance = found.profile.covariance;
+  for (std::size_t i = 0; i < found.profile.number_density.size(); ++i) heights.push_back(found.profile.bins.middle(i));
+  if (covariance.size() != heights.size() * heights.size()) heights.clear();
+  write_covariance_csv(context.output("covariance.csv"), heights, covariance, found.profile.independent_samples);
 }
 
 // Disks found and places rejected, frame by frame: missing and doubled beads show as dips and spikes.
@@ -462,10 +561,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
                                               static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
   }
-  measure.kernel = {options.kernel == DensityKernel::gaussian  ? ingest::KernelKind::gaussian
-                    : options.kernel == DensityKernel::top_hat ? ingest::KernelKind::top_hat
-                                                               : ingest::KernelKind::disk_chord,
-                    options.kernel_width};
+  measure.kernel = options.kernel;
   measure.bin_width = options.spacing;
   measure.lowest = options.lowest, measure.highest = options.highest;
   measure.shaking_frequency_hz = options.frequency;
@@ -483,7 +579,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
     }
     if (!measure.lowest) {
       // Heights at multiples of the spacing, low enough for what lies below the floor's mean while it is down.
-      const double reach = options.kernel == DensityKernel::gaussian ? 6 * options.kernel_width : options.kernel_width;
+      const double reach = kernel_reach(options.kernel);
       measure.lowest = (std::floor((std::min(0.0, geometry.lowest) - reach) / options.spacing) - 0.5) * options.spacing;
     }
     paths.push_back((rendered->directory / "frames").string());
@@ -532,9 +628,6 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
                                   std::filesystem::path(frame.origin.path).filename().string(), frame.why));
   }
   if (bad > 5) context.warning(fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - 5));
-  const std::string kernel = options.kernel == DensityKernel::gaussian  ? "gaussian"
-                             : options.kernel == DensityKernel::top_hat ? "top_hat"
-                                                                        : "disk_chord";
   if (options.frame_rate && !(bed.shaking_frequency_hz > 0))
     context.warning("No shaking is seen in the film (" + bed.why_no_frequency +
                     "): there are no profiles by phase. Give frequency (--frequency) if the bed is shaken.");
@@ -550,57 +643,8 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
                                     ? "some are missed or out of view (count.svg, overlays)"
                                     : "something else passes for a bead (overlays), or there are more"));
   const double column_number = found.disk_count_mean / bed.width;
-  write_profile_csv(
-      context.output("profile.csv"),
-      table_of(found.profile, bed.width,
-               {"heights in D above the floor's mean position", "kernel: " + kernel,
-                "kernel_width: " + number_text(options.kernel_width), "column_number: " + number_text(column_number)}));
-  if (found.second_profile) {
-    write_profile_csv(
-        context.output("second_profile.csv"),
-        table_of(*found.second_profile, bed.width,
-                 {"beads of the second diameter; heights in D of the first above the floor's mean position",
-                  "kernel: " + kernel, "kernel_width: " + number_text(options.kernel_width)}));
-  }
-  if (found.coverage_profile) {
-    write_profile_csv(context.output("coverage_profile.csv"),
-                      table_of(*found.coverage_profile, bed.width,
-                               {"from covered area, heights in D above the floor's mean position", "kernel: disk_chord",
-                                "kernel_width: 1"}));
-  }
-  for (std::size_t i = 0; i < found.phases.size(); ++i) {
-    write_profile_csv(context.output(fmt::format("profile_phase_{:02d}.csv", i)),
-                      table_of(found.phases[i].profile, bed.width,
-                               {"phase: " + number_text(found.phases[i].phase), "kernel: " + kernel,
-                                "kernel_width: " + number_text(options.kernel_width)}));
-  }
-  {
-    const std::size_t n = found.profile.number_density.size();
-    std::string text = fmt::format(
-        "# covariance of number_density (j >= i, only what is not 0)\n# independent_blocks: {}\n"
-        "height_i,height_j,covariance\n",
-        found.profile.independent_samples);
-    for (std::size_t i = 0; i < n && found.profile.covariance.size() == n * n; ++i) {
-      for (std::size_t j = i; j < n; ++j) {
-        const double value = found.profile.covariance[i * n + j];
-        if (value != 0)
-          text += fmt::format("{},{},{}\n", number_text(found.profile.bins.middle(i)),
-                              number_text(found.profile.bins.middle(j)), number_text(value));
-      }
-    }
-    write_file(context.output("covariance.csv"), text);
-  }
-  {
-    std::string text = "frame,file,page,status,disks,second,rejected,residual_level,contrast_gain\n";
-    constexpr const char* names[] = {"good", "nothing_found", "unreadable", "size_changed"};
-    for (const ingest::FrameReport& frame : found.frames) {
-      text += fmt::format("{},{},{},{},{},{},{},{},{}\n", frame.index,
-                          std::filesystem::path(frame.origin.path).filename().string(), frame.origin.page,
-                          names[static_cast<std::size_t>(frame.status)], frame.disks, frame.second, frame.rejected,
-                          number_text(frame.residual_level), number_text(frame.light.gain));
-    }
-    write_file(context.output("frames.csv"), text);
-  }
+  write_profiles(context, found, column_number);
+  frames_table(found.frames).write(context.output("frames.csv"));
 
   Json result;
   result["frames"] = found.frames.size();
@@ -637,7 +681,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   result["column_number"] = quantity_json(
       column_number, "1",
       found.disk_count_std / bed.width / std::sqrt(std::max<double>(1, static_cast<double>(found.profile.samples))));
-  result["kernel"] = Json{{"kind", kernel}, {"width", options.kernel_width}};
+  result["kernel"] = Json{{"kind", to_string(options.kernel.kind)}, {"width", options.kernel.width}};
   result["profile"] = profile_numbers(found.profile);
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
 
@@ -664,12 +708,13 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   }
   if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
   write_file(context.output("extract.json"), dump(result));
-  if (rendered != nullptr && rendered->has("bed.json"))
-    write_file(context.output("bed.json"), read_file(rendered->file("bed.json")));
+  write_file(context.output("bed.json"),
+             dump((rendered != nullptr ? BedDescription::read(rendered->file("bed.json")) : bed_seen(options, found))
+                      .to_json()));
 
-  write_file(context.output("quality.csv"), on_the_way.quality_table());
+  on_the_way.quality_table().write(context.output("quality.csv"));
   write_file(context.output("quality.svg"), on_the_way.quality_figure());
-  write_file(context.output("bead.csv"), bead_table(found.finder));
+  bead_table(found.finder).write(context.output("bead.csv"));
   ingest::write_png(context.output("bead.png"), ingest::bead_picture(found.finder, 8));
   write_file(context.output("count.svg"), count_figure(found.frames));
   draw_overlays(options, context, paths, source_options, found, on_the_way);

@@ -10,6 +10,7 @@
 
 #include "fit/profile_fit/fit_profile.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "sim/engine/simulation.hpp"
@@ -74,6 +75,7 @@ class Infer : public Stage {
   // Those that are no farther from the target than the nearest, as far as the errors allow to tell.
   std::vector<const Point*> as_near(const std::vector<Point>& points, const Point& nearest) const;
   Json results_of(const std::vector<Point>& points) const;
+  Table points_table(const std::vector<Point>& points) const;
 
   SceneOptions bed_;
   double settle_ = 0, measure_ = 0;
@@ -161,9 +163,9 @@ Bed Infer::simulate(const Point& point, std::uint64_t seed, const RunContext& co
   const double first = std::ceil(settle_ / bed.time_unit() / period * (1 - 1e-12)) * period;
   const auto periods = static_cast<std::uint64_t>(measure_ / bed.time_unit() / period * (1 + 1e-12));
   const double spacing = 0.25;
-  const sim::ProfileGrid grid{-std::ceil((6 * kernel_width_ + 3) / spacing) * spacing, spacing,
-                              static_cast<std::size_t>((5 * column + 30) / spacing)};
-  sim::BedObserver observer(scene, simulation->properties(), phases_, grid, {sim::KernelKind::gaussian, kernel_width_});
+  const HeightGrid grid{-std::ceil((6 * kernel_width_ + 3) / spacing) * spacing, spacing,
+                        static_cast<std::size_t>((5 * column + 30) / spacing)};
+  sim::BedObserver observer(scene, simulation->properties(), phases_, grid, {KernelKind::gaussian, kernel_width_});
   sim::Snapshot at;
   const auto run_to = [&](double time) {  // a period at a time, to be interrupted
     while (simulation->time() < time) {
@@ -194,7 +196,7 @@ Bed Infer::simulate(const Point& point, std::uint64_t seed, const RunContext& co
   fit::FitOptions options;
   options.plateau_density = plateau_density_;
   options.column_number = column;
-  options.kernel = {fit::KernelKind::gaussian, kernel_width_};
+  options.kernel = {KernelKind::gaussian, kernel_width_};
   options.interval = options.sweep = options.compare = false;
   options.curve_points = 0;
   const fit::FitResult result = fit::fit_profile(measured, options);
@@ -321,22 +323,37 @@ void Infer::run(RunContext& context) const {
   if (failure) std::rethrow_exception(failure);
   for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
 
-  std::string table = fmt::format(
-      "# mean of {} beds a point; errors are of that mean{}\n"
-      "# T in m g D; density: greatest of the profile [1/D^2]; heights in D\n"
-      "restitution,friction,side_friction,status,temperature,temperature_error,solid_height,density,density_error,"
-      "temperature_x,temperature_z,temperature_z_local,rise,distance,collisions,distance_error\n",
-      replicas_, replicas_ > 1 ? ", from the spread between them" : "");
-  for (const Point& p : all) {
-    const bool near = std::isfinite(p.distance);
-    table += fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", p.restitution, p.friction, p.side_friction,
-        fit::to_string(p.status), p.temperature.value, p.temperature.std_error, p.solid_height.value, p.density.value,
-        p.density.std_error, p.temperature_x.value, p.temperature_z.value, p.temperature_z_local.value, p.rise.value,
-        near ? fmt::format("{}", p.distance) : "", p.collisions, near ? fmt::format("{}", p.distance_error) : "");
-  }
-  write_file(context.output("infer.csv"), table);
+  points_table(all).write(context.output("infer.csv"));
   write_file(context.output("infer.json"), dump(results_of(all)));
+}
+
+Table Infer::points_table(const std::vector<Point>& points) const {
+  Table table("grid points: means over the beds of a point, with standard errors from the spread between them",
+              {{"restitution", "1", "of the beads"},
+               {"friction", "1", "of the beads"},
+               {"side_friction", "1", "of the sides"},
+               {"status", "", "of the fit"},
+               {"temperature", "m g D", "fitted temperature"},
+               {"temperature_error", "m g D", "standard error of temperature"},
+               {"solid_height", "D", "height of the solid"},
+               {"density", "1/D^2", "greatest density of the profile"},
+               {"density_error", "1/D^2", "standard error of density"},
+               {"temperature_x", "m g D", "kinetic temperature, horizontal"},
+               {"temperature_z", "m g D", "kinetic temperature, vertical"},
+               {"temperature_z_local", "m g D", "the same without the mean velocity of the layer"},
+               {"rise", "D", "rise of the centre of mass"},
+               {"distance", "1", "distance from the target"},
+               {"collisions", "1", "collisions of all beds of the point"},
+               {"distance_error", "1", "standard error of distance"}});
+  table.note("beds_per_point", replicas_);
+  for (const Point& p : points) {
+    const bool near = std::isfinite(p.distance);
+    table.add({p.restitution, p.friction, p.side_friction, std::string(fit::to_string(p.status)), p.temperature.value,
+               p.temperature.std_error, p.solid_height.value, p.density.value, p.density.std_error,
+               p.temperature_x.value, p.temperature_z.value, p.temperature_z_local.value, p.rise.value,
+               near ? p.distance : no_number, count_cell(p.collisions), near ? p.distance_error : no_number});
+  }
+  return table;
 }
 
 void Infer::results(ResultList& list) const {

@@ -11,6 +11,8 @@
 #include "fit/map/empirical_map.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
+#include "pipelines/stages/bed_facts.hpp"
 #include "pipelines/stages/study_table.hpp"
 #include "pipelines/stages/theory.hpp"
 
@@ -71,13 +73,7 @@ class Map : public Stage {
                      nearest.empty() ? fmt::format("There are {}", fmt::join(known, ", "))
                                      : fmt::format("Did you mean \"{}\"?", nearest));
     }
-    if (!fields.has_upstream("simulate")) {
-      for (const std::string key : {"gamma", "frequency", "diameter", "initial_height"}) {
-        const bool from_frames = key == "initial_height" && fields.has_upstream("extract");
-        fields.require(fields.has(key) || from_frames, key,
-                       fmt::format("\"{}\" is missing, and no simulate stage in \"from\" can say it", key));
-      }
-    }
+    require_bed_facts(fields);
   }
 
   void results(ResultList& list) const override {
@@ -115,24 +111,18 @@ class Map : public Stage {
       question.measured_std_error = number("/temperature/std_error");
     }
     std::optional<double> bead_restitution = bead_restitution_, bead_friction = bead_friction_;
-    if (const Input* source = context.find_input("simulate")) {
+    const auto source = std::find_if(context.inputs().begin(), context.inputs().end(),
+                                     [](const Input& input) { return input.has("bed.json"); });
+    if (source != context.inputs().end()) {
       const BedDescription bed = BedDescription::read(source->file("bed.json"));
       if (!bead_restitution) bead_restitution = bed.restitution;
       if (!bead_friction) bead_friction = bed.friction;
       if (bed.reduced && !(diameter_ && frequency_))
         throw InputError("the bed is in reduced units: give diameter and frequency here");
       question.gamma = bed.gamma();
-      question.frequency = bed.frequency, question.diameter = bed.diameter;
-      if (!bed.reduced) question.gravity = bed.gravity;
+      question.frequency = bed.frequency.value_or(0), question.diameter = bed.diameter;
+      if (!bed.reduced && bed.gravity) question.gravity = *bed.gravity;
       question.initial_height = bed.column_number() / question.plateau_density;
-    }
-    if (const Input* frames = context.find_input("extract"); frames != nullptr && !initial_height_) {
-      const Json extract = frames->result();
-      const Json* column = find_pointer(extract, "/column_number/value");
-      if (column == nullptr || !column->is_number())
-        throw InputError(
-            "the frames do not tell the height of the bed at rest (no walls were found): give initial_height");
-      question.initial_height = column->get<double>() / question.plateau_density;
     }
     if (gamma_) question.gamma = *gamma_;
     if (frequency_) question.frequency = *frequency_;
@@ -148,22 +138,29 @@ class Map : public Stage {
       json["simulated"] = simulated(context, table, question, bead_restitution, bead_friction, json);
     }
     write_file(context.output("map.json"), dump(json));
-    std::string csv = "name,jump_height,expansion,constants,jump,rise,reduced_temperature,in_range\n";
+    Table readings("formulas that predict T/T_c from Gamma",
+                   {{"name", "", "name of the formula"},
+                    {"jump_height", "", "definition of the jump height of a single ball"},
+                    {"expansion", "", "relation between the rise of the bed and T"},
+                    {"constants", "", "constants of the theory that it uses"},
+                    {"jump", "D", "jump height of a single ball"},
+                    {"rise", "D", "rise of the centre of mass"},
+                    {"reduced_temperature", "1", "T/T_c"},
+                    {"in_range", "1", "1 where the formula applies at this Gamma, else 0"}});
     std::size_t in_range = 0;
     for (const Json& row : json["readings"]) {
       const auto value = [&](const char* key) {
-        return row[key].is_null() ? std::string() : number_text(row[key]["value"].get<double>());
+        return row[key].is_null() ? no_number : row[key]["value"].get<double>();
       };
-      csv += fmt::format("{},{},{},{},{},{},{},{}\n", row["name"].get<std::string>(),
-                         row["jump_height"].get<std::string>(), row["expansion"].get<std::string>(),
-                         row["constants"].get<std::string>(), value("jump"), value("rise"),
-                         value("reduced_temperature"), row["in_range"].get<bool>() ? "true" : "false");
+      readings.add({row["name"].get<std::string>(), row["jump_height"].get<std::string>(),
+                    row["expansion"].get<std::string>(), row["constants"].get<std::string>(), value("jump"),
+                    value("rise"), value("reduced_temperature"), count_cell(row["in_range"].get<bool>() ? 1 : 0)});
       in_range += row["in_range"].get<bool>();
     }
-    write_file(context.output("map.csv"), csv);
+    readings.write(context.output("map.csv"));
     if (in_range < json["readings"].size()) {
       context.warning(fmt::format(
-          "{} of {} readings of Gamma ask for a temperature outside the range of their formula (in_range: false)",
+          "{} of the {} formulas that predict T from Gamma do not apply at this Gamma (see map.csv, column in_range).",
           json["readings"].size() - in_range, json["readings"].size()));
     }
   }
@@ -193,7 +190,7 @@ class Map : public Stage {
                  {"jump", "D", "jump height of a single ball"},
                  {"rise", "D", "rise of the centre of mass"},
                  {"reduced_temperature", "1", "T/T_c"},
-                 {"in_range", "", "whether its formula applies at this Gamma", {"true", "false"}}}});
+                 {"in_range", "1", "1 where its formula applies at this Gamma, else 0", {"0", "1"}}}});
   }
 
   void state_simulated(ResultList& list) const {
@@ -210,6 +207,27 @@ class Map : public Stage {
     list.quantity("/simulated/temperature", "m g D", "temperature by the table", found);
     list.quantity("/simulated/temperature_over_mg", "m", "the same as T/(m g)", found);
     list.quantity("/simulated/reduced_temperature", "1", "the same as T/T_c", found);
+  }
+
+  // What the bed knows need not be stated again, and may not be stated otherwise.
+  void require_bed_facts(Fields& fields) const {
+    const KnownBed* known = fields.known_bed();
+    if (known != nullptr) {
+      const BedDescription& bed = known->bed;
+      const bool shakes = bed.frequency.value_or(0) > 0;
+      require_same_as_bed(fields, "diameter", diameter_, bed.diameter, dimension::length);
+      require_same_as_bed(fields, "gravity", gravity_, bed.gravity, dimension::acceleration);
+      if (shakes) require_same_as_bed(fields, "frequency", frequency_, bed.frequency, dimension::frequency);
+      if (shakes) require_same_as_bed(fields, "gamma", gamma_, bed.gamma(), dimension::none);
+    }
+    const bool simulated = known != nullptr && known->bed.mass.has_value();
+    const auto need = [&](const char* key, bool there) {
+      fields.require(there, key, fmt::format("\"{}\" is missing, and no stage in \"from\" knows it", key));
+    };
+    need("gamma", gamma_ || simulated);
+    need("frequency", frequency_ || simulated);
+    need("diameter", diameter_ || known != nullptr);
+    need("initial_height", initial_height_ || known != nullptr);
   }
 
   struct TableColumns {

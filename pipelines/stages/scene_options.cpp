@@ -439,11 +439,13 @@ BedDescription SceneOptions::description() const {
   bed.reduced = reduced_;
   bed.count = disks_.count + (disks_.second ? disks_.second->count : 0);
   bed.diameter = disks_.diameter;
+  if (disks_.second) bed.second_diameter = disks_.second->diameter;
   const double cube = disks_.diameter * disks_.diameter * disks_.diameter;
   bed.mass = reduced_ ? 1 : disks_.density * std::numbers::pi * cube / (disks_.inertia == Inertia::sphere ? 6 : 4);
   bed.gravity = gravity_.value_or(0);
   bed.width = box_.width;
   bed.periodic = std::holds_alternative<PeriodicSidesOptions>(box_.sides);
+  bed.amplitude = bed.frequency = 0;
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion)) {
     bed.amplitude = sine->amplitude;
     bed.frequency = sine->frequency;

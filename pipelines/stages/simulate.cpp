@@ -19,6 +19,7 @@
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/bed_measurement.hpp"
 #include "pipelines/stages/bed_results.hpp"
+#include "pipelines/stages/kernel_options.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "sim/engine/random.hpp"
@@ -42,13 +43,9 @@ struct FrameOptions {
   std::uint32_t count = 0;
   std::uint32_t phases = 32;
 };
-struct KernelOptions {
-  sim::KernelKind kind = sim::KernelKind::gaussian;
-  double width = 0.5;  // [D]
-};
 struct ProfileOptions {
   double spacing = 0.25;  // [D]
-  KernelOptions kernel;
+  Kernel kernel{KernelKind::gaussian, 0.5};
 };
 // Of the reservoir's temperature, before the bed settles.
 struct AnnealingStep {
@@ -151,6 +148,7 @@ class Simulate : public Stage {
   }
   Json facts() const override { return bed_.facts(); }
   void run(RunContext& context) const override;
+  std::optional<BedDescription> bed() const override;
 
  private:
   // When snapshots are taken, in reduced time. A shaken bed is looked at `phases` times a period, and every frame is
@@ -204,16 +202,8 @@ void Simulate::describe(Fields& fields) {
       "profile", profile_,
       [](Fields& f, ProfileOptions& p) {
         f.number("spacing", p.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
-        f.object<KernelOptions>(
-            "kernel", p.kernel,
-            [](Fields& g, KernelOptions& k) {
-              g.choice("kind", k.kind, {{sim::KernelKind::gaussian, "gaussian"}, {sim::KernelKind::top_hat, "top_hat"}},
-                       {.help = "a Gaussian does not alias with the rows of a crystal; a top hat of 1 D does"});
-              g.number(
-                  "width", k.width,
-                  {.help = "standard deviation (gaussian) or full width (top_hat) in D", .range = from_to(1e-3, 100)});
-            },
-            {.help = "the window through which density is measured"});
+        f.object<Kernel>("kernel", p.kernel, describe_measuring_kernel,
+                         {.help = "the window through which density is measured"});
       },
       {.help = "the density profile"});
   fields.array<AnnealingStep>(
@@ -332,7 +322,7 @@ MeasurementPlan Simulate::measurement_plan(const sim::Scene& scene) const {
   const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * temperature;
   plan.grid.points =
       static_cast<std::size_t>(std::min((loose_height - plan.grid.lowest) / plan.grid.spacing, 200'000.0));
-  plan.kernel = {profile_.kernel.kind, profile_.kernel.width};
+  plan.kernel = profile_.kernel;
   plan.observe = ObserveOptions::from(observe_);
   return plan;
 }
@@ -422,7 +412,7 @@ class Simulate::Run {
     simulation_->snapshot(at);
     final.write(frame_of(at, scene_, properties_, 0));
     final.close();
-    if (!stage_.annealing_.empty()) write_file(context_.output("schedule.csv"), schedule_text());
+    if (!stage_.annealing_.empty()) schedule_table().write(context_.output("schedule.csv"));
     if (measurement_->above_profile() > 0)
       context_.warning(std::to_string(measurement_->above_profile()) +
                        " disk positions lay above the highest bin of the profile and are missing from it");
@@ -542,25 +532,43 @@ class Simulate::Run {
     const double step = std::max(stage_.bed_.period(), 1.0);
     const double end = times_.moment(times_.periods * times_.phases);
     while (simulation_->time() < time) {
-      context_.check_interrupted();
+      stop_if_interrupted();
       const double steps_done = std::floor(simulation_->time() / step + 1e-9);
       const double goal = std::min(time, (steps_done + 1) * step);
       const double synchronisation = simulation_->next_synchronisation();
       const bool save_due = stage_.checkpoint_seconds_ > 0 &&
                             std::chrono::duration<double>(std::chrono::steady_clock::now() - last_saved_).count() >=
                                 stage_.checkpoint_seconds_;
-      const bool keep_due = simulation_->time() >= keep_at_;
+      const bool keep_due = simulation_->time() >= keep_at_ || std::chrono::steady_clock::now() >= keep_after_;
       if ((save_due || keep_due) && synchronisation <= goal) {
-        simulation_->advance_to(synchronisation);
+        advance_to(synchronisation);
         require_precision(*simulation_, sound_, folder_ / "checkpoint");
-        sound_ = state();
+        keep();
         keep_at_ = simulation_->time() + end / 16;
         if (save_due) save();
       } else {
-        simulation_->advance_to(goal);
+        advance_to(goal);
       }
       if (lead_) context_.progress(simulation_->time() / end, what);
     }
+  }
+
+  // However many events that takes, an interruption is answered within some of them, and then the latest state is saved.
+  void advance_to(double time) {
+    constexpr std::uint64_t events_between_looks = 200'000;  // 0.03 to 0.1 s
+    while (!simulation_->advance_towards(time, events_between_looks)) stop_if_interrupted();
+  }
+  void stop_if_interrupted() {
+    if (context_.interrupted() && stage_.checkpoint_seconds_ > 0 && kept_at_ > last_saved_) save();
+    context_.check_interrupted();
+  }
+
+  // The state, in memory: often enough that an interruption loses little, seldom enough to cost at most a fiftieth.
+  void keep() {
+    const auto start = std::chrono::steady_clock::now();
+    sound_ = state();
+    kept_at_ = std::chrono::steady_clock::now();
+    keep_after_ = kept_at_ + std::max<std::chrono::steady_clock::duration>(50 * (kept_at_ - start), std::chrono::seconds(2));
   }
 
   void save() {
@@ -588,19 +596,22 @@ class Simulate::Run {
     }
   }
 
-  std::string schedule_text() const {
-    std::string text =
-        "# means over the second half of each hold; temperatures in m g D, heights in D\n"
-        "step,bath_temperature,temperature,temperature_error,center_of_mass,center_of_mass_error\n";
+  Table schedule_table() const {
+    Table table("annealing: means over the second half of each hold",
+                {{"step", "1", "number of the step, from 0"},
+                 {"bath_temperature", "m g D", "temperature of the reservoir"},
+                 {"temperature", "m g D", "kinetic temperature of the disks"},
+                 {"temperature_error", "m g D", "standard error of temperature"},
+                 {"center_of_mass", "D", "height of the centre of mass"},
+                 {"center_of_mass_error", "D", "standard error of center_of_mass"}});
     for (std::size_t k = 0; k < step_means_.size(); ++k) {
       const sim::BlockedMean& means = step_means_[k];
-      text += fmt::format("{},{}", k, stage_.annealing_[k].temperature / stage_.bed_.length_unit());
-      if (means.samples() == 0)
-        text += ",,,,\n";
-      else
-        text += fmt::format(",{},{},{},{}\n", means.mean(0), means.std_error(0), means.mean(1), means.std_error(1));
+      const bool seen = means.samples() > 0;
+      const double bath = stage_.annealing_[k].temperature / stage_.bed_.length_unit();
+      table.add({count_cell(k), bath, seen ? means.mean(0) : no_number, seen ? means.std_error(0) : no_number,
+                 seen ? means.mean(1) : no_number, seen ? means.std_error(1) : no_number});
     }
-    return text;
+    return table;
   }
 
   const Simulate& stage_;
@@ -623,7 +634,7 @@ class Simulate::Run {
   double cpu_start_ = 0;
   double keep_at_ = 0;
   std::vector<std::uint8_t> sound_;
-  std::chrono::steady_clock::time_point last_saved_;
+  std::chrono::steady_clock::time_point last_saved_, kept_at_, keep_after_;
 };
 
 // ------------------------------------------------------------------------------------------------ replicas
@@ -667,20 +678,20 @@ Json joined(const std::vector<Json>& results) {
   return out;
 }
 
-std::string replicas_text(const std::vector<Json>& results) {
-  std::string text = "replica", rows;
+Table replicas_table(const std::vector<Json>& results) {
+  std::vector<Column> columns{{"replica", "1", "number of the replica, from 0"}};
   for (const auto& [key, value] : results.front().items())
-    if (value.is_object() && value.contains("std_error")) text += "," + key;
+    if (value.is_object() && value.contains("std_error"))
+      columns.push_back({key, value.value("unit", std::string("1")), key + " of the replica"});
+  Table table("each replica by itself", columns);
   for (std::size_t k = 0; k < results.size(); ++k) {
-    rows += std::to_string(k);
-    for (const auto& [key, value] : results[k].items()) {
-      if (!value.is_object() || !value.contains("std_error")) continue;
-      rows += ",";
-      if (value["value"].is_number()) rows += number_text(value["value"].get<double>());
-    }
-    rows += "\n";
+    std::vector<Cell> cells{count_cell(k)};
+    for (const auto& [key, value] : results[k].items())
+      if (value.is_object() && value.contains("std_error"))
+        cells.emplace_back(value["value"].is_number() ? value["value"].get<double>() : no_number);
+    table.add(std::move(cells));
   }
-  return text + "\n" + rows;
+  return table;
 }
 
 // The same file of every replica's measurement: mean densities, errors from their spread.
@@ -721,6 +732,12 @@ std::vector<double> joined_covariance(const std::vector<const BedMeasurement*>& 
   if (seen > own && own > 0)
     for (double& value : covariance) value *= seen / own;
   return covariance;
+}
+
+std::optional<BedDescription> Simulate::bed() const {
+  BedDescription description = bed_.description();
+  if (!annealing_.empty()) description.bath_temperature = annealing_.back().temperature / bed_.length_unit();
+  return description;
 }
 
 void Simulate::run(RunContext& context) const {
@@ -772,15 +789,13 @@ void Simulate::run(RunContext& context) const {
     std::size_t blocks = 0;
     const std::vector<double> covariance = joined_covariance(measurements, lab, blocks);
     measurements[0]->write_densities(context, lab, joined_density(measurements, true), covariance, blocks);
-    write_file(context.output("replicas.csv"), replicas_text(results));
+    replicas_table(results).write(context.output("replicas.csv"));
   }
   Json out = replicas_ > 1 ? joined(results) : results[0];
   out["collisions_per_second"] = collisions / cpu;
   out["cpu_seconds"] = cpu;
   write_file(context.output("observables.json"), dump(out));
-  BedDescription description = bed_.description();
-  if (!annealing_.empty()) description.bath_temperature = annealing_.back().temperature / bed_.length_unit();
-  write_file(context.output("bed.json"), dump(description.to_json()));
+  write_file(context.output("bed.json"), dump(bed()->to_json()));
   context.timing("cpu_seconds", cpu);
   context.timing("collisions_per_second", collisions / cpu);
   context.progress(1, "measured");

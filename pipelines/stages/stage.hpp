@@ -60,10 +60,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/json.hpp"
@@ -131,6 +133,9 @@ class Stage {
   // What follows from the options and is worth knowing before a run, as quantities: {"gamma": {...}}.
   virtual Json facts() const { return Json::object(); }
   virtual void run(RunContext& context) const = 0;
+  // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
+  // state it again, and may not state it otherwise.
+  virtual std::optional<BedDescription> bed() const { return std::nullopt; }
 };
 
 struct StageRow {

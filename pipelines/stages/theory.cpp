@@ -258,7 +258,7 @@ Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
                        {"high", quantity_json(result.window_high, "D")},
                        {"bins", result.bins},
                        {"rule", result.window_rule}};
-  out["kernel"] = Json{{"kind", fit::to_string(result.kernel.kind)}, {"width", result.kernel.width}};
+  out["kernel"] = Json{{"kind", to_string(result.kernel.kind)}, {"width", result.kernel.width}};
   out["area"] = quantity_json(result.area, "1");
   Json models = Json::array();
   for (const fit::ModelFit& model : result.model_comparison) {

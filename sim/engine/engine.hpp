@@ -63,7 +63,7 @@ class Engine final : public Simulation {
  public:
   Engine(const Scene& scene, FloorMotion floor, const std::vector<Placed>& placed);
 
-  void advance_to(double time) override;
+  bool advance_towards(double time, std::uint64_t most_events) override;
   double time() const override { return base_ + now_; }
   double next_synchronisation() const override { return base_ + synchronise_at_; }
   void snapshot(Snapshot& out) const override;
@@ -174,7 +174,8 @@ class Engine final : public Simulation {
 
   // --- contacts
   template <bool watched>
-  void process_until(double until);
+  bool process_until(double until);
+  bool go_on(double until);
   template <Order order>
   void process(std::uint32_t i, std::uint32_t k);
   void process_and_tell(std::uint32_t i, std::uint32_t k);
@@ -201,7 +202,7 @@ class Engine final : public Simulation {
   static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
   void choose_tiles();
   void leave_tiles();
-  void process_tiles_until(double until);
+  bool process_tiles_until(double until);
   bool process_window(double until);
   void queue_tile(const Tile& tile, double until);
   template <Order order>
@@ -260,7 +261,9 @@ class Engine final : public Simulation {
   std::uint64_t events_at_synchronisation_ = 0;
   double bath_at_ = never;  // next action of the reservoir
   double checked_at_ = -1;  // for rows that lock, see locked()
-  std::uint64_t events_to_check_ = 1;
+  // Events until that check, and until advance_towards() returns; in process_until() those beyond the next pause, which
+  // is after events_to_pause_ - 1 more.
+  std::uint64_t events_to_check_ = 1, events_to_return_ = 1, events_to_pause_ = 1;
   std::uint32_t crawls_ = 0;
   Random random_;
   Counters counters_;

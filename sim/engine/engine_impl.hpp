@@ -510,22 +510,40 @@ template <class Space, class Rule, class Sizes>
   for (std::uint32_t neighbour : lists_.first_block(b).disk) fetch(&disks_[neighbour]);
 }
 
+// A pause in process_until(): is there anything that forbids to go on? What is due is done, and the next pause set.
+template <class Space, class Rule, class Sizes>
+[[gnu::noinline]] bool Engine<Space, Rule, Sizes>::go_on(double until) {
+  settle();
+  if (events_to_check_ == 0 && locked()) {
+    relieve();
+    tell_all();
+  }
+  if (events_to_return_ == 0) {
+    if (now_ < until) return false;
+    events_to_return_ = 1;  // of the events at `until` none is left to the next call
+  }
+  const std::uint64_t events = std::min(events_to_check_, events_to_return_);
+  events_to_check_ -= events;
+  events_to_return_ -= events;
+  events_to_pause_ = events + 1;
+  return true;
+}
+
+// False where it returns for its number of events.
 template <class Space, class Rule, class Sizes>
 template <bool watched>
-void Engine<Space, Rule, Sizes>::process_until(double until) {
+bool Engine<Space, Rule, Sizes>::process_until(double until) {
   std::uint32_t i = 0, with = 0;
-  while (queue_.pop(until, i, with, *this)) {
+  events_to_pause_ = 1;
+  for (;;) {
+    if (--events_to_pause_ == 0) [[unlikely]] {
+      if (!go_on(until)) return false;
+      --events_to_pause_;
+    }
+    if (!queue_.pop(until, i, with, *this)) break;
     // Of so few disks that all is in the second-level cache, the lists alone are worth it.
     beyond_cache_ ? fetch_for_upcoming() : fetch_lists(3);
     now_ = disks_[i].event_time;
-    if (--events_to_check_ == 0) [[unlikely]] {
-      if (locked()) {
-        settle();
-        relieve();
-        tell_all();
-        continue;
-      }
-    }
     if constexpr (watched) {
       process_and_tell(i, with);
     } else {
@@ -534,6 +552,9 @@ void Engine<Space, Rule, Sizes>::process_until(double until) {
   }
   settle();
   now_ = until;
+  events_to_check_ += events_to_pause_;  // what was not used
+  events_to_return_ += events_to_pause_;
+  return true;
 }
 
 // The event of disk i that is due now, with disk k if k is not i: the same that its record says, but known earlier.
@@ -617,23 +638,26 @@ void Engine<Space, Rule, Sizes>::tell_all() const {
 }
 
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::advance_to(double time) {
+bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most_events) {
+  events_to_return_ = most_events;
   for (;;) {
     double goal = time - base_;
     if (std::abs(goal - synchronise_at_) <= 8 * std::numeric_limits<double>::epsilon() * std::abs(time))
       goal = synchronise_at_;
-    if (!(goal > now_)) return;
+    if (!(goal > now_)) return true;
     const double until = std::min({goal, synchronise_at_, bath_at_});
+    bool arrived = true;
     if (tiles_.empty()) {
-      watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
+      arrived = watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
     } else if constexpr (tiles_apply) {
-      process_tiles_until(until);
+      arrived = process_tiles_until(until);
     }
+    if (!arrived) return false;
     if (now_ == bath_at_) act_bath();
     if (now_ == synchronise_at_) {
-      const bool arrived = goal == synchronise_at_;  // before the next one is set
+      const bool is_goal = goal == synchronise_at_;  // before the next one is set
       synchronise();
-      if (arrived || !(time - base_ > 0)) return;
+      if (is_goal || !(time - base_ > 0)) return true;
     }
   }
 }

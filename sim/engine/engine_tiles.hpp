@@ -57,22 +57,24 @@ void Engine<Space, Rule, Sizes>::leave_tiles() {
 }
 
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::process_tiles_until(double until) {
+bool Engine<Space, Rule, Sizes>::process_tiles_until(double until) {
   while (now_ < until) {
+    if (events_to_return_ == 0) return false;
     const double longest = std::min(events_a_window * count_ / rate_in_tiles_, longest_window_);
     const double windows = std::ceil((until - now_) / longest);
     const double start = now_, end = windows > 1 ? start + (until - start) / windows : until;
     const std::uint64_t before = counters_.events();
     if (longest < shortest_window || !process_window(end)) {  // something has locked
       leave_tiles();
-      process_until<false>(until);
-      return;
+      return process_until<false>(until);
     }
     const std::uint64_t events = counters_.events() - before;
+    events_to_return_ -= std::min(events, events_to_return_);
     const double rate = static_cast<double>(events) / (end - start);
     const bool tells = events > count_ / 8;  // some windows are very short
     rate_in_tiles_ = tells ? rate : std::clamp(rate, rate_in_tiles_ / 8, 8 * rate_in_tiles_);
   }
+  return true;
 }
 
 // False if there is no end of events: then now_ is that of the latest one up to which all is known.

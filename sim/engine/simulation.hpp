@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -67,7 +68,10 @@ class Simulation {
   virtual ~Simulation() = default;
   // Runs to the given time since the start (never backwards). Its events do not depend on where one stops to look; in
   // beds that go on tile by tile (see engine_tiles.hpp) their rounding does.
-  virtual void advance_to(double time) = 0;
+  void advance_to(double time) { advance_towards(time, std::numeric_limits<std::uint64_t>::max()); }
+  // The same, but returns after about so many events (at least 1) wherever it is then: whether it arrived. Called again
+  // until it has, it makes the same bytes as advance_to(); between the calls nothing is to be asked of the run.
+  virtual bool advance_towards(double time, std::uint64_t most_events) = 0;
   virtual double time() const = 0;
   virtual void snapshot(Snapshot& out) const = 0;
   virtual DiskProperties properties() const = 0;

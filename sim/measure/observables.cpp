@@ -7,65 +7,6 @@
 
 namespace shakebed::sim {
 
-namespace {
-
-// A Gaussian of unit height about `centre`, by grid points from `first` to `last`, added to `density`. By the point
-// nearest to its centre and ratios from point to point: two exponentials instead of one a point; after k points to
-// 1e-16 k of the value there. falls: exp(-k^2 step^2 / 2), `step` being the grid's spacing in the Gaussian's width.
-void add_gaussian(double centre, double weight, double step, const std::vector<double>& falls, double first,
-                  double last, std::vector<double>& density) {
-  const double nearest = std::clamp(std::round(centre), first, last);
-  const double away = (nearest - centre) * step;
-  const double value = weight * std::exp(-0.5 * away * away), ratio = std::exp(-away * step);
-  const auto middle = static_cast<std::size_t>(nearest);
-  const auto above = static_cast<std::size_t>(last - nearest), below = static_cast<std::size_t>(nearest - first);
-  density[middle] += value;
-  double here = value;
-  for (std::size_t k = 1; k <= above; ++k) density[middle + k] += falls[k] * (here *= ratio);
-  here = value;
-  const double downwards = 1 / ratio;
-  for (std::size_t k = 1; k <= below; ++k) density[middle - k] += falls[k] * (here *= downwards);
-}
-
-}  // namespace
-
-void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
-                 double shift, std::vector<double>& density) {
-  const bool gaussian = kernel.kind == KernelKind::gaussian;
-  const double reach = gaussian ? 6 * kernel.width : kernel.width / 2;
-  const double weight =
-      gaussian ? 1 / (width * kernel.width * std::sqrt(2 * std::numbers::pi)) : 1 / (width * kernel.width);
-  const double step = grid.spacing / kernel.width;
-  std::vector<double> falls;
-  if (gaussian) {
-    const double most = std::min(static_cast<double>(grid.points), std::floor(2 * reach / grid.spacing) + 2);
-    falls.resize(static_cast<std::size_t>(most));
-    for (std::size_t k = 0; k < falls.size(); ++k) {
-      const double away = static_cast<double>(k) * step;
-      falls[k] = std::exp(-0.5 * away * away);
-    }
-  }
-  for (double z : heights) {
-    const double place = (z - shift - grid.lowest) / grid.spacing;
-    if (std::isnan(place)) {  // nowhere in particular: not to be left out
-      std::fill(density.begin(), density.end(), place);
-      return;
-    }
-    const double first = std::max(0.0, std::ceil(place - reach / grid.spacing));
-    const double last = std::min(static_cast<double>(grid.points) - 1, std::floor(place + reach / grid.spacing));
-    if (!(first <= last)) continue;
-    if (gaussian) {
-      add_gaussian(place, weight, step, falls, first, last, density);
-      continue;
-    }
-    for (auto i = static_cast<std::size_t>(first); i <= static_cast<std::size_t>(last); ++i) {
-      const double distance = (static_cast<double>(i) - place) * grid.spacing;
-      const bool on_edge = std::abs(std::abs(distance) - reach) < 1e-12;  // of two windows: half to each
-      density[i] += on_edge ? 0.5 * weight : weight;
-    }
-  }
-}
-
 double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) {
   const auto full = static_cast<std::uint32_t>(std::floor(width * (1 + 1e-12)));
   const bool room_for_shift = !hard_sides || width - full >= 0.5;
@@ -105,7 +46,7 @@ enum Scalar : std::size_t { centre, t_x, spin_t, bottom_row, scalar_count };
 
 }  // namespace
 
-BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const ProfileGrid& grid,
+BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const HeightGrid& grid,
                          const Kernel& kernel)
     : width_(scene.box.width),
       masses_(disks.mass),

@@ -7,21 +7,9 @@
 
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/statistics.hpp"
+#include "statistics/kernel.hpp"
 
 namespace shakebed::sim {
-
-// The window through which a density is measured: the profile is the true one convolved with it.
-enum class KernelKind { top_hat, gaussian };
-struct Kernel {
-  KernelKind kind = KernelKind::gaussian;
-  double width = 0.5;  // full width of a top hat, standard deviation of a Gaussian, in D
-};
-
-struct ProfileGrid {
-  double lowest = 0, spacing = 0.25;  // heights lowest + i spacing, in D
-  std::size_t points = 0;
-  double height(std::size_t i) const { return lowest + static_cast<double>(i) * spacing; }
-};
 
 struct Profile {
   std::vector<double> height;          // D, above the floor's mean position (or the floor itself)
@@ -29,10 +17,6 @@ struct Profile {
   std::vector<double> std_error;       // allows for correlation in time
   std::uint64_t samples = 0;           // snapshots
 };
-
-// Adds every disk's kernel, per unit width, to density[i]. heights: of the disks' centres.
-void add_density(const ProfileGrid& grid, const Kernel& kernel, double width, const std::vector<double>& heights,
-                 double shift, std::vector<double>& density);
 
 // Height of the centre of mass of count equal disks packed hexagonally on a floor at 0: rows of floor(width), in a hard
 // box alternately one less where half a diameter is missing.
@@ -45,7 +29,7 @@ std::string precision_lost(const Simulation& simulation);
 // Collects snapshots taken at `phases` moments of each period, in order, and averages over whole periods.
 class BedObserver {
  public:
-  BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const ProfileGrid& grid,
+  BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const HeightGrid& grid,
               const Kernel& kernel);
 
   // The snapshot at the given phase, 0 <= phase < phases; phase 0 begins a period.
@@ -90,7 +74,7 @@ class BedObserver {
   std::vector<double> masses_;
   std::vector<double> inertias_;  // I of each disk
   std::uint32_t phases_;
-  ProfileGrid grid_;
+  HeightGrid grid_;
   Kernel kernel_;
   std::size_t layer_count_;
   double layer_bottom_;

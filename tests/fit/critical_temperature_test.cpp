@@ -40,6 +40,45 @@ TEST(CriticalTemperature, ToleratesNoiseThatIsNotMonotone) {
   EXPECT_NEAR(crossing.temperature.value, 0.325, 1e-12);
 }
 
+// A quarter of the way from a point known to 0.003 to one known to 0.01, 0.2 m g D apart and 0.04 in value: the line's
+// value there has the variance (3/4)^2 0.003^2 + (1/4)^2 0.01^2, and T that over the slope of 0.2.
+TEST(CriticalTemperature, ItsErrorWeighsTheNeighboursByTheirDistance) {
+  const std::vector<TemperaturePoint> points{{0.1, 1.14, 0.003}, {0.3, 1.10, 0.01}};
+  const ThresholdCrossing crossing = threshold_temperature(points, 1.13);
+  ASSERT_EQ(crossing.status, ValueStatus::ok);
+  EXPECT_NEAR(crossing.temperature.value, 0.15, 1e-12);
+  EXPECT_NEAR(crossing.temperature.std_error, std::sqrt(0.5625 * 9e-6 + 0.0625 * 1e-4) / 0.2, 1e-12);
+}
+
+// Two points in the wrong order, known to 0.01 and 0.02, become one with four fifths of the first's place and value.
+TEST(CriticalTemperature, PoolsByTheWeightsOfThePoints) {
+  const std::vector<TemperaturePoint> points{{0.1, 1.10, 0.01}, {0.2, 1.13, 0.02}, {0.4, 1.05, 0.01}};
+  const ThresholdCrossing crossing = threshold_temperature(points, 1.08);
+  ASSERT_EQ(crossing.status, ValueStatus::ok);
+  // Between (0.12, 1.106), of variance 1/12,500, and (0.4, 1.05), of variance 1/10,000; slope 0.2.
+  const double part = 0.026 / 0.056;
+  EXPECT_NEAR(crossing.temperature.value, 0.12 + part * 0.28, 1e-12);
+  EXPECT_NEAR(crossing.temperature.std_error, std::sqrt((1 - part) * (1 - part) / 12500 + part * part / 10000) / 0.2,
+              1e-12);
+}
+
+// 4,000 draws of the two points: T scatters by what is stated, to four standard errors of a standard deviation (4.5 %).
+TEST(CriticalTemperature, ItsErrorIsWhatItScattersBy) {
+  synthetic::Normal normal(11);
+  double sum = 0.0, squares = 0.0, stated = 0.0;
+  constexpr int draws = 4000;
+  for (int i = 0; i < draws; ++i) {
+    const std::vector<TemperaturePoint> points{{0.1, 1.14 + 0.0004 * normal(), 0.0004},
+                                               {0.3, 1.10 + 0.0015 * normal(), 0.0015}};
+    const ThresholdCrossing crossing = threshold_temperature(points, 1.13);
+    ASSERT_EQ(crossing.status, ValueStatus::ok);
+    sum += crossing.temperature.value / draws;
+    squares += crossing.temperature.value * crossing.temperature.value / draws;
+    stated += crossing.temperature.std_error / draws;
+  }
+  EXPECT_NEAR(std::sqrt(squares - sum * sum) / stated, 1.0, 4.0 / std::sqrt(2.0 * draws));
+}
+
 TEST(CriticalTemperature, HasAStatusWhereNothingCrosses) {
   const std::vector<TemperaturePoint> points{{0.1, 1.15, 0.0}, {0.2, 1.10, 0.0}};
   EXPECT_EQ(threshold_temperature(points, 1.16).status, ValueStatus::outside_range);

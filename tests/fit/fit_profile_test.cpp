@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -285,28 +284,6 @@ TEST(FitProfile, ReportsWindowSweepComparisonCurveAndInterval) {
               0.1 * fit.temperature.std_error);
   EXPECT_GT(fit.temperature_interval.high, fit.temperature.value);
   EXPECT_LT(fit.temperature_interval.low, fit.temperature.value);
-}
-
-TEST(FitProfile, AHundredBinsTakeAMillisecond) {
-  const auto truth = HydrostaticProfile::of_column(enskog(), 0.12, {11.22, 1.10});
-  for (const Kernel& kernel : all_kernels) {
-    const Profile data = profile_of(truth, kernel, 100, 12.5, 0.01, 11);
-    FitOptions options = core_options(1.10);
-    options.kernel = kernel;
-    double best = 1e9;
-    for (int repeat = 0; repeat < 7; ++repeat) {
-      const auto start = std::chrono::steady_clock::now();
-      const FitResult fit = fit_profile(data, options);
-      const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-      ASSERT_EQ(fit.status, FitStatus::ok);
-      best = std::min(best, took.count());
-    }
-    std::printf("[ measured ] 100 bins, kernel %s: %.3f ms (target 1, optimised build)\n",
-                std::string(to_string(kernel.kind)).c_str(), best);
-#if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__)
-    EXPECT_LE(best, 5.0) << "five times the target: not load, but a lost optimisation";
-#endif
-  }
 }
 
 // --- hard cases
@@ -642,6 +619,7 @@ TEST(FitHardCases, AnyProfileEndsInFiniteTimeWithFiniteNumbers) {
     if (uniform() < 0.2) options.fixed_temperature = std::exp(3.0 * normal());
     if (uniform() < 0.2) options.window.low = range * uniform();
     options.base = normal();
+    options.sweep = options.compare = seed % 40 < 8;  // every model in turn; they cost thirty fits
     const FitResult fit = fit_profile(data, options);
     EXPECT_FALSE(any_number_is_not_finite(fit)) << seed << " " << to_string(fit.status);
     EXPECT_TRUE(fit.ok() || !fit.message.empty()) << seed << " " << to_string(fit.status);

@@ -175,12 +175,9 @@ TEST(Kernels, AreNormalisedAndNamed) {
       // a step of the sum at each edge of a top hat
       EXPECT_NEAR(kernel_cumulative(kernel, s), sum, (s + 4.0) / steps / kernel.width);
     }
-    KernelKind back = KernelKind::none;
-    EXPECT_TRUE(kernel_kind_from_string(to_string(kernel.kind), back));
-    EXPECT_EQ(back, kernel.kind);
+    EXPECT_EQ(kernel_kind_from(to_string(kernel.kind)), kernel.kind);
   }
-  KernelKind kind = KernelKind::none;
-  EXPECT_FALSE(kernel_kind_from_string("boxcar", kind));
+  EXPECT_FALSE(kernel_kind_from("boxcar"));
 }
 
 TEST(FermiProfile, CenterOfMassRisesAsTheLowTemperatureForm) {

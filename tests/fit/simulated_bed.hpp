@@ -32,7 +32,7 @@ struct BedRun {
   int frames = 100;
   std::uint64_t seed = 1;
   double spacing = 1;  // of the profile's points [D]
-  sim::Kernel kernel{sim::KernelKind::top_hat, 1};
+  Kernel kernel{KernelKind::top_hat, 1};
   double rate = 0.3;  // of the bath
 };
 
@@ -49,7 +49,7 @@ ProfileFrames profiles_of(const BedRun& run, Look&& look) {
   scene.seed = run.seed;
   const auto simulation = sim::simulate(scene);
   const auto points = static_cast<std::size_t>((60 + 12 * run.temperature) / run.spacing);
-  const sim::ProfileGrid grid{0.5 * run.spacing, run.spacing, points};
+  const HeightGrid grid{0.5 * run.spacing, run.spacing, points};
   ProfileFrames frames;
   for (std::size_t i = 0; i < points; ++i) frames.height.push_back(grid.height(i));
   frames.number_density.assign(points * static_cast<std::size_t>(run.frames), 0.0);

@@ -52,7 +52,7 @@ TEST_F(StudyTables, TellTheTemperaturesAtWhichThresholdsAreCrossed) {
   EXPECT_TRUE(density[2]["temperature"].is_null());
   EXPECT_THAT(ran.err, HasSubstr("1 of 4 thresholds are not crossed"));
   EXPECT_EQ(json["T_c_prime"]["series"]["all"][0]["status"], "ok");
-  EXPECT_THAT(read_text(folder_ / "o/critical/critical.csv"), HasSubstr("\"all\",T_c,1.13,"));
+  EXPECT_THAT(read_text(folder_ / "o/critical/critical.csv"), HasSubstr("\nall,T_c,1.13,"));
   const ProgramResult refused = run(study + R"(, { "stage": "critical", "from": "beds", "density": "botom_density" })");
   EXPECT_EQ(refused.exit_code, 4);
   EXPECT_THAT(refused.err, HasSubstr("did you mean \"bottom_density\"?"));

@@ -11,6 +11,7 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/profile_csv.hpp"
 #include "pipelines/formats/sha256_block.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "tests/pipelines/program.hpp"
@@ -271,7 +272,8 @@ TEST(Zstd, GivesTheSameBytesBackAndRefusesDamage) {
 TEST(ProfileCsv, ComesBackTheSame) {
   ScratchFolder folder;
   ProfileTable table;
-  table.comments = {"kernel: gaussian", "kernel_width: 0.5"};
+  table.kernel = shakebed::Kernel{shakebed::KernelKind::gaussian, 0.5};
+  table.column_number = 10.2;
   for (int i = 0; i < 20; ++i) {
     table.height.push_back(0.25 * i), table.number_density.push_back(1.0 / (1 + i)),
         table.std_error.push_back(0.01 / 3);
@@ -284,8 +286,9 @@ TEST(ProfileCsv, ComesBackTheSame) {
   EXPECT_EQ(back.std_error, table.std_error);
   EXPECT_EQ(back.area_fraction, table.area_fraction);
   EXPECT_EQ(back.samples, table.samples);
-  EXPECT_EQ(back.comment("kernel"), "gaussian");
-  EXPECT_EQ(profile_text(back), profile_text(table));
+  EXPECT_EQ(back.kernel, table.kernel);
+  EXPECT_EQ(back.column_number, table.column_number);
+  EXPECT_TRUE(back.notes.empty());
 }
 
 TEST(ProfileCsv, ReadsWhatPeopleHave) {
@@ -297,8 +300,34 @@ TEST(ProfileCsv, ReadsWhatPeopleHave) {
     const ProfileTable table = read_profile_csv(folder / "p.csv");
     EXPECT_EQ(table.height, (std::vector<double>{1, 2})) << text;
     EXPECT_EQ(table.number_density, (std::vector<double>{0.75, 0.5})) << text;
-    EXPECT_LT(table.std_error[0], 0) << "unknown errors are not 0";
+    EXPECT_TRUE(table.std_error.empty()) << "unknown errors are not 0";
   }
+}
+
+TEST(ProfileCsv, RowsWithoutAnErrorTakeThatOfTheNearestHeight) {
+  ScratchFolder folder;
+  write_text(folder / "p.csv", "height,phi,sigma\n0,1,0\n1,1,0.1\n2,1,\n3,1,0.3\n5,1,0\n");
+  const ProfileTable table = read_profile_csv(folder / "p.csv");
+  EXPECT_EQ(table.std_error, (std::vector<double>{0.1, 0.1, 0.3, 0.3, 0.3})) << "half way: the larger one";
+  ASSERT_EQ(table.notes.size(), 1U);
+  EXPECT_THAT(table.notes[0], HasSubstr("3 of 5 rows have no standard error or one of 0 (lines 2, 4, 6)"));
+}
+
+TEST(ProfileCsv, CommentsOfUsersNameKernelAndColumnNumber) {
+  ScratchFolder folder;
+  using shakebed::Kernel;
+  using shakebed::KernelKind;
+  const auto read = [&](const std::string& comments) {
+    write_text(folder / "p.csv", comments + "z,phi\n1,1\n");
+    return read_profile_csv(folder / "p.csv");
+  };
+  EXPECT_EQ(read("").kernel, std::nullopt);
+  EXPECT_EQ(read("# kernel: top_hat:0.25\n").kernel, (Kernel{KernelKind::top_hat, 0.25}));
+  EXPECT_EQ(read("# kernel: disk_chord\n# kernel_width: 1\n").kernel, (Kernel{KernelKind::disk_chord, 1}));
+  EXPECT_EQ(read("# kernel: none\n").kernel, (Kernel{KernelKind::none, 0}));
+  EXPECT_EQ(read("# column_number: 10.2\n").column_number, 10.2);
+  EXPECT_THROW(read("# kernel: top-hat\n"), InputError);
+  EXPECT_THROW(read("# column_number: many\n"), InputError);
 }
 
 TEST(ProfileCsv, DamageIsNamedWithItsLine) {

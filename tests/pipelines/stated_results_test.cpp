@@ -63,8 +63,11 @@ class Comparison {
     compare_value(*stated, json, pointer);
     if (!is_quantity(json)) return;
     for (const auto& [key, value] : json.items()) {  // what stands beside value, std_error and unit
-      if (stage_.results->find(pointer_join(pointer, key)) == nullptr)
+      const StatedResult* part = stage_.results->find(pointer_join(pointer, key));
+      if (part == nullptr)
         fail("gives " + pointer_join(pointer, key) + ", which it does not state");
+      else if (part != stated)
+        walk(value, pointer_join(pointer, key));
     }
   }
 
@@ -163,7 +166,7 @@ TEST(StatedResults, OfAFilm) {
       "settle": "0.5 s", "measure": "0.4 s", "frames": { "count": 256, "phases": 32 } },
     { "stage": "render", "from": "bed", "scale": "0.2 mm/px" },
     { "stage": "extract", "from": "render", "diameter": "3 mm", "frame_rate": "640 Hz", "frequency": "20 Hz",
-      "bead_number": 60, "kernel": "top_hat", "kernel_width": 1 },
+      "bead_number": 60, "kernel": { "kind": "top_hat", "width": 1 } },
     { "stage": "figure", "from": ["bed", "extract"], "reference": "clement-rajchenbach-1991" } ] })");
 }
 

@@ -49,7 +49,7 @@ FitOptions options_of(const Method& method, const BedRun& run, double fluid_from
   FitOptions options;
   options.model = method.model;
   options.plateau_density_free = method.plateau_free;
-  options.kernel = {run.kernel.kind == sim::KernelKind::gaussian ? KernelKind::gaussian : KernelKind::top_hat,
+  options.kernel = {run.kernel.kind == KernelKind::gaussian ? KernelKind::gaussian : KernelKind::top_hat,
                     run.kernel.width};
   options.base = bed_base;
   if (method.column_known) options.column_number = run.bed.column().column_number;
@@ -138,7 +138,7 @@ TEST(Thermometer, FluidAt40CriticalTemperatures) { expect_fluid(40, 5); }
 BedRun crystal_run() {
   BedRun run;
   run.settle = 150, run.interval = 2, run.spacing = 0.25;
-  run.kernel = {sim::KernelKind::gaussian, row_blur};
+  run.kernel = {KernelKind::gaussian, row_blur};
   return run;
 }
 const std::vector<Method> all_methods{{"enskog-rectangle", "rule"},

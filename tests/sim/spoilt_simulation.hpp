@@ -21,7 +21,9 @@ class Spoilt : public Simulation {
   EnergyLedger ledger;
   double overlap = 0;
 
-  void advance_to(double time) override { sound_->advance_to(time); }
+  bool advance_towards(double time, std::uint64_t most_events) override {
+    return sound_->advance_towards(time, most_events);
+  }
   double time() const override { return sound_->time(); }
   void snapshot(Snapshot& out) const override { sound_->snapshot(out); }
   DiskProperties properties() const override { return sound_->properties(); }

@@ -111,54 +111,6 @@ TEST(BlockedCovariance, KnowsThatOfAShortSeriesWithALongMemory) {
   }
 }
 
-// Whatever the kernel, the area under the density is the number of disks over the width.
-TEST(Density, HasTheDisksUnderIt) {
-  const ProfileGrid grid{-2, 0.05, 400};
-  Random random(43);
-  std::vector<double> heights(300);
-  for (double& z : heights) z = 3 + 10 * random.uniform();
-  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.3}, Kernel{KernelKind::top_hat, 0.7}}) {
-    std::vector<double> density(grid.points);
-    add_density(grid, kernel, 30, heights, 0, density);
-    double area = 0;
-    for (double value : density) area += value * grid.spacing;
-    EXPECT_NEAR(area, 10, kernel.kind == KernelKind::gaussian ? 1e-7 : 0.05);
-  }
-}
-
-// The Gaussians are told from point to point; here each point's value from its own exponential. Disks inside, at the
-// edges and beyond them, grids finer and coarser than the kernel.
-TEST(Density, IsTheSumOfTheKernels) {
-  Random random(44);
-  for (const double spacing : {0.002, 0.05, 0.4, 3.0}) {
-    const ProfileGrid grid{-1, spacing, static_cast<std::size_t>(9 / spacing)};
-    const double top = grid.lowest + spacing * static_cast<double>(grid.points), width = 0.25;
-    for (int i = 0; i < 200; ++i) {
-      const double z = grid.lowest - 2 + (top - grid.lowest + 4) * random.uniform(), shift = random.uniform() - 0.5;
-      std::vector<double> density(grid.points);
-      add_density(grid, {KernelKind::gaussian, width}, 30, {z}, shift, density);
-      for (std::size_t k = 0; k < grid.points; ++k) {
-        const double away = (grid.lowest + spacing * static_cast<double>(k) + shift - z) / width;
-        const double value = std::exp(-0.5 * away * away) / (30 * width * std::sqrt(2 * std::numbers::pi));
-        if (std::abs(away) > 6 + 1e-9) {
-          ASSERT_EQ(density[k], 0) << z << ' ' << k;
-        } else if (std::abs(away) < 6 - 1e-9) {
-          ASSERT_NEAR(density[k], value, 1e-12 * value) << z << ' ' << k;
-        }
-      }
-    }
-  }
-}
-
-TEST(Density, DoesNotHideAPlaceThatIsNoNumber) {
-  const ProfileGrid grid{-1, 0.05, 100};
-  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.3}, Kernel{KernelKind::top_hat, 0.7}}) {
-    std::vector<double> density(grid.points);
-    add_density(grid, kernel, 30, {1, std::nan("")}, 0, density);
-    for (double value : density) EXPECT_TRUE(std::isnan(value));
-  }
-}
-
 // 306 disks in a hard box of 30 D: 4.561 D, as in the independent simulation of this bed.
 TEST(IdealPacking, HasTheCentreOfMassOfAlternateRows) {
   EXPECT_NEAR(ideal_centre_of_mass(306, 30, true), 4.561, 5e-4);

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double true_temperature = 0.12, plateau = 1.10, column = 11.22;
 
-fit::Profile exact_profile(int bins, const fit::Kernel& kernel, double highest = 13) {
+fit::Profile exact_profile(int bins, const Kernel& kernel, double highest = 13) {
   const auto truth = fit::HydrostaticProfile::of_column(fit::enskog(), true_temperature, {column, plateau});
   fit::Profile data;
   for (int i = 0; i < bins; ++i) data.height.push_back(highest * (i + 0.5) / bins);
@@ -30,7 +30,7 @@ fit::Profile exact_profile(int bins, const fit::Kernel& kernel, double highest =
   return data;
 }
 
-fit::FitOptions plain_options(const fit::Kernel& kernel) {
+fit::FitOptions plain_options(const Kernel& kernel) {
   fit::FitOptions options;
   options.plateau_density = plateau;
   options.kernel = kernel;
@@ -109,7 +109,7 @@ void room_benchmark(const Effort& effort, StageResult& result) {
 // What a fit keeps, by its bins.
 void memory_growth(const Effort& effort, StageResult& result) {
   effort.step("fit: memory by bins");
-  const fit::Kernel kernel{fit::KernelKind::gaussian, 0.5};
+  const Kernel kernel{KernelKind::gaussian, 0.5};
   Table table{"Memory of a fit by the number of bins",
               "resident, at its peak, the profile included; 0: no new page of memory was needed",
               {"bins", "memory [MB]"},
@@ -184,7 +184,7 @@ double bound_of_temperature(const fit::FitOptions& options, const fit::Profile& 
 
 void statistics(const Effort& effort, StageResult& result) {
   effort.step("fit: noise and the Cramer-Rao bound");
-  const fit::Kernel kernel{fit::KernelKind::gaussian, 0.5};
+  const Kernel kernel{KernelKind::gaussian, 0.5};
   const int replicas = effort.quick ? 60 : 1000;
   Table table{"Fits of noisy profiles, 52 bins of 0.25 D",
               fmt::format("{} noisy profiles a row; noise: of the density of a bin, 0.05/sqrt(frames); bound: "
@@ -267,7 +267,7 @@ void hard_cases(const Effort& effort, StageResult& result) {
     effort.check_interrupted();
     result.hard_cases.push_back(run_hard_case(name, unit, limit, 2, work));
   };
-  const fit::Kernel none{}, gaussian{fit::KernelKind::gaussian, 0.5};
+  const Kernel none{}, gaussian{KernelKind::gaussian, 0.5};
   for (const double phi : {1e-300, 1e-8, 0.5, fit::close_packing_density}) {
     add(fmt::format("f and back at phi = {:.4g}", phi), "relative", 2e-14, [&](HardCase& one) {
       const fit::Value f = fit::enskog().f(phi), back = fit::enskog().density_from_f(f.value);
@@ -307,7 +307,7 @@ void hard_cases(const Effort& effort, StageResult& result) {
     refusal_case(one, data, plain_options(gaussian));
   });
   add("wide kernel (2 D) over a tail of 0.12 D", "relative", 1e-3, [&](HardCase& one) {
-    const fit::Kernel wide{fit::KernelKind::gaussian, 2};
+    const Kernel wide{KernelKind::gaussian, 2};
     fit_case(one, exact_profile(100, wide, 20), plain_options(wide), true_temperature);
   });
   add("errors over nine decades", "relative", 1e-3, [&](HardCase& one) {

@@ -1,0 +1,103 @@
+#include "fit/profile_fit/fit_setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shakebed::fit {
+
+namespace {
+
+// A tail of 100 T much shorter than a bin is a step: T below this part of a bin cannot be told from zero.
+constexpr double lowest_temperature_in_bins = 1e-5;
+// However the user rounded 2/sqrt 3.
+constexpr double rounding = 1e-12;
+
+bool positive(double value) { return std::isfinite(value) && value > 0.0; }
+
+FitStatus check_options(const FitOptions& options, const FitModel& model, FitResult& result) {
+  if (!positive(options.plateau_density)) return bad_input(result, "the plateau density must be positive");
+  if (options.column_number && !positive(*options.column_number)) {
+    return bad_input(result, "the column number N D/W must be positive");
+  }
+  if (options.fixed_temperature && !positive(*options.fixed_temperature)) {
+    return bad_input(result, "the fixed temperature must be positive");
+  }
+  if (options.fixed_shift && !std::isfinite(*options.fixed_shift)) {
+    return bad_input(result, "the fixed shift is not a finite number");
+  }
+  if (options.fixed_shift && model.place_is_column()) {
+    return bad_input(result, "a whole column has no shift of its own to fix: fix N D/W instead");
+  }
+  if (!kernel_is_valid(options.kernel)) return bad_input(result, "the kernel's width must be finite and not negative");
+  if (!std::isfinite(options.base)) return bad_input(result, "the base is not a finite number");
+  if (!(options.confidence > 0.0 && options.confidence < 1.0)) {
+    return bad_input(result, "the confidence must lie between 0 and 1");
+  }
+  return FitStatus::ok;
+}
+
+bool is_whole_column(const FitOptions& options) { return options.model.starts_with("hydrostatic:"); }
+
+FitStatus check_plateau(const FitOptions& options, const FitModel& model, FitResult& result) {
+  if (options.plateau_density > close_packing_density * (1.0 + rounding)) {
+    result.message = "the plateau density " + number(options.plateau_density, 5) +
+                     " is above close packing, 2/sqrt 3 = 1.1547: there are no such disks";
+    return FitStatus::undefined_model;
+  }
+  if (!is_whole_column(options) && options.plateau_density > model.largest_plateau() * (1.0 + rounding)) {
+    result.message = "the equation of state has no value at the plateau density " + number(options.plateau_density, 5);
+    return FitStatus::undefined_model;
+  }
+  return FitStatus::ok;
+}
+
+std::array<bool, 3> free_parameters(const FitOptions& options, const FitModel& model) {
+  std::array<bool, 3> free{model.uses_temperature() && !options.fixed_temperature, true, options.plateau_density_free};
+  if (model.place_is_column()) {
+    free[FitModel::place] = !options.column_number.has_value();
+    // Only a column with a rectangle knows its density.
+    if (is_whole_column(options) && model.equation().has_pole()) free[FitModel::plateau] = false;
+  } else if (options.fixed_shift) {
+    free[FitModel::place] = false;
+  }
+  return free;
+}
+
+FitModel::Parameters first_guess(const FitOptions& options, const FitModel& model) {
+  FitModel::Parameters start{options.fixed_temperature.value_or(1.0), 0.0,
+                             std::min(options.plateau_density, close_packing_density)};
+  if (model.place_is_column() && options.column_number) start[FitModel::place] = *options.column_number;
+  if (options.fixed_shift) start[FitModel::place] = *options.fixed_shift;
+  if (options.model == "rectangle") start[FitModel::temperature] = 1.0;
+  return start;
+}
+
+}  // namespace
+
+FitStatus make_setup(const FitOptions& options, const MeasuredProfile& measured, FitSetup& setup, FitResult& result) {
+  if (options.constrain_column && !options.column_number) {
+    return bad_input(result, "constrain_column needs the column number N D/W");
+  }
+  const double resolution = measured.spacing > 0.0 ? measured.spacing : 1.0;
+  setup.model = make_fit_model(options.model, options.base, options.constrain_column, resolution);
+  if (!setup.model) return bad_input(result, "there is no model named '" + options.model + "'");
+  const FitModel& model = *setup.model;
+  FitStatus status = check_options(options, model, result);
+  if (status == FitStatus::ok) status = check_plateau(options, model, result);
+  if (status != FitStatus::ok) return status;
+
+  LeastSquaresOptions& least_squares = setup.least_squares;
+  least_squares.free = free_parameters(options, model);
+  least_squares.kernel = KernelRule(options.kernel);
+  least_squares.robust = options.robust;
+  least_squares.robust_threshold = options.robust_threshold;
+  least_squares.errors_known = measured.errors_known;
+  least_squares.max_iterations = options.max_iterations;
+  least_squares.lowest_temperature = lowest_temperature_in_bins * resolution;
+  setup.start = first_guess(options, model);
+  setup.parameters = static_cast<int>(std::count(least_squares.free.begin(), least_squares.free.end(), true));
+  setup.model_error = options.model_error;
+  return FitStatus::ok;
+}
+
+}  // namespace shakebed::fit

@@ -1,0 +1,31 @@
+// The kernel as an option: {"kind": "gaussian", "width": 0.5}, the same in every stage.
+#pragma once
+
+#include "pipelines/formats/config.hpp"
+#include "statistics/kernel.hpp"
+
+namespace shakebed::pipelines {
+
+inline void describe_kernel(Fields& fields, Kernel& kernel) {
+  std::vector<Choice<KernelKind>> choices;
+  for (const KernelKind kind : kernel_kinds) choices.push_back({kind, to_string(kind)});
+  fields.choice(
+      "kind", kernel.kind, choices,
+      {.help = "none: densities at points. A Gaussian does not alias with the rows of a crystal; a top hat of "
+               "1 D does. disk_chord: covered area"});
+  fields.number("width", kernel.width,
+                {.help = "standard deviation (gaussian), full width (top_hat) or diameter (disk_chord) in D",
+                 .range = from_to(0, 100)});
+}
+
+// The same for a stage that measures a density, which needs a window of some width.
+inline void describe_measuring_kernel(Fields& fields, Kernel& kernel) {
+  describe_kernel(fields, kernel);
+  if (!fields.decoding()) return;
+  fields.require(kernel.kind != KernelKind::none, "kind", "a density is measured through a window of some width",
+                 "Choose gaussian, top_hat or disk_chord");
+  fields.require(kernel.kind == KernelKind::none || kernel.width >= 1e-3, "width",
+                 "must be at least 0.001 D to measure a density");
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,113 @@
+#include "fit/profile_fit/least_squares.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fit/theory/expansion.hpp"
+#include "tests/fit/synthetic.hpp"
+
+// The solver's covariance, by formulas written out here for two parameters with derivatives by differences: nothing of
+// the solver but the place of its minimum enters.
+namespace shakebed::fit {
+namespace {
+
+struct Problem {
+  Bins bins;
+  LeastSquaresOptions options;
+  FitModel::Parameters start{0.12, 8.0, 1.10};
+  std::unique_ptr<FitModel> model = make_fit_model("enskog-rectangle", 0.0, false, 0.25);
+};
+
+// 60 bins, T = 0.15, every seventh off by 8 errors, neighbours correlated by `correlation`^distance.
+Problem correlated_problem(double correlation) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.15, {11.22, 1.10});
+  Problem problem;
+  synthetic::Normal normal(21);
+  constexpr Eigen::Index n = 60;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double height = 3.0 + 0.15 * static_cast<double>(i), error = 0.01;
+    problem.bins.height.push_back(height);
+    problem.bins.density.push_back(truth.density(height) + error * (normal() + (i % 7 == 3 ? 8.0 : 0.0)));
+    problem.bins.inverse_error.push_back(1.0 / error);
+  }
+  problem.bins.samples = 20;
+  problem.bins.correlation.resize(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      problem.bins.correlation(i, j) = std::pow(correlation, std::abs(static_cast<double>(i - j)));
+  }
+  return problem;
+}
+
+// B J^T W R W J B, B = (J^T W J)^-1: W of Huber's weights at the solution, J of (T, shift), R the bins' correlations.
+std::array<double, 4> sandwich(const Problem& problem, const Solution& solution) {
+  const std::size_t n = problem.bins.size();
+  const auto densities = [&](std::size_t parameter, double step) {
+    FitModel::Parameters p = solution.parameters;
+    p[parameter] += step;
+    FitOptions options;
+    return evaluate_model(options, p[0], p[1], p[2], 0.0, problem.bins.height).densities;
+  };
+  const std::vector<double> best = densities(0, 0.0);
+  const double steps[2] = {1e-6, 1e-5};
+  std::vector<double> j[2];
+  std::vector<double> weight(n);
+  for (std::size_t p = 0; p < 2; ++p) {
+    const auto up = densities(p, steps[p]), down = densities(p, -steps[p]);
+    for (std::size_t i = 0; i < n; ++i)
+      j[p].push_back((up[i] - down[i]) / (2.0 * steps[p]) * problem.bins.inverse_error[i]);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double residual = std::abs(best[i] - problem.bins.density[i]) * problem.bins.inverse_error[i];
+    const double k = problem.options.robust_threshold;
+    weight[i] = problem.options.robust && residual > k ? k / residual : 1.0;
+  }
+  double a[2][2] = {}, meat[2][2] = {};
+  for (std::size_t p = 0; p < 2; ++p) {
+    for (std::size_t q = 0; q < 2; ++q) {
+      for (std::size_t i = 0; i < n; ++i) {
+        a[p][q] += j[p][i] * weight[i] * j[q][i];
+        for (std::size_t k = 0; k < n; ++k)
+          meat[p][q] += j[p][i] * weight[i] *
+                        problem.bins.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) *
+                        weight[k] * j[q][k];
+      }
+    }
+  }
+  const double determinant = a[0][0] * a[1][1] - a[0][1] * a[1][0];
+  const double b[2][2] = {{a[1][1] / determinant, -a[0][1] / determinant},
+                          {-a[1][0] / determinant, a[0][0] / determinant}};
+  std::array<double, 4> covariance{};
+  for (std::size_t p = 0; p < 2; ++p) {
+    for (std::size_t q = 0; q < 2; ++q) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        for (std::size_t l = 0; l < 2; ++l) covariance[2 * p + q] += b[p][k] * meat[k][l] * b[l][q];
+      }
+    }
+  }
+  return covariance;
+}
+
+void expect_sandwich(const Problem& problem) {
+  const Solution solution = least_squares(problem.bins, *problem.model, problem.start, problem.options);
+  ASSERT_TRUE(solution.converged);
+  const std::array<double, 4> expected = sandwich(problem, solution);
+  for (Eigen::Index p = 0; p < 2; ++p) {
+    for (Eigen::Index q = 0; q < 2; ++q) {
+      const double entry = expected[static_cast<std::size_t>(2 * p + q)];
+      EXPECT_NEAR(solution.covariance(p, q) / entry, 1.0, 1e-4) << p << q;
+    }
+  }
+}
+
+TEST(LeastSquares, ErrorsComeThroughTheCorrelations) { expect_sandwich(correlated_problem(0.6)); }
+
+TEST(LeastSquares, RobustErrorsComeThroughTheCorrelationsWithHubersWeights) {
+  Problem problem = correlated_problem(0.6);
+  problem.options.robust = true;
+  expect_sandwich(problem);
+}
+
+}  // namespace
+}  // namespace shakebed::fit
