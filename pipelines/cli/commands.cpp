@@ -16,10 +16,14 @@
 #include "pipelines/formats/profile_csv.hpp"
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "pipelines/runner/plan_graph.hpp"
+#include "pipelines/runner/read_recipe.hpp"
+#include "pipelines/runner/recipe_schema.hpp"
 #include "pipelines/runner/run.hpp"
 #include "pipelines/runner/slurm.hpp"
 #include "pipelines/runner/sweep.hpp"
 #include "pipelines/stages/measured_profile.hpp"
+#include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {
@@ -43,36 +47,12 @@ std::vector<Setting> settings_of(const RunArguments& run) {
   return settings;
 }
 
-// --data: the user's points go into every stage of the recipe that draws them.
-void add_data(JsonNode& document, const std::string& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) throw InputError(fmt::format("--data {}: there is no such file", file));
-  read_profile_csv(file);  // its mistakes now rather than after the simulation
-  bool found = false;
-  if (JsonNode* stages = document.find("stages"); stages != nullptr && stages->is_array()) {
-    for (JsonNode& stage : stages->items) {
-      const JsonNode* kind = stage.find("stage");
-      const StageRow* row = kind != nullptr && kind->is_string() ? find_stage(kind->text) : nullptr;
-      if (row == nullptr || row->data_option.empty()) continue;
-      found = true;
-      JsonNode path;
-      path.kind = JsonNode::Kind::string;
-      path.text = fs::absolute(file).string();
-      set_pointer(stage, pointer_join("", row->data_option), std::move(path));
-    }
-  }
-  if (!found) throw UsageError("--data: no stage of the recipe draws the points (a figure stage does)");
-}
+RecipeChanges changes_of(const RunArguments& run) { return {run.preset, settings_of(run), run.data}; }
 
-// A recipe read with --preset, --set and --data applied.
-Plan plan_of(const std::string& text, const std::string& file, const fs::path& directory, const RunArguments& run) {
-  std::vector<Problem> problems;
-  auto document = parse_json(text, file, problems);
-  if (!problems.empty()) throw ConfigError(std::move(problems));
-  if (run.preset) apply_preset(*document, file, *run.preset);
-  for (const Setting& setting : settings_of(run)) set_pointer(*document, setting.pointer, setting.value);
-  if (run.data) add_data(*document, *run.data);
-  return make_plan(std::move(*document), file, directory);
+// Mistakes end the program before anything runs; what is odd is said by validate, explain and run alike.
+void show_warnings(const Plan& plan) {
+  for (const Warning& warning : plan.warnings)
+    std::fputs(fmt::format("warning: {}\n", to_string(warning.problem)).c_str(), stderr);
 }
 
 fs::path out_of(const Arguments& arguments, const std::string& name) {
@@ -108,16 +88,36 @@ Json outcome_json(const Plan& plan, const RunOutcome& outcome) {
   return out;
 }
 
-Json explanation_json(const std::vector<StageOutcome>& stages) {
+Json explanation_json(const Plan& plan, const std::vector<StageOutcome>& stages) {
   Json out = Json::array();
   for (const StageOutcome& stage : stages) {
-    out.push_back(Json{{"id", stage.id},
-                       {"stage", stage.kind},
-                       {"runs", stage.state == StageState::waiting},
-                       {"state", to_string(stage.state)},
-                       {"why", stage.reasons}});
+    Json row{{"id", stage.id},
+             {"stage", stage.kind},
+             {"runs", stage.state == StageState::waiting},
+             {"state", to_string(stage.state)},
+             {"why", stage.reasons}};
+    if (Json facts = plan.find(stage.id)->stage->facts(); !facts.empty()) row["facts"] = std::move(facts);
+    out.push_back(std::move(row));
   }
   return out;
+}
+
+// "bed: gamma 4.02, column number 15, width 16 D".
+std::string facts_text(const Plan& plan) {
+  std::string text;
+  for (const PlannedStage& stage : plan.stages) {
+    std::string line;
+    const Json facts = stage.stage->facts();
+    for (const auto& [name, quantity] : facts.items()) {
+      std::string words = name;
+      std::replace(words.begin(), words.end(), '_', ' ');
+      const std::string unit = quantity.value("unit", "1");
+      line += fmt::format("{}{} {:.4g}{}", line.empty() ? "" : ", ", words, quantity["value"].get<double>(),
+                          unit == "1" ? "" : " " + unit);
+    }
+    if (!line.empty()) text += fmt::format("{}: {}\n", stage.id, line);
+  }
+  return text;
 }
 
 // Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
@@ -131,6 +131,7 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
       print(dump(json));
   };
   if (plan.sweep) {
+    if (arguments.run.dry_run) show_warnings(plan);
     SweepArguments sweep{arguments.run.shard, arguments.run.gather, arguments.run.dry_run, arguments.common.json, {}};
     const int code = run_sweep_command(plan, options, sweep, report_pages(), console);
     if (arguments.common.json) answer(std::move(sweep.result));
@@ -140,10 +141,11 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
   if (arguments.run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");
   if (arguments.run.dry_run) {
     const auto stages = explain(plan, options);
+    show_warnings(plan);
     if (arguments.common.json)
-      answer(explanation_json(stages));
+      answer(explanation_json(plan, stages));
     else
-      print(explanation_text(stages));
+      print(explanation_text(stages) + facts_text(plan));
     return exit_ok;
   }
   install_interrupt_handler();
@@ -160,12 +162,25 @@ int run_plan_command(const Arguments& arguments, const Plan& plan, Json* result 
   return outcome.code;
 }
 
+void require_positive(const char* name, double value) {
+  if (!(value > 0)) throw UsageError(fmt::format("{}: must be above 0, got {}", name, number_text(value)));
+}
+
 double quantity_argument(const std::string& name, const std::string& text, const Dimension& wanted) {
   try {
     return parse_quantity(text, wanted);
   } catch (const std::invalid_argument& problem) {
     throw UsageError(fmt::format("{}: {}", name, problem.what()));
   }
+}
+
+// A bead's diameter; one of metres is worth a word.
+double diameter_argument(const std::string& text) {
+  const double diameter = quantity_argument("--diameter", text, dimension::length);
+  require_positive("--diameter", diameter);
+  if (const auto odd = odd_bead(diameter))
+    std::fputs(fmt::format("warning: --diameter: {}. {}\n", odd->what, odd->suggestion).c_str(), stderr);
+  return diameter;
 }
 
 // A length with its unit, or a plain number of diameters.
@@ -183,10 +198,6 @@ double diameters_argument(const std::string& name, const std::string& text, std:
   }
 }
 
-void require_positive(const char* name, double value) {
-  if (!(value > 0)) throw UsageError(fmt::format("{}: must be above 0, got {}", name, number_text(value)));
-}
-
 double checked_plateau(std::optional<double> given) {
   const double density = given.value_or(fit::close_packing_density);
   if (!(density > 0) || density > fit::close_packing_density * (1 + 1e-12)) {
@@ -200,7 +211,7 @@ double checked_plateau(std::optional<double> given) {
 
 int command_run(const Arguments& arguments) {
   const fs::path file = arguments.recipe;
-  return run_plan_command(arguments, plan_of(read_file(file), file.string(), file.parent_path(), arguments.run));
+  return run_plan_command(arguments, read_recipe(file, changes_of(arguments.run)));
 }
 
 int command_reproduce(const Arguments& arguments) {
@@ -227,7 +238,8 @@ int command_reproduce(const Arguments& arguments) {
                                                  : fmt::format("did you mean \"{}\"?", nearest)));
   }
   const auto read = [&](const EmbeddedFile& file) {
-    return plan_of(std::string(file.text), std::string(file.name), fs::current_path(), arguments.run);
+    return read_recipe_text(std::string(file.text), std::string(file.name), fs::current_path(),
+                            changes_of(arguments.run));
   };
   if (wanted != "all") {
     const auto chosen =
@@ -332,7 +344,8 @@ int command_fit_images(const Arguments& arguments) {
                             {"text",
                              "Disks were found in the frames given, the scale follows from the bead's diameter, the "
                              "profile is that of the disks' centres above the floor."}};
-  return run_plan_command(arguments, plan_of(dump(document), "(command line)", fs::current_path(), arguments.run));
+  return run_plan_command(
+      arguments, read_recipe_text(dump(document), "(command line)", fs::current_path(), changes_of(arguments.run)));
 }
 
 int command_fit_profile(const Arguments& arguments) {
@@ -346,8 +359,7 @@ int command_fit_profile(const Arguments& arguments) {
   if (!p.window.empty()) options.window.low = p.window[0], options.window.high = p.window[1];
   std::optional<double> diameter;
   if (p.diameter) {
-    diameter = quantity_argument("--diameter", *p.diameter, dimension::length);
-    require_positive("--diameter", *diameter);
+    diameter = diameter_argument(*p.diameter);
   }
   if (p.kernel) {
     const auto kernel = kernel_from(*p.kernel);
@@ -379,8 +391,7 @@ int command_theory(const Arguments& arguments) {
   question.equation = t.equation;
   question.plateau_density = checked_plateau(t.plateau_density);
   if (t.diameter) {
-    question.diameter = quantity_argument("--diameter", *t.diameter, dimension::length);
-    require_positive("--diameter", *question.diameter);
+    question.diameter = diameter_argument(*t.diameter);
   }
   if (t.initial_height && t.column_number)
     throw UsageError("--initial-height and --column-number say the same thing: give one");
@@ -404,10 +415,9 @@ int command_map(const Arguments& arguments) {
   question.equation = m.equation;
   question.plateau_density = checked_plateau(m.plateau_density);
   question.frequency = quantity_argument("--frequency", m.frequency, dimension::frequency);
-  question.diameter = quantity_argument("--diameter", m.diameter, dimension::length);
+  question.diameter = diameter_argument(m.diameter);
   question.gravity = quantity_argument("--gravity", m.gravity.value_or("9.81 m/s^2"), dimension::acceleration);
-  require_positive("--frequency", question.frequency), require_positive("--diameter", question.diameter),
-      require_positive("--gravity", question.gravity);
+  require_positive("--frequency", question.frequency), require_positive("--gravity", question.gravity);
   question.initial_height = diameters_argument("--initial-height", m.initial_height, question.diameter);
   require_positive("--initial-height", question.initial_height);
   if (m.restitution < 0 || m.restitution > 0.99) throw UsageError("--restitution: must be from 0 to 0.99");
@@ -456,33 +466,31 @@ int command_schema(const Arguments& arguments) {
   return exit_ok;
 }
 
+Json problem_json(const Problem& problem) {
+  return Json{{"file", problem.file},       {"line", problem.at.line}, {"column", problem.at.column},
+              {"pointer", problem.pointer}, {"problem", problem.what}, {"suggestion", problem.suggestion}};
+}
+
 int command_validate(const Arguments& arguments) {
   const fs::path file = arguments.recipe;
   try {
-    const Plan plan = read_plan(file, settings_of(arguments.run), arguments.run.preset);
-    if (plan.sweep) sweep_points(plan);
-    if (!arguments.run.preset) {  // a preset that spoils the recipe is found now as well
-      for (const std::string& preset : preset_names(plan.document)) {
-        const Plan with = read_plan(file, settings_of(arguments.run), preset);
-        if (with.sweep) sweep_points(with);
-      }
+    const Plan plan = read_recipe(file, changes_of(arguments.run));
+    if (!arguments.common.json) {
+      show_warnings(plan);
+      if (!arguments.common.quiet)
+        print(fmt::format("{}: valid: {} {}\n", file.string(), plan.stages.size(),
+                          plan.stages.size() == 1 ? "stage" : "stages"));
+      return exit_ok;
     }
-    if (arguments.common.json)
-      print(dump(Json{{"valid", true}, {"name", plan.name}, {"stages", plan.stages.size()}}));
-    else if (!arguments.common.quiet)
-      print(fmt::format("{}: a good recipe of {} stages\n", file.string(), plan.stages.size()));
+    Json warnings = Json::array();
+    for (const Warning& warning : plan.warnings) warnings.push_back(problem_json(warning.problem));
+    print(dump(
+        Json{{"valid", true}, {"name", plan.name}, {"stages", plan.stages.size()}, {"warnings", std::move(warnings)}}));
     return exit_ok;
   } catch (const ConfigError& error) {
     if (!arguments.common.json) throw;
     Json problems = Json::array();
-    for (const Problem& problem : error.problems()) {
-      problems.push_back(Json{{"file", problem.file},
-                              {"line", problem.at.line},
-                              {"column", problem.at.column},
-                              {"pointer", problem.pointer},
-                              {"problem", problem.what},
-                              {"suggestion", problem.suggestion}});
-    }
+    for (const Problem& problem : error.problems()) problems.push_back(problem_json(problem));
     print(dump(Json{{"valid", false}, {"problems", std::move(problems)}}));
     return error.code();
   }
@@ -495,7 +503,7 @@ int command_explain(const Arguments& arguments) {
 }
 
 int command_graph(const Arguments& arguments) {
-  const Plan plan = read_plan(arguments.recipe);
+  const Plan plan = read_recipe(arguments.recipe);
   if (arguments.common.json) {
     Json nodes = Json::array(), edges = Json::array();
     for (const PlannedStage& stage : plan.stages) {
@@ -691,7 +699,7 @@ int command_clean(const Arguments& arguments) {
 }
 
 int command_submit_slurm(const Arguments& arguments) {
-  const Plan plan = read_plan(arguments.recipe, settings_of(arguments.run), arguments.run.preset);
+  const Plan plan = read_recipe(arguments.recipe, changes_of(arguments.run));
   Console console(level_of(arguments.common));
   SlurmOptions options;
   options.shards = arguments.slurm.shards;

@@ -26,19 +26,6 @@ std::string Range::words() const {
   return "";
 }
 
-std::string nearest_name(std::string_view word, const std::vector<std::string>& names) {
-  std::string best;
-  int best_distance = 1 + static_cast<int>(word.size()) / 3;
-  for (const std::string& name : names) {
-    const int distance = edit_distance(word, name);
-    // A word that continues or begins the other is near whatever its length ("freq" for "frequency").
-    const bool begins = word.size() >= 3 && (name.starts_with(word) || word.starts_with(name));
-    const int rank = begins ? std::min(distance, best_distance) : distance;
-    if (rank <= best_distance && (best.empty() || rank < best_distance)) best = name, best_distance = rank;
-  }
-  return best;
-}
-
 Fields Fields::decode(const JsonNode& object, std::string pointer, const Source& source) {
   return Fields(Mode::decode, &object, nullptr, std::move(pointer), source);
 }
@@ -81,6 +68,37 @@ bool Fields::has(std::string_view key) const { return node_ != nullptr && node_-
 
 bool Fields::has_upstream(std::string_view kind) const {
   return std::find(source_.upstream.begin(), source_.upstream.end(), kind) != source_.upstream.end();
+}
+
+const StatedResult* Fields::check_result(std::string_view pointer_below, const std::string& pointer) {
+  if (mode_ != Mode::decode) return nullptr;
+  if (const auto misfit = misfit_of_pointer(source_.from, pointer, "\"from\"")) {
+    problem(pointer_below, misfit->what, misfit->suggestion);
+    return nullptr;
+  }
+  const std::string id = split_pointer(pointer).front();
+  for (const StatedStage& stage : source_.from) {
+    if (stage.id == id && stage.results != nullptr)
+      return stage.results->find(std::string_view(pointer).substr(1 + escape_pointer_token(id).size()));
+  }
+  return nullptr;
+}
+
+void Fields::either(std::string_view one, std::string_view other, const std::string& suggestion) {
+  if (mode_ == Mode::schema) {
+    const auto needs = [](std::string_view key) { return Json{{"required", Json::array({key})}}; };
+    (*out_)["oneOf"] = Json::array({needs(one), needs(other)});
+  }
+  if (mode_ != Mode::decode || has(one) != has(other)) return;
+  const bool both = has(one);
+  problem("/" + std::string(both ? other : one),
+          both ? fmt::format("both \"{}\" and \"{}\" are given, and each follows from the other", one, other)
+               : fmt::format("\"{}\" is missing, and so is \"{}\": one of them is needed", one, other),
+          suggestion);
+}
+
+void Fields::comment(const std::string& text) {
+  if (mode_ == Mode::encode) (*out_)["$comment"] = text;
 }
 
 const JsonNode* Fields::take(std::string_view key, const About& about, std::string_view expected) {
@@ -145,7 +163,7 @@ bool Fields::read_quantity(const JsonNode& node, std::string_view key, const Dim
       }
       if (!reduced_ && !quantity.has_unit) {
         complain(node, key, fmt::format("\"{}\" has no unit: expected {}", node.text, expected),
-                 fmt::format("Write \"{} {}\"", node.text, si_unit(wanted)));
+                 fmt::format("Write \"{}\"", likely_quantity(node.text, quantity.value, wanted)));
         return false;
       }
       if (!reduced_ && quantity.dimension != wanted) {
@@ -451,7 +469,16 @@ void Fields::require(bool holds, std::string_view key, const std::string& what, 
 }
 
 void Fields::problem(std::string_view pointer_below, const std::string& what, const std::string& suggestion) {
-  if (mode_ != Mode::decode) return;
+  if (mode_ == Mode::decode) source_.problems->push_back(located(pointer_below, what, suggestion));
+}
+
+void Fields::warn(std::string_view kind, std::string_view pointer_below, const std::string& what,
+                  const std::string& suggestion) {
+  if (mode_ == Mode::decode && source_.warnings != nullptr)
+    source_.warnings->push_back({std::string(kind), located(pointer_below, what, suggestion)});
+}
+
+Problem Fields::located(std::string_view pointer_below, const std::string& what, const std::string& suggestion) const {
   // The place of the nearest thing that was written.
   const JsonNode* node = node_;
   for (const std::string& token : split_pointer(pointer_below)) {
@@ -465,9 +492,8 @@ void Fields::problem(std::string_view pointer_below, const std::string& what, co
     if (next == nullptr) break;
     node = next;
   }
-  source_.problems->push_back({node->from_command_line ? "--set" : source_.file,
-                               node->from_command_line ? Position{} : node->at, pointer_ + std::string(pointer_below),
-                               what, suggestion});
+  return {node->from_command_line ? "--set" : source_.file, node->from_command_line ? Position{} : node->at,
+          pointer_ + std::string(pointer_below), what, suggestion};
 }
 
 std::optional<std::size_t> Fields::read_tag(const std::string& tag, const std::vector<RowText>& rows,
@@ -508,11 +534,12 @@ void Fields::schema_of_variant(Json& out, std::string_view tag, const std::vecto
           known = Json{{"anyOf", Json::array({known, schema})}};
       }
     }
-    if (bodies[i].contains("required")) {
+    if (bodies[i].contains("required") || bodies[i].contains("oneOf")) {
       Json condition;
       condition["if"]["properties"][std::string(tag)]["const"] = rows[i].name;
       condition["if"]["required"] = Json::array({tag});
-      condition["then"]["required"] = bodies[i]["required"];
+      for (const char* key : {"required", "oneOf"})
+        if (bodies[i].contains(key)) condition["then"][key] = bodies[i][key];
       out["allOf"].push_back(std::move(condition));
     }
   }

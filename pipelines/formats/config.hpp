@@ -38,6 +38,7 @@
 
 #include "pipelines/formats/json.hpp"
 #include "pipelines/formats/quantity.hpp"
+#include "pipelines/formats/results.hpp"
 
 namespace shakebed::pipelines {
 
@@ -100,9 +101,11 @@ class Fields {
     std::string file;                      // for messages
     std::filesystem::path directory = {};  // relative paths are resolved against it
     std::vector<Problem>* problems = nullptr;
+    std::vector<Warning>* warnings = nullptr;  // what is odd but not wrong; may be left out
     // Every input file that was named: pointer and file.
     std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
     std::vector<std::string> upstream = {};  // kinds of the stages that a stage takes its input from
+    std::vector<StatedStage> from = {};      // the same stages, and what each will give
     const KnownBed* bed = nullptr;           // what those stages know of the bed
   };
 
@@ -124,6 +127,11 @@ class Fields {
   // Kinds of the stages that "from" names, in its order (decoding only).
   const std::vector<std::string>& upstream() const { return source_.upstream; }
   bool has_upstream(std::string_view kind) const;
+  // What the stages in "from" will give (decoding only).
+  const std::vector<StatedStage>& from() const { return source_.from; }
+  // Checks a pointer into the results of the stages in "from", "/fit/temperature"; what is wrong is a problem at
+  // `pointer_below`. Returns what is stated of the result, where that is known.
+  const StatedResult* check_result(std::string_view pointer_below, const std::string& pointer);
   // What the stages that "from" names know of the bed; nullptr where they know none (decoding only).
   const KnownBed* known_bed() const { return source_.bed; }
 
@@ -144,6 +152,11 @@ class Fields {
   void text(std::string_view key, std::optional<std::string>& value, const About& about = {});
   template <class Integer>
   void integer(std::string_view key, std::optional<Integer>& value, const About& about = {});
+
+  // Exactly one of two keys that were read must be written.
+  void either(std::string_view one, std::string_view other, const std::string& suggestion);
+  // When writing: "$comment", which says what follows from the options. Reading ignores it.
+  void comment(const std::string& text);
 
   void numbers(std::string_view key, std::vector<double>& values, const About& about = {});
   void quantities(std::string_view key, std::vector<double>& values, const Dimension& dimension,
@@ -185,6 +198,11 @@ class Fields {
   void require(bool holds, std::string_view key, const std::string& what, const std::string& suggestion = {});
   // The same for whoever knows the pointer below this object ("/disks/diameter").
   void problem(std::string_view pointer_below, const std::string& what, const std::string& suggestion = {});
+  // The same for what is odd but not wrong; warnings of one kind are counted together in a sweep.
+  void warn(std::string_view kind, std::string_view pointer_below, const std::string& what,
+            const std::string& suggestion = {});
+  // What was written under a key, nullptr where nothing was (decoding only).
+  const JsonNode* written(std::string_view key) const { return node_ != nullptr ? node_->find(key) : nullptr; }
   // Whether the key was written (decoding only).
   bool has(std::string_view key) const;
   // Number of problems so far in the whole document.
@@ -199,6 +217,7 @@ class Fields {
   };
 
   const JsonNode* take(std::string_view key, const About& about, std::string_view expected);
+  Problem located(std::string_view pointer_below, const std::string& what, const std::string& suggestion) const;
   void complain(const JsonNode& node, std::string_view key, const std::string& what, const std::string& suggestion = {},
                 bool is_input = false);
   void wrong_type(const JsonNode& node, std::string_view key, std::string_view expected, const About& about);
@@ -233,9 +252,6 @@ class Fields {
   bool unknown_keys_matter_ = true;
   std::vector<std::string> known_;
 };
-
-// "did you mean": the nearest of the names, or "" when none is near.
-std::string nearest_name(std::string_view word, const std::vector<std::string>& names);
 
 // ---------------------------------------------------------------------------------------------------------------------
 

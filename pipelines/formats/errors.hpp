@@ -33,6 +33,12 @@ struct Problem {
   bool is_input = false;   // a missing or unreadable input file rather than a mistake in the recipe
 };
 
+// What is odd but not wrong. Warnings of one kind at one pointer are counted together where many recipes are read.
+struct Warning {
+  std::string kind;  // "gamma", "box"
+  Problem problem;
+};
+
 // "recipe.json:12:7: /stages/0/disks/diameter: ... Suggestion."
 std::string to_string(const Problem& problem);
 

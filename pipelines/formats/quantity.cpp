@@ -292,6 +292,16 @@ std::string handy_text(double value, const Dimension& d) {
   return fmt::format("{:.6g} {}", value / best->factor, best->name);
 }
 
+std::string likely_quantity(std::string_view number, double value, const Dimension& d) {
+  // Beads and boxes of 0.1 m and more are rare: such a number was meant in millimetres.
+  constexpr double largest_in_metres = 0.1;
+  std::string unit = si_unit(d);
+  if (d == dimension::length && std::abs(value) >= largest_in_metres) unit = "mm";
+  if (d == dimension::length_per_pixel && std::abs(value) >= 1e-3) unit = "mm/px";
+  if (d == dimension::angle) unit = "deg";
+  return fmt::format("{} {}", trimmed(number), unit);
+}
+
 int edit_distance(std::string_view a, std::string_view b) {
   std::vector<int> before(b.size() + 1), previous(b.size() + 1), current(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) previous[j] = static_cast<int>(j);
@@ -306,6 +316,19 @@ int edit_distance(std::string_view a, std::string_view b) {
     std::swap(previous, current);
   }
   return previous[b.size()];
+}
+
+std::string nearest_name(std::string_view word, const std::vector<std::string>& names) {
+  std::string best;
+  int best_distance = 1 + static_cast<int>(word.size()) / 3;
+  for (const std::string& name : names) {
+    const int distance = edit_distance(word, name);
+    // A word that continues or begins the other is near whatever its length ("freq" for "frequency").
+    const bool begins = word.size() >= 3 && (name.starts_with(word) || word.starts_with(name));
+    const int rank = begins ? std::min(distance, best_distance) : distance;
+    if (rank <= best_distance && (best.empty() || rank < best_distance)) best = name, best_distance = rank;
+  }
+  return best;
 }
 
 }  // namespace shakebed::pipelines

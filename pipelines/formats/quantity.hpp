@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace shakebed::pipelines {
 
@@ -36,6 +37,8 @@ std::string name_of(const Dimension& dimension);
 std::string si_unit(const Dimension& dimension);
 // One that people would write: "2.99 mm" for a length.
 std::string example_of(const Dimension& dimension);
+// A number that was written without its unit, with the unit that it is likely to have: "3 mm", "0.06 m", "20 Hz".
+std::string likely_quantity(std::string_view number, double value, const Dimension& dimension);
 
 // A number and its unit as read. Exact where the unit is a power of ten: "2.99 mm" is the double nearest 0.00299.
 struct Quantity {
@@ -58,5 +61,7 @@ std::string handy_text(double value, const Dimension& dimension);
 
 // How far two words are apart: insertions, deletions, replacements and swaps of neighbours.
 int edit_distance(std::string_view a, std::string_view b);
+// "did you mean": the nearest of the names, or "" when none is near.
+std::string nearest_name(std::string_view word, const std::vector<std::string>& names);
 
 }  // namespace shakebed::pipelines

@@ -134,6 +134,13 @@ std::string html_of(const Plan& plan, const SweepOutcome& sweep, const std::vect
     for (const std::string& problem : sweep.problems) out += fmt::format("<li>{}</li>\n", escape_markup(problem));
     out += "</ul></div>\n";
   }
+  if (!plan.warnings.empty()) {
+    out += "<div class=\"warnings\"><strong>Warnings</strong><ul>\n";
+    for (const Warning& warning : plan.warnings)
+      out += fmt::format("<li>{}: {}. {}</li>\n", escape_markup(warning.problem.pointer),
+                         escape_markup(warning.problem.what), escape_markup(warning.problem.suggestion));
+    out += "</ul></div>\n";
+  }
   int number = 0;
   for (const fs::path& figure : figures) out += fmt::format("<figure>{}</figure>\n", inline_svg(figure, ++number));
   const std::vector<std::vector<std::string>>& table = sweep.table;

@@ -379,6 +379,11 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, const Pages
   }
   const FolderLock lock(options.out);
   remove_leftovers(options.out);
+  for (const Warning& warning : plan.warnings) {
+    outcome.warnings.push_back(
+        to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what, warning.problem.suggestion}));
+    console.warning(to_string(warning.problem));
+  }
   run_stages(plan, options, &console, outcome);
   outcome.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   console.end_progress();

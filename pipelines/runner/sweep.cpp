@@ -83,6 +83,7 @@ class SweepRun {
       throw StageError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.code().message()));
     }
     install_interrupt_handler();
+    for (const Warning& warning : plan_.warnings) console_.warning(to_string(warning.problem));
     start_ = Clock::now();
     run_points();
     interrupted_ = interrupt_requested();
@@ -289,6 +290,10 @@ class SweepRun {
     const ExitCode code = exit_code();
     Json summary;
     summary["pipeline"] = plan_.name;
+    summary["warnings"] = Json::array();
+    for (const Warning& warning : plan_.warnings)
+      summary["warnings"].push_back(
+          to_string(Problem{{}, {}, warning.problem.pointer, warning.problem.what, warning.problem.suggestion}));
     summary["points"] = all_.size();
     summary["done"] = there_;
     summary["missing"] = all_.size() - there_;

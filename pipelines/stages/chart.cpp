@@ -1,6 +1,7 @@
 #include "pipelines/stages/chart.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -171,6 +172,7 @@ Json power_json(const std::vector<double>& x, const std::vector<double>& y, cons
 class Chart : public Stage {
  public:
   void describe(Fields& fields) override;
+  void results(ResultList& list) const override;
   void run(RunContext& context) const override;
 
  private:
@@ -185,6 +187,48 @@ const Input& input_named(const RunContext& context, const std::string& id) {
     if (input.id == id || (id.empty() && context.inputs().size() == 1)) return input;
   }
   throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
+}
+
+// The table, its columns and the rows wanted must be what the stage writes.
+void check_points(Fields& fields, const PointsOptions& p) {
+  const std::vector<StatedStage>& from = fields.from();
+  const auto stage = std::find_if(from.begin(), from.end(), [&](const StatedStage& one) {
+    return one.id == p.from || (p.from.empty() && from.size() == 1);
+  });
+  if (stage == from.end()) {
+    std::vector<std::string> ids;
+    for (const StatedStage& one : from) ids.push_back(one.id);
+    const std::string nearest = nearest_name(p.from, ids);
+    fields.problem("/from",
+                   p.from.empty() ? "which stage's table is it? \"from\" of the stage names several"
+                                  : fmt::format("\"{}\" is not in the \"from\" of this stage", p.from),
+                   nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
+                                   : fmt::format("Did you mean \"{}\"?", nearest));
+    return;
+  }
+  if (stage->results == nullptr) return;
+  if (const auto misfit = misfit_of_table(*stage, p.file))
+    return fields.problem("/file", misfit->what, misfit->suggestion);
+  const StatedTable& table = *stage->results->find_table(p.file);
+  const auto check = [&](const std::string& where, const std::string& column) {
+    const auto misfit = misfit_of_column(table, column);
+    if (misfit) fields.problem(where, misfit->what, misfit->suggestion);
+  };
+  if (fields.has("x")) check("/x", p.x);
+  if (fields.has("y")) check("/y", p.y);
+  if (!p.error.empty() && p.error != "none") check("/error", p.error);
+  for (const auto& [column, value] : p.where) {
+    const std::string where = "/where/" + escape_pointer_token(column);
+    check(where, column);
+    const auto found = std::find_if(table.columns.begin(), table.columns.end(),
+                                    [&, name = column](const StatedColumn& c) { return c.name == name; });
+    if (found == table.columns.end() || found->values.empty()) continue;
+    if (std::find(found->values.begin(), found->values.end(), value) != found->values.end()) continue;
+    const std::string nearest = nearest_name(value, found->values);
+    fields.problem(where, fmt::format("no row of {} has \"{}\" in the column {}", p.file, value, column),
+                   nearest.empty() ? fmt::format("There are {}", fmt::join(found->values, ", "))
+                                   : fmt::format("Did you mean \"{}\"?", nearest));
+  }
 }
 
 void describe_points(Fields& fields, PointsOptions& p) {
@@ -229,6 +273,96 @@ void describe_points(Fields& fields, PointsOptions& p) {
   }
   fields.require(!p.residuals || p.look != Look::none, "residuals", "what is not drawn has no residuals to draw");
   fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals from what? \"against\" names no curve");
+  check_points(fields, p);
+}
+
+void check_snapshot(Fields& fields, const SnapshotOptions& s) {
+  std::vector<std::string> ids;
+  for (const StatedStage& one : fields.from()) {
+    if (one.kind == "simulate") ids.push_back(one.id);
+  }
+  const std::string nearest = nearest_name(s.from, ids);
+  fields.require(std::find(ids.begin(), ids.end(), s.from) != ids.end(), "from",
+                 fmt::format("\"{}\" is no simulate stage in the \"from\" of this stage", s.from),
+                 nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
+                                 : fmt::format("Did you mean \"{}\"?", nearest));
+}
+
+// What is found about some points, under /<chart>/<points>/.
+class PointsStatement {
+ public:
+  PointsStatement(ResultList& list, std::string pointer, const PointsOptions& points)
+      : list_(list), at_(std::move(pointer)), points_(points) {}
+
+  void state() {
+    list_.number(at_ + "/points", "1", "points drawn or used");
+    line();
+    power();
+    against();
+    for (const double level : points_.levels)
+      list_.quantity(at_ + "/crossings/" + fmt::format("{:g}", level), "1", "x at which y first crosses this level", {},
+                     true);
+  }
+
+ private:
+  void line() {
+    const Given asked = given_if(points_.line_fit, "\"line_fit\" is true");
+    const Given found = both(asked, given_when("two points have errors"));
+    list_.text(at_ + "/line_fit", "whether the line could be fitted", asked);
+    list_.quantity(at_ + "/slope", "1", "slope of the fitted line, in the units of the axes", found);
+    list_.quantity(at_ + "/intercept", "1", "y of the fitted line at x = 0", found);
+    list_.quantity(at_ + "/zero", "1", "x at which the fitted line crosses zero", found);
+    list_.number(at_ + "/chi2", "1", "sum of the squared residuals over their errors", found);
+    list_.number(at_ + "/dof", "1", "degrees of freedom", found);
+    list_.number(at_ + "/p_value", "1", "chance of so large a chi2", found, true);
+  }
+
+  void power() {
+    const Given asked = given_if(points_.power_fit, "\"power_fit\" is true");
+    const Given found = both(asked, given_when("the power law could be fitted"));
+    list_.text(at_ + "/power/status", "whether the power law could be fitted", asked);
+    list_.quantity(at_ + "/power/exponent", "1", "fitted exponent", asked, true);
+    for (const std::string law : {"/power/law", "/power/given/1", "/power/given/2"}) {
+      for (const char* key : {"amplitude", "offset", "chi2", "dof", "p_value"})
+        list_.number(at_ + law + "/" + key, "1", "of offset + amplitude x^exponent", found, true);
+    }
+  }
+
+  void against() {
+    const Given asked = given_if(!points_.against.empty(), "\"against\" names a curve");
+    const Given weighted = both(asked, given_when("the points have errors"));
+    const std::string at = at_ + "/against/";
+    list_.text(at + "curve", "the curve", asked);
+    list_.number(at + "points", "1", "points compared", asked);
+    list_.number(at + "chi2", "1", "sum of the squared differences over their errors", weighted, true);
+    list_.number(at + "dof", "1", "degrees of freedom", weighted);
+    list_.number(at + "chi2_per_dof", "1", "chi2 over the degrees of freedom", weighted);
+    list_.number(at + "p_value", "1", "chance of so large a chi2", weighted, true);
+    list_.quantity(at + "mean_difference", "1", "mean difference, in the unit of y", asked, true);
+    list_.quantity(at + "rms_difference", "1", "rms difference, in the unit of y", asked, true);
+    list_.number(at + "largest_difference", "1", "largest difference, in the unit of y", asked, true);
+    list_.number(at + "rms_log_ratio", "1", "rms of ln(y/curve)", both(asked, given_when("all ratios are positive")));
+  }
+
+  ResultList& list_;
+  std::string at_;
+  const PointsOptions& points_;
+};
+
+void Chart::results(ResultList& list) const {
+  for (const ChartOptions& chart : charts_) {
+    const std::string at = pointer_join("", chart.name);
+    list.text(at + "/caption", "text below the chart", given_if(!chart.caption.empty(), "there is a \"caption\""));
+    for (const PointsOptions& points : chart.points)
+      PointsStatement(list, pointer_join(at, points.name), points).state();
+  }
+  for (const SnapshotOptions& one : snapshots_) {
+    const std::string at = pointer_join("", one.name);
+    list.text(at + "/caption", "text below the picture", given_if(!one.caption.empty(), "there is a \"caption\""));
+    list.number(at + "/disks", "1", "disks");
+    list.number(at + "/empty_sites", "1", "empty sites of the crystal");
+    list.number(at + "/disks_with_psi6_above_0.8", "1", "disks whose |psi_6| is above 0.8");
+  }
 }
 
 void Chart::describe(Fields& fields) {
@@ -277,6 +411,7 @@ void Chart::describe(Fields& fields) {
                                   f.text("from", s.from,
                                          {.help = "id of the simulate stage whose last state it is", .required = true});
                                   f.text("caption", s.caption, {.help = "below it in the report"});
+                                  if (f.decoding() && f.has("from")) check_snapshot(f, s);
                                 },
                                 {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
   if (fields.decoding())

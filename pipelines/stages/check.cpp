@@ -176,11 +176,23 @@ class Check : public Stage {
     fields.map<Expectation>("expect", expect_, describe_expectation,
                             {.help = "/<stage id>/<name in its result> → what it should be", .required = true});
     if (!fields.decoding()) return;
-    for (const auto& [pointer, ignored] : expect_) {
-      fields.require(!pointer.empty() && pointer.front() == '/', "expect/" + escape_pointer_token(pointer),
-                     "is not a JSON pointer", "Write for example \"/fit/temperature\"");
+    for (const auto& [pointer, expectation] : expect_) {
+      const std::string where = "/expect/" + escape_pointer_token(pointer);
+      if (const StatedResult* stated = fields.check_result(where, pointer))
+        check_unit(fields, where, expectation, *stated);
     }
     fields.require(!expect_.empty() || !fields.has("expect"), "expect", "nothing is expected");
+  }
+
+  void results(ResultList& list) const override {
+    list.truth("/passed", "whether every result is as expected");
+    list.number("/failures", "1", "results that are not as expected");
+    list.text("/checks/#/pointer", "a result");
+    list.text("/checks/#/expected", "what was expected of it");
+    list.text("/checks/#/found", "what was found");
+    list.truth("/checks/#/passed", "whether they agree");
+    list.text("/checks/#/why", "why they do not agree", given_when("they do not agree"));
+    list.text("/checks/#/note", "where the expectation comes from", given_when("the expectation has a \"note\""));
   }
 
   void run(RunContext& context) const override {
@@ -233,6 +245,24 @@ class Check : public Stage {
   }
 
  private:
+  // An expectation in a unit that the result cannot have.
+  static void check_unit(Fields& fields, const std::string& where, const Expectation& expectation,
+                         const StatedResult& stated) {
+    if (stated.kind != ResultKind::quantity && stated.kind != ResultKind::number) return;
+    const std::pair<const char*, const Json*> all[] = {{"value", &expectation.value},
+                                                       {"absolute", &expectation.absolute},
+                                                       {"least", &expectation.least},
+                                                       {"most", &expectation.most}};
+    for (const auto& [key, json] : all) {
+      if (!json->is_string()) continue;
+      try {
+        in_unit_of(*json, {.json = json, .unit = stated.unit}, "what is expected");
+      } catch (const std::invalid_argument& problem) {
+        fields.problem(where + "/" + key, problem.what());
+      }
+    }
+  }
+
   std::vector<std::pair<std::string, Expectation>> expect_;
 };
 

@@ -48,10 +48,35 @@ class Claims : public Stage {
           if (!f.decoding()) return;
           f.require(c.value || c.least || c.most, "", "nothing is claimed: neither value nor least nor most");
           f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
-          f.require(!c.pointer.empty() && c.pointer.front() == '/', "number", "is not a JSON pointer");
+          if (f.has("number")) f.check_result("/number", c.pointer);
         },
         {.help = "sentence by sentence", .required = true});
     if (fields.decoding()) fields.require(!claims_.empty() || !fields.has("claims"), "claims", "there are none");
+  }
+
+  void results(ResultList& list) const override {
+    const std::string row = "/claims/#/";
+    list.text("/verdict_is", "what the verdicts mean");
+    list.text(row + "claim", "what is claimed");
+    list.text(row + "claimed", "the claim as a number or an interval");
+    list.text(row + "measured", "the measured number with its error");
+    list.text(row + "verdict", "holds, open, does not hold, or not measured");
+    list.number(row + "value", "1", "the measured number, in its own unit", {}, true);
+    list.number(row + "std_error", "1", "its standard error", given_when("the number has an error"));
+    list.text(row + "number", "where the number is");
+    const Given written = given_when("the claim says so");
+    list.text(row + "place", "where the claim stands", written);
+    list.text(row + "measured_as", "what the number is", written);
+    list.text(row + "note", "what else there is to say", written);
+    list.table({"claims.csv",
+                "the claims and what was measured",
+                {{"claim", "", "what is claimed"},
+                 {"measured_as", "", "what the number is"},
+                 {"claimed", "", "the claim as a number or an interval"},
+                 {"measured", "", "the measured number, in its own unit"},
+                 {"std_error", "", "its standard error"},
+                 {"verdict", "", "holds, open, does not hold, or not measured"},
+                 {"place", "", "where the claim stands"}}});
   }
 
   void run(RunContext& context) const override {

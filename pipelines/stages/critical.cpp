@@ -30,6 +30,36 @@ class Critical : public Stage {
       fields.require(p > 0 && p < 1, "orders", fmt::format("a threshold of psi_6 lies between 0 and 1, not {}", p));
   }
 
+  void results(ResultList& list) const override {
+    // The series are those of the study.
+    std::vector<std::string> series{"*"};
+    const StatedStage* study = list.from("study");
+    const StatedTable* table =
+        study != nullptr && study->results != nullptr ? study->results->find_table("table.csv") : nullptr;
+    if (table != nullptr && !table->columns.empty() && !table->columns.front().values.empty())
+      series = table->columns.front().values;
+    const auto state = [&](const std::string& name, const std::string& column, const std::string& meaning) {
+      const Given looked = given_if(!column.empty(), "its column is named");
+      list.text("/" + name + "/column", "column of the study", looked);
+      for (const std::string& one : series) {
+        const std::string row = pointer_join("/" + name + "/series", one) + "/#/";
+        list.number(row + "threshold", "1", "threshold of the column", looked);
+        list.text(row + "status", "whether it is crossed", looked);
+        list.quantity(row + "temperature", unit_, meaning, looked, true);
+      }
+    };
+    state("T_c", density_, "temperature at which the bottom falls below the threshold");
+    state("T_c_prime", order_, "temperature at which the bond order falls below the threshold");
+    list.table({"critical.csv",
+                "the temperatures",
+                {{"series", "", "series of the study"},
+                 {"quantity", "", "T_c or T_c_prime", {"T_c", "T_c_prime"}},
+                 {"threshold", "1", "threshold of the column"},
+                 {"temperature", unit_, "where it is crossed"},
+                 {"std_error", unit_, "its standard error"},
+                 {"status", "", "whether it is crossed"}}});
+  }
+
   void run(RunContext& context) const override {
     const StudyTable table = read_study_table(context.input("study").file("table.csv"));
     std::vector<std::string> series;

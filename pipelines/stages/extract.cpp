@@ -1,8 +1,10 @@
 #include "pipelines/stages/extract.hpp"
 
 #include "pipelines/stages/bed_facts.hpp"
+#include "pipelines/stages/extract_results.hpp"
 #include "pipelines/stages/images_module.hpp"
 #include "pipelines/stages/kernel_options.hpp"
+#include "pipelines/stages/scene_options.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -85,7 +87,9 @@ class Extract : public Stage {
     if (o.left_wall && o.right_wall)
       fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
     fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
+    if (fields.has("diameter") && o.diameter > 0) warn_of_bead(fields, "/diameter", o.diameter);
   }
+  void results(ResultList& list) const override { state_extract_results(list, options_); }
   void run(RunContext& context) const override { images_module().extract(options_, context); }
   // Of photographs; that of a simulated bed is the simulate stage's.
   std::optional<BedDescription> bed() const override {

@@ -363,6 +363,23 @@ class Figure : public Stage {
     fields.text("title", title_, {.help = "above the figure"});
     fields.number("highest", highest_, {.help = "where the axis of heights ends, in D", .range = positive});
   }
+  void results(ResultList& list) const override {
+    const Given both_drawn = both(given_if(list.from("extract") != nullptr && list.from("simulate") != nullptr,
+                                           "\"from\" names an extract and a simulate stage"),
+                                  given_when("the profiles overlap"));
+    list.quantity("/frames_against_simulation", "1/D^2", "rms difference of the frames from the simulation",
+                  both_drawn);
+    list.quantity("/frames_against_simulation_same_moments", "1/D^2",
+                  "rms difference of the frames from the simulation at the moments of the frames", both_drawn);
+    const Given compared = given_when("two profiles are drawn"), overlap = given_when("the two overlap");
+    const std::string row = "/comparisons/#/";
+    list.text(row + "of", "a profile", compared);
+    list.text(row + "with", "the one it is compared with", compared);
+    list.number(row + "points", "1", "heights at which both are known", compared);
+    list.quantity(row + "rms_difference", "1/D^2", "rms difference", overlap);
+    list.quantity(row + "mean_difference", "1/D^2", "mean difference", overlap);
+    list.quantity(row + "largest_difference", "1/D^2", "largest difference", overlap);
+  }
   void run(RunContext& context) const override;
 
  private:

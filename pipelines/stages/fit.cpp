@@ -15,6 +15,7 @@
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/bed_facts.hpp"
+#include "pipelines/stages/fit_results.hpp"
 #include "pipelines/stages/kernel_options.hpp"
 #include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/theory.hpp"
@@ -142,6 +143,11 @@ class Fit : public Stage {
                                    : fmt::format("Did you mean \"{}\"?", nearest));
   }
 
+  void results(ResultList& list) const override {
+    state_fit_results(list, {.matched = options_.model == simulation,
+                             .bootstrap = bootstrap_ > 0,
+                             .answer = answer_ && options_.model != simulation});
+  }
   void run(RunContext& context) const override;
 
  private:

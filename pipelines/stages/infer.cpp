@@ -64,6 +64,8 @@ double student_t(int freedom) {
 class Infer : public Stage {
  public:
   void describe(Fields& fields) override;
+  void results(ResultList& list) const override;
+  Json facts() const override { return bed_.facts(); }
   void run(RunContext& context) const override;
 
  private:
@@ -72,7 +74,7 @@ class Infer : public Stage {
   void average(Point& point, const Bed* beds) const;  // replicas_ of them
   // Those that are no farther from the target than the nearest, as far as the errors allow to tell.
   std::vector<const Point*> as_near(const std::vector<Point>& points, const Point& nearest) const;
-  Json results(const std::vector<Point>& points) const;
+  Json results_of(const std::vector<Point>& points) const;
   Table points_table(const std::vector<Point>& points) const;
 
   SceneOptions bed_;
@@ -126,6 +128,7 @@ void Infer::describe(Fields& fields) {
   if (!fields.decoding() || fields.problem_count() > 0) return;
   fields.require(bed_.period() > 0 && measure_ >= bed_.period() * bed_.time_unit(), "measure",
                  "the bed must be shaken, and measured over at least one period of the floor");
+  bed_.warn(fields, settle_);
 }
 
 std::vector<Point> Infer::points() const {
@@ -321,7 +324,7 @@ void Infer::run(RunContext& context) const {
   for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
 
   points_table(all).write(context.output("infer.csv"));
-  write_file(context.output("infer.json"), dump(results(all)));
+  write_file(context.output("infer.json"), dump(results_of(all)));
 }
 
 Table Infer::points_table(const std::vector<Point>& points) const {
@@ -353,7 +356,46 @@ Table Infer::points_table(const std::vector<Point>& points) const {
   return table;
 }
 
-Json Infer::results(const std::vector<Point>& points) const {
+void Infer::results(ResultList& list) const {
+  const std::string length = bed_.length_unit() == 1 ? "D" : "m";
+  list.quantity("/target/temperature_over_mg", length, "measured T/(m g)");
+  list.quantity("/target/density", "1/D^2", "measured density");
+  list.text("/distance_is", "what the distance means");
+  list.text("/profile", "how the profiles are measured");
+  list.text("/as_near_is", "which points are as near as the nearest");
+  list.number("/replicas", "1", "beds at every point");
+  const Given found = given_when("a fit succeeds");
+  for (const std::string row : {"/nearest/", "/points/#/"}) {
+    const Given given = row == "/nearest/" ? found : Given{};
+    list.number(row + "restitution", "1", "restitution of disks, floor and sides", given);
+    list.number(row + "friction", "1", "friction of disks and floor", given);
+    list.number(row + "side_friction", "1", "friction of the sides", given);
+    list.text(row + "fit_status", "whether the fits succeeded", given);
+    list.quantity(row + "temperature_over_mg", length, "fitted T/(m g)", given, true);
+    list.quantity(row + "solid_height", "D", "fitted height of the solid", given, true);
+    list.quantity(row + "density", "1/D^2", "greatest density of the profile", given, true);
+    list.quantity(row + "temperature_x_over_mg", length, "kinetic T/(m g) across", given, true);
+    list.quantity(row + "temperature_z_over_mg", length, "kinetic T/(m g) upwards", given, true);
+    list.quantity(row + "temperature_z_local_over_mg", length, "kinetic T/(m g) upwards, layer by layer", given, true);
+    list.quantity(row + "center_of_mass_rise", "D", "rise of the centre of mass", given, true);
+    list.number(row + "distance", "1", "distance from what was measured", given, true);
+    list.number(row + "distance_error", "1", "its standard error", found, true);
+    list.number(row + "collisions", "1", "contacts of all its beds", given);
+  }
+  for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error"})
+    list.number(std::string("/as_near/#/") + key, "1", "a point that is as near as the nearest", found, true);
+  std::vector<StatedColumn> columns;
+  for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error", "collisions"})
+    columns.push_back({key, "1", "as in infer.json"});
+  columns.push_back({"status", "", "whether the fits succeeded"});
+  for (const char* key : {"temperature", "temperature_error", "temperature_x", "temperature_z", "temperature_z_local"})
+    columns.push_back({key, "m g D", "as in infer.json"});
+  for (const char* key : {"solid_height", "rise"}) columns.push_back({key, "D", "as in infer.json"});
+  for (const char* key : {"density", "density_error"}) columns.push_back({key, "1/D^2", "as in infer.json"});
+  list.table({"infer.csv", "the beds of every point", columns});
+}
+
+Json Infer::results_of(const std::vector<Point>& points) const {
   const double length = bed_.length_unit();
   const std::string length_name = length == 1 ? "D" : "m";
   const auto row = [&](const Point& p) {

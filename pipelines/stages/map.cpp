@@ -76,6 +76,24 @@ class Map : public Stage {
     require_bed_facts(fields);
   }
 
+  void results(ResultList& list) const override {
+    const bool fitted = list.from("fit") != nullptr;
+    list.quantity("/gamma", "1", "peak acceleration of the floor over g");
+    list.quantity("/frequency", "Hz", "frequency of the shaking");
+    list.quantity("/diameter", "m", "diameter of a disk");
+    list.quantity("/gravity", "m/s^2", "acceleration g");
+    list.quantity("/initial_height", "D", "height mu of the bed at rest");
+    list.quantity("/plateau_density", "1/D^2", "density of the solid, phi_0");
+    list.text("/equation_of_state", "equation of state");
+    list.quantity("/critical_temperature", "m g D", "temperature at which the solid vanishes, T_c",
+                  given_when("T_c is known"));
+    const Given measured = both(given_if(fitted, "\"from\" names a fit stage"), given_when("the fit succeeds"));
+    list.quantity("/measured_temperature", "m g D", "fitted temperature", measured);
+    list.quantity("/measured_reduced_temperature", "1", "fitted T/T_c", measured);
+    state_readings(list, measured);
+    state_simulated(list);
+  }
+
   void run(RunContext& context) const override {
     MapQuestion question;
     question.restitution = restitution_;
@@ -148,6 +166,49 @@ class Map : public Stage {
   }
 
  private:
+  static void state_readings(ResultList& list, const Given& measured) {
+    const std::string row = "/readings/#/";
+    list.text(row + "name", "name of the reading");
+    list.text(row + "jump_height", "how the jump height follows from Gamma");
+    list.text(row + "expansion", "how the expansion follows from T");
+    list.text(row + "constants", "whose constants");
+    list.text(row + "status", "whether the reading gives a temperature");
+    list.quantity(row + "jump", "D", "jump height of a single ball", {}, true);
+    list.quantity(row + "rise", "D", "rise of the centre of mass", {}, true);
+    list.quantity(row + "temperature", "m g D", "temperature", {}, true);
+    list.quantity(row + "temperature_over_mg", "m", "temperature as T/(m g)", {}, true);
+    list.quantity(row + "reduced_temperature", "1", "T/T_c", {}, true);
+    list.truth(row + "in_range", "whether its formula applies at this Gamma");
+    list.quantity(row + "gamma_of_measured_temperature", "1", "Gamma that the fitted temperature asks for", measured,
+                  true);
+    list.table({"map.csv",
+                "Gamma to T/T_c by every reading",
+                {{"name", "", "name of the reading"},
+                 {"jump_height", "", "how the jump height follows from Gamma"},
+                 {"expansion", "", "how the expansion follows from T"},
+                 {"constants", "", "whose constants"},
+                 {"jump", "D", "jump height of a single ball"},
+                 {"rise", "D", "rise of the centre of mass"},
+                 {"reduced_temperature", "1", "T/T_c"},
+                 {"in_range", "1", "1 where its formula applies at this Gamma, else 0", {"0", "1"}}}});
+  }
+
+  void state_simulated(ResultList& list) const {
+    const Given asked = given_if(list.from("study") != nullptr || !table_.texts.empty(),
+                                 "\"from\" names a study or \"table\" is given");
+    const Given found = both(asked, given_when("the table of simulated beds gives a temperature"));
+    list.text("/simulated/status", "whether the table of simulated beds gives a temperature", asked);
+    list.text("/simulated/message", "why it does not", both(asked, given_when("it does not")));
+    list.number("/simulated/beds", "1", "beds in the table", asked);
+    for (const std::string& axis : columns_.axes)
+      list.number("/simulated/at/" + axis, axis == "frequency" ? "Hz" : "1", "where the bed lies in the table", asked);
+    list.truth("/simulated/inside", "whether the bed lies inside the table", found);
+    list.number("/simulated/interpolation_error", "1", "relative error of the interpolation", found, true);
+    list.quantity("/simulated/temperature", "m g D", "temperature by the table", found);
+    list.quantity("/simulated/temperature_over_mg", "m", "the same as T/(m g)", found);
+    list.quantity("/simulated/reduced_temperature", "1", "the same as T/T_c", found);
+  }
+
   // What the bed knows need not be stated again, and may not be stated otherwise.
   void require_bed_facts(Fields& fields) const {
     const KnownBed* known = fields.known_bed();

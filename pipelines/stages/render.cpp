@@ -37,6 +37,20 @@ class Render : public Stage {
     fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
                    "Choose another level");
   }
+  void results(ResultList& list) const override {
+    list.number("/frames", "1", "frames drawn");
+    list.quantity("/width", "px", "width of a frame");
+    list.quantity("/height", "px", "height of a frame");
+    list.quantity("/scale", "m/px", "length of a pixel");
+    list.quantity("/radius", "px", "radius of a bead");
+    list.table({"truth.csv",
+                "true centres of the disks",
+                {{"frame", "1", "number of the frame"},
+                 {"disk", "1", "number of the disk"},
+                 {"x_px", "px", "column of the centre"},
+                 {"y_px", "px", "row of the centre"},
+                 {"radius_px", "px", "radius"}}});
+  }
   void run(RunContext& context) const override { images_module().render(options_, context); }
 
  private:

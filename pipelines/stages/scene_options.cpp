@@ -54,6 +54,32 @@ void read_table(Fields& fields, TableFloorOptions& table) {
   if (!table.period) table.period = 1;
 }
 
+// Amplitude and frequency, or Gamma and frequency: Gamma = a (2 pi f)^2/g.
+void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<double> gravity) {
+  std::optional<double> amplitude;
+  if (fields.mode() == Fields::Mode::encode && !s.gamma) amplitude = s.amplitude;
+  fields.quantity("amplitude", amplitude, dimension::length,
+                  {.help = "amplitude a; or give gamma", .range = positive, .example = "\"2.5 mm\""});
+  fields.number("gamma", s.gamma,
+                {.help = "peak acceleration of the floor over g, Gamma = a (2 pi f)^2/g, in place of the amplitude",
+                 .range = positive,
+                 .example = "4"});
+  fields.quantity("frequency", s.frequency, dimension::frequency,
+                  {.help = "frequency f", .required = true, .range = positive, .example = "\"20 Hz\""});
+  fields.either("amplitude", "gamma", "Give \"amplitude\": \"2.5 mm\", or \"gamma\": 4");
+  const double omega = 2 * std::numbers::pi * s.frequency;
+  if (fields.decoding()) {
+    fields.require(!s.gamma || gravity, "gamma", "a weightless scene has no Gamma", "Give the amplitude");
+    s.amplitude = amplitude.value_or(s.gamma && gravity && omega > 0 ? *s.gamma * *gravity / (omega * omega) : 0);
+  }
+  if (!gravity) return;
+  if (s.gamma)
+    fields.comment(fmt::format("amplitude {}", fields.reduced() ? fmt::format("{:.6g}", s.amplitude)
+                                                                : handy_text(s.amplitude, dimension::length)));
+  else
+    fields.comment(fmt::format("gamma {:.6g}", s.amplitude * omega * omega / *gravity));
+}
+
 sim::Surface to_sim(const SurfaceOptions& s) { return {s.restitution, s.friction, s.tangential_restitution}; }
 
 }  // namespace
@@ -200,7 +226,7 @@ void SceneOptions::describe(Fields& fields) {
                                                 [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
                   alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
         f.variant(
-            "lid", b.lid, {.help = "what is above"}, alternative<OpenLidOptions>("open", "nothing"),
+            "lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "nothing"),
             alternative<FixedLidOptions>(
                 "fixed", "a wall",
                 [](Fields& g, FixedLidOptions& l) {
@@ -217,18 +243,12 @@ void SceneOptions::describe(Fields& fields) {
       {.help = "the box", .required = true});
   fields.object<FloorOptions>(
       "floor", floor_,
-      [](Fields& f, FloorOptions& floor) {
+      [gravity = gravity_](Fields& f, FloorOptions& floor) {
         f.tagged("motion", floor.motion, {.help = "how the floor moves"},
                  alternative<StillFloorOptions>("still", "not at all"),
                  alternative<SinusoidalFloorOptions>(
                      "sinusoidal", "a sin(2 pi f t)",
-                     [](Fields& g, SinusoidalFloorOptions& s) {
-                       g.quantity(
-                           "amplitude", s.amplitude, dimension::length,
-                           {.help = "amplitude a", .required = true, .range = positive, .example = "\"2.5 mm\""});
-                       g.quantity("frequency", s.frequency, dimension::frequency,
-                                  {.help = "frequency f", .required = true, .range = positive, .example = "\"20 Hz\""});
-                     }),
+                     [gravity](Fields& g, SinusoidalFloorOptions& s) { describe_shaking(g, s, gravity); }),
                  alternative<TableFloorOptions>(
                      "table",
                      "one period of measured positions, equally spaced in time; a periodic cubic spline between them",

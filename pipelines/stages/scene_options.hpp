@@ -56,6 +56,7 @@ struct BoxOptions {
 struct StillFloorOptions {};
 struct SinusoidalFloorOptions {
   double amplitude = 0, frequency = 0;
+  std::optional<double> gamma;  // given in place of the amplitude, which follows from it
 };
 struct TableFloorOptions {
   std::optional<double> period;
@@ -105,6 +106,11 @@ struct FloorTable {
 };
 FloorTable read_floor_table(const std::filesystem::path& path);
 
+// Says where a bead [m] is larger or smaller than those of experiments (decoding only).
+void warn_of_bead(Fields& fields, std::string_view pointer_below, double diameter);
+// The words for it, and what to do; nothing about an ordinary bead.
+std::optional<Misfit> odd_bead(double diameter);
+
 class SceneOptions {
  public:
   // Names every option of the bed; when decoding, also checks that such a bed can be and reports what cannot.
@@ -127,7 +133,20 @@ class SceneOptions {
   // T/(m g D) of the reservoir; 0 without one.
   double bath_temperature() const;
 
+  // Peak acceleration of a sinusoidal floor over g; 0 for other floors.
+  double gamma() const;
+  // Says what is odd about the bed, though it can be simulated (decoding only). `settle` as written.
+  void warn(Fields& fields, double settle) const;
+  // For Stage::facts.
+  Json facts() const;
+
  private:
+  void warn_of_shaking(Fields& fields) const;
+  void warn_of_size(Fields& fields) const;
+  void warn_of_locking(Fields& fields) const;
+  double height_at_rest() const;  // [D]
+  std::string length_text(double length) const;
+
   DiskOptions disks_;
   std::optional<double> gravity_;
   BoxOptions box_;

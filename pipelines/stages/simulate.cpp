@@ -18,6 +18,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/bed_measurement.hpp"
+#include "pipelines/stages/bed_results.hpp"
 #include "pipelines/stages/kernel_options.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
@@ -135,6 +136,17 @@ TrajectoryFrame frame_of(const sim::Snapshot& at, const sim::Scene& scene, const
 class Simulate : public Stage {
  public:
   void describe(Fields& fields) override;
+  void results(ResultList& list) const override {
+    state_bed_results(list, {.reduced = bed_.description().reduced,
+                             .weightless = bed_.weightless(),
+                             .periodic_upwards = bed_.periodic_upwards(),
+                             .shaken = bed_.period() > 0,
+                             .frames = frames_.count > 0,
+                             .annealed = !annealing_.empty(),
+                             .replicas = replicas_,
+                             .observe = ObserveOptions::from(observe_)});
+  }
+  Json facts() const override { return bed_.facts(); }
   void run(RunContext& context) const override;
   std::optional<BedDescription> bed() const override;
 
@@ -253,6 +265,7 @@ void Simulate::describe(Fields& fields) {
                        std::to_string(plan.periods * plan.phases) + " moments at which the bed is looked at",
                    "Measure longer, or ask for fewer frames");
   }
+  bed_.warn(fields, settle_);
 }
 
 Simulate::Schedule Simulate::schedule() const {
@@ -369,7 +382,7 @@ class Simulate::Run {
     const BedDescription bed = stage_.bed_.description();
     const sim::EnergyLedger energy = simulation_->energy();
     const sim::Counters counters = simulation_->counters();
-    out["gamma"] = quantity_json(bed.gamma(), "1");
+    out["gamma"] = quantity_json(stage_.bed_.gamma(), "1");
     out["column_number"] = quantity_json(bed.column_number(), "1");
     out["energy_ledger"] = {{"unit", stage_.bed_.weightless() ? "T0" : "m g D"},
                             {"initial", energy.initial},

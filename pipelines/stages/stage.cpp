@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
@@ -39,6 +41,17 @@ const Input& RunContext::input(std::string_view kind) const {
   if (found.size() > 1)
     throw InputError(fmt::format("\"from\" names {} stages \"{}\", one is needed", found.size(), kind));
   return *found.front();
+}
+
+std::vector<StatedStage> Chain::stated() const {
+  std::vector<StatedStage> out;
+  for (const ChainStage& stage : stages) out.push_back({stage.id, stage.stage, stage.results.get()});
+  return out;
+}
+
+const ChainStage* Chain::find(std::string_view id) const {
+  const auto found = std::find_if(stages.begin(), stages.end(), [&](const ChainStage& s) { return s.id == id; });
+  return found == stages.end() ? nullptr : &*found;
 }
 
 }  // namespace shakebed::pipelines

@@ -15,6 +15,9 @@
 //            fields.quantity("amplitude", amplitude_, dimension::length, {.help = "amplitude", .required = true,
 //                                                                         .range = positive, .example = "\"2.5 mm\""});
 //          }
+//          void results(ResultList& list) const override {            // every number and table that run() writes
+//            list.quantity("/rise", "D", "rise of the centre of mass");
+//          }
 //          void run(RunContext& context) const override {
 //            const Input& bed = context.input("simulate");                    // by the kind of the stage it comes from
 //            const auto lines = read_profile_csv(bed.file("profile.csv"));    // InputError when it is not one
@@ -131,9 +134,14 @@ class RunContext {
 struct ChainStage {
   std::string id, stage;  // its kind
   bool reads_files = false;
+  std::unique_ptr<ResultList> results;  // what it will give
 };
 struct Chain {
   std::vector<ChainStage> stages;
+  std::vector<Warning> warnings;
+
+  std::vector<StatedStage> stated() const;
+  const ChainStage* find(std::string_view id) const;  // nullptr if there is none
 };
 // Reads the recipe of a chain without running it. Throws ConfigError.
 using ChainReader = std::function<Chain(const JsonNode& recipe)>;
@@ -144,6 +152,11 @@ class Stage {
   virtual ~Stage() = default;
   // Names every option: reads, writes or describes them (see config.hpp). Called once when decoding.
   virtual void describe(Fields& fields) = 0;
+  // States every number of the result file and every table (see results.hpp). Called when the options are right, before
+  // anything runs; list.from() are the stages that it reads.
+  virtual void results(ResultList& list) const = 0;
+  // What follows from the options and is worth knowing before a run, as quantities: {"gamma": {...}}.
+  virtual Json facts() const { return Json::object(); }
   virtual void run(RunContext& context) const = 0;
   // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
   // state it again, and may not state it otherwise.

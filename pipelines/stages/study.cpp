@@ -82,6 +82,7 @@ class Study : public Stage {
   void describe(Fields& fields) override;
   void check_chains(Fields& fields, const ChainReader& read) override;
   std::vector<std::string> chain_kinds() const override;
+  void results(ResultList& list) const override;
   void run(RunContext& context) const override;
 
  private:
@@ -91,7 +92,7 @@ class Study : public Stage {
   };
   std::vector<Point> points() const;
   JsonNode recipe_at(const Point& point, std::uint64_t seed) const;
-  void check_pointers(Fields& fields, const Chain& chain) const;
+  void check_chain(Fields& fields, const Chain& chain) const;
   std::vector<Number> numbers(const std::vector<Input>& chain) const;
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
@@ -103,6 +104,7 @@ class Study : public Stage {
   std::vector<std::pair<std::string, Collected>> collect_;
   std::vector<std::pair<std::string, Tabulated>> tables_;
   std::uint32_t replicas_ = 1;
+  std::shared_ptr<const Chain> first_;  // the chain of the first point, once it has been read
 };
 
 void Study::describe(Fields& fields) {
@@ -164,42 +166,20 @@ std::vector<std::string> Study::chain_kinds() const {
   return kinds;
 }
 
-void Study::check_pointers(Fields& fields, const Chain& chain) const {
-  const auto has = [&](const std::string& id) {
-    return std::any_of(chain.stages.begin(), chain.stages.end(),
-                       [&](const ChainStage& stage) { return stage.id == id; });
-  };
-  for (const ChainStage& stage : chain.stages) {
-    // Pictures and verdicts are for people: no number of theirs is collected.
-    for (const char* kind : {"chart", "claims", "study"}) {
-      if (stage.stage == kind)
-        fields.problem("/stages", fmt::format("a chain holds no {} stage", kind), "Put it after the study");
-    }
-    if (stage.reads_files) fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "");
-  }
-  for (const auto& [name, collected] : collect_) {
-    const auto tokens = split_pointer(collected.at);
-    if (tokens.size() < 2 || !has(tokens.front()))
-      fields.problem("/collect/" + escape_pointer_token(name) + "/at",
-                     "\"" + collected.at + "\" leads to no stage of the chain", "Write /<stage id>/<number>");
-  }
-  for (const auto& [name, table] : tables_) {
-    const auto tokens = split_pointer(table.at);
-    if (tokens.size() != 2 || !has(tokens.front()))
-      fields.problem("/tables/" + escape_pointer_token(name) + "/at",
-                     "\"" + table.at + "\" leads to no file of the chain", "Write /<stage id>/<file>.csv");
-    if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
-      fields.problem("/tables/" + escape_pointer_token(name), "\"" + name + "\" cannot be the name of its file");
-  }
-}
-
 // Every series is read before any runs, so that a mistake in the last one is found now.
 void Study::check_chains(Fields& fields, const ChainReader& read) {
+  std::map<std::pair<std::string, std::string>, std::pair<Warning, std::size_t>> warnings;  // by kind and pointer
+  std::size_t points_read = 0;
   for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
     const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[k].first);
     for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
       try {
-        check_pointers(fields, read(recipe_at({k, v, 0}, 1)));
+        const auto chain = std::make_shared<const Chain>(read(recipe_at({k, v, 0}, 1)));
+        check_chain(fields, *chain);
+        ++points_read;
+        if (!first_) first_ = chain;
+        for (const Warning& warning : chain->warnings)
+          ++warnings.try_emplace({warning.kind, warning.problem.pointer}, warning, 0).first->second.second;
       } catch (const ConfigError& error) {
         for (const Problem& problem : error.problems())
           fields.problem(
@@ -211,6 +191,95 @@ void Study::check_chains(Fields& fields, const ChainReader& read) {
       }
       if (fields.problem_count() > 0) return;
     }
+  }
+  for (const auto& [key, counted] : warnings)
+    fields.warn(key.first, key.second,
+                fmt::format("{} ({} of {} points)", counted.first.problem.what, counted.second, points_read),
+                counted.first.problem.suggestion);
+}
+
+// What the chain may hold, and that it gives what is collected.
+void Study::check_chain(Fields& fields, const Chain& chain) const {
+  for (const ChainStage& stage : chain.stages) {
+    // Pictures and verdicts are for people: no number of theirs is collected.
+    for (const char* kind : {"chart", "claims", "study"}) {
+      if (stage.stage == kind)
+        fields.problem("/stages", fmt::format("a chain holds no {} stage", kind), "Put it after the study");
+    }
+    if (stage.reads_files)
+      fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "Put it after the study");
+  }
+  const std::vector<StatedStage> stated = chain.stated();
+  for (const auto& [name, collected] : collect_) {
+    const auto misfit = misfit_of_pointer(stated, collected.at, "the chain");
+    if (misfit) fields.problem("/collect/" + escape_pointer_token(name) + "/at", misfit->what, misfit->suggestion);
+  }
+  for (const auto& [name, table] : tables_) {
+    const std::string where = "/tables/" + escape_pointer_token(name);
+    if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
+      fields.problem(where, "\"" + name + "\" cannot be the name of its file");
+    std::vector<std::string> tokens;
+    try {
+      tokens = split_pointer(table.at);
+    } catch (const UsageError&) {}
+    const auto stage = std::find_if(stated.begin(), stated.end(),
+                                    [&](const StatedStage& s) { return !tokens.empty() && s.id == tokens.front(); });
+    if (tokens.size() != 2 || stage == stated.end()) {
+      fields.problem(where + "/at", "\"" + table.at + "\" leads to no file of the chain",
+                     "Write /<stage id>/<file>.csv");
+      continue;
+    }
+    auto misfit = misfit_of_table(*stage, tokens[1]);
+    if (misfit) {
+      fields.problem(where + "/at", misfit->what, misfit->suggestion);
+      continue;
+    }
+    misfit = misfit_of_column(*stage->results->find_table(tokens[1]), table.key);
+    if (misfit) fields.problem(where + "/key", misfit->what, misfit->suggestion);
+  }
+}
+
+void Study::results(ResultList& list) const {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) names.push_back(series_name(k));
+  std::vector<StatedColumn> columns{{"series", "", "kind of bed", names}, {parameter_.name, "", "what is varied"}};
+  std::vector<StatedColumn> runs = columns;
+  runs.push_back({"replica", "1", "number of the run"});
+  list.number("/replicas", "1", "runs at every point");
+  list.number("/runs", "1", "runs altogether");
+  for (const auto& [name, collected] : collect_) {
+    const auto tokens = split_pointer(collected.at);
+    const ChainStage* stage = first_->find(tokens.front());
+    const StatedResult* number =
+        stage == nullptr ? nullptr
+                         : stage->results->find(collected.at.substr(1 + escape_pointer_token(tokens.front()).size()));
+    const bool scaled = collected.times != 1 || collected.plus != 0;
+    const std::string unit = number == nullptr || scaled ? "" : number->unit;
+    const std::string meaning = number == nullptr ? "" : number->meaning;
+    columns.push_back({name, unit, meaning});
+    columns.push_back({name + "_error", unit, "its standard error"});
+    runs.push_back({name, unit, meaning});
+    for (const std::string& one : names)
+      list.quantity(pointer_join(pointer_join("/series", one) + "/#", name), unit, meaning, {}, true);
+  }
+  for (const std::string& one : names)
+    list.number(pointer_join(pointer_join("/series", one) + "/#", parameter_.name), "", "what is varied");
+  list.table({"table.csv", "means over the runs of each point", columns});
+  list.table({"replicas.csv", "the numbers of each run", runs});
+  for (const auto& [name, table] : tables_) {
+    const auto tokens = split_pointer(table.at);
+    const StatedTable* source = first_->find(tokens[0])->results->find_table(tokens[1]);
+    StatedTable out{name + ".csv", source->meaning + ", averaged over the runs", {columns[0], columns[1]}};
+    for (const StatedColumn& column : source->columns) {
+      if (column.name == table.key) out.columns.push_back(column);
+    }
+    for (const StatedColumn& column : source->columns) {
+      if (column.name == table.key) continue;
+      out.columns.push_back(column);
+      out.columns.push_back({column.name + "_error", column.unit, "its standard error"});
+    }
+    out.columns.push_back({"runs", "1", "runs that have the row"});
+    list.table(std::move(out));
   }
 }
 

@@ -24,6 +24,7 @@ class Counting : public Stage {
  public:
   explicit Counting(End end) : end_(end) {}
   void describe(Fields&) override {}
+  void results(ResultList&) const override {}
   void run(RunContext& context) const override {
     const fs::path file = context.scratch() / "starts";
     std::string starts = fs::exists(file) ? read_file(file) : "";

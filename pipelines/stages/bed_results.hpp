@@ -1,0 +1,24 @@
+// The numbers and tables of a simulated bed (observables.json and the CSV files beside it), stated before it runs.
+#pragma once
+
+#include <cstdint>
+
+#include "pipelines/formats/results.hpp"
+#include "pipelines/stages/bed_measurement.hpp"
+
+namespace shakebed::pipelines {
+
+struct BedOutput {
+  bool reduced = false, weightless = false, periodic_upwards = false;
+  bool shaken = false, frames = false, annealed = false;
+  std::uint32_t replicas = 1;
+  ObserveOptions observe;
+};
+void state_bed_results(ResultList& list, const BedOutput& bed);
+
+// The columns of a density profile.
+std::vector<StatedColumn> profile_columns();
+// Those of a covariance between its heights.
+std::vector<StatedColumn> covariance_columns();
+
+}  // namespace shakebed::pipelines

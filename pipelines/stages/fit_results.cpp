@@ -1,0 +1,193 @@
+#include "pipelines/stages/fit_results.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+class FitStatement {
+ public:
+  FitStatement(ResultList& list, const FitOutput& fit) : list_(list), fit_(fit) {}
+
+  void state() {
+    list_.text("/status", "whether the fit succeeded");
+    list_.text("/message", "why it did not", given_when("the fit does not succeed"));
+    list_.text("/model", "the model fitted");
+    estimates();
+    quality();
+    window();
+    comparisons();
+    list_.truth("/describes_data", "whether the model fits");
+    list_.text("/why_not", "why it does not fit", given_when("the model does not fit"));
+    list_.text("/warnings/#", "what is odd about the fit", given_when("something is odd"));
+    answer();
+    extras();
+    tables();
+  }
+
+ private:
+  void estimates() {
+    const Given known = both(fitted_, given_when("the diameter is known"));
+    list_.quantity("/temperature", "m g D", "fitted temperature", fitted_);
+    list_.quantity("/temperature_over_mg", "m", "fitted temperature as T/(m g)", known);
+    list_.quantity("/shift", "D", "height at which the fluid begins", fitted_);
+    list_.quantity("/solid_height", "D", "height of the solid, zeta_F", fitted_);
+    list_.quantity("/plateau_density", "1/D^2", "density of the solid, phi_0", fitted_);
+    list_.quantity("/column_number", "1", "disks a diameter of width, N D/W", fitted_);
+    const Given critical = both(fitted_, given_when("T_c is known from N D/W"));
+    list_.quantity("/critical_temperature", "m g D", "temperature at which the solid vanishes, T_c", critical);
+    list_.quantity("/critical_temperature_over_mg", "m", "T_c as a length, T_c/(m g)", both(critical, known));
+    list_.quantity("/reduced_temperature", "1", "T/T_c", critical);
+    list_.quantity("/solid_height_by_sum_rule", "D", "height of the solid by the number of disks", critical);
+    list_.text("/critical_temperature_status", "why T_c is not known", given_when("T_c is not known"));
+    interval("/temperature_interval", fitted_);
+    list_.text("/parameters/#", "name of a fitted parameter", fitted_);
+    list_.number("/covariance/#/#", "1", "covariance of the parameters, in their order", fitted_);
+  }
+
+  void interval(const std::string& pointer, const Given& given) {
+    list_.text(pointer + "/status", "whether both ends were found", given);
+    list_.number(pointer + "/low", "m g D", "lower end of the interval of T", given, true);
+    list_.number(pointer + "/high", "m g D", "upper end of the interval of T", given, true);
+    list_.number(pointer + "/confidence", "1", "its confidence", given);
+    list_.truth(pointer + "/low_open", "whether the lower end lies beyond what was searched", given);
+    list_.truth(pointer + "/high_open", "whether the upper end lies beyond what was searched", given);
+  }
+
+  void quality() {
+    list_.number("/chi2", "1", "sum of the squared residuals over their errors", fitted_);
+    list_.number("/dof", "1", "degrees of freedom", fitted_);
+    list_.number("/chi2_per_dof", "1", "chi2 over the degrees of freedom", fitted_, true);
+    list_.number("/p_value", "1", "chance of so large a chi2", fitted_, true);
+    list_.number("/aic", "1", "Akaike's criterion", fitted_, true);
+    list_.number("/bic", "1", "Bayes' criterion", fitted_, true);
+    list_.truth("/errors_scaled", "whether the errors follow from the scatter about the fit", fitted_);
+    list_.number("/relative_misfit", "1", "rms residual over the greatest density");
+    list_.quantity("/area", "1", "disks a diameter of width, by the profile's area");
+  }
+
+  void window() {
+    list_.quantity("/window/low", "D", "lowest height used");
+    list_.quantity("/window/high", "D", "highest height used");
+    list_.number("/window/bins", "1", "heights used");
+    list_.text("/window/rule", "the rule that chose them");
+    list_.text("/kernel/kind", "the window through which density was measured");
+    list_.number("/kernel/width", "D", "its width");
+    const Given several = given_when("several windows are compared"),
+                good = given_when("the fit of the window succeeds");
+    const std::string row = "/temperature_by_window/#/";
+    list_.number(row + "low", "D", "lowest height of the window", several);
+    list_.number(row + "high", "D", "highest height of the window", several);
+    list_.number(row + "bins", "1", "heights in the window", several);
+    list_.text(row + "status", "whether the fit of the window succeeded", several);
+    list_.number(row + "temperature", "m g D", "temperature of the window", good);
+    list_.number(row + "temperature_std_error", "m g D", "its standard error", good);
+    list_.number(row + "shift", "D", "shift of the window", good);
+    list_.number(row + "chi2_per_dof", "1", "chi2 over the degrees of freedom of the window", good, true);
+  }
+
+  void comparisons() {
+    const Given several = given_when("several models are compared"), good = given_when("the fit of the model succeeds");
+    const std::string row = "/models/#/";
+    list_.text(row + "model", "a model beside the one chosen", several);
+    list_.truth(row + "plateau_density_free", "whether phi_0 was fitted, too", several);
+    list_.text(row + "status", "whether its fit succeeded", several);
+    list_.quantity(row + "temperature", "m g D", "its temperature", good);
+    list_.quantity(row + "shift", "D", "its shift", good);
+    list_.quantity(row + "plateau_density", "1/D^2", "its density of the solid", good);
+    list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", good, true);
+    list_.number(row + "aic", "1", "its Akaike criterion", good, true);
+    list_.number(row + "bic", "1", "its Bayes criterion", good, true);
+  }
+
+  void answer() {
+    const Given asked = given_if(fit_.answer, "\"answer\" is true and the model is not \"simulation\""),
+                found = both(asked, given_when("there is an answer"));
+    list_.text("/answer/verdict", "one temperature, model does not fit, or no single temperature", asked);
+    list_.text("/answer/why", "the reason of the verdict", asked);
+    list_.text("/answer/advice", "what to do", asked);
+    list_.text("/answer/status", "ok, or why there is no answer", asked);
+    const auto temperature = [&](const std::string& name, const std::string& meaning, const Given& given) {
+      list_.quantity("/answer/" + name, "m g D", meaning, given);
+      list_.quantity("/answer/" + name + "_over_mg", "m", meaning + ", as T/(m g)",
+                     both(given, given_when("the diameter is known")));
+    };
+    const Given kinetic = both(found, given_when("a kinetic temperature is known"));
+    temperature("temperature", "temperature with its whole uncertainty", found);
+    temperature("temperature_x", "kinetic temperature, horizontal", kinetic);
+    temperature("temperature_z", "kinetic temperature, vertical", kinetic);
+    list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
+    list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
+    list_.number("/answer/interval/confidence", "1", "confidence of the interval", found);
+    list_.quantity("/answer/statistical_error", "m g D", "statistical error of T", found);
+    list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
+    list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);
+    list_.number("/answer/bias", "1", "known bias that has been taken off, relative", found);
+    list_.text("/answer/thermometer", "model and window that gave T", found);
+    list_.text("/answer/model", "model that gave T", found);
+    list_.quantity("/answer/solid_height", "D", "height of the solid at this T", found);
+    const std::string row = "/answer/readings/#/";
+    list_.text(row + "thermometer", "a model and window", found);
+    list_.text(row + "model", "its model", found);
+    list_.text(row + "status", "whether its fit succeeded", found);
+    list_.truth(row + "admissible", "whether it checks the answer", found);
+    list_.quantity(row + "temperature", "m g D", "its temperature without the known bias", found);
+    list_.number(row + "bias", "1", "its known bias, relative", found);
+    list_.number(row + "bias_uncertainty", "1", "uncertainty of its bias, relative", found);
+    list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", found, true);
+  }
+
+  void extras() {
+    const Given matched = given_if(fit_.matched, "the model is \"simulation\"");
+    list_.text("/library/#/stage", "a simulated bed of the library", matched);
+    list_.quantity("/library/#/temperature", "m g D", "its temperature", matched);
+    list_.quantity("/interpolation_error", "m g D", "error of the interpolation between the beds", matched);
+    list_.number("/library_scatter", "1", "relative scatter of the library's own beds", matched, true);
+    const Given asked = given_if(fit_.bootstrap, "\"bootstrap\" is above 0");
+    const Given found = both(asked, given_when("the bootstrap succeeds"));
+    list_.text("/bootstrap/status", "whether the bootstrap succeeded", asked);
+    list_.text("/bootstrap/message", "why it did not", both(asked, given_when("it does not succeed")));
+    list_.number("/bootstrap/resamples", "1", "resamples of the frames", asked);
+    list_.number("/bootstrap/succeeded", "1", "resamples whose fit succeeded", asked);
+    list_.number("/bootstrap/window_frames", "1", "frames in a block", asked);
+    list_.quantity("/bootstrap/temperature", "m g D", "temperature over the resamples", found);
+    list_.quantity("/bootstrap/shift", "D", "shift over the resamples", found);
+    for (const char* end : {"low", "high"})
+      list_.number(std::string("/bootstrap/temperature_interval/") + end, "m g D", "end of the interval of T", found);
+    list_.number("/bootstrap/temperature_interval/confidence", "1", "its confidence", found);
+  }
+
+  void tables() {
+    const StatedColumn height{"height", "D", "height"};
+    list_.table({"curve.csv",
+                 "the fitted curve",
+                 {height,
+                  {"number_density", "1/D^2", "density of the model"},
+                  {"smoothed_density", "1/D^2", "the same through the kernel of the measurement"}}});
+    list_.table({"residuals.csv",
+                 "measured and fitted densities",
+                 {height,
+                  {"number_density", "1/D^2", "measured density"},
+                  {"std_error", "1/D^2", "its standard error"},
+                  {"model", "1/D^2", "fitted density"},
+                  {"used", "1", "1 inside the window", {"0", "1"}}}});
+    list_.table({"windows.csv",
+                 "the temperature against the window",
+                 {{"low", "D", "lowest height"},
+                  {"high", "D", "highest height"},
+                  {"bins", "1", "heights used"},
+                  {"temperature", "m g D", "fitted temperature"},
+                  {"std_error", "m g D", "its standard error"},
+                  {"shift", "D", "fitted shift"},
+                  {"chi2_per_dof", "1", "chi2 over the degrees of freedom"},
+                  {"status", "", "whether the fit succeeded"}}});
+  }
+
+  ResultList& list_;
+  const FitOutput& fit_;
+  Given fitted_ = given_when("the fit has numbers");
+};
+
+}  // namespace
+
+void state_fit_results(ResultList& list, const FitOutput& fit) { FitStatement(list, fit).state(); }
+
+}  // namespace shakebed::pipelines
