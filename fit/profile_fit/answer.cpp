@@ -26,6 +26,8 @@ constexpr double admissible_misfit = 2.0;
 constexpr double row_modulation = 1.633;
 // A thermometer is preferred to one before it in the list where its scatter is less than this part of the other's.
 constexpr double clearly_less = 0.8;
+// An interval that reaches farther than this in ln T, a factor of twenty, says that T is not known: its ends are open.
+constexpr double widest_interval = 3.0;
 // Steps in which the known bias and the temperature at which it is looked up settle.
 constexpr int bias_steps = 4;
 // The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
@@ -239,7 +241,11 @@ class AnswerFinder {
       take_the_range();
       return;
     }
-    const double far = quantile() * a.std_error / a.temperature;
+    double far = quantile() * a.std_error / a.temperature;
+    if (far > widest_interval) {
+      far = widest_interval;
+      a.interval.low_open = a.interval.high_open = true;
+    }
     a.interval.low = a.temperature * std::exp(-far);
     a.interval.high = a.temperature * std::exp(far);
   }

@@ -248,6 +248,38 @@ TEST(Answer, WithoutATemperatureSaysWhy) {
   EXPECT_EQ(find_answer({}).status, FitStatus::bad_input);
 }
 
+TEST(Answer, OfAnyProfileIsFiniteAndInOrder) {
+  for (std::uint64_t seed = 0; seed < 120; ++seed) {
+    synthetic::Normal normal(17 * seed + 5);
+    const auto uniform = [&] { return 0.5 * std::erfc(-normal() / std::sqrt(2.0)); };
+    AnswerInput input;
+    const int bins = 1 + static_cast<int>(60.0 * uniform());
+    const double range = std::exp(1.5 * normal() + 2.0);
+    for (int i = 0; i < bins; ++i) {
+      const double x = (i + 0.5) / bins;
+      const double clean = seed % 3 == 0 ? 1.0 - x : seed % 3 == 1 ? std::exp(-5.0 * x) : (x < 0.5 ? 1.1 : 0.0);
+      input.profile.height.push_back(range * x);
+      input.profile.number_density.push_back(clean + 0.02 * normal());
+      input.profile.std_error.push_back(0.02 * std::exp(2.0 * normal()));
+    }
+    if (uniform() < 0.2) input.profile.std_error.clear();
+    const Kernel kernels[] = {{}, {KernelKind::top_hat, 0.3}, {KernelKind::gaussian, 0.5}, {KernelKind::disk_chord, 1}};
+    input.kernel = kernels[seed % 4];
+    if (uniform() < 0.5) input.column_number = 0.5 * range;
+    const Answer answer = find_answer(input);
+    EXPECT_FALSE(answer.why.empty()) << seed;
+    EXPECT_FALSE(answer.advice.empty()) << seed;
+    if (!answer.ok()) continue;
+    for (const double number : {answer.temperature, answer.std_error, answer.statistical_error, answer.bias_uncertainty,
+                                answer.spread, answer.bias, answer.interval.low, answer.interval.high,
+                                answer.solid_height.value, answer.solid_height.std_error})
+      EXPECT_TRUE(std::isfinite(number)) << seed;
+    EXPECT_GT(answer.temperature, 0.0) << seed;
+    EXPECT_LE(answer.interval.low, answer.temperature) << seed;
+    EXPECT_GE(answer.interval.high, answer.temperature) << seed;
+  }
+}
+
 TEST(Answer, IsTheSameTwice) {
   const AnswerInput input = column(0.3);
   const Answer one = find_answer(input), two = find_answer(input);
