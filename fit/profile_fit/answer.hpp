@@ -53,8 +53,10 @@ struct Answer {
   double spread = 0.0;             // of the admissible thermometers beyond what these two explain
   double std_error = 0.0;          // all three in quadrature
   double bias = 0.0;               // what has been taken off, relative
-  Interval interval;               // of T; with no_single_temperature the range of all readings and kinetic T
-  Estimate solid_height;           // of the Enskog tail at this T [D]
+  // Of T; with no_single_temperature the range of all readings and kinetic T. Ends that are open lie a factor of twenty
+  // away: T is then not known.
+  Interval interval;
+  Estimate solid_height;                                 // of the Enskog tail at this T [D]
   std::optional<Estimate> temperature_x, temperature_z;  // kinetic, as given
   std::vector<Reading> readings;                         // of all thermometers
   [[nodiscard]] bool ok() const { return status == FitStatus::ok; }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 #include "fit/theory/expansion.hpp"
 #include "tests/fit/simulated_bed.hpp"
@@ -162,6 +163,70 @@ TEST(Answer, SaysWhereTheModelDoesNotFit) {
   EXPECT_GT(answer.std_error, fits.std_error);
 }
 
+// A profile at points, with the rows of a crystal in it: no model has them, and they are not the model's failure.
+TEST(Answer, IsNotMisledByTheRowsOfACrystal) {
+  const auto truth = HydrostaticProfile::of_column(best_of(), 0.3, {20.0, close_packing_density});
+  AnswerInput input;
+  input.base = 0.0;
+  for (double z = 0.05; z < synthetic::top_of(truth); z += 0.1) {
+    const double density = truth.density(z);
+    const double rows = density > 0.9 ? 0.6 * std::cos(2.0 * 3.14159265358979 * z / 0.8660254) : 0.0;
+    input.profile.height.push_back(z);
+    input.profile.number_density.push_back(density * (1.0 + rows));
+    input.profile.std_error.push_back(synthetic::bin_error(density, 0.02));
+  }
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+  EXPECT_NEAR(answer.temperature, 0.3, 0.01);
+  EXPECT_LT(answer.std_error, 0.01);
+}
+
+TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
+  // White noise of 0.1 every 0.1 D on a flat density of 0.7, at points. Blurred by 0.5 D its variance is that times
+  // 0.1/(2 sqrt(pi) 0.5), and neighbours d apart are correlated by exp(-d^2/(4 0.25)).
+  Profile profile;
+  for (int i = 0; i < 200; ++i) {
+    profile.height.push_back(0.05 + 0.1 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
+  EXPECT_EQ(blurred.kernel.kind, KernelKind::gaussian);
+  EXPECT_EQ(blurred.kernel.width, 0.5);
+  EXPECT_NEAR(blurred.rows_seen, std::exp(-2.0 * std::pow(3.14159265358979 * 0.5 / 0.8660254, 2)), 1e-6);
+  ASSERT_EQ(blurred.profile.height.size(), 200U);
+  EXPECT_NEAR(blurred.profile.number_density[100], 0.7, 1e-4);
+  EXPECT_NEAR(blurred.profile.number_density[0], 0.7 * kernel_cumulative({KernelKind::gaussian, 0.5}, 0.05), 1e-2);
+  const double variance = 0.01 * 0.1 / (2.0 * std::sqrt(3.14159265358979) * 0.5);
+  EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(variance), 1.0, 1e-3);
+  EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 107] / variance, std::exp(-0.49), 1e-3);
+}
+
+TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
+  Profile profile;
+  for (int i = 0; i < 50; ++i) {
+    profile.height.push_back(0.25 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  const Kernel wide{KernelKind::gaussian, 0.5};
+  EXPECT_EQ(blur_rows(profile, wide, 0.0).profile.number_density, profile.number_density);
+  EXPECT_EQ(blur_rows(profile, wide, 0.0).kernel.width, 0.5);
+  Profile coarse = profile;  // heights 1 D apart cannot be blurred by 0.5 D
+  for (double& height : coarse.height) height *= 4.0;
+  EXPECT_EQ(blur_rows(coarse, {}, 0.0).kernel.kind, KernelKind::none);
+  EXPECT_EQ(blur_rows(coarse, {}, 0.0).rows_seen, 1.0);
+  Profile bare = profile;
+  bare.std_error.clear();
+  EXPECT_EQ(blur_rows(bare, {}, 0.0).profile.number_density, bare.number_density);
+  Profile broken = profile;  // to be refused with its place, not blurred
+  broken.std_error[3] = -0.1;
+  EXPECT_EQ(blur_rows(broken, {}, 0.0).profile.std_error, broken.std_error);
+  // A profile that begins in the middle of a bed loses the heights that lack what lies below.
+  EXPECT_NEAR(blur_rows(profile, {}, -5.0).profile.height.front(), 2.0, 1e-12);
+}
+
 TEST(Answer, FindsTheSolidOfAColdBed) {
   const double critical = critical_temperature(enskog(), {20.0, close_packing_density}).value;
   const Answer answer = find_answer(column(0.6 * critical));
@@ -181,6 +246,38 @@ TEST(Answer, WithoutATemperatureSaysWhy) {
   EXPECT_FALSE(broken.why.empty());
   EXPECT_FALSE(broken.advice.empty());
   EXPECT_EQ(find_answer({}).status, FitStatus::bad_input);
+}
+
+TEST(Answer, OfAnyProfileIsFiniteAndInOrder) {
+  for (std::uint64_t seed = 0; seed < 120; ++seed) {
+    synthetic::Normal normal(17 * seed + 5);
+    const auto uniform = [&] { return 0.5 * std::erfc(-normal() / std::sqrt(2.0)); };
+    AnswerInput input;
+    const int bins = 1 + static_cast<int>(60.0 * uniform());
+    const double range = std::exp(1.5 * normal() + 2.0);
+    for (int i = 0; i < bins; ++i) {
+      const double x = (i + 0.5) / bins;
+      const double clean = seed % 3 == 0 ? 1.0 - x : seed % 3 == 1 ? std::exp(-5.0 * x) : (x < 0.5 ? 1.1 : 0.0);
+      input.profile.height.push_back(range * x);
+      input.profile.number_density.push_back(clean + 0.02 * normal());
+      input.profile.std_error.push_back(0.02 * std::exp(2.0 * normal()));
+    }
+    if (uniform() < 0.2) input.profile.std_error.clear();
+    const Kernel kernels[] = {{}, {KernelKind::top_hat, 0.3}, {KernelKind::gaussian, 0.5}, {KernelKind::disk_chord, 1}};
+    input.kernel = kernels[seed % 4];
+    if (uniform() < 0.5) input.column_number = 0.5 * range;
+    const Answer answer = find_answer(input);
+    EXPECT_FALSE(answer.why.empty()) << seed;
+    EXPECT_FALSE(answer.advice.empty()) << seed;
+    if (!answer.ok()) continue;
+    for (const double number : {answer.temperature, answer.std_error, answer.statistical_error, answer.bias_uncertainty,
+                                answer.spread, answer.bias, answer.interval.low, answer.interval.high,
+                                answer.solid_height.value, answer.solid_height.std_error})
+      EXPECT_TRUE(std::isfinite(number)) << seed;
+    EXPECT_GT(answer.temperature, 0.0) << seed;
+    EXPECT_LE(answer.interval.low, answer.temperature) << seed;
+    EXPECT_GE(answer.interval.high, answer.temperature) << seed;
+  }
 }
 
 TEST(Answer, IsTheSameTwice) {
