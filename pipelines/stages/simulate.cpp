@@ -550,7 +550,8 @@ class Simulate::Run {
     }
   }
 
-  // However many events that takes, an interruption is answered within some of them, and then the latest state is saved.
+  // However many events that takes, an interruption is answered within some of them, and then the latest state is
+  // saved.
   void advance_to(double time) {
     constexpr std::uint64_t events_between_looks = 200'000;  // 0.03 to 0.1 s
     while (!simulation_->advance_towards(time, events_between_looks)) stop_if_interrupted();
@@ -565,7 +566,8 @@ class Simulate::Run {
     const auto start = std::chrono::steady_clock::now();
     sound_ = state();
     kept_at_ = std::chrono::steady_clock::now();
-    keep_after_ = kept_at_ + std::max<std::chrono::steady_clock::duration>(50 * (kept_at_ - start), std::chrono::seconds(2));
+    keep_after_ =
+        kept_at_ + std::max<std::chrono::steady_clock::duration>(50 * (kept_at_ - start), std::chrono::seconds(2));
   }
 
   void save() {
@@ -812,7 +814,7 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
 
 StageRow simulate_stage() {
   return {.name = "simulate",
-          .version = 21,
+          .version = 22,
           .summary = "simulates a bed of hard disks, event by event",
           .accepts = {"simulate"},
           .most_inputs = 1,
