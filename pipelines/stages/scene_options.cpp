@@ -22,6 +22,21 @@ constexpr Dimension cube_over_time{.length = 2, .time = -3};
 void describe_surface(Fields& fields, SurfaceOptions& surface) {
   fields.number("restitution", surface.restitution,
                 {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
+  fields.choice(
+      "restitution_law", surface.law,
+      {{sim::RestitutionLaw::constant, "constant"},
+       {sim::RestitutionLaw::power, "power"},
+       {sim::RestitutionLaw::viscoelastic, "viscoelastic"}},
+      {.help = "how e depends on the approach v: not at all; 1 - (1 - e) (v/v0)^(3/4) below v0, e above (Bizon "
+               "1998); that of viscoelastic spheres, e at v0 (Mueller and Poeschel 2011)"});
+  fields.quantity("restitution_speed", surface.law_speed, dimension::velocity,
+                  {.help = "v0 of the restitution's law", .range = positive, .example = "\"0.3 m/s\""});
+  if (fields.decoding())
+    fields.require(
+        (surface.law == sim::RestitutionLaw::constant) == !surface.law_speed, "restitution_speed",
+        "a restitution that depends on speed needs the speed v0 at which it is the stated one, a constant one "
+        "has none",
+        "Give both \"restitution_law\" and \"restitution_speed\", or neither");
   fields.number("friction", surface.friction,
                 {.help = "Coulomb friction coefficient", .range = non_negative, .example = "0.2"});
   fields.number("tangential_restitution", surface.tangential_restitution,
@@ -80,7 +95,10 @@ void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<d
     fields.comment(fmt::format("gamma {:.6g}", s.amplitude * omega * omega / *gravity));
 }
 
-sim::Surface to_sim(const SurfaceOptions& s) { return {s.restitution, s.friction, s.tangential_restitution}; }
+// speed_unit: sqrt(g D) [m/s].
+sim::Surface to_sim(const SurfaceOptions& s, double speed_unit) {
+  return {s.restitution, s.friction, s.tangential_restitution, s.law, s.law_speed ? *s.law_speed / speed_unit : 1};
+}
 
 }  // namespace
 
@@ -185,6 +203,10 @@ void SceneOptions::describe(Fields& fields) {
                  "Default: 1e-4 sqrt(D/g) where anything dissipates",
              .range = non_negative,
              .example = "\"1 us\""});
+        f.boolean(
+            "rests", d.rests,
+            {.help = "a dissipative bed that has come to rest on the floor lies there, moving with it, until it falls "
+                     "away; false: it goes on in small contacts, which costs up to a thousand times more"});
         f.object<SecondSpeciesOptions>(
             "second", d.second,
             [](Fields& g, SecondSpeciesOptions& s) {
@@ -374,8 +396,9 @@ double SceneOptions::bath_temperature() const {
 }
 
 sim::Scene SceneOptions::scene(std::uint64_t seed) const {
-  const double length = length_unit(), time = time_unit();
+  const double length = length_unit(), time = time_unit(), speed = length / time;
   sim::Scene scene;
+  scene.rests = disks_.rests;
   scene.seed = seed;
   if (gravity_) scene.gravity = sim::UniformGravity{};
 
@@ -386,20 +409,20 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
                         (disks_.inertia == Inertia::sphere ? ratio * ratio * ratio : ratio * ratio);
     scene.disks.species.push_back({disks_.second->count, ratio, mass});
   }
-  scene.disks.contact = to_sim(disks_.surface);
+  scene.disks.contact = to_sim(disks_.surface, speed);
   scene.disks.inertia_ratio = disks_.inertia == Inertia::sphere ? 0.4 : 0.5;
 
   scene.box.width = box_.width / length;
   bool dissipates = disks_.surface.restitution < 1 || disks_.surface.friction > 0 || floor_.surface.restitution < 1 ||
                     floor_.surface.friction > 0;
   if (const auto* hard = std::get_if<HardSidesOptions>(&box_.sides)) {
-    scene.box.sides = sim::HardSides{to_sim(hard->surface)};
+    scene.box.sides = sim::HardSides{to_sim(hard->surface, speed)};
     dissipates = dissipates || hard->surface.restitution < 1 || hard->surface.friction > 0;
   } else {
     scene.box.sides = sim::PeriodicSides{};
   }
   if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid)) {
-    scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface)};
+    scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface, speed)};
     dissipates = dissipates || lid->surface.restitution < 1 || lid->surface.friction > 0;
   }
   if (const auto* lid = std::get_if<PeriodicLidOptions>(&box_.lid))
@@ -413,7 +436,7 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
     for (double& height : floor.heights) height /= length;
     scene.box.floor = floor;
   }
-  scene.box.floor_surface = to_sim(floor_.surface);
+  scene.box.floor_surface = to_sim(floor_.surface, speed);
 
   if (const auto* b = std::get_if<LangevinOptions>(&bath_))
     scene.bath = sim::LangevinBath{b->temperature / length, b->rate * time, b->interval / time};

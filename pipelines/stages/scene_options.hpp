@@ -17,6 +17,8 @@ namespace shakebed::pipelines {
 // sqrt(D/g) (weightless: sqrt(m D^2/T)).
 struct SurfaceOptions {
   double restitution = 1, friction = 0, tangential_restitution = 0;
+  sim::RestitutionLaw law = sim::RestitutionLaw::constant;
+  std::optional<double> law_speed;
 };
 enum class Inertia { disk, sphere };
 
@@ -32,6 +34,7 @@ struct DiskOptions {
   SurfaceOptions surface;
   Inertia inertia = Inertia::disk;
   std::optional<double> contact_duration;
+  bool rests = true;
   std::optional<SecondSpeciesOptions> second;
 };
 

@@ -17,7 +17,7 @@
 // positions, velocities, spins and contact clocks, so a run continued from a
 // checkpoint taken there gives the same bytes as one that was never stopped.
 //
-// Large periodic beds go on tile by tile: engine_tiles.hpp.
+// Large periodic beds go on tile by tile: engine_tiles.hpp. Beds that lie on the floor rest there: engine_rest.hpp.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +32,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -48,6 +49,7 @@
 #include "sim/engine/overlap.hpp"
 #include "sim/engine/policies.hpp"
 #include "sim/engine/random.hpp"
+#include "sim/engine/restitution.hpp"
 #include "sim/engine/shell_grid.hpp"
 #include "sim/engine/simulation.hpp"
 #include "sim/engine/space_filling_curve.hpp"
@@ -191,12 +193,33 @@ class Engine final : public Simulation {
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
   void hit_floor(std::uint32_t i, Motion& motion);
-  void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Surface& surface);
+  void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
   bool locked();
   void relieve();
+  std::uint64_t events_between_checks() const { return 4096 + 200 * static_cast<std::uint64_t>(count_); }
 
   void act_bath();
+
+  // --- rest: engine_rest.hpp
+  static constexpr bool rests_apply = Space::falls && Rule::dissipates;
+  void plan_rest(bool wanted);
+  void act_rest();
+  bool is_slow(double approach);
+  bool is_calm(const FloorMotion::Motion& floor);
+  void lay_down(const FloorMotion::Motion& floor);
+  void stop(std::uint32_t i, const FloorMotion::Motion& floor);
+  void wake(std::uint32_t i);
+  void wake_unsupported(const FloorMotion::Motion& floor);
+  void wake_all();
+  void hop(double length, const FloorMotion::Motion& floor);
+  void push_from_floor(std::uint32_t i, double vz, double floor);
+  void tell_push(std::uint32_t i, double floor, double given) const;
+  bool push_off_rest(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second, TwoLanes d);
+  double time_pressed(double horizon) const;
+  bool is_supported(std::uint32_t i, double floor);
+  bool is_at_rest(std::uint32_t i) const { return rest_height_[i] < never; }
+  double energy_of(std::uint32_t i, TwoLanes velocity) const;
 
   // --- tiles
   static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
@@ -240,7 +263,7 @@ class Engine final : public Simulation {
   Period period_x_, period_z_;
   FloorMotion floor_;
   bool hard_sides_ = false;
-  Surface disk_surface_, side_surface_, floor_surface_, lid_surface_;
+  Contact disk_surface_, side_surface_, floor_surface_, lid_surface_;
   double contact_duration_ = 0;
   double inverse_inertia_ratio_ = 2;  // 1/q
   [[no_unique_address]] Sizes sizes_;
@@ -280,6 +303,15 @@ class Engine final : public Simulation {
   double margin_ = 0, margin_growth_ = 0;  // from a tile's border, when a window begins, and what is added a time unit
   std::uint64_t events_left_ = 0;          // so many more in a window, and something has locked
 
+  // --- rest
+  std::vector<double> rest_height_;  // above the floor's, of disks at rest; `never` of the others
+  std::uint32_t resting_ = 0;
+  bool chatters_ = false;                     // the bed lies on the floor, but for its contacts' hops
+  bool woken_ = false;                        // a disk has lost its rest, and others perhaps their support
+  double rest_at_ = never, look_at_ = never;  // the next hop or look; the next look
+  double rest_period_ = 1;
+  std::uint64_t contacts_at_look_ = 0;
+
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
   bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
@@ -300,4 +332,5 @@ class Engine final : public Simulation {
 }  // namespace shakebed::sim
 
 #include "sim/engine/engine_impl.hpp"
+#include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_tiles.hpp"

@@ -27,13 +27,13 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if constexpr (Space::falls) gravity_ = 1;
   if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) {
     hard_sides_ = Space::has_walls;
-    side_surface_ = sides->surface;
+    side_surface_ = Contact(sides->surface);
   } else {
     period_x_ = Period(width_);
   }
   if (const auto* lid = std::get_if<Lid>(&scene.box.top)) {
     lid_height_ = lid->height;
-    lid_surface_ = lid->surface;
+    lid_surface_ = Contact(lid->surface);
   }
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);
 
@@ -67,6 +67,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (!floor_.moves()) intervals_ = 16;
   event_rate_ = 8.0 * count_;
   initial_energy_ = kinetic_energy() + potential_energy();
+  plan_rest(scene.rests);
   begin_interval();
 }
 
@@ -434,7 +435,9 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
     const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
     note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
     note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
-    note(disk.shell_z < floor_.highest() + reach, near_floor);
+    bool meets_floor = disk.shell_z < floor_.highest() + reach;
+    if constexpr (rests_apply) meets_floor = meets_floor && !is_at_rest(i);
+    note(meets_floor, near_floor);
     note(disk.shell_z > lid_height_ - reach, near_lid);
   }
   const double reach = largest_contact_ + disk.skin * skin_unit + largest_skin_ + shell_slack_;
@@ -611,9 +614,13 @@ template <class Space, class Rule, class Sizes>
     double dx = second.x() - first.x(), dz = second.z() - first.z();
     if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
     if constexpr (Space::wraps_z) dz = period_z_.nearest(dz);
-    const double mass = sizes_.mass(b);
-    watcher_->touched(time, first.x(), first.z(), dx, dz, mass * (disks_[b].vx - second.vx()),
-                      mass * (disks_[b].vz - second.vz()));
+    bool from_first = false;  // where the second is at rest, and is not moved
+    if constexpr (rests_apply) from_first = is_at_rest(b);
+    const double mass = from_first ? -sizes_.mass(a) : sizes_.mass(b);
+    const Disk& pushed = disks_[from_first ? a : b];
+    const Motion& before_it = from_first ? first : second;
+    watcher_->touched(time, first.x(), first.z(), dx, dz, mass * (pushed.vx - before_it.vx()),
+                      mass * (pushed.vz - before_it.vz()));
     tell(a);
     tell(b);
   } else if (before.partner < 0 && before.partner != shell_exit) {
@@ -645,7 +652,7 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
     if (std::abs(goal - synchronise_at_) <= 8 * std::numeric_limits<double>::epsilon() * std::abs(time))
       goal = synchronise_at_;
     if (!(goal > now_)) return true;
-    const double until = std::min({goal, synchronise_at_, bath_at_});
+    const double until = std::min({goal, synchronise_at_, bath_at_, rest_at_});
     bool arrived = true;
     if (tiles_.empty()) {
       arrived = watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
@@ -653,6 +660,9 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
       arrived = process_tiles_until(until);
     }
     if (!arrived) return false;
+    if constexpr (rests_apply) {
+      if (now_ == rest_at_) act_rest();
+    }
     if (now_ == bath_at_) act_bath();
     if (now_ == synchronise_at_) {
       const bool is_goal = goal == synchronise_at_;  // before the next one is set
@@ -720,13 +730,27 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   // shells there as now.
   if constexpr (Space::wraps_x || Space::wraps_z)
     d += Period::to_nearest(period_x_, period_z_, pair_at(&disks_[j].x) - pair_at(&disks_[i].x));
+  if constexpr (rests_apply) {
+    if (resting_ > 0 && is_at_rest(i) != is_at_rest(j)) [[unlikely]] {
+      if (push_off_rest(i, j, first, second, d)) return;
+    }
+  }
   const TwoLanes dv = second.velocity - first.velocity;
 
   double restitution = 1;
   bool elastic = true;
   if constexpr (Rule::dissipates) {
     elastic = too_soon(i, j);
-    if (!elastic) restitution = disk_surface_.restitution;
+    const auto approach = [&] { return -(d[0] * dv[0] + d[1] * dv[1]) / std::sqrt(d[0] * d[0] + d[1] * d[1]); };
+    if constexpr (rests_apply) {
+      if (chatters_ && !elastic) [[unlikely]]
+        elastic = is_slow(approach());
+    }
+    if (!elastic) {
+      restitution = disk_surface_.restitution;
+      if (disk_surface_.varies()) [[unlikely]]
+        restitution = disk_surface_.restitution_at(approach());
+    }
   }
   const double inverse_first = 1 / sizes_.mass(i), inverse_second = 1 / sizes_.mass(j);
   const double reduced_mass = 1 / (inverse_first + inverse_second);
@@ -737,7 +761,14 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
       const double ri = sizes_.radius(i), rj = sizes_.radius(j);
       const double gn = -(dvx * nx + dvz * nz);
       const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
-      const RoughImpulse p = walton_impulse(nx, nz, gn, gt, reduced_mass, disk_surface_, inverse_inertia_ratio_);
+      Surface varied;
+      const Surface* surface = &disk_surface_;
+      if (disk_surface_.varies()) [[unlikely]] {
+        varied = disk_surface_;
+        varied.restitution = restitution;
+        surface = &varied;
+      }
+      const RoughImpulse p = walton_impulse(nx, nz, gn, gt, reduced_mass, *surface, inverse_inertia_ratio_);
       first.velocity += TwoLanes{p.px, p.pz} * inverse_first;
       second.velocity -= TwoLanes{p.px, p.pz} * inverse_second;
       spins_[i] += inverse_inertia_ratio_ * p.tangential * inverse_first / ri;
@@ -810,14 +841,20 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
 // to the wall.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz,
-                                        const Surface& surface) {
+                                        const Contact& surface) {
   const double mass = sizes_.mass(i);
   const double gx = motion.vx(), gz = motion.vz() - wall_vz;
   const double gn = gx * nx + gz * nz;
   if (!(gn > 0)) return;  // grazed, by rounding
   Surface contact = surface;
   if constexpr (Rule::dissipates) {
-    if (too_soon(i, i)) contact = Surface{};
+    bool elastic = too_soon(i, i);
+    if constexpr (rests_apply) elastic = elastic || (chatters_ && is_slow(gn));
+    if (elastic) {
+      contact = Surface{};
+    } else if (surface.varies()) [[unlikely]] {
+      contact.restitution = surface.restitution_at(gn);
+    }
   }
   if constexpr (Rule::spins) {
     const double radius = sizes_.radius(i);
@@ -841,7 +878,7 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::locked() {
   const double passed = now_ - checked_at_;
-  const std::uint64_t events = 4096 + 200 * static_cast<std::uint64_t>(count_);
+  const std::uint64_t events = events_between_checks();
   checked_at_ = now_;
   events_to_check_ = events;
   if constexpr (Rule::dissipates) {
@@ -867,6 +904,7 @@ void Engine<Space, Rule, Sizes>::relieve() {
   constexpr double touching = 1e-11;
   constexpr int most_sweeps = 100'000;
   ++counters_.locks_relieved;
+  if constexpr (rests_apply) wake_all();
   for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
   const double before = kinetic_energy(), work_before = floor_work_;
   double fastest = never;
@@ -987,6 +1025,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   }
   for (double& time : last_contact_) time -= now_;
   bath_at_ -= now_;
+  rest_at_ -= now_;
+  look_at_ -= now_;
   const double elapsed = now_;
   intervals_done_ += intervals_;
   base_ = static_cast<double>(intervals_done_) * interval_;
@@ -1023,6 +1063,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
   permute(labels_);
   if constexpr (Rule::spins) permute(spins_);
   if constexpr (Rule::dissipates) permute(last_contact_);
+  if constexpr (rests_apply) permute(rest_height_);
   if constexpr (!Sizes::equal) {
     permute(sizes_.radii);
     permute(sizes_.masses);
@@ -1077,7 +1118,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   synchronise_at_ = static_cast<double>(intervals_) * interval_;
   checked_at_ = -1;
   crawls_ = 0;
-  events_to_check_ = 4096 + 200 * static_cast<std::uint64_t>(count_);
+  events_to_check_ = events_between_checks();
   if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
@@ -1146,6 +1187,15 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   }
   for (auto& spin : self.spins_) visit(spin);
   for (auto& clock : self.last_contact_) visit(clock);
+  if constexpr (rests_apply) {
+    for (auto& height : self.rest_height_) visit(height);
+    visit(self.resting_);
+    visit(self.woken_);
+    visit(self.chatters_);
+    visit(self.rest_at_);
+    visit(self.look_at_);
+    visit(self.contacts_at_look_);
+  }
 }
 
 template <class Space, class Rule, class Sizes>
@@ -1236,6 +1286,11 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
     out.vx[label] = motion.vx();
     out.vz[label] = motion.vz();
     if constexpr (Rule::spins) out.spin[label] = spins_[i];
+    if constexpr (rests_apply) {
+      if (!is_at_rest(i)) continue;
+      out.z[label] = out.floor_position + rest_height_[i];
+      out.vz[label] = out.floor_velocity;
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 // visit() of their own. The bytes are those of this kind of machine.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <stdexcept>
@@ -39,8 +40,9 @@ class ArchiveWriter {
       value.visit(*this);
     } else {
       static_assert(std::is_trivially_copyable_v<T>, "give it a visit()");
-      const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
-      bytes_.insert(bytes_.end(), bytes, bytes + sizeof value);
+      const std::size_t before = bytes_.size();
+      bytes_.resize(before + sizeof value);
+      std::memcpy(bytes_.data() + before, &value, sizeof value);
     }
   }
   std::vector<std::uint8_t> bytes_;

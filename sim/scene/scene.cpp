@@ -38,6 +38,10 @@ class Check {
   void surface(const Value& s, const std::string& where) {
     require(s.restitution >= 0 && s.restitution <= 1, where + "/restitution",
             "a restitution lies between 0 and 1, not " + number(s.restitution));
+    require(s.law_speed > 0 && std::isfinite(s.law_speed), where + "/restitution_speed",
+            "the speed at which the restitution holds is positive, not " + number(s.law_speed));
+    require(s.law != RestitutionLaw::viscoelastic || s.restitution > 0, where + "/restitution",
+            "viscoelastic bodies have a restitution above 0 at every speed");
     require(s.friction >= 0 && std::isfinite(s.friction), where + "/friction",
             "a friction coefficient is not negative, but this one is " + number(s.friction));
     require(s.tangential_restitution >= -1 && s.tangential_restitution <= 1, where + "/tangential_restitution",

@@ -104,6 +104,7 @@ struct Scene {
   Box box;
   Bath bath;
   Start start;
+  bool rests = true;             // a dissipative bed that has come to rest on the floor lies there: see engine_rest.hpp
   double start_temperature = 1;  // of the Maxwellian velocities at the start (placed disks keep their own)
   std::uint64_t seed = 1;
 

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/engine/collision.hpp"
 #include "sim/engine/random.hpp"
+#include "sim/engine/restitution.hpp"
 
 namespace shakebed::sim {
 namespace {
@@ -13,6 +15,43 @@ struct Body {
 };
 double energy(const Body& b, double q) {
   return 0.5 * b.mass * (b.vx * b.vx + b.vz * b.vz + q * b.radius * b.radius * b.spin * b.spin);
+}
+
+// Two viscoelastic spheres by their equation of motion, x'' + beta x' sqrt(x) + x^(3/2) = 0 from x = 0, x' = 1 until
+// the force is 0 [MuellerPoeschel2011, scaled]: -x' then.
+double restitution_by_integration(double beta) {
+  const auto force = [beta](double x, double v) {
+    const double root = std::sqrt(std::max(x, 0.0));
+    return -(beta * v * root + root * root * root);
+  };
+  double x = 1e-12, v = 1;
+  for (constexpr double h = 2e-4;;) {
+    const double a1 = force(x, v), a2 = force(x + h / 2 * v, v + h / 2 * a1),
+                 a3 = force(x + h / 2 * (v + h / 2 * a1), v + h / 2 * a2),
+                 a4 = force(x + h * (v + h / 2 * a2), v + h * a3);
+    x += h * v + h * h / 6 * (a1 + a2 + a3);
+    v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+    if (v < 0 && force(x, v) >= 0) return -v;
+  }
+}
+
+TEST(Restitution, OfViscoelasticSpheresFollowsTheirEquationOfMotion) {
+  for (const double beta : {0.01, 0.05, 0.1, 0.3})
+    EXPECT_NEAR(viscoelastic_restitution(std::sqrt(beta)), restitution_by_integration(beta), 1e-3) << beta;
+  EXPECT_NEAR(viscoelastic_restitution(1), restitution_by_integration(1), 6e-3);
+}
+
+// beta grows as v^(1/5): a surface that has e at v0 has at 3 v0 what the equation of motion gives with beta 3^(1/5).
+TEST(Restitution, DependsOnSpeedAsItsLawSays) {
+  const Contact viscoelastic(Surface{restitution_by_integration(0.1), 0, 0, RestitutionLaw::viscoelastic, 0.5});
+  EXPECT_NEAR(viscoelastic.restitution_at(0.5), restitution_by_integration(0.1), 1e-12);
+  EXPECT_NEAR(viscoelastic.restitution_at(1.5), restitution_by_integration(0.1 * std::pow(3, 0.2)), 1e-3);
+  EXPECT_NEAR(viscoelastic.restitution_at(0.005), restitution_by_integration(0.1 * std::pow(0.01, 0.2)), 1e-3);
+  const Contact power(Surface{0.8, 0, 0, RestitutionLaw::power, 0.5});
+  EXPECT_DOUBLE_EQ(power.restitution_at(0.5), 0.8);
+  EXPECT_DOUBLE_EQ(power.restitution_at(5), 0.8);
+  EXPECT_NEAR(power.restitution_at(0.05), 1 - 0.2 * std::pow(0.1, 0.75), 1e-15);
+  EXPECT_EQ(Contact(Surface{0.8}).restitution_at(1e-6), 0.8);
 }
 
 TEST(SmoothImpulse, KeepsMomentumAndLosesTheEnergyItSays) {

@@ -15,6 +15,7 @@
 #include "sim/engine/random.hpp"
 #include "sim/engine/shell_grid.hpp"
 #include "sim/engine/simulation.hpp"
+#include "sim/measure/flights.hpp"
 
 namespace shakebed::sim {
 namespace {
@@ -65,10 +66,19 @@ Scene fluid() {
   return scene;
 }
 
+// Shaken with Gamma = 1.3 in a box in which rows do not lock: it lands, comes to rest and takes off again.
+Scene gentle_bed(double gamma = 1.3) {
+  Scene scene = shaken_bed();
+  scene.box.width = 12.3;
+  scene.box.floor = SinusoidalFloor{gamma / std::pow(2 * std::numbers::pi * 0.35, 2), 0.35};
+  return scene;
+}
+
 // However often: what an event's disks will do next is left unwritten until the next event has begun, but not over a
 // stop. 40,000 stops, nearly one an event of the fluid.
 TEST(Engine, DoesNotCareWhenOneLooks) {
-  for (const auto& [scene, end] : {std::pair{shaken_bed(), 100.0}, {shaken_bed(), 20.0}, {fluid(), 40.0}}) {
+  for (const auto& [scene, end] :
+       {std::pair{shaken_bed(), 100.0}, {shaken_bed(), 20.0}, {fluid(), 40.0}, {gentle_bed(), 40.0}}) {
     const auto a = simulate(scene), b = simulate(scene);
     a->advance_to(end);
     Snapshot at;
@@ -81,11 +91,11 @@ TEST(Engine, DoesNotCareWhenOneLooks) {
   }
 }
 
-// A bed in a box that 12 disks fill exactly, shaken so gently that its disks lie on one another: no end of contacts.
+// Also of a bed that is shaken so gently that its disks chatter on one another.
 TEST(Engine, ReturnsAfterSoManyEventsAndMakesTheSameBytes) {
-  Scene quiet = shaken_bed();
-  quiet.box.floor = SinusoidalFloor{0.1, 0.35};
-  for (const Scene& scene : {shaken_bed(), quiet, fluid()}) {
+  Scene restless = gentle_bed(0.5);
+  restless.rests = false;
+  for (const Scene& scene : {shaken_bed(), gentle_bed(), restless, fluid()}) {
     const auto a = simulate(scene), b = simulate(scene);
     a->advance_to(8);
     std::uint64_t most = 1;
@@ -102,7 +112,7 @@ TEST(Engine, ReturnsAfterSoManyEventsAndMakesTheSameBytes) {
 }
 
 TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
-  std::vector<Scene> scenes(6, shaken_bed());
+  std::vector<Scene> scenes(8, shaken_bed());
   scenes[1].bath = LangevinBath{2, 1, 0.37};
   scenes[2].bath = AndersenBath{2, 0.5};
   scenes[3].disks.species = {{60, 1, 1}, {40, 1.4, 2.744}};
@@ -111,6 +121,8 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[5] = fluid();  // five shells a cell
   scenes[5].disks.species = {{40, 1, 1}, {250, 0.3, 0.09}};
   scenes[5].start = RandomStart{};
+  scenes[6] = gentle_bed();
+  scenes[7] = gentle_bed(0.5);
   for (const Scene& scene : scenes) {
     const auto a = simulate(scene);
     std::vector<std::uint8_t> saved;
@@ -125,6 +137,83 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
     b->advance_to(150);
     expect_same(*a, *b);
   }
+}
+
+// Below Gamma = 1 nothing moves against anything once it has come to rest, and nothing is done for it.
+TEST(Engine, LetsABedLieThatHasComeToRest) {
+  for (const double friction : {0.0, 0.3}) {
+    Scene scene = gentle_bed(0.8);
+    scene.disks.contact.friction = scene.box.floor_surface.friction = friction;
+    const auto bed = simulate(scene);
+    bed->advance_to(30);
+    const Counters before = bed->counters();
+    const EnergyLedger ledger_before = bed->energy();
+    Snapshot first, later;
+    bed->snapshot(first);
+    for (int k = 1; k <= 400; ++k) {
+      bed->advance_to(30 + 0.1 * k);
+      bed->snapshot(later);
+      for (std::size_t i = 0; i < first.z.size(); ++i) {
+        ASSERT_EQ(later.x[i], first.x[i]);
+        ASSERT_NEAR(later.z[i] - later.floor_position, first.z[i] - first.floor_position, 1e-14);
+        ASSERT_EQ(later.vz[i], later.floor_velocity);
+      }
+    }
+    EXPECT_EQ(bed->counters().events(), before.events());
+    EXPECT_EQ(bed->largest_overlap(), 0);
+    const EnergyLedger ledger = bed->energy();
+    EXPECT_EQ(ledger.dissipated, ledger_before.dissipated);
+    EXPECT_NEAR(ledger.imbalance(), 0, 1e-10 * ledger.dissipated);
+  }
+}
+
+// It lands, rests but for a few disks on top, and takes off when the floor falls faster than it, again and again.
+TEST(Engine, LetsARestingBedTakeOff) {
+  constexpr double gamma = 1.15, period = 1 / 0.35, frequency = 2 * std::numbers::pi * 0.35, since = 0.3;
+  const auto bed = simulate(gentle_bed(gamma));
+  const double take_off = std::asin(1 / gamma) / frequency;  // a w^2 sin(wt) = g
+  const double height = 1 / (frequency * frequency), speed = gamma / frequency * std::cos(frequency * take_off);
+  Snapshot at;
+  int rests = 0;
+  for (int p = 20; p < 40; ++p) {
+    bed->advance_to(p * period + take_off - 0.01);
+    bed->snapshot(at);
+    std::size_t still = 0;
+    for (std::size_t i = 0; i < at.vz.size(); ++i) still += at.vx[i] == 0 && at.vz[i] == at.floor_velocity;
+    if (still < at.vz.size() * 9 / 10) continue;
+    ++rests;
+    bed->advance_to(p * period + take_off + since);
+    bed->snapshot(at);
+    const double lowest = *std::min_element(at.z.begin(), at.z.end()) - 0.5;
+    EXPECT_NEAR(lowest, height + speed * since - since * since / 2, 1e-3);
+    EXPECT_GT(lowest, at.floor_position + 1e-3);
+  }
+  EXPECT_GE(rests, 10);
+  EXPECT_NEAR(bed->energy().imbalance(), 0, 1e-10 * bed->energy().dissipated);
+  EXPECT_LT(bed->largest_overlap(), 1e-12);
+}
+
+// What lies on the floor presses on it with its weight, whether its contacts are made or not.
+TEST(Engine, TellsWatchersWhatARestingBedWeighs) {
+  const Scene scene = gentle_bed(0.8);
+  const auto bed = simulate(scene), unwatched = simulate(scene);
+  bed->advance_to(30);
+  FlightObserver observer(scene, bed->properties(), LayerGrid{-1, 0.5, 60});
+  bed->watch(&observer);
+  observer.begin(bed->time());
+  for (int k = 1; k <= 14; ++k) {
+    bed->advance_to(30 + k / 0.35);
+    observer.end_block(bed->time());
+  }
+  const double weight = 120 / 12.3;
+  EXPECT_NEAR(observer.floor_pressure().value, weight, 1e-3 * weight);
+  for (const FlightObserver::Layer& layer : observer.layers()) {
+    if (layer.height < 2 || layer.weight_above.value < 1) continue;
+    EXPECT_NEAR(layer.pressure_zz.value, layer.weight_above.value, 0.05 * layer.weight_above.value + 0.5)
+        << layer.height;
+  }
+  unwatched->advance_to(bed->time());
+  expect_same(*bed, *unwatched);
 }
 
 TEST(Engine, RefusesACheckpointOfAnotherScene) {

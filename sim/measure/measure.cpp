@@ -1,0 +1,149 @@
+#include "sim/measure/measure.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+namespace shakebed::sim {
+
+namespace {
+
+constexpr std::uint64_t state_form = 0x313073656d626b73;  // "skbmes01", little-endian
+
+class Run {
+ public:
+  Run(const Scene& scene, const MeasurementSchedule& schedule, const std::vector<RunObserver*>& observers,
+      const RunControl& control)
+      : schedule_(schedule), observers_(observers), control_(control), simulation_(simulate(scene)) {}
+
+  void go_on_from(const std::vector<std::uint8_t>& kept) {
+    ArchiveReader in(kept);
+    std::vector<std::uint8_t> engine;
+    visit(in, engine);
+    for (RunObserver* one : observers_) one->load(in);
+    if (!in.at_end()) throw std::invalid_argument("the state holds more than this run needs");
+    simulation_->restore(engine);
+    if (step_ > schedule_.bath.size() || look_ > schedule_.looks())
+      throw std::invalid_argument("the state is of another schedule");
+    // The reservoir's temperature is no part of a checkpoint.
+    if (step_ > 0) simulation_->set_bath_temperature(schedule_.bath[step_ - 1].temperature);
+    if (look_ > 0)
+      for (RunObserver* one : observers_) one->go_on(*simulation_);
+  }
+
+  // False where it was stopped.
+  bool operator()() {
+    for (; step_ < schedule_.bath.size(); ++step_) {
+      simulation_->set_bath_temperature(schedule_.bath[step_].temperature);
+      if (!advance_to(schedule_.bath[step_].until)) return false;
+    }
+    Snapshot at;
+    for (; look_ < schedule_.looks(); ++look_) {
+      if (!advance_to(schedule_.moment(look_))) return false;
+      if (look_ == 0)
+        for (RunObserver* one : observers_) one->begin(*simulation_);
+      simulation_->snapshot(at);
+      const auto phase = static_cast<std::uint32_t>(look_ % schedule_.phases);
+      for (RunObserver* one : observers_) one->look(*simulation_, at, look_, phase);
+    }
+    if (!advance_to(schedule_.end())) return false;
+    for (RunObserver* one : observers_) one->end(*simulation_);
+    return true;
+  }
+
+  std::unique_ptr<Simulation> simulation() { return std::move(simulation_); }
+
+ private:
+  template <class Archive>
+  void visit(Archive& archive, std::vector<std::uint8_t>& engine) {
+    std::uint64_t form = state_form;
+    archive(form);
+    if (form != state_form) throw std::invalid_argument("these bytes are not the state of a run");
+    archive(engine, step_, look_);
+  }
+
+  // By way of the engine's synchronisations, where the state may be kept.
+  bool advance_to(double time) {
+    const double end = schedule_.end();
+    while (simulation_->time() < time) {
+      const double synchronisation = simulation_->next_synchronisation();
+      const bool keeps = control_.keep && synchronisation <= time && (!control_.keep_due || control_.keep_due());
+      const double goal = keeps ? synchronisation : time;
+      while (!simulation_->advance_towards(goal, control_.events_between_questions)) {
+        if (control_.stop && control_.stop()) return false;
+        if (control_.progress) control_.progress(std::min(simulation_->time() / end, 1.0));
+      }
+      if (keeps) keep();
+      if (control_.stop && control_.stop()) return false;
+      if (control_.progress) control_.progress(std::min(simulation_->time() / end, 1.0));
+    }
+    return true;
+  }
+
+  void keep() {
+    std::vector<std::uint8_t> engine = simulation_->checkpoint();
+    ArchiveWriter out;
+    visit(out, engine);
+    for (RunObserver* one : observers_) one->save(out);
+    control_.keep(out.take());
+  }
+
+  const MeasurementSchedule& schedule_;
+  const std::vector<RunObserver*>& observers_;
+  const RunControl& control_;
+  std::unique_ptr<Simulation> simulation_;
+  std::uint64_t step_ = 0, look_ = 0;  // to be done next
+};
+
+void check(const MeasurementSchedule& schedule) {
+  const bool counts = schedule.periods > 0 && schedule.phases > 0 && schedule.period > 0 &&
+                      std::isfinite(schedule.period) && schedule.settle >= 0 && std::isfinite(schedule.end());
+  if (!counts) throw std::invalid_argument("a schedule needs a period, and at least one period and one look in it");
+  double before = 0;
+  for (const BathStep& step : schedule.bath) {
+    if (step.until < before || step.until > schedule.settle)
+      throw std::invalid_argument("the reservoir's steps are not in the order of time before the first look");
+    before = step.until;
+  }
+}
+
+}  // namespace
+
+RunResult measure(const Scene& scene, const MeasurementSchedule& schedule, const std::vector<RunObserver*>& observers,
+                  const RunControl& control, const std::vector<std::uint8_t>& kept) {
+  check(schedule);
+  Run run(scene, schedule, observers, control);
+  if (!kept.empty()) run.go_on_from(kept);
+  const bool finished = run();
+  return {finished, run.simulation()};
+}
+
+bool each_replica(std::uint32_t replicas, int threads, const std::function<bool(std::uint32_t)>& run) {
+  std::atomic<std::uint32_t> next{0};
+  std::atomic<bool> ends{false};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::uint32_t k = next++; k < replicas && !ends; k = next++) {
+      try {
+        if (!run(k)) ends = true;
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+        ends = true;
+      }
+    }
+  };
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads && t < static_cast<int>(replicas); ++t) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+  if (failure) std::rethrow_exception(failure);
+  return !ends;
+}
+
+}  // namespace shakebed::sim

@@ -1,0 +1,89 @@
+// The loop that measures a bed: it settles, is looked at by stated phases of its period, and observers see each look.
+//
+//   BedObserver bed(...);
+//   Observing observing(bed);
+//   measure(scene, schedule, {&observing});
+//
+// A run may be stopped between any two events and go on from its latest kept state to the same bytes; replicas are runs
+// of the same bed with seeds of their own, and their results do not depend on the number of threads. Reduced units.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/archive.hpp"
+
+namespace shakebed::sim {
+
+// Before it settles, a bed's reservoir may go through temperatures: each holds until its time.
+struct BathStep {
+  double until, temperature;
+};
+
+struct MeasurementSchedule {
+  std::vector<BathStep> bath;  // in the order of time
+  double settle = 0;           // the first look; not before the bath's last step
+  double period = 1;
+  std::uint64_t periods = 1;  // that are measured
+  std::uint32_t phases = 1;   // looks a period, equally spaced
+  std::uint64_t looks() const { return periods * phases; }
+  double moment(std::uint64_t look) const {
+    return settle + (static_cast<double>(look / phases) + static_cast<double>(look % phases) / phases) * period;
+  }
+  double end() const { return moment(looks()); }
+};
+
+// What sees the looks of one run. Its state goes into the kept state of the run.
+class RunObserver {
+ public:
+  virtual ~RunObserver() = default;
+  virtual void begin(Simulation& /*simulation*/) {}  // at the first look, before it
+  virtual void look(Simulation& simulation, const Snapshot& at, std::uint64_t look, std::uint32_t phase) = 0;
+  virtual void end(Simulation& /*simulation*/) {}    // when all periods are over
+  virtual void go_on(Simulation& /*simulation*/) {}  // in place of begin(), after load()
+  virtual void save(ArchiveWriter& out) = 0;
+  virtual void load(ArchiveReader& in) = 0;
+};
+
+// Any class with observe(snapshot, phase) and visit(archive) as an observer: BedObserver and its like.
+template <class Observed>
+class Observing final : public RunObserver {
+ public:
+  explicit Observing(Observed& observed) : observed_(observed) {}
+  void look(Simulation&, const Snapshot& at, std::uint64_t, std::uint32_t phase) override {
+    observed_.observe(at, phase);
+  }
+  void save(ArchiveWriter& out) override { out(observed_); }
+  void load(ArchiveReader& in) override { in(observed_); }
+
+ private:
+  Observed& observed_;
+};
+
+// What the caller has to say while the run goes on. All may be empty.
+struct RunControl {
+  std::function<bool()> stop;            // asked every events_between_questions; true ends the run there
+  std::function<void(double)> progress;  // the fraction of the run that is over
+  std::function<bool()> keep_due;        // asked at every synchronisation of the engine
+  std::function<void(const std::vector<std::uint8_t>&)> keep;  // a state from which measure() goes on
+  std::uint64_t events_between_questions = 200'000;            // 0.03 to 0.1 s of processor time
+};
+
+struct RunResult {
+  bool finished = false;  // false: it was stopped
+  std::unique_ptr<Simulation> simulation;
+};
+
+// Runs the scene by the schedule; `kept`: a state that an earlier call gave to keep(), or empty. Throws
+// std::invalid_argument with check()'s words, or where the state is not one of this run.
+RunResult measure(const Scene& scene, const MeasurementSchedule& schedule, const std::vector<RunObserver*>& observers,
+                  const RunControl& control = {}, const std::vector<std::uint8_t>& kept = {});
+
+// Calls run(k) for every k below `replicas`, each once, on so many threads; the first exception is thrown again when
+// all have returned. Later replicas are not begun once one has failed or returned false (it was stopped): false then.
+bool each_replica(std::uint32_t replicas, int threads, const std::function<bool(std::uint32_t)>& run);
+
+}  // namespace shakebed::sim
