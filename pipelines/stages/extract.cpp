@@ -92,7 +92,7 @@ class Extract : public Stage {
 
 StageRow extract_stage() {
   return {.name = "extract",
-          .version = 16,
+          .version = 17,
           .summary = "finds the disks in frames and measures the density profile",
           .accepts = {"render", "simulate"},
           .fewest_inputs = 0,
