@@ -467,7 +467,10 @@ void use_first_look(const ExtractOptions& options, RunContext& context, const st
                    : ". If the beads are those of one of its pictures, crop to them with --roi, or try";
     for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
       message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
-    throw StageError(message);
+    const bool any = std::any_of(survey.candidates.begin(), survey.candidates.end(),
+                                 [](const ingest::SurveyCandidate& one) { return !one.disks.empty(); });
+    if (any) throw StageError(message);
+    throw InputError(message);
   }
   const ingest::SurveyCandidate* chosen = &survey.candidates.front();
   if (options.bead_number) {  // of what may be beads, the kind that is as numerous as told
