@@ -80,7 +80,7 @@ class AnswerFinder {
     for (const Thermometer& thermometer : thermometers()) {
       if (thermometer.column_known && !input_.column_number) continue;
       const FitResult fit = fit_profile(seen_.profile, options_of(thermometer));
-      Reading reading;
+      ThermometerReading reading;
       reading.thermometer = thermometer.name;
       reading.model = thermometer.model;
       reading.status = fit.status;
@@ -108,7 +108,7 @@ class AnswerFinder {
     return false;
   }
 
-  static void fill(Reading& reading, const Thermometer& thermometer, const FitResult& fit) {
+  static void fill(ThermometerReading& reading, const Thermometer& thermometer, const FitResult& fit) {
     reading.fitted = fit.temperature;
     reading.chi2_per_dof = fit.chi2_per_dof;
     reading.model_error = fit.model_error;
@@ -130,7 +130,7 @@ class AnswerFinder {
   void choose() {
     double least = 0.0, temperature = 0.0;
     for (std::size_t i = 0; i < votes_.size(); ++i) {
-      const Reading& reading = answer_.readings[i];
+      const ThermometerReading& reading = answer_.readings[i];
       if (!votes_[i]->votes || reading.status != FitStatus::ok) continue;
       if (temperature == 0.0) temperature = reading.temperature;
       const double scatter = known_bias(*votes_[i], temperature).scatter;
@@ -147,13 +147,13 @@ class AnswerFinder {
     answer_.bias_uncertainty = chosen_->temperature * chosen_->bias_uncertainty;
   }
 
-  static double statistical(const Reading& reading) { return reading.fitted.std_error / reading.fitted.value; }
+  static double statistical(const ThermometerReading& reading) { return reading.fitted.std_error / reading.fitted.value; }
 
   // How far the admissible readings are from the chosen one, in ln T.
   void compare_readings() {
     double all = 0.0, beyond = 0.0;
     int count = 0;
-    for (const Reading& reading : answer_.readings) {
+    for (const ThermometerReading& reading : answer_.readings) {
       if (!reading.admissible || &reading == chosen_) continue;
       const double apart = std::log(reading.temperature / chosen_->temperature);
       const double expected =
@@ -203,7 +203,7 @@ class AnswerFinder {
       answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
       return;
     }
-    const Reading& whole = whole_column();
+    const ThermometerReading& whole = whole_column();
     const double misfit = known_misfit(whole.temperature) + row_modulation * seen_.rows_seen;
     answer_.verdict = Verdict::model_does_not_fit;
     if (whole.model_error > admissible_misfit * misfit) {
@@ -224,8 +224,8 @@ class AnswerFinder {
   }
 
   // The whole column's reading whose misfit is known.
-  [[nodiscard]] const Reading& whole_column() const {
-    for (const Reading& reading : answer_.readings) {
+  [[nodiscard]] const ThermometerReading& whole_column() const {
+    for (const ThermometerReading& reading : answer_.readings) {
       if (reading.thermometer == "whole column" && reading.status == FitStatus::ok) return reading;
     }
     return *chosen_;
@@ -266,7 +266,7 @@ class AnswerFinder {
       low = std::min(low, temperature);
       high = std::max(high, temperature);
     };
-    for (const Reading& reading : answer_.readings) {
+    for (const ThermometerReading& reading : answer_.readings) {
       if (reading.admissible) include(reading.temperature);
     }
     if (input_.temperature_x) include(input_.temperature_x->value);
@@ -298,8 +298,8 @@ class AnswerFinder {
   const BlurredProfile seen_;  // without the crystal's rows
   Answer answer_;
   std::vector<const Thermometer*> votes_;  // of the readings
-  const Reading* chosen_ = nullptr;
-  const Reading* farthest_ = nullptr;                 // of those that contradict the chosen one
+  const ThermometerReading* chosen_ = nullptr;
+  const ThermometerReading* farthest_ = nullptr;                 // of those that contradict the chosen one
   double spread_of_all_ = 0.0, spread_beyond_ = 0.0;  // in ln T
   int compared_ = 0;
 };

@@ -27,7 +27,7 @@ enum class Verdict { one_temperature, model_does_not_fit, no_single_temperature 
 std::string_view to_string(Verdict verdict);  // "one temperature", ...
 
 // What one thermometer says.
-struct Reading {
+struct ThermometerReading {
   std::string thermometer;  // "whole column, N known"
   std::string model;        // FitOptions::model
   FitStatus status = FitStatus::not_converged;
@@ -58,7 +58,7 @@ struct Answer {
   Interval interval;
   Estimate solid_height;                                 // of the Enskog tail at this T [D]
   std::optional<Estimate> temperature_x, temperature_z;  // kinetic, as given
-  std::vector<Reading> readings;                         // of all thermometers
+  std::vector<ThermometerReading> readings;                         // of all thermometers
   [[nodiscard]] bool ok() const { return status == FitStatus::ok; }
 };
 

@@ -12,6 +12,7 @@
 
 #include "ingest/calibrate/calibration.hpp"
 #include "ingest/calibrate/flatten.hpp"
+#include "ingest/find/rim_finder.hpp"
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
@@ -24,8 +25,15 @@ struct FoundDisk {
   double covariance_xy = 0;               // px^2
   double quality = 0;                     // 0 .. 1: 1 is a bead like all the others
   double contrast = 0;                    // its own contrast, 1 for a typical bead
+  double probability = 1;                 // that it is a bead; 1 unless rims were looked at (learn_beads.hpp)
   bool cut = false;                       // cut by the border of the frame or of the region of interest
   bool half_hidden = false;               // part of it does not look like a bead: covered, out of focus, in shadow
+};
+
+// What a survey of the film's first frame has shown (survey.hpp).
+struct BeadsSeen {
+  Polarity polarity = Polarity::automatic;
+  double radius_px = 0;
 };
 
 // Everything is found when left alone; each member overrides one finding.
@@ -33,6 +41,7 @@ struct FindOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;    // a first value, refined unless hold_radius
   bool hold_radius = false;           // keep radius_px exactly
+  std::optional<BeadsSeen> seen;      // for learn_beads()
   std::optional<PixelRectangle> roi;  // centres outside are not reported
   int joint_fit_sweeps =
       20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
@@ -60,6 +69,10 @@ struct FinderCalibration {
   std::size_t frames_used = 0;
   std::size_t disks_used = 0;
   std::vector<std::string> warnings;  // plain sentences
+  // Of a film that was surveyed (learn_beads.hpp):
+  std::optional<RimModel> rims;
+  bool by_rims = false;             // beads are found by rims alone: light and profile are empty
+  bool rims_to_be_checked = false;  // faces without a rim occur, and are dropped
 };
 
 struct FindResult {

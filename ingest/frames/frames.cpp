@@ -13,6 +13,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <utility>
 
@@ -40,7 +41,23 @@ std::string lower_extension(const fs::path& path) {
   return extension;
 }
 
-Kind kind_of(const fs::path& path) {
+// By the first bytes of the file.
+Kind kind_of_contents(const fs::path& path) {
+  std::array<char, 16> bytes{};
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(bytes.data(), bytes.size())) return Kind::unknown;
+  const std::string head(bytes.begin(), bytes.end());
+  const auto starts = [&](std::string_view with) { return head.compare(0, with.size(), with) == 0; };
+  if (starts(std::string_view("II*\0", 4)) || starts(std::string_view("MM\0*", 4))) return Kind::tiff;
+  if (starts("\x89PNG") || starts("\xff\xd8\xff") || (starts("RIFF") && head.compare(8, 4, "WEBP") == 0))
+    return Kind::image;
+  if ((starts("RIFF") && head.compare(8, 4, "AVI ") == 0) || head.compare(4, 4, "ftyp") == 0 ||
+      starts("\x1a\x45\xdf\xa3"))
+    return Kind::film;
+  return Kind::unknown;
+}
+
+Kind kind_of_name(const fs::path& path) {
   static const std::array<const char*, 12> images = {".png", ".jpg", ".jpeg", ".jpe", ".bmp",  ".dib",
                                                      ".pgm", ".ppm", ".pnm",  ".jp2", ".webp", ".exr"};
   static const std::array<const char*, 9> films = {".mp4", ".avi",  ".mov", ".mkv", ".m4v",
@@ -50,6 +67,11 @@ Kind kind_of(const fs::path& path) {
   if (std::find(images.begin(), images.end(), extension) != images.end()) return Kind::image;
   if (std::find(films.begin(), films.end(), extension) != films.end()) return Kind::film;
   return Kind::unknown;
+}
+
+Kind kind_of(const fs::path& path) {
+  const Kind contents = kind_of_contents(path);
+  return contents != Kind::unknown ? contents : kind_of_name(path);
 }
 
 // frame2 before frame10.
@@ -111,12 +133,13 @@ void quiet_opencv() {
 
 // How pictures become grey levels: held for a whole stream once the first frame has been seen.
 struct GreyRule {
-  int channel = -1;        // 0 red, 1 green, 2 blue; -1 not decided
-  double depth_scale = 0;  // factor to 0..255 for 16-bit and float files; 0 not decided
+  Channel channel = Channel::automatic;  // automatic: not decided
+  double depth_scale = 0;                // factor to 0..255 for 16-bit and float files; 0 not decided
+  std::optional<cv::Vec3f> background;   // blue, green, red: the most frequent colour
 };
 
 // The channel whose levels spread most: difference between the 95th and the 5th percentile over the step-to-step noise.
-int best_channel(const cv::Mat& picture) {
+Channel best_channel(const cv::Mat& picture) {
   double best = -1;
   int winner = 1;
   for (int channel = 0; channel < 3; ++channel) {
@@ -162,7 +185,64 @@ int best_channel(const cv::Mat& picture) {
       winner = channel;
     }
   }
-  return winner;
+  return static_cast<Channel>(winner);
+}
+
+// The mean of the pixels in the fullest of 16 x 16 x 16 cells of colour.
+cv::Vec3f most_frequent_colour(const cv::Mat& picture) {
+  constexpr int cells = 16;
+  double least = 0, most = 1;
+  cv::minMaxLoc(picture.reshape(1), &least, &most);
+  const float per_cell = static_cast<float>(std::max(1.0, most - least) * 1.0001 / cells);
+  std::vector<std::size_t> counts(cells * cells * cells, 0);
+  std::vector<cv::Vec3d> sums(counts.size(), cv::Vec3d(0, 0, 0));
+  const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(picture.total()) / 40000.0)));
+  for (int row = 0; row < picture.rows; row += stride)
+    for (int column = 0; column < picture.cols; column += stride) {
+      const cv::Vec3f colour = picture.at<cv::Vec3f>(row, column);
+      std::size_t cell = 0;
+      for (int k = 0; k < 3; ++k)
+        cell = cell * cells + static_cast<std::size_t>(
+                                  std::clamp((colour[k] - static_cast<float>(least)) / per_cell, 0.0F, cells - 1.0F));
+      ++counts[cell];
+      sums[cell] += cv::Vec3d(colour);
+    }
+  const auto fullest = static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
+  const cv::Vec3d mean = sums[fullest] / static_cast<double>(std::max<std::size_t>(1, counts[fullest]));
+  return cv::Vec3f(static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2]));
+}
+
+// One level a pixel from three (blue, green, red), float.
+cv::Mat mixed(const cv::Mat& picture, GreyRule& rule) {
+  cv::Mat colours;
+  picture.convertTo(colours, CV_32F);
+  if (rule.channel == Channel::background_distance && !rule.background) rule.background = most_frequent_colour(colours);
+  cv::Mat level(colours.rows, colours.cols, CV_32F);
+  for (int row = 0; row < colours.rows; ++row) {
+    const cv::Vec3f* from = colours.ptr<cv::Vec3f>(row);
+    float* to = level.ptr<float>(row);
+    for (int column = 0; column < colours.cols; ++column) {
+      const cv::Vec3f& c = from[column];
+      if (rule.channel == Channel::grey) {
+        to[column] = 0.114F * c[0] + 0.587F * c[1] + 0.299F * c[2];  // ITU-R BT.601
+      } else if (rule.channel == Channel::saturation) {
+        to[column] = std::max({c[0], c[1], c[2]}) - std::min({c[0], c[1], c[2]});
+      } else {
+        const cv::Vec3f away = c - *rule.background;
+        to[column] = std::sqrt((away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) / 3);
+      }
+    }
+  }
+  return level;
+}
+
+// Averages over factor x factor pixels.
+cv::Mat averaged(const cv::Mat& picture, int factor) {
+  if (factor == 1) return picture;
+  cv::Mat small;
+  const cv::Rect whole(0, 0, picture.cols / factor * factor, picture.rows / factor * factor);
+  cv::resize(picture(whole), small, cv::Size(picture.cols / factor, picture.rows / factor), 0, 0, cv::INTER_AREA);
+  return small;
 }
 
 GrayFrame to_gray(cv::Mat picture, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
@@ -172,6 +252,7 @@ GrayFrame to_gray(cv::Mat picture, const std::string& path, const FrameSourceOpt
         path, "frame of " + std::to_string(picture.cols) + " x " + std::to_string(picture.rows) + " px is too large",
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",
         "crop it or reduce it");
+  picture = averaged(picture, options.reduction);
   if (picture.depth() != CV_8U && picture.depth() != CV_16U && picture.depth() != CV_32F) {
     cv::Mat converted;
     picture.convertTo(converted, CV_32F);
@@ -187,9 +268,15 @@ GrayFrame to_gray(cv::Mat picture, const std::string& path, const FrameSourceOpt
     picture = three;
   }
   if (picture.channels() == 3) {
-    if (rule.channel < 0) rule.channel = options.channel >= 0 ? std::min(options.channel, 2) : best_channel(picture);
+    if (rule.channel == Channel::automatic)
+      rule.channel = options.channel != Channel::automatic ? options.channel : best_channel(picture);
     cv::Mat single;
-    cv::extractChannel(picture, single, 2 - rule.channel);
+    if (rule.channel <= Channel::blue) {
+      cv::extractChannel(picture, single, 2 - static_cast<int>(rule.channel));
+    } else {
+      if (picture.depth() == CV_8U) rule.depth_scale = 1;
+      single = mixed(picture, rule);
+    }
     picture = single;
   }
 
@@ -294,8 +381,7 @@ void refuse_if_enormous(const std::string& path, std::ifstream& file, const Fram
         "crop it or reduce it");
 }
 
-GrayFrame read_image(const std::string& path, Kind kind, std::size_t page, const FrameSourceOptions& options,
-                     GreyRule& rule) {
+cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const FrameSourceOptions& options) {
   quiet_opencv();
   std::error_code error;
   const auto bytes = fs::file_size(path, error);
@@ -304,8 +390,11 @@ GrayFrame read_image(const std::string& path, Kind kind, std::size_t page, const
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path, "the file cannot be opened", "no permission to read it", "check its permissions");
   refuse_if_enormous(path, file, options);
-  const std::string extension = lower_extension(path);
-  if (extension == ".jpg" || extension == ".jpeg" || extension == ".jpe") {
+  char head[2] = {};
+  file.clear();
+  file.seekg(0);
+  file.read(head, 2);
+  if (head[0] == '\xff' && head[1] == '\xd8') {
     // libjpeg paints the missing part of a truncated picture grey: look for the end-of-image marker in the last bytes.
     const auto tail_size = static_cast<std::streamoff>(std::min<std::uintmax_t>(bytes, 4096));
     std::string tail(static_cast<std::size_t>(tail_size), '\0');
@@ -331,7 +420,13 @@ GrayFrame read_image(const std::string& path, Kind kind, std::size_t page, const
     throw InputError(path, "not enough memory for the picture", "it is too large", "crop or reduce it");
   }
   if (picture.empty()) throw_unreadable(path, "it is truncated, damaged or not a picture of the kind its name says");
-  return to_gray(picture, page == 0 ? path : path + " (page " + std::to_string(page) + ")", options, rule);
+  return picture;
+}
+
+GrayFrame read_image(const std::string& path, Kind kind, std::size_t page, const FrameSourceOptions& options,
+                     GreyRule& rule) {
+  return to_gray(decode_image(path, kind, page, options),
+                 page == 0 ? path : path + " (page " + std::to_string(page) + ")", options, rule);
 }
 
 // A film decoded forward; seeking backwards starts again from the first frame, so that frame k is always the k-th.
@@ -612,23 +707,88 @@ std::optional<std::size_t> FrameSource::count_if_known() const {
   return (count + stride - 1) / stride;
 }
 
-GrayFrame read_frame(const fs::path& path, std::size_t page, const FrameSourceOptions& options) {
-  GreyRule rule;
+namespace {
+
+cv::Mat decode_picture(const fs::path& path, std::size_t page, const FrameSourceOptions& options) {
   std::error_code error;
   if (!fs::exists(path, error)) throw InputError(path.string(), "no such file", "it does not exist", "check the path");
   const Kind kind = kind_of(path);
   if (kind == Kind::unknown)
     throw InputError(path.string(), "neither a picture nor a film", "its ending is not known",
                      "use PNG, TIFF, JPEG or BMP");
-  if (kind == Kind::film) {
-    Film film(path.string(), options);
-    auto picture = film.picture(page);
-    if (!picture)
-      throw InputError(path.string(), "no frame " + std::to_string(page), "the film ends before it",
-                       "ask for an earlier one");
-    return to_gray(*picture, path.string(), options, rule);
+  if (kind != Kind::film) return decode_image(path.string(), kind, page, options);
+  Film film(path.string(), options);
+  auto picture = film.picture(page);
+  if (!picture)
+    throw InputError(path.string(), "no frame " + std::to_string(page), "the film ends before it",
+                     "ask for an earlier one");
+  return *picture;
+}
+
+bool has_colour(const cv::Mat& picture) {
+  if (picture.channels() < 3) return false;
+  constexpr double faint = 0.01;  // of the brightest level: what compression leaves of grey
+  cv::Mat colours;
+  picture.convertTo(colours, CV_32F);
+  GreyRule rule;
+  rule.channel = Channel::saturation;
+  if (colours.channels() == 4) {
+    cv::Mat three(colours.rows, colours.cols, CV_32FC3);
+    cv::mixChannels(std::vector<cv::Mat>{colours}, std::vector<cv::Mat>{three}, {0, 0, 1, 1, 2, 2});
+    colours = three;
   }
-  return read_image(path.string(), kind, page, options, rule);
+  double most = 0;
+  cv::minMaxLoc(colours.reshape(1), nullptr, &most);
+  return cv::mean(mixed(colours, rule))[0] > faint * most;
+}
+
+}  // namespace
+
+const char* name_of(Channel channel) {
+  switch (channel) {
+    case Channel::automatic:
+      return "automatic";
+    case Channel::red:
+      return "red";
+    case Channel::green:
+      return "green";
+    case Channel::blue:
+      return "blue";
+    case Channel::grey:
+      return "grey";
+    case Channel::saturation:
+      return "saturation";
+    case Channel::background_distance:
+      return "background_distance";
+  }
+  return "automatic";
+}
+
+GrayFrame read_frame(const fs::path& path, std::size_t page, const FrameSourceOptions& options) {
+  GreyRule rule;
+  return to_gray(decode_picture(path, page, options), path.string(), options, rule);
+}
+
+ChannelFrames read_channels(const fs::path& path, std::size_t page, std::size_t most_pixels,
+                            const FrameSourceOptions& options) {
+  ChannelFrames frames;
+  cv::Mat picture = decode_picture(path, page, options);
+  frames.width = picture.cols;
+  frames.height = picture.rows;
+  while (picture.total() / static_cast<std::size_t>(frames.reduction * frames.reduction) > most_pixels)
+    ++frames.reduction;
+  picture = averaged(picture, frames.reduction);
+  std::vector<Channel> wanted = {options.channel};
+  if (options.channel == Channel::automatic && has_colour(picture))
+    wanted = {Channel::grey,       Channel::red,  Channel::background_distance,
+              Channel::saturation, Channel::blue, Channel::green};
+  for (const Channel channel : wanted) {
+    GreyRule rule;
+    FrameSourceOptions of_channel = options;
+    of_channel.channel = channel;
+    frames.channels.push_back({channel, to_gray(picture, path.string(), of_channel, rule)});
+  }
+  return frames;
 }
 
 void write_png(const fs::path& path, const GrayFrame& frame, int compression) {

@@ -51,26 +51,32 @@ struct FrameOrigin {
   std::size_t page = 0;
 };
 
+// What is taken for the level of a colour pixel. `automatic` takes the one of red, green and blue with the best
+// contrast in the first colour frame, for the whole stream; `background_distance` is the distance from the most
+// frequent colour of the first colour frame, `saturation` the largest component less the smallest.
+enum class Channel { automatic = -1, red = 0, green = 1, blue = 2, grey = 3, saturation = 4, background_distance = 5 };
+const char* name_of(Channel channel);
+
 struct FrameSourceOptions {
-  // Colour images: -1 takes the channel with the best contrast of the first colour frame (held for the whole stream),
-  // 0, 1, 2 take red, green, blue.
-  int channel = -1;
+  Channel channel = Channel::automatic;
   // Pixels beyond which a frame is refused (a located error), so that memory stays bounded.
   std::size_t largest_frame_pixels = 150'000'000;
+  // Frames are averaged over squares of so many pixels; pixels left over at the right and at the bottom are dropped.
+  int reduction = 1;
   // Keep every `stride`-th frame of the stream, the first included.
   std::size_t stride = 1;
 };
 
 // A stream of frames, one in memory at a time. Files are read in the order given; folders and globs (`*`, `?`, `[..]`)
-// are expanded in natural order (frame2 before frame10). Readable: PNG, TIFF (8, 16 bit, float; multi-page), JPEG, BMP,
-// PGM/PPM, and films (mp4, avi, mov, mkv, ...). Films are decoded forward from their first frame, so frame k is exactly
-// the k-th picture of the film. 16-bit files that use 10, 12 or 14 bits are scaled by the bits used, found on the
-// first.
+// are expanded in natural order (frame2 before frame10). A file's kind follows from its contents, and from its name
+// where they say nothing. Readable: PNG, TIFF (8, 16 bit, float; multi-page), JPEG, BMP, PGM/PPM, and films (mp4, avi,
+// mov, mkv, ...). Films are decoded forward from their first frame, so frame k is exactly the k-th picture of the film.
+// 16-bit files that use 10, 12 or 14 bits are scaled by the bits used, found on the first.
 class FrameSource {
  public:
   // Throws InputError when nothing matches, a path does not exist, or is of no known kind. Opens no file's contents.
   static FrameSource open(const std::vector<std::string>& paths, const FrameSourceOptions& options = {});
-  // Whether the name's ending is that of a picture or a film: what a folder's other files are told from.
+  // Whether the file, or else its name's ending, is that of a picture or a film.
   static bool is_frame_file(const std::filesystem::path& path);
   // Frames made on demand, e.g. by a renderer: `make(index)` for index 0 .. count - 1, called from several threads.
   static FrameSource from_generator(std::size_t count, std::function<GrayFrame(std::size_t)> make);
@@ -106,6 +112,20 @@ class FrameSource {
 
 // The page-th picture of an image file, or the page-th frame of a film. Throws InputError.
 GrayFrame read_frame(const std::filesystem::path& path, std::size_t page = 0, const FrameSourceOptions& options = {});
+
+// One frame in every channel it has: grey alone when it has no colour. Frames of more than `most_pixels` are reduced by
+// averaging over `reduction` x `reduction` pixels.
+struct ChannelFrames {
+  struct One {
+    Channel channel = Channel::automatic;
+    GrayFrame frame;
+  };
+  int reduction = 1;
+  int width = 0, height = 0;  // of the frame itself
+  std::vector<One> channels;
+};
+ChannelFrames read_channels(const std::filesystem::path& path, std::size_t page = 0,
+                            std::size_t most_pixels = 6'000'000, const FrameSourceOptions& options = {});
 
 // Writes 8-bit grey PNG, levels rounded to nearest and clamped to 0 .. 255, into a temporary file beside `path` that is
 // then renamed, so that a half-written PNG is never seen. `compression` 0 (fast) .. 9 (small). Throws InputError for an

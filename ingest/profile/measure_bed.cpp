@@ -11,9 +11,11 @@
 #include <thread>
 
 #include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/learn_beads.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/frames/atomic_file.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "ingest/profile/reduced_bed.hpp"
 #include "ingest/profile/shaking_frequency.hpp"
 
 namespace shakebed::ingest {
@@ -129,10 +131,25 @@ GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const F
   return left;
 }
 
+// Beads of the second diameter by their rims, if they are seen.
+std::optional<FinderCalibration> learn_second_by_rims(const GrayFrame& frame, const FinderCalibration& first,
+                                                      const MeasureOptions& options) {
+  FindOptions find = options.find;
+  const double expected = first.radius_px * *options.second_diameter_m / options.bead_diameter_m;
+  find.seen = BeadsSeen{first.polarity, expected};
+  find.radius_px.reset();
+  constexpr double nearly = 0.1;
+  CalibrationResult result = learn_by_rims(frame, *find.seen);
+  if (!result.found || std::abs(result.calibration.radius_px / expected - 1) > nearly) return std::nullopt;
+  return std::move(result.calibration);
+}
+
 // Disks of the second species, none where the first has one.
 std::vector<FoundDisk> find_second(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder,
                                    const FinderCalibration& second, const FindOptions& options) {
-  std::vector<FoundDisk> disks = find_disks(without_disks(frame, found, finder), second, options).disks;
+  std::vector<FoundDisk> disks = second.by_rims
+                                     ? find_beads(frame, second, options).disks
+                                     : find_disks(without_disks(frame, found, finder), second, options).disks;
   const double near = 0.72 * (finder.radius_px + second.radius_px);
   const Nearby taken(found.disks.size(), near,
                      [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });
@@ -164,7 +181,7 @@ FrameFindings examine(FrameSource::Item& item, const FinderCalibration& finder, 
   if (!lens.lens().plain()) frame = lens.corrected(frame);
   FindOptions find = options.find;
   find.learn_rim = item.index < rim_frames;
-  FindResult found = find_disks(frame, finder, find);
+  FindResult found = find_beads(frame, finder, find);
   findings.rim.profile = std::move(found.profile);
   findings.rim.profile_beads = found.profile_beads;
   if (second) {
@@ -380,6 +397,7 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
 
 Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
   check(asked);
+  if (asked.reduction > 1) return measure_reduced_bed(source, asked);
   MeasureOptions options = asked;  // its places become those of true frames
   Measurement measurement;
   FindOptions find = options.find;
@@ -418,7 +436,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
       for (const GrayFrame& one : learned_from) pointers.push_back(&one);
     else
       pointers = {&learned_from.back()};
-    CalibrationResult attempt = learn_finder(pointers, find);
+    CalibrationResult attempt = learn_beads(pointers, find);
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;
       learned_from.pop_back();
@@ -441,7 +459,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     return frame.width != recorded_width || frame.height != recorded_height;
   });
   constexpr int lens_rounds = 5;
-  for (int round = 0; round < lens_rounds && !(options.pixel_aspect && options.lens_radial); ++round) {
+  const bool rims_alone = calibrated.calibration.by_rims;  // too coarse to tell the lens from
+  for (int round = 0; round < lens_rounds && !rims_alone && !(options.pixel_aspect && options.lens_radial); ++round) {
     std::vector<const GrayFrame*> pointers;
     std::vector<FindResult> found;
     learned_from.clear();
@@ -476,18 +495,27 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     const bool little =
         std::abs(lens.pixel_aspect / before.pixel_aspect - 1) < small && std::abs(lens.radial - before.radial) < small;
     CalibrationResult again =
-        little ? learn_again(pointers, find, calibrated.calibration) : learn_finder(pointers, find);
+        little ? learn_again(pointers, find, calibrated.calibration) : learn_beads(pointers, find);
     if (!again.found) {
       lens = before;
       break;
+    }
+    if (little) {
+      again.calibration.rims = calibrated.calibration.rims;
+      again.calibration.rims_to_be_checked = calibrated.calibration.rims_to_be_checked;
     }
     calibrated = std::move(again);
     // What a small correction leaves is its square and a share of its own: less than what would be worth it.
     if (little) break;
   }
   tell_radius(calibrated);
+  if (calibrated.calibration.by_rims) options.profile_from_coverage = false;
   calibrated.beads.reset();
-  if (options.second_diameter_m) {
+  if (options.second_diameter_m && find.seen) {
+    measurement.second_finder = learn_second_by_rims(learned_from.back(), calibrated.calibration, options);
+    if (!measurement.second_finder)
+      measurement.warnings.push_back("No beads of the second diameter were found: no rims of that radius are seen.");
+  } else if (options.second_diameter_m) {
     const double expected = calibrated.calibration.radius_px * *options.second_diameter_m / options.bead_diameter_m;
     FindOptions find_second_kind = find;
     find_second_kind.polarity = Polarity::automatic;
@@ -831,6 +859,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
                     (disk.y_px - bed.floor_px - bed.floor_slope * disk.x_px) * cosine * bed.floor_slope) /
                    diameter_px;
       measured.quality = disk.quality;
+      measured.probability = disk.probability;
       measured.variance_x = disk.variance_x;
       measured.variance_y = disk.variance_y;
       measured.covariance_xy = disk.covariance_xy;

@@ -19,6 +19,7 @@ struct MeasuredDisk {
   double x_px = 0, y_px = 0, radius_px = 0;
   double x = 0, z = 0;  // D, from the left wall and from the floor
   double quality = 0;
+  double probability = 1;                                    // that it is a bead
   double std_error_px = 0;                                   // rms of the two below
   double variance_x = 0, variance_y = 0, covariance_xy = 0;  // px^2
   double contrast = 0;                                       // 1 for a typical bead
@@ -62,6 +63,9 @@ struct MeasureOptions {
   std::optional<double> shaking_frequency_hz;  // needs frame_rate_hz; found from the film if left out and it shakes
   std::optional<double> frame_rate_hz;         // of the stream: then profiles are told by the shaker's phase
   std::size_t phase_bins = 8;
+  // The source's frames are reduced by this factor (FrameSourceOptions::reduction). All places and lengths, in and out,
+  // are px of the frames as recorded.
+  int reduction = 1;
   std::size_t calibration_frames = 3;                     // taken evenly from the first calibration_window frames
   bool profile_from_coverage = true;                      // also measure covered area, independently
   unsigned threads = 1;                                   // results do not depend on it

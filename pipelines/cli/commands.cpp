@@ -24,6 +24,7 @@
 #include "pipelines/runner/sweep.hpp"
 #include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/scene_options.hpp"
+#include "pipelines/stages/images_module.hpp"
 #include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {
@@ -282,6 +283,26 @@ int command_reproduce(const Arguments& arguments) {
   return code;
 }
 
+int preview_images(const Arguments& arguments) {
+  const ImageArguments& image = arguments.images;
+  PreviewRequest request{.files = image.files, .diameter = image.diameter};
+  ExtractOptions& options = request.options;
+  options.roi = image.roi;
+  options.radius = image.radius;
+  if (image.polarity == "dark") options.polarity = BeadPolarity::dark;
+  if (image.polarity == "bright") options.polarity = BeadPolarity::bright;
+  const std::vector<std::string> channels = {"automatic",          "red", "green", "blue", "grey", "saturation",
+                                             "background_distance"};
+  if (image.channel)
+    options.channel =
+        static_cast<BeadChannel>(std::find(channels.begin(), channels.end(), *image.channel) - channels.begin());
+  const fs::path folder = arguments.common.out.value_or("shakebed-preview");
+  fs::create_directories(folder);
+  request.folder = folder.string();
+  print(fmt::format("{}\nsee {}\n", images_module().preview(request), (folder / "preview.html").string()));
+  return exit_ok;
+}
+
 int command_fit_images(const Arguments& arguments) {
   const ImageArguments& image = arguments.images;
   require_positive("--diameter", quantity_argument("--diameter", image.diameter, dimension::length));
@@ -297,6 +318,9 @@ int command_fit_images(const Arguments& arguments) {
   if (image.right_wall) extract["right_wall"] = *image.right_wall;
   if (!image.roi.empty()) extract["roi"] = image.roi;
   if (image.polarity) extract["polarity"] = *image.polarity;
+  if (image.channel) extract["channel"] = *image.channel;
+  if (image.radius) extract["radius"] = *image.radius;
+  if (image.preview) return preview_images(arguments);
   if (image.second_diameter) extract["second_diameter"] = *image.second_diameter;
   if (image.gravity) extract["gravity"] = *image.gravity;
   if (image.pixel_aspect) extract["pixel_aspect"] = *image.pixel_aspect;

@@ -21,8 +21,9 @@ struct ImageArguments {
   std::vector<std::string> files;
   std::string diameter;
   std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity,
-      second_diameter, kernel;
-  std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens;
+      second_diameter, kernel, channel;
+  std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens, radius;
+  bool preview = false;
   std::optional<std::uint64_t> bead_number;
   std::vector<double> roi;
 };

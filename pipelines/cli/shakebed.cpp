@@ -115,6 +115,12 @@ int run_program(int argc, char** argv) {
       ->expected(4);
   images->add_option("--polarity", image.polarity, "automatic, dark or bright beads")
       ->check(CLI::IsMember({"automatic", "dark", "bright"}));
+  images->add_option("--radius", image.radius, "radius of a bead in pixels, good to a quarter (default: found)")
+      ->check(CLI::PositiveNumber);
+  images->add_option("--channel", image.channel, "part of a colour picture that is used (default: found)")
+      ->check(CLI::IsMember({"automatic", "red", "green", "blue", "grey", "saturation", "background_distance"}));
+  images->add_flag("--preview", image.preview,
+                   "draw what would be found in the first frame, with the command for each alternative, and stop");
   images->add_option("--frequency", image.frequency,
                      "of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
   images->add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");

@@ -74,7 +74,7 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   if (answer.temperature_z)
     put_temperature(out, "temperature_z", answer.temperature_z->value, answer.temperature_z->std_error, diameter);
   out["readings"] = Json::array();
-  for (const fit::Reading& reading : answer.readings) {
+  for (const fit::ThermometerReading& reading : answer.readings) {
     out["readings"].push_back(Json{{"thermometer", reading.thermometer},
                                    {"model", reading.model},
                                    {"status", fit::to_string(reading.status)},

@@ -33,6 +33,7 @@ struct RenderOptions {
 };
 
 enum class BeadPolarity { automatic, dark, bright };
+enum class BeadChannel { automatic, red, green, blue, grey, saturation, background_distance };
 
 // Pixels count from the centre of the top-left one, x to the right, y downwards.
 struct ExtractOptions {
@@ -49,6 +50,7 @@ struct ExtractOptions {
   std::optional<double> pixel_aspect;           // a pixel's width over its height; found if left out
   std::optional<double> lens_radial;            // how far the corners move, in half diagonals; found if left out
   BeadPolarity polarity = BeadPolarity::automatic;
+  BeadChannel channel = BeadChannel::automatic;
   std::optional<double> radius;  // first value [px]
   bool keep_half_hidden = false;
   Kernel kernel{KernelKind::gaussian, 0.5};
@@ -60,11 +62,21 @@ struct ExtractOptions {
   std::uint64_t overlays = 1;                   // frames drawn with what was found
 };
 
+// fit-images --preview: files and diameter as on the command line.
+struct PreviewRequest {
+  std::vector<std::string> files;
+  std::string diameter;
+  ExtractOptions options;  // polarity, channel, radius and roi
+  std::string folder;      // for preview.html
+};
+
 class ImagesModule {
  public:
   virtual ~ImagesModule() = default;
   virtual void render(const RenderOptions& options, RunContext& context) const = 0;
   virtual void extract(const ExtractOptions& options, RunContext& context) const = 0;
+  // A sentence that says what is seen.
+  virtual std::string preview(const PreviewRequest& request) const = 0;
 };
 
 // Loads the module once. It lies beside the program, or in the library folder it was installed to. Throws StageError

@@ -26,6 +26,7 @@
 #include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/images_module.hpp"
+#include "pipelines/stages/preview.hpp"
 #include "pipelines/version.hpp"
 
 namespace shakebed::pipelines {
@@ -255,6 +256,7 @@ class DisksOnTheWay {
       ++quality_[std::min<std::size_t>(quality_.size() - 1,
                                        static_cast<std::size_t>(disk.quality * static_cast<double>(quality_.size())))];
       cut_ += disk.cut, half_hidden_ += disk.half_hidden;
+      wrong_ += 1 - disk.probability, ++all_;
     }
     if (meter_) {
       std::vector<ingest::MeasuredDisk> first;
@@ -289,6 +291,7 @@ class DisksOnTheWay {
     }
     return chosen;
   }
+  [[nodiscard]] double expected_wrong_share() const { return all_ > 0 ? wrong_ / static_cast<double>(all_) : 0; }
   [[nodiscard]] std::size_t cut() const { return cut_; }
   [[nodiscard]] std::size_t half_hidden() const { return half_hidden_; }
   [[nodiscard]] std::optional<ingest::VelocityMeasurement> velocities() {
@@ -403,7 +406,8 @@ class DisksOnTheWay {
   std::optional<ingest::VelocityMeter> meter_;
   std::array<std::size_t, 50> quality_{};
   std::size_t cut_ = 0, half_hidden_ = 0, matched_ = 0, reported_ = 0, real_ = 0;
-  double squares_ = 0;
+  double squares_ = 0, wrong_ = 0;  // wrong_: the disks' doubts, summed
+  std::size_t all_ = 0;
   std::size_t every_ = 1;
   std::map<std::size_t, std::vector<ingest::MeasuredDisk>> to_draw_;
 };
@@ -512,8 +516,10 @@ void draw_overlays(const ExtractOptions& options, RunContext& context, const std
   const auto to_draw = on_the_way.to_draw();
   if (options.overlays == 0 || to_draw.empty()) return;
   const ingest::BedCalibration& bed = found.calibration;
-  ingest::FrameSource again = ingest::FrameSource::open(paths, source_options);
-  bool first = true;
+  ingest::FrameSourceOptions whole = source_options;
+  whole.reduction = 1;
+  ingest::FrameSource again = ingest::FrameSource::open(paths, whole);
+  bool first = source_options.reduction == 1 && !found.finder.by_rims;  // then there is a model of the frame
   for (auto item = again.next_item(); item && item->index <= to_draw.rbegin()->first; item = again.next_item()) {
     const auto at = to_draw.find(item->index);
     if (at == to_draw.end()) continue;
@@ -544,6 +550,76 @@ void draw_overlays(const ExtractOptions& options, RunContext& context, const std
   }
 }
 
+// The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none.
+void use_first_look(const ExtractOptions& options, RunContext& context, const std::vector<std::string>& paths,
+                    ingest::FrameSourceOptions& source, ingest::MeasureOptions& measure) {
+  context.progress(0, "looking for beads");
+  const std::optional<FirstLook> look = look_at_first(paths, options);
+  if (!look) return;  // measure_bed() says which files cannot be read
+  const ingest::Survey& survey = look->survey;
+  const std::string diameter = fmt::format("{:g} mm", 1e3 * options.diameter);
+  if (!survey.found) {
+    write_preview(context.scratch(), *look, options.images.texts, diameter);
+    std::string message = fmt::format("{}: no beads: {}. See {}", look->path, survey.why_not,
+                                      (context.scratch() / "preview.html").string());
+    message += survey.candidates.empty()
+                   ? ". If there are beads, give their radius in pixels (--radius) and a region (--roi)"
+                   : ". If the beads are those of one of its pictures, crop to them with --roi, or try";
+    for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
+      message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
+    const bool any = std::any_of(survey.candidates.begin(), survey.candidates.end(),
+                                 [](const ingest::SurveyCandidate& one) { return !one.disks.empty(); });
+    if (any) throw StageError(message);
+    throw InputError(message);
+  }
+  const ingest::SurveyCandidate* chosen = &survey.candidates.front();
+  if (options.bead_number) {  // of what may be beads, the kind that is as numerous as told
+    const auto off = [&](const ingest::SurveyCandidate& one) {
+      return std::abs(std::log(static_cast<double>(std::max<std::size_t>(1, one.disks.size())) /
+                               static_cast<double>(*options.bead_number)));
+    };
+    constexpr double clearly = 0.1;
+    for (const ingest::SurveyCandidate& other : survey.candidates)
+      if (other.credible && off(other) + clearly < off(*chosen)) chosen = &other;
+  }
+  source.channel = chosen->channel;
+  measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};
+  // Large beads need not be seen by every pixel: a radius of 12 to 24 px is enough.
+  constexpr double enough_px = 12, large_frame = 2e6;
+  if (static_cast<double>(look->width) * look->height > large_frame)
+    source.reduction = measure.reduction = std::max(1, static_cast<int>(chosen->rims.radius_px / enough_px));
+  context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
+                          options_for(*chosen), chosen->disks.size()));
+}
+
+// Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
+void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found,
+                 const DisksOnTheWay& on_the_way) {
+  constexpr double most_wrong = 0.2, worth_a_word = 0.02, far_off = 0.2;
+  const double wrong = on_the_way.expected_wrong_share();
+  if (wrong > most_wrong)
+    throw StageError(
+        fmt::format("{:.0f} % of the {} disks found may be wrong: too many to measure anything. Look at "
+                    "fit-images --preview, and give --radius, --polarity, --channel or --roi",
+                    100 * wrong, found.disk_total));
+  if (wrong > worth_a_word)
+    context.warning(
+        fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
+                    "numbers.",
+                    100 * wrong));
+  if (!options.bead_number) return;
+  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
+  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
+                                       found.disk_count_mean, *options.bead_number);
+  if (std::abs(ratio - 1) > far_off)
+    throw StageError(text +
+                     ": something else was found. Look at fit-images --preview, and give --radius, --polarity, "
+                     "--channel or --roi; or correct --bead-number");
+  if (std::abs(ratio - 1) > 1e-3)
+    context.warning(text + (ratio < 1 ? ": some are missed or out of view (count.svg, overlays)."
+                                      : ": something else passes for a bead (overlays), or there are more."));
+}
+
 void extract_disks(const ExtractOptions& options, RunContext& context) {
   const Input* rendered = context.find_input("render");
   ingest::MeasureOptions measure;
@@ -553,9 +629,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
   measure.second_diameter_m = options.second_diameter;
   measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
-  measure.find.polarity = options.polarity == BeadPolarity::dark     ? ingest::Polarity::dark_beads
-                          : options.polarity == BeadPolarity::bright ? ingest::Polarity::bright_beads
-                                                                     : ingest::Polarity::automatic;
+  measure.find.polarity = polarity_of(options.polarity);
   measure.find.radius_px = options.radius;
   measure.find.keep_half_hidden = options.keep_half_hidden;
   if (options.roi.size() == 4) {
@@ -600,6 +674,8 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   }
   ingest::FrameSourceOptions source_options;
   source_options.stride = options.stride;
+  source_options.channel = channel_of(options.channel);
+  if (rendered == nullptr) use_first_look(options, context, paths, source_options, measure);
   ingest::FrameSource source = ingest::FrameSource::open(paths, source_options);
   // A film's own frame rate serves for the shaker's phase only: fast cameras write films to be watched slowly.
   measure.frame_rate_hz =
@@ -618,6 +694,7 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   const ingest::Measurement found = ingest::measure_bed(source, measure);
   context.check_interrupted();
   on_the_way.close();
+  if (rendered == nullptr) judge_disks(options, context, found, on_the_way);
 
   const ingest::BedCalibration& bed = found.calibration;
   for (const std::string& warning : found.warnings) context.warning(warning);
@@ -637,12 +714,6 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
         fmt::format("Times are by the film's own {:g} frames/s; if it was recorded faster, give frame_rate "
                     "(--frame-rate): the shaking's frequency grows with it, its phases stay.",
                     *measure.frame_rate_hz * static_cast<double>(options.stride)));
-  if (options.bead_number && std::abs(found.disk_count_mean / static_cast<double>(*options.bead_number) - 1) > 1e-3)
-    context.warning(fmt::format("On average {:.2f} beads were found of the {} there are: {}", found.disk_count_mean,
-                                *options.bead_number,
-                                found.disk_count_mean < static_cast<double>(*options.bead_number)
-                                    ? "some are missed or out of view (count.svg, overlays)"
-                                    : "something else passes for a bead (overlays), or there are more"));
   const double column_number = found.disk_count_mean / bed.width;
   write_profiles(context, found, column_number);
   frames_table(found.frames).write(context.output("frames.csv"));
@@ -721,6 +792,22 @@ void extract_disks(const ExtractOptions& options, RunContext& context) {
   draw_overlays(options, context, paths, source_options, found, on_the_way);
 }
 
+std::string preview_images(const PreviewRequest& request) {
+  ingest::FrameSource source = ingest::FrameSource::open(request.files, {});
+  std::vector<std::string> paths;
+  constexpr std::size_t enough = 5;
+  for (auto item = source.next_item(); item && paths.size() < enough; item = source.next_item())
+    if (paths.empty() || paths.back() != item->origin.path) paths.push_back(item->origin.path);
+  const std::optional<FirstLook> look = look_at_first(paths, request.options);
+  if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
+  write_preview(request.folder, *look, request.files, request.diameter);
+  if (!look->survey.found) return fmt::format("no beads: {}", look->survey.why_not);
+  const ingest::SurveyCandidate& best = look->survey.candidates.front();
+  return fmt::format("{} {} beads of {:.2f} px radius in channel {}; expected share of wrong ones {:.1f} %",
+                     best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                     best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong);
+}
+
 // ingest's own errors become ours.
 template <class Work>
 void translated(const Work& work) {
@@ -740,6 +827,11 @@ class Module : public ImagesModule {
   }
   void extract(const ExtractOptions& options, RunContext& context) const override {
     translated([&] { extract_disks(options, context); });
+  }
+  std::string preview(const PreviewRequest& request) const override {
+    std::string sentence;
+    translated([&] { sentence = preview_images(request); });
+    return sentence;
   }
 };
 

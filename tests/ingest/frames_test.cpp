@@ -244,7 +244,7 @@ TEST(Frames, ColourFramesAreReadInTheChannelThatShowsTheBeads) {
   EXPECT_EQ(second->at(30, 30), 60.0F) << "another channel than in the frame before";
   for (const auto& [channel, level] : {std::pair{0, 110.0F}, {1, 20.0F}, {2, 95.0F}}) {
     FrameSourceOptions options;
-    options.channel = channel;
+    options.channel = static_cast<Channel>(channel);
     EXPECT_EQ(read_frame(folder / "1.png", 0, options).at(30, 30), level);
   }
 }

@@ -1,0 +1,248 @@
+#include "ingest/find/circle_census.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/picture_scale.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double smallest_at_level = 5, largest_at_level = 10.4;  // px, radii searched at each level of the pyramid
+constexpr int window_side = 640;                                  // px, of the busiest part searched at each level
+constexpr double circle_cost_px = 8;                              // px of rim, for a circle's place and radius
+constexpr double mode_width = 0.1;                                // radii of one hypothesis, either way
+constexpr double faintest_support = 0.35;
+constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
+
+// The window of at most `side` px with the most change of level; returns its left and top.
+std::array<int, 2> busiest_corner(const GrayFrame& frame, int wide, int high) {
+  constexpr int block = 16;
+  const int columns = frame.width / block, rows = frame.height / block;
+  std::vector<double> sums(static_cast<std::size_t>(columns + 1) * static_cast<std::size_t>(rows + 1), 0.0);
+  const auto at = [&](int column, int row) -> double& {
+    return sums[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +
+                static_cast<std::size_t>(column)];
+  };
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      double sum = 0;
+      for (int y = row * block; y < (row + 1) * block - 2; y += 2)
+        for (int x = column * block; x < (column + 1) * block - 2; x += 2) {
+          const float change =
+              std::abs(frame.at(x + 2, y) - frame.at(x, y)) + std::abs(frame.at(x, y + 2) - frame.at(x, y));
+          sum += unseen(change) ? 0.0 : static_cast<double>(change);
+        }
+      at(column + 1, row + 1) = sum + at(column, row + 1) + at(column + 1, row) - at(column, row);
+    }
+  const int window_columns = std::min(columns, wide / block), window_rows = std::min(rows, high / block);
+  int best_column = 0, best_row = 0;
+  double best = -1;
+  for (int row = 0; row + window_rows <= rows; ++row)
+    for (int column = 0; column + window_columns <= columns; ++column) {
+      const double sum = at(column + window_columns, row + window_rows) - at(column, row + window_rows) -
+                         at(column + window_columns, row) + at(column, row);
+      if (sum > best) {
+        best = sum;
+        best_column = column;
+        best_row = row;
+      }
+    }
+  return {std::min(best_column * block, frame.width - wide), std::min(best_row * block, frame.height - high)};
+}
+
+GrayFrame cut_out(const GrayFrame& frame, int left, int top, int wide, int high) {
+  GrayFrame window;
+  window.width = wide;
+  window.height = high;
+  window.pixels.reserve(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
+  for (int row = top; row < top + high; ++row) {
+    const auto from = frame.pixels.begin() + static_cast<std::ptrdiff_t>(row) * frame.width + left;
+    window.pixels.insert(window.pixels.end(), from, from + wide);
+  }
+  return window;
+}
+
+ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
+  ScaledPicture level;
+  const int wide = std::min(side, picture.width), high = std::min(side, picture.height);
+  const auto [left, top] = busiest_corner(picture, wide, high);
+  level.picture = cut_out(picture, left, top, wide, high);
+  level.scale = scale;
+  level.left = left * scale;
+  level.top = top * scale;
+  return level;
+}
+
+// From twice the resolution down, until no circle fits in any more.
+std::vector<ScaledPicture> pyramid_of(const GrayFrame& frame, const CensusOptions& options) {
+  std::vector<ScaledPicture> levels;
+  const auto wanted = [&](double scale) {
+    if (!options.radius_px) return largest_at_level * scale > options.smallest_radius_px;
+    return *options.radius_px * 1.25 > smallest_at_level * scale && *options.radius_px * 0.8 < largest_at_level * scale;
+  };
+  if (wanted(0.5)) {
+    ScaledPicture half = windowed(frame, 1, window_side / 2);
+    half.picture = doubled(half.picture);
+    half.scale = 0.5;
+    levels.push_back(std::move(half));
+  }
+  GrayFrame picture = frame;
+  for (double scale = 1; std::min(picture.width, picture.height) >= 4 * smallest_at_level; scale *= 2) {
+    if (wanted(scale)) levels.push_back(windowed(picture, scale, window_side));
+    picture = halved(picture);
+  }
+  return levels;
+}
+
+double range_of(const GrayFrame& frame) {
+  std::vector<float> levels;
+  const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 100000);
+  for (std::size_t k = 0; k < frame.pixels.size(); k += step)
+    if (!unseen(frame.pixels[k])) levels.push_back(frame.pixels[k]);
+  if (levels.empty()) return 1;
+  const auto part = [&](double fraction) {
+    const auto place = levels.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(levels.size() - 1));
+    std::nth_element(levels.begin(), place, levels.end());
+    return static_cast<double>(*place);
+  };
+  return std::max(1.0, part(0.998) - part(0.002));
+}
+
+// What one circle explains, px of its level.
+double gain_of(const Circle& circle, double range) {
+  const double weight = std::min(1.0, circle.contrast / (full_contrast_share * range));
+  return weight * (2 * std::numbers::pi * circle.radius * circle.support - circle_cost_px);
+}
+
+std::vector<Circle> near_radius(const std::vector<Circle>& circles, double radius) {
+  std::vector<Circle> near;
+  for (const Circle& circle : circles)
+    if (std::abs(circle.radius / radius - 1) < mode_width) near.push_back(circle);
+  return without_doubles(std::move(near), 0.8);
+}
+
+struct Found {
+  std::vector<Circle> picture;
+  std::array<std::vector<Circle>, 2> copies;
+};
+
+struct Sum {
+  double count = 0, gain = 0;
+};
+Sum sum_of(const std::vector<Circle>& circles, double least_support, double range) {
+  Sum sum;
+  for (const Circle& circle : circles)
+    if (circle.support >= least_support) {
+      ++sum.count;
+      sum.gain += gain_of(circle, range);
+    }
+  return sum;
+}
+
+// The hypothesis of this radius at the threshold of support that serves it best.
+CircleHypothesis weigh(const Found& found, double radius, double range, double* by_chance) {
+  CircleHypothesis best;
+  const std::vector<Circle> seen = near_radius(found.picture, radius);
+  const std::array<std::vector<Circle>, 2> copies = {near_radius(found.copies[0], radius),
+                                                     near_radius(found.copies[1], radius)};
+  for (double least = 0.4; least < 0.99; least += 0.05) {
+    const Sum here = sum_of(seen, least, range);
+    const Sum one = sum_of(copies[0], least, range), other = sum_of(copies[1], least, range);
+    const double gain = here.gain - 0.5 * (one.gain + other.gain);
+    *by_chance =
+        std::max({*by_chance, one.gain - 0.5 * (here.gain + other.gain), other.gain - 0.5 * (here.gain + one.gain)});
+    if (!(gain > best.gain_px)) continue;
+    best.gain_px = gain;
+    best.least_support = least;
+    best.circles = here.count;
+    best.by_chance = 0.5 * (one.count + other.count);
+    best.radius_px = radius;
+  }
+  std::vector<double> contrasts;
+  for (const Circle& circle : seen)
+    if (circle.support >= best.least_support) {
+      best.seen.push_back(circle);
+      best.scatter += circle.scatter / best.circles;
+      contrasts.push_back(circle.contrast);
+    }
+  if (!contrasts.empty()) {
+    std::nth_element(contrasts.begin(), contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2),
+                     contrasts.end());
+    best.contrast = contrasts[contrasts.size() / 2];
+  }
+  return best;
+}
+
+class Census {
+ public:
+  explicit Census(const CensusOptions& options) : options_(options) {}
+
+  void search(std::size_t channel, const GrayFrame& frame) {
+    const double range = range_of(frame);
+    for (const ScaledPicture& level : pyramid_of(frame, options_)) {
+      const EdgeMap edges = find_edges(level.picture);
+      const EdgeMap one = find_edges(stretched(level.picture, decoy_stretch, 0), edges.threshold);
+      const EdgeMap other = find_edges(stretched(level.picture, decoy_stretch, std::numbers::pi / 4), edges.threshold);
+      for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
+        if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
+        const auto circles = [&](const EdgeMap& map) {
+          return find_circles(map, smallest_at_level, largest_at_level, polarity, faintest_support);
+        };
+        const Found found{circles(edges), {circles(one), circles(other)}};
+        for (double radius = smallest_at_level; radius < largest_at_level; radius *= 1.05) {
+          double by_chance = 0;
+          CircleHypothesis hypothesis = weigh(found, radius, range, &by_chance);
+          census_.best_by_chance_px = std::max(census_.best_by_chance_px, by_chance * level.scale);
+          if (!(hypothesis.gain_px > 0)) continue;
+          hypothesis.channel = channel;
+          hypothesis.polarity = polarity;
+          hypothesis.explained_share =
+              hypothesis.gain_px / static_cast<double>(std::max<std::size_t>(1, edges.ridge.size()));
+          hypothesis.radius_px *= level.scale;
+          hypothesis.gain_px *= level.scale;
+          for (Circle& circle : hypothesis.seen) {
+            circle.x = level.to_frame_x(circle.x);
+            circle.y = level.to_frame_y(circle.y);
+            circle.radius *= level.scale;
+          }
+          all_.push_back(std::move(hypothesis));
+        }
+      }
+    }
+  }
+
+  CircleCensus result() {
+    std::sort(all_.begin(), all_.end(),
+              [](const CircleHypothesis& a, const CircleHypothesis& b) { return a.gain_px > b.gain_px; });
+    for (CircleHypothesis& one : all_) {
+      constexpr double another = 1.15;
+      constexpr std::size_t most = 12;
+      const bool known = std::any_of(census_.hypotheses.begin(), census_.hypotheses.end(), [&](const auto& other) {
+        return other.channel == one.channel && other.polarity == one.polarity &&
+               std::max(other.radius_px / one.radius_px, one.radius_px / other.radius_px) < another;
+      });
+      if (!known && census_.hypotheses.size() < most) census_.hypotheses.push_back(std::move(one));
+    }
+    return std::move(census_);
+  }
+
+ private:
+  CensusOptions options_;
+  CircleCensus census_;
+  std::vector<CircleHypothesis> all_;
+};
+
+}  // namespace
+
+CircleCensus take_census(const std::vector<const GrayFrame*>& channels, const CensusOptions& options) {
+  Census census(options);
+  for (std::size_t channel = 0; channel < channels.size(); ++channel) census.search(channel, *channels[channel]);
+  return census.result();
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,281 @@
+#include "ingest/find/circle_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "ingest/find/nearby.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double radius_ratio = 1.09;    // of one radius voted for to the next: what a peak is wide
+constexpr double least_votes = 0.3;      // share of the rim that must vote for a place
+constexpr double least_alignment = 0.8;  // cosine between an edge's gradient and the ray
+constexpr double least_tolerance = 0.6;  // px: what pixels do to an edge's place
+constexpr double ray_step = 0.5;         // px
+
+struct Direction {
+  double cosine, sine;
+};
+constexpr std::size_t directions_in_table = 96;  // 32 and 48 divide it
+Direction direction_of(int k, int count) {
+  static const std::array<Direction, directions_in_table> table = [] {
+    std::array<Direction, directions_in_table> all{};
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(all.size());
+      all[i] = {std::cos(angle), std::sin(angle)};
+    }
+    return all;
+  }();
+  return table[static_cast<std::size_t>(k) * directions_in_table / static_cast<std::size_t>(count)];
+}
+
+struct Gradient {
+  float x, y;
+};
+Gradient gradient_at(const EdgeMap& edges, double x, double y) {
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const float right = static_cast<float>(x - column), lower = static_cast<float>(y - row);
+  const std::size_t at = edges.at(column, row), below = at + static_cast<std::size_t>(edges.width);
+  const auto mix = [&](const std::vector<float>& field) {
+    return (1 - lower) * ((1 - right) * field[at] + right * field[at + 1]) +
+           lower * ((1 - right) * field[below] + right * field[below + 1]);
+  };
+  return {mix(edges.x), mix(edges.y)};
+}
+
+// Where along a ray the edge is: its distance from the rim, if there is one.
+struct Met {
+  bool in_view = false, edge = false;
+  double offset = 0;  // px outwards
+  float slope = 0;    // grey levels per px
+};
+Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double sine, float sign, double reach) {
+  Met met;
+  const int steps = static_cast<int>(std::ceil(reach / ray_step));
+  std::array<float, 130> along{};
+  const int used = std::min(steps, 64);
+  float best = edges.threshold;
+  int best_step = 0;
+  bool found = false;
+  for (int k = -used; k <= used; ++k) {
+    const double distance = circle.radius + k * ray_step;
+    const double x = circle.x + distance * cosine, y = circle.y + distance * sine;
+    if (x < 1 || y < 1 || x >= edges.width - 2 || y >= edges.height - 2) continue;
+    met.in_view = met.in_view || k == 0;
+    const Gradient gradient = gradient_at(edges, x, y);
+    const float radial = sign * (gradient.x * static_cast<float>(cosine) + gradient.y * static_cast<float>(sine));
+    along[static_cast<std::size_t>(k + used)] = radial;
+    if (radial <= best) continue;
+    if (radial * radial <
+        static_cast<float>(least_alignment * least_alignment) * (gradient.x * gradient.x + gradient.y * gradient.y))
+      continue;
+    best = radial;
+    best_step = k;
+    found = true;
+  }
+  if (!found) return met;
+  met.edge = true;
+  met.offset = best_step * ray_step;
+  met.slope = best;
+  if (best_step > -used && best_step < used) {
+    const float before = along[static_cast<std::size_t>(best_step + used - 1)],
+                after = along[static_cast<std::size_t>(best_step + used + 1)];
+    const float bend = before - 2 * best + after;
+    if (bend < 0) met.offset += ray_step * std::clamp(0.5 * static_cast<double>((before - after) / bend), -0.5, 0.5);
+  }
+  return met;
+}
+
+// Least squares of offset = dx cos + dy sin + dr over the edges met; a poorly seen arc moves little.
+struct CircleStep {
+  double x = 0, y = 0, radius = 0;
+};
+CircleStep step_towards(const std::vector<std::array<double, 3>>& met, int rays) {
+  double cc = 0, cs = 0, ss = 0, c = 0, s = 0, oc = 0, os = 0, o = 0;
+  for (const auto& [cosine, sine, offset] : met) {
+    cc += cosine * cosine, cs += cosine * sine, ss += sine * sine, c += cosine, s += sine;
+    oc += offset * cosine, os += offset * sine, o += offset;
+  }
+  const double hold = 0.02 * rays, n = static_cast<double>(met.size()) + hold;
+  cc += hold, ss += hold;
+  // The radius eliminated, then the two of the centre.
+  const double a = cc - c * c / n, b = cs - c * s / n, d = ss - s * s / n;
+  const double u = oc - c * o / n, v = os - s * o / n;
+  const double determinant = a * d - b * b;
+  if (!(determinant > 1e-6)) return {};
+  CircleStep step;
+  step.x = (d * u - b * v) / determinant;
+  step.y = (a * v - b * u) / determinant;
+  step.radius = (o - c * step.x - s * step.y) / n;
+  return step;
+}
+
+// A quick look: enough of the pixels near the rim have a gradient along the radius.
+bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, double reach) {
+  constexpr int looks = 16;
+  int in_view = 0, met = 0;
+  for (int k = 0; k < looks; ++k) {
+    const auto [cosine, sine] = direction_of(k, looks);
+    bool seen = false, edge = false;
+    for (double off = -reach; off <= reach + 1e-9; off += reach / std::ceil(reach)) {
+      const int column = static_cast<int>(circle.x + (circle.radius + off) * cosine + 0.5);
+      const int row = static_cast<int>(circle.y + (circle.radius + off) * sine + 0.5);
+      if (column < 1 || row < 1 || column >= edges.width - 1 || row >= edges.height - 1) continue;
+      seen = true;
+      const std::size_t at = edges.at(column, row);
+      const float radial = sign * (edges.x[at] * static_cast<float>(cosine) + edges.y[at] * static_cast<float>(sine));
+      edge = edge || (radial > edges.threshold &&
+                      radial * radial > 0.6F * (edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]));
+    }
+    in_view += seen;
+    met += edge;
+  }
+  return met >= 6 && 10 * met >= 4 * in_view;
+}
+
+std::vector<float> vote_map(const EdgeMap& edges, double radius, float sign) {
+  const std::size_t width = static_cast<std::size_t>(edges.width);
+  std::vector<float> votes(width * static_cast<std::size_t>(edges.height), 0.0F);
+  const float shift = static_cast<float>(-radius) * sign;
+  for (const RidgePixel& edge : edges.ridge) {
+    const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
+    const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
+    if (column < 1 || row < 1 || column >= edges.width - 1 || row >= edges.height - 1) continue;
+    votes[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] += 1.0F;
+  }
+  return votes;
+}
+
+// Sums over 3 x 3 pixels.
+std::vector<float> gathered(const std::vector<float>& votes, int width_px, int height_px) {
+  const std::size_t width = static_cast<std::size_t>(width_px), height = static_cast<std::size_t>(height_px);
+  std::vector<float> across(votes.size(), 0.0F), sums(votes.size(), 0.0F);
+  for (std::size_t row = 0; row < height; ++row) {
+    const float* from = votes.data() + row * width;
+    float* to = across.data() + row * width;
+    for (std::size_t k = 1; k + 1 < width; ++k) to[k] = from[k - 1] + from[k] + from[k + 1];
+  }
+  for (std::size_t row = 1; row + 1 < height; ++row) {
+    const float* from = across.data() + row * width;
+    float* to = sums.data() + row * width;
+    for (std::size_t k = 0; k < width; ++k) to[k] = *(from + k - width) + from[k] + from[k + width];
+  }
+  return sums;
+}
+
+std::vector<Circle> peaks_of(const std::vector<float>& sums, int width, int height, double radius) {
+  const float least = static_cast<float>(least_votes * 2 * std::numbers::pi * radius);
+  std::vector<Circle> peaks;
+  for (int row = 2; row + 2 < height; ++row) {
+    const float* here = sums.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
+    for (int column = 2; column + 2 < width; ++column) {
+      const float value = here[column];
+      if (value < least) continue;
+      bool highest = true;
+      for (int dy = -2; dy <= 2 && highest; ++dy)
+        for (int dx = -2; dx <= 2 && highest; ++dx) {
+          const float other = *(here + dy * width + column + dx);
+          highest =
+              dy < 0 || (dy == 0 && dx < 0) ? other <= value : (dx == 0 && dy == 0) || other < value || other == value;
+          if (other == value && (dy < 0 || (dy == 0 && dx < 0))) highest = false;
+        }
+      if (highest) peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius, 0, 0, 0, 0});
+    }
+  }
+  return peaks;
+}
+
+}  // namespace
+
+Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, const RimRays& rays) {
+  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
+  Circle circle = start;
+  if (!worth_fitting(edges, start, sign, std::max(1.2, rays.reach * start.radius))) return circle;
+  constexpr int rounds = 3;
+  std::vector<std::array<double, 3>> met;
+  std::vector<float> slopes;
+  for (int round = 0; round <= rounds; ++round) {
+    const double narrow = std::max(least_tolerance, rays.tolerance * circle.radius);
+    const double wide = std::max(1.2, rays.reach * circle.radius);
+    const double reach = round == 0 ? wide : round == 1 ? 0.5 * (wide + narrow) : narrow;
+    met.clear();
+    slopes.clear();
+    int in_view = 0;
+    double square = 0;
+    for (int k = 0; k < rays.count; ++k) {
+      const auto [cosine, sine] = direction_of(k, rays.count);
+      const Met one = look_along(edges, circle, cosine, sine, sign, reach);
+      in_view += one.in_view;
+      if (!one.edge || !one.in_view || std::abs(one.offset) > reach) continue;
+      met.push_back({cosine, sine, one.offset});
+      slopes.push_back(one.slope);
+      square += one.offset * one.offset;
+    }
+    circle.rays = in_view;
+    circle.support = 2 * in_view < rays.count ? 0 : static_cast<double>(met.size()) / in_view;
+    circle.scatter = met.empty() ? 0 : std::sqrt(square / static_cast<double>(met.size())) / circle.radius;
+    if (round == rounds || circle.support < 0.15) break;
+    const CircleStep step = step_towards(met, rays.count);
+    circle.x += std::clamp(step.x, -reach, reach);
+    circle.y += std::clamp(step.y, -reach, reach);
+    circle.radius += std::clamp(step.radius, -0.5 * reach, 0.5 * reach);
+    const double away = std::hypot(circle.x - start.x, circle.y - start.y);
+    if (away > 0.5 * start.radius || circle.radius < 0.7 * start.radius || circle.radius > 1.4 * start.radius) {
+      circle.support = 0;
+      break;
+    }
+  }
+  if (!slopes.empty()) {
+    const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
+    std::nth_element(slopes.begin(), middle, slopes.end());
+    circle.contrast = step_per_slope * static_cast<double>(*middle);
+  }
+  return circle;
+}
+
+std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, Polarity polarity,
+                                 double least_support) {
+  std::vector<Circle> found;
+  if (edges.ridge.size() < 8) return found;
+  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
+  const int count = static_cast<int>(std::ceil(std::log(to / from) / std::log(radius_ratio) - 1e-9)) + 1;
+  for (int k = 0; k < count; ++k) {
+    const double radius = from * std::pow(radius_ratio, k);
+    const std::vector<float> sums = gathered(vote_map(edges, radius, sign), edges.width, edges.height);
+    for (const Circle& peak : peaks_of(sums, edges.width, edges.height, radius)) {
+      const Circle circle = fit_circle(edges, peak, polarity);
+      if (circle.support >= least_support) found.push_back(circle);
+    }
+  }
+  return found;
+}
+
+std::vector<Circle> without_doubles(std::vector<Circle> circles, double share) {
+  std::sort(circles.begin(), circles.end(), [](const Circle& a, const Circle& b) {
+    const double one = a.support - a.scatter, other = b.support - b.scatter;
+    if (one != other) return one > other;
+    if (a.y != b.y) return a.y < b.y;
+    return a.x < b.x;
+  });
+  double largest = 1;
+  for (const Circle& circle : circles) largest = std::max(largest, circle.radius);
+  const Nearby near(circles.size(), 2 * share * largest,
+                    [&](std::size_t i) { return std::pair(circles[i].x, circles[i].y); });
+  std::vector<std::uint8_t> kept(circles.size(), 0);
+  std::vector<Circle> out;
+  for (std::size_t i = 0; i < circles.size(); ++i) {
+    const bool taken = near.any_near(circles[i].x, circles[i].y, [&](std::size_t j) {
+      return kept[j] != 0 && std::hypot(circles[i].x - circles[j].x, circles[i].y - circles[j].y) <
+                                 share * (circles[i].radius + circles[j].radius);
+    });
+    kept[i] = !taken;
+    if (!taken) out.push_back(circles[i]);
+  }
+  return out;
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,158 @@
+#include "ingest/find/learn_beads.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "ingest/find/nearby.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double same_place = 0.3;     // radii, between a face and a rim that are one bead
+constexpr double surely_a_bead = 0.9;  // probability of a rim from which the faces must have it too
+constexpr double most_missed = 0.06;   // share of these that faces may miss
+constexpr double no_rim = 0.2;         // support below which a face has no rim at all
+constexpr double most_rimless = 0.35;  // share of the faces without a rim beyond which they are something else
+constexpr double same_radius = 0.15;   // between faces and rims
+constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
+
+Circle place_of(const FoundDisk& disk) {
+  Circle circle;
+  circle.x = disk.x_px;
+  circle.y = disk.y_px;
+  circle.radius = disk.radius_px;
+  return circle;
+}
+
+// Takes out faces without a rim, and gives the others their probability.
+void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& found) {
+  std::vector<Circle> places;
+  for (const FoundDisk& disk : found.disks) places.push_back(place_of(disk));
+  const std::vector<Circle> circles = rims_at(frame, rims, places);
+  std::vector<FoundDisk> kept;
+  for (std::size_t k = 0; k < circles.size(); ++k) {
+    FoundDisk disk = found.disks[k];
+    // A cut bead shows half its rim at most: its support is of that half.
+    if (circles[k].support < no_rim && !disk.cut) {
+      ++found.rejected;
+      continue;
+    }
+    disk.probability = std::max(rims.probability_of(circles[k].support), disk.quality >= whole_quality ? 0.95 : 0.5);
+    kept.push_back(disk);
+  }
+  found.disks = std::move(kept);
+  if (found.disks.empty() && found.why_nothing.empty()) found.why_nothing = "no disk has a rim";
+}
+
+struct Agreement {
+  double missed = 0;   // share of the sure rims that no face has
+  double rimless = 0;  // share of the faces
+};
+Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
+  Agreement agreement;
+  const double near = same_place * rims.model.radius_px;
+  const Nearby by_face(faces.disks.size(), near,
+                       [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
+  double sure = 0, missed = 0;
+  for (const RimDisk& rim : rims.disks) {
+    if (rim.probability < surely_a_bead) continue;
+    ++sure;
+    missed += !by_face.any_near(rim.circle.x, rim.circle.y);
+  }
+  agreement.missed = sure > 0 ? missed / sure : 1;
+  std::vector<Circle> places;
+  for (const FoundDisk& disk : faces.disks)
+    if (!disk.cut) places.push_back(place_of(disk));
+  for (const Circle& circle : rims_at(frame, rims.model, places))
+    agreement.rimless += (circle.support < no_rim) / static_cast<double>(places.size());
+  return agreement;
+}
+
+CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims) {
+  CalibrationResult result;
+  FinderCalibration& calibration = result.calibration;
+  calibration.polarity = rims.model.polarity;
+  calibration.radius_px = calibration.rim_radius_px = rims.model.radius_px;
+  // Rims of an unknown blur are known to a fifth of a pixel at best.
+  constexpr double unknown_blur_px = 0.2;
+  calibration.radius_std_error_px = std::hypot(rims.model.radius_std_error_px, unknown_blur_px);
+  calibration.edge_width_px = 1;
+  calibration.contrast_level = (rims.model.polarity == Polarity::dark_beads ? -1 : 1) * rims.model.contrast;
+  calibration.width = frame.width;
+  calibration.height = frame.height;
+  calibration.profile.step_px = 1;
+  calibration.frames_used = 1;
+  calibration.disks_used = rims.disks.size();
+  calibration.rims = rims.model;
+  calibration.by_rims = true;
+  result.found = !rims.disks.empty();
+  if (!result.found) result.why_not = "no rim of " + std::to_string(rims.model.radius_px) + " px is seen";
+  return result;
+}
+
+FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {
+  FoundDisk disk;
+  disk.x_px = rim.circle.x;
+  disk.y_px = rim.circle.y;
+  disk.radius_px = calibration.radius_px;
+  disk.variance_x = disk.variance_y = rim.variance_px2;
+  disk.quality = disk.probability = rim.probability;
+  disk.contrast = rim.circle.contrast / std::max(1e-6, calibration.rims->contrast);
+  const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;
+  const double right = options.roi ? left + options.roi->width : calibration.width;
+  const double bottom = options.roi ? top + options.roi->height : calibration.height;
+  disk.cut = disk.x_px - disk.radius_px < left - 0.5 || disk.y_px - disk.radius_px < top - 0.5 ||
+             disk.x_px + disk.radius_px > right - 0.5 || disk.y_px + disk.radius_px > bottom - 0.5;
+  constexpr double half = 0.5;
+  disk.half_hidden = rim.circle.support < half;
+  return disk;
+}
+
+FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
+  FindResult result;
+  for (const RimDisk& rim : find_rims(frame, *calibration.rims)) {
+    const FoundDisk disk = found_disk(rim, calibration, options);
+    const bool outside = options.roi && (disk.x_px < options.roi->left - 0.5 || disk.y_px < options.roi->top - 0.5 ||
+                                         disk.x_px >= options.roi->left + options.roi->width - 0.5 ||
+                                         disk.y_px >= options.roi->top + options.roi->height - 0.5);
+    if (!outside) result.disks.push_back(disk);
+  }
+  if (result.disks.empty()) result.why_nothing = "no rim of " + std::to_string(calibration.radius_px) + " px is seen";
+  return result;
+}
+
+}  // namespace
+
+CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
+  if (!options.seen) return learn_finder(frames, options);
+  const GrayFrame& frame = *frames.back();
+  const LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px);
+  FindOptions asked = options;
+  asked.polarity = options.seen->polarity;
+  if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
+  CalibrationResult faces = learn_finder(frames, asked);
+  if (faces.found && std::abs(faces.calibration.radius_px / rims.model.radius_px - 1) < same_radius) {
+    const Agreement agreement = compare(frame, rims, find_disks(frame, faces.calibration, asked));
+    if (agreement.missed <= most_missed && agreement.rimless <= most_rimless) {
+      faces.calibration.rims = rims.model;
+      faces.calibration.rims_to_be_checked = agreement.rimless > 0;
+      return faces;
+    }
+  }
+  return calibration_by_rims(frame, rims);
+}
+
+CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
+  return calibration_by_rims(frame, learn_rims(frame, seen.polarity, seen.radius_px));
+}
+
+FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
+  if (calibration.by_rims) return find_by_rims(frame, calibration, options);
+  FindResult found = find_disks(frame, calibration, options);
+  if (calibration.rims && calibration.rims_to_be_checked) check_by_rims(frame, *calibration.rims, found);
+  return found;
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,20 @@
+#pragma once
+// Beads by their faces or by their rims, whichever makes up the frame.
+//
+// Where a survey has told what the beads are (FindOptions::seen), the finder by faces starts from there, and is
+// believed when it finds what the rims show and little else; then it is the more accurate one. Otherwise beads are
+// found by their rims alone. Without a survey this is learn_finder() and find_disks().
+
+#include "ingest/find/find_disks.hpp"
+#include "ingest/find/rim_finder.hpp"
+
+namespace shakebed::ingest {
+
+CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options);
+
+// By rims alone, from one frame.
+CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen);
+
+FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,92 @@
+#include "ingest/find/picture_scale.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ingest/frames/smooth_field.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+constexpr double least_radius = 5, wanted_radius = 8;  // px: below the first a rim is too coarse to tell a circle
+}
+
+GrayFrame halved(const GrayFrame& frame) {
+  GrayFrame half;
+  half.width = frame.width / 2;
+  half.height = frame.height / 2;
+  half.pixels.resize(static_cast<std::size_t>(half.width) * static_cast<std::size_t>(half.height));
+  for (int row = 0; row < half.height; ++row) {
+    const float* upper =
+        frame.pixels.data() + static_cast<std::size_t>(2 * row) * static_cast<std::size_t>(frame.width);
+    const float* lower = upper + frame.width;
+    float* to = half.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(half.width);
+    for (int column = 0; column < half.width; ++column)
+      to[column] = 0.25F * (upper[2 * column] + upper[2 * column + 1] + lower[2 * column] + lower[2 * column + 1]);
+  }
+  return half;
+}
+
+GrayFrame doubled(const GrayFrame& frame) {
+  GrayFrame twice;
+  twice.width = 2 * frame.width;
+  twice.height = 2 * frame.height;
+  twice.pixels.resize(static_cast<std::size_t>(twice.width) * static_cast<std::size_t>(twice.height));
+  for (int row = 0; row < twice.height; ++row) {
+    const double y = std::clamp(0.5 * row - 0.25, 0.0, frame.height - 1.001);
+    const int upper = static_cast<int>(y);
+    const float down = static_cast<float>(y - upper);
+    for (int column = 0; column < twice.width; ++column) {
+      const double x = std::clamp(0.5 * column - 0.25, 0.0, frame.width - 1.001);
+      const int left = static_cast<int>(x);
+      const float along = static_cast<float>(x - left);
+      twice.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(twice.width) +
+                   static_cast<std::size_t>(column)] =
+          (1 - down) * ((1 - along) * frame.at(left, upper) + along * frame.at(left + 1, upper)) +
+          down * ((1 - along) * frame.at(left, upper + 1) + along * frame.at(left + 1, upper + 1));
+    }
+  }
+  return twice;
+}
+
+GrayFrame stretched(const GrayFrame& frame, double ratio, double angle) {
+  const double along = std::sqrt(ratio), c = std::cos(angle), s = std::sin(angle);
+  const double xx = c * c * along + s * s / along, xy = c * s * (along - 1 / along), yy = s * s * along + c * c / along;
+  const double middle_x = 0.5 * (frame.width - 1), middle_y = 0.5 * (frame.height - 1);
+  const auto mirrored = [](double x, double last) {
+    x = std::abs(x);
+    return std::clamp(x > last ? 2 * last - x : x, 0.0, last - 1e-3);
+  };
+  GrayFrame out;
+  out.width = frame.width;
+  out.height = frame.height;
+  out.pixels.resize(frame.pixels.size());
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column) {
+      const double u = column - middle_x, v = row - middle_y;
+      const double x = mirrored(middle_x + xx * u + xy * v, frame.width - 1.0);
+      const double y = mirrored(middle_y + xy * u + yy * v, frame.height - 1.0);
+      const int left = static_cast<int>(x), upper = static_cast<int>(y);
+      const float right = static_cast<float>(x - left), down = static_cast<float>(y - upper);
+      out.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +
+                 static_cast<std::size_t>(column)] =
+          (1 - down) * ((1 - right) * frame.at(left, upper) + right * frame.at(left + 1, upper)) +
+          down * ((1 - right) * frame.at(left, upper + 1) + right * frame.at(left + 1, upper + 1));
+    }
+  return out;
+}
+
+ScaledPicture scaled_for(const GrayFrame& frame, double radius_px) {
+  ScaledPicture scaled;
+  if (radius_px < least_radius) {
+    scaled.picture = doubled(frame);
+    scaled.scale = 0.5;
+    return scaled;
+  }
+  const int factor = std::max(1, static_cast<int>(radius_px / wanted_radius));
+  scaled.picture = reduced(frame, factor);
+  scaled.scale = factor;
+  return scaled;
+}
+
+}  // namespace shakebed::ingest

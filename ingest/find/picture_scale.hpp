@@ -1,0 +1,30 @@
+#pragma once
+// Copies of a picture at another scale or shape, for searches.
+
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// Half the resolution (averages of 2 x 2 pixels); twice the resolution (bilinear).
+GrayFrame halved(const GrayFrame& frame);
+GrayFrame doubled(const GrayFrame& frame);
+
+// The picture stretched by sqrt(ratio) along the axis at `angle` and shrunk by as much across it, about its middle;
+// what lies beyond the border is mirrored.
+GrayFrame stretched(const GrayFrame& frame, double ratio, double angle);
+
+// A picture in which a length of the frame is `scale` times as long, and where its places are in the frame.
+struct ScaledPicture {
+  GrayFrame picture;
+  double scale = 1;          // full px per px
+  double left = 0, top = 0;  // of the picture within the frame, full px
+  [[nodiscard]] double to_frame_x(double x) const { return left + (x + 0.5) * scale - 0.5; }
+  [[nodiscard]] double to_frame_y(double y) const { return top + (y + 0.5) * scale - 0.5; }
+  [[nodiscard]] double from_frame_x(double x) const { return (x + 0.5 - left) / scale - 0.5; }
+  [[nodiscard]] double from_frame_y(double y) const { return (y + 0.5 - top) / scale - 0.5; }
+};
+
+// Reduced so that a radius becomes 8 to 16 px, doubled if it is below 5 px.
+ScaledPicture scaled_for(const GrayFrame& frame, double radius_px);
+
+}  // namespace shakebed::ingest

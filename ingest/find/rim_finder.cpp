@@ -1,0 +1,215 @@
+#include "ingest/find/rim_finder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "ingest/find/picture_scale.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double radius_window = 0.12;     // radii, either way: circles of one kind of bead
+constexpr double nearest_centres = 0.8;    // diameters: two circles nearer than that are one
+constexpr double faintest_support = 0.3;   // share of the rim
+constexpr std::size_t support_steps = 20;  // of the table of probabilities
+constexpr double support_width = 0.055;    // over which circles are counted, either way
+// Before any is seen: circles that chance makes up in a class of support, fewer the better the support.
+constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
+constexpr double least_probability = 0.8;  // of a disk that is reported: more than one circle alone in its class has
+constexpr double well_supported = 0.9;     // probability from which a circle tells the radius
+const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07};
+
+std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity polarity) {
+  std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_support);
+  std::erase_if(circles, [&](const Circle& circle) { return std::abs(circle.radius / radius - 1) > radius_window; });
+  return without_doubles(std::move(circles), nearest_centres);
+}
+
+// Circles of one class of support, in the frame and (the mean) in its copies.
+struct SupportClass {
+  double here = 0, chance = 0, support_sum = 0;
+  std::size_t classes = 1;  // that were put together
+  [[nodiscard]] double doubt() const { return here > 0 ? chance / here : 0; }
+};
+
+std::size_t class_of(double support) {
+  return std::min(support_steps, static_cast<std::size_t>(std::lround(support * support_steps)));
+}
+
+// Better support is never less likely a bead's: neighbouring classes that say otherwise are put together (isotonic
+// regression [Barlow]).
+std::vector<double> probabilities(const std::vector<Circle>& seen, const std::vector<std::vector<Circle>>& copies) {
+  std::vector<SupportClass> classes(support_steps + 1);
+  for (const Circle& circle : seen) {
+    SupportClass& its = classes[class_of(circle.support)];
+    ++its.here;
+    its.support_sum += circle.support;
+  }
+  for (const auto& copy : copies)
+    for (const Circle& circle : copy)
+      classes[class_of(circle.support)].chance += 1 / static_cast<double>(copies.size());
+  std::vector<SupportClass> pooled;
+  for (const SupportClass& one : classes) {
+    pooled.push_back(one);
+    while (pooled.size() > 1) {
+      SupportClass& below = pooled[pooled.size() - 2];
+      const SupportClass& above = pooled.back();
+      if (below.here > 0 && above.here > 0 && below.doubt() >= above.doubt()) break;
+      below = {below.here + above.here, below.chance + above.chance, below.support_sum + above.support_sum,
+               below.classes + above.classes};
+      pooled.pop_back();
+    }
+  }
+  std::vector<double> probability;
+  for (const SupportClass& pool : pooled) {
+    const double missing = pool.here > 0 ? 1 - pool.support_sum / pool.here : 1;
+    const double chance = pool.chance + prior_at_full + prior_per_missing * missing;
+    const double sure = pool.here > 0 ? std::max(0.0, 1 - chance / pool.here) : 0;
+    const double before = probability.empty() ? 0 : probability.back();
+    probability.insert(probability.end(), pool.classes, std::max(before, sure));
+  }
+  return probability;
+}
+
+// Edges fainter than the beads' rims count less.
+double edge_length(const EdgeMap& edges, double contrast) {
+  double sum = 0;
+  for (const RidgePixel& pixel : edges.ridge) {
+    const std::size_t at = edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y));
+    const double step = step_per_slope * static_cast<double>(std::hypot(edges.x[at], edges.y[at]));
+    sum += std::min(1.0, step / std::max(1e-6, contrast));
+  }
+  return sum;
+}
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Radius, its spread and the contrast, of circles that are beads.
+void measure_rims(const std::vector<Circle>& circles, double scale, RimModel& model) {
+  std::vector<double> radii, contrasts, deviations;
+  for (const Circle& circle : circles)
+    if (model.probability_of(circle.support) >= std::min(well_supported, model.probability.back())) {
+      radii.push_back(circle.radius);
+      contrasts.push_back(circle.contrast);
+    }
+  if (radii.empty()) return;
+  const double middle = median_of(radii);
+  for (const double radius : radii) deviations.push_back(std::abs(radius - middle));
+  const double spread = 1.4826 * median_of(deviations);
+  model.radius_px = middle * scale;
+  model.radius_spread = spread / middle;
+  constexpr double of_a_median = 1.2533;  // sqrt(pi / 2): its error over that of a mean
+  model.radius_std_error_px = of_a_median * spread * scale / std::sqrt(static_cast<double>(radii.size()));
+  model.contrast = median_of(contrasts);
+}
+
+RimDisk disk_of(const Circle& circle, const ScaledPicture& at, const RimModel& model) {
+  RimDisk disk;
+  disk.circle = circle;
+  disk.circle.x = at.to_frame_x(circle.x);
+  disk.circle.y = at.to_frame_y(circle.y);
+  disk.circle.radius = circle.radius * at.scale;
+  disk.probability = model.probability_of(circle.support);
+  const double met = std::max(3.0, circle.support * circle.rays);
+  const double offset = circle.scatter * disk.circle.radius;
+  disk.variance_px2 = 2 * offset * offset / met;
+  return disk;
+}
+
+void sort_by_place(std::vector<RimDisk>& disks) {
+  std::sort(disks.begin(), disks.end(), [](const RimDisk& a, const RimDisk& b) {
+    if (a.circle.y != b.circle.y) return a.circle.y < b.circle.y;
+    return a.circle.x < b.circle.x;
+  });
+}
+
+std::vector<RimDisk> likely_ones(const std::vector<Circle>& circles, const EdgeMap& edges, const ScaledPicture& at,
+                                 const RimModel& model) {
+  std::vector<RimDisk> disks;
+  for (const Circle& circle : circles) {
+    if (model.probability_of(circle.support) < least_probability) continue;
+    const Circle fine = fit_circle(edges, circle, model.polarity, fine_rays);
+    const bool better = fine.support > 0.7 * circle.support;
+    disks.push_back(disk_of(better ? fine : circle, at, model));
+    disks.back().probability = model.probability_of(circle.support);
+  }
+  sort_by_place(disks);
+  return disks;
+}
+
+}  // namespace
+
+double RimModel::probability_of(double support) const {
+  if (probability.empty()) return 0;
+  const double place = std::clamp(support, 0.0, 1.0) * static_cast<double>(probability.size() - 1);
+  const auto cell = std::min(probability.size() - 2, static_cast<std::size_t>(place));
+  const double part = place - static_cast<double>(cell);
+  return (1 - part) * probability[cell] + part * probability[cell + 1];
+}
+
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px) {
+  LearnedRims learned;
+  RimModel& model = learned.model;
+  model.polarity = polarity;
+  model.radius_px = radius_px;
+  const ScaledPicture at = scaled_for(frame, radius_px);
+  const EdgeMap edges = find_edges(at.picture);
+  model.threshold = edges.threshold;
+  std::vector<EdgeMap> copies;  // in four directions, so that what is oval in one of them is round in another
+  for (const double turn : {0.0, 0.25, 0.5, 0.75})
+    copies.push_back(find_edges(stretched(at.picture, decoy_stretch, turn * std::numbers::pi), edges.threshold));
+  std::vector<Circle> circles;
+  constexpr int rounds = 2;
+  for (int round = 0; round < rounds; ++round) {
+    const double radius = model.radius_px / at.scale;
+    circles = circles_of(edges, radius, polarity);
+    std::vector<std::vector<Circle>> by_chance;
+    for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, polarity));
+    model.probability = probabilities(circles, by_chance);
+    measure_rims(circles, at.scale, model);
+  }
+  learned.disks = likely_ones(circles, edges, at, model);
+  learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
+  return learned;
+}
+
+std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model) {
+  const ScaledPicture at = scaled_for(frame, model.radius_px);
+  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  return likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
+}
+
+std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places) {
+  const ScaledPicture at = scaled_for(frame, model.radius_px);
+  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  std::vector<Circle> circles;
+  for (const Circle& place : places) {
+    Circle start = place;
+    start.x = at.from_frame_x(place.x);
+    start.y = at.from_frame_y(place.y);
+    start.radius = model.radius_px / at.scale;
+    Circle fitted = fit_circle(edges, start, model.polarity);
+    fitted.x = at.to_frame_x(fitted.x);
+    fitted.y = at.to_frame_y(fitted.y);
+    fitted.radius *= at.scale;
+    circles.push_back(fitted);
+  }
+  return circles;
+}
+
+double expected_wrong_share(const std::vector<RimDisk>& disks) {
+  if (disks.empty()) return 1;
+  double wrong = 0;
+  for (const RimDisk& disk : disks) wrong += 1 - disk.probability;
+  return wrong / static_cast<double>(disks.size());
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,50 @@
+#pragma once
+// Beads by their rims alone, whatever their faces look like: fringes, highlights, two colours, shade.
+//
+// The frame is reduced until a bead is 8 to 16 px in radius, circles of the beads' radius are searched in its edges,
+// and each is given the probability that it is a bead. That probability follows from the share of the rim that is seen:
+// the same search on copies of the frame stretched along one axis, where no bead is round any more, tells how many
+// circles so well supported chance makes up (target and decoy [EliasGygi]).
+
+#include <vector>
+
+#include "ingest/find/circle_search.hpp"
+
+namespace shakebed::ingest {
+
+struct RimModel {
+  Polarity polarity = Polarity::automatic;
+  double radius_px = 0;
+  double radius_std_error_px = 0;
+  double radius_spread = 0;         // standard deviation of single radii over their mean
+  double contrast = 0;              // median step across a rim, grey levels
+  float threshold = 0;              // weakest edge, grey levels per px of the reduced frame
+  std::vector<double> probability;  // of a circle with support 0, 1/20, 2/20 .. 1
+  [[nodiscard]] double probability_of(double support) const;
+};
+
+struct RimDisk {
+  Circle circle;            // px of the frame
+  double probability = 0;   // that it is a bead
+  double variance_px2 = 0;  // of the centre along each axis
+};
+
+struct LearnedRims {
+  RimModel model;
+  std::vector<RimDisk> disks;  // of the frame learned from
+  double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
+};
+
+// Learns from one frame, starting from a radius good to a tenth.
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px);
+
+// Disks that are beads with a probability of 0.8 or more, from top to bottom.
+std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model);
+
+// The support of circles of this radius at given places (after a fit that may move them by a third of the radius).
+std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places);
+
+// Sum over the disks of their doubts, over their number; 1 when there are none.
+double expected_wrong_share(const std::vector<RimDisk>& disks);
+
+}  // namespace shakebed::ingest

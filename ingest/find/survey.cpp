@@ -1,0 +1,161 @@
+#include "ingest/find/survey.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/circle_census.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Two channels whose levels are this much alike show the same: one is enough.
+constexpr double alike = 0.97;
+constexpr std::size_t most_examined = 8;  // hypotheses of the census looked at in full
+constexpr double circle_cost_px = 8;      // px of rim at a radius of 8 px, for a circle's place and radius
+constexpr double cost_radius_px = 8;
+constexpr double hopeless = 0.5;       // of the census's circles, made up by chance: not looked at in full
+constexpr double worth_a_look = 0.15;  // of the best hypothesis's gain
+constexpr double most_wrong = 0.2;     // share of the disks beyond which nothing is measured
+constexpr double few_wrong = 0.1;      // beyond it, beads must make up a good part of the picture's edges
+constexpr double good_part = 0.15;
+constexpr double least_explained =
+    0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
+// Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
+constexpr double least_mean_support = 0.42, support_for_few = 2.2;
+
+double likeness(const GrayFrame& a, const GrayFrame& b) {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  const std::size_t step = std::max<std::size_t>(1, a.pixels.size() / 50000);
+  for (std::size_t k = 0; k < a.pixels.size(); k += step) {
+    const auto one = static_cast<double>(a.pixels[k]), other = static_cast<double>(b.pixels[k]);
+    if (unseen(a.pixels[k]) || unseen(b.pixels[k])) continue;
+    ++n, x += one, y += other, xx += one * one, yy += other * other, xy += one * other;
+  }
+  const double spread = (xx - x * x / n) * (yy - y * y / n);
+  return spread > 0 ? std::abs(xy - x * y / n) / std::sqrt(spread) : 1;
+}
+
+double spread_of(const GrayFrame& frame) {
+  double n = 0, sum = 0, squares = 0;
+  const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 50000);
+  for (std::size_t k = 0; k < frame.pixels.size(); k += step) {
+    const auto level = static_cast<double>(frame.pixels[k]);
+    ++n, sum += level, squares += level * level;
+  }
+  return n > 0 ? squares / n - sum / n * sum / n : 0;
+}
+
+// Of channels that show the same, the one of the greatest contrast.
+std::vector<const ChannelFrames::One*> different_channels(const ChannelFrames& frames) {
+  std::vector<std::pair<double, const ChannelFrames::One*>> ranked;
+  for (const ChannelFrames::One& one : frames.channels) ranked.emplace_back(spread_of(one.frame), &one);
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<const ChannelFrames::One*> chosen;
+  for (const auto& [spread, one] : ranked)
+    if (std::none_of(chosen.begin(), chosen.end(), [&, candidate = one](const auto* other) {
+          return likeness(candidate->frame, other->frame) > alike;
+        }))
+      chosen.push_back(one);
+  return chosen;
+}
+
+GrayFrame only_inside(GrayFrame frame, const PixelRectangle& roi, int reduction) {
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column) {
+      const int x = column * reduction, y = row * reduction;
+      if (x < roi.left || y < roi.top || x >= roi.left + roi.width || y >= roi.top + roi.height)
+        frame.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +
+                     static_cast<std::size_t>(column)] = unseen_level;
+    }
+  return frame;
+}
+
+std::string text_of(const char* format, double a, double b = 0) {
+  char text[300];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+void judge(SurveyCandidate& candidate, double edge_length_px) {
+  double support = 0;
+  for (const RimDisk& disk : candidate.disks) {
+    const double rim = 2 * std::numbers::pi * disk.circle.radius;
+    const double cost = circle_cost_px * disk.circle.radius / cost_radius_px;
+    candidate.gain_px += disk.probability * rim * disk.circle.support - cost;
+    candidate.explained_share += disk.probability * rim * disk.circle.support / std::max(1.0, edge_length_px);
+    support += disk.circle.support;
+  }
+  candidate.expected_wrong = expected_wrong_share(candidate.disks);
+  const auto count = static_cast<double>(candidate.disks.size());
+  const double wrong = candidate.expected_wrong * count;
+  const double at_worst = (wrong + std::sqrt(wrong)) / std::max(1.0, count);  // a standard deviation more
+  if (candidate.disks.empty())
+    candidate.why_not = "no circle is seen more often than chance makes up";
+  else if (at_worst > most_wrong || (at_worst > few_wrong && candidate.explained_share < good_part))
+    candidate.why_not = text_of("of %.0f circles, chance makes up as many as %.0f %%", count, 100 * at_worst);
+  else if (support / count < least_mean_support + support_for_few / count)
+    candidate.why_not =
+        text_of("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
+  else if (candidate.explained_share < least_explained)
+    candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
+  else
+    candidate.credible = true;
+}
+
+void enlarge(SurveyCandidate& candidate, int factor) {
+  const double scale = factor, shift = 0.5 * (scale - 1);
+  candidate.rims.radius_px *= scale;
+  candidate.rims.radius_std_error_px *= scale;
+  for (RimDisk& disk : candidate.disks) {
+    disk.circle.x = scale * disk.circle.x + shift;
+    disk.circle.y = scale * disk.circle.y + shift;
+    disk.circle.radius *= scale;
+    disk.variance_px2 *= scale * scale;
+  }
+}
+
+}  // namespace
+
+Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
+  Survey survey;
+  const std::vector<const ChannelFrames::One*> channels = different_channels(frames);
+  std::vector<GrayFrame> cropped;
+  std::vector<const GrayFrame*> pictures;
+  if (options.roi)
+    for (const auto* one : channels) cropped.push_back(only_inside(one->frame, *options.roi, frames.reduction));
+  for (std::size_t k = 0; k < channels.size(); ++k) pictures.push_back(options.roi ? &cropped[k] : &channels[k]->frame);
+  CensusOptions asked;
+  asked.polarity = options.polarity;
+  if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
+  const CircleCensus census = take_census(pictures, asked);
+  for (const CircleHypothesis& hypothesis : census.hypotheses) {
+    if (survey.candidates.size() >= most_examined) break;
+    if (hypothesis.by_chance > hopeless * hypothesis.circles) continue;
+    if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
+    SurveyCandidate candidate;
+    candidate.channel = channels[hypothesis.channel]->channel;
+    LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px);
+    candidate.rims = std::move(learned.model);
+    candidate.disks = std::move(learned.disks);
+    judge(candidate, learned.edge_length_px);
+    enlarge(candidate, frames.reduction);
+    candidate.gain_px *= frames.reduction;
+    survey.candidates.push_back(std::move(candidate));
+  }
+  std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
+                   [](const SurveyCandidate& a, const SurveyCandidate& b) {
+                     if (a.credible != b.credible) return a.credible;
+                     return a.gain_px > b.gain_px;
+                   });
+  survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
+  if (!survey.found)
+    survey.why_not = survey.candidates.empty() ? "no circle is seen more often than chance makes up"
+                                               : survey.candidates.front().why_not;
+  return survey;
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,38 @@
+#pragma once
+// What a picture shows, before anything is measured: beads of which radius, polarity and channel, or none.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/find/rim_finder.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+struct SurveyCandidate {
+  Channel channel = Channel::automatic;
+  RimModel rims;               // px of the full frame
+  std::vector<RimDisk> disks;  // px of the full frame
+  double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
+  double explained_share = 0;  // of all edges at this scale
+  double expected_wrong = 0;   // share of the disks
+  bool credible = false;       // "no beads here" does not explain the picture as well
+  std::string why_not;         // a sentence, unless credible
+};
+
+struct Survey {
+  bool found = false;
+  std::string why_not;                      // a sentence unless found
+  std::vector<SurveyCandidate> candidates;  // best first
+};
+
+struct SurveyOptions {
+  Polarity polarity = Polarity::automatic;
+  std::optional<double> radius_px;  // px of the full frame
+  std::optional<PixelRectangle> roi;
+};
+
+Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options = {});
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,55 @@
+#include "ingest/profile/candidate_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "ingest/frames/atomic_file.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Red, green and blue of the source, or its grey three times, reduced for drawing.
+cv::Mat colours_of(const std::filesystem::path& source, std::size_t page, int most_px, double& scale) {
+  std::vector<cv::Mat> planes;
+  for (const Channel channel : {Channel::blue, Channel::green, Channel::red}) {
+    FrameSourceOptions options;
+    options.channel = channel;
+    const GrayFrame frame = read_frame(source, page, options);
+    const cv::Mat plane(frame.height, frame.width, CV_32F, const_cast<float*>(frame.pixels.data()));
+    scale = std::min(1.0, static_cast<double>(most_px) / std::max(frame.width, frame.height));
+    cv::Mat small, rounded;
+    cv::resize(plane, small, cv::Size(), scale, scale, cv::INTER_AREA);
+    small.convertTo(rounded, CV_8U);
+    planes.push_back(rounded);
+  }
+  cv::Mat picture;
+  cv::merge(planes, picture);
+  return picture;
+}
+
+}  // namespace
+
+void write_candidate_picture(const std::filesystem::path& path, const std::filesystem::path& source, std::size_t page,
+                             const SurveyCandidate* candidate, int most_px) {
+  double scale = 1;
+  cv::Mat picture = colours_of(source, page, most_px, scale);
+  constexpr int shift = 4;  // sub-pixel drawing: 1/16 px
+  const auto fixed = [&](double px) { return static_cast<int>(std::lround(px * (1 << shift))); };
+  if (candidate != nullptr)
+    for (const RimDisk& disk : candidate->disks) {
+      constexpr double sure = 0.9;
+      const cv::Scalar colour = disk.probability >= sure ? cv::Scalar(255, 0, 255) : cv::Scalar(0, 230, 255);
+      cv::circle(picture, {fixed((disk.circle.x + 0.5) * scale - 0.5), fixed((disk.circle.y + 0.5) * scale - 0.5)},
+                 fixed(disk.circle.radius * scale), colour, disk.circle.radius * scale > 12 ? 2 : 1, cv::LINE_AA,
+                 shift);
+    }
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  write_file_atomically(path, std::string(bytes.begin(), bytes.end()));
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,275 @@
+// Drawn imitations of strangers' photographs: beads are found whatever their faces look like, and where there are none
+// none are found.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "ingest/find/learn_beads.hpp"
+#include "ingest/find/survey.hpp"
+#include "ingest/profile/measure_bed.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+struct Place {
+  double x, y;
+};
+
+// Places at least `apart` from one another, in a frame of this size.
+std::vector<Place> scattered(std::size_t count, double apart, int width, int height, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<Place> places;
+  for (int tries = 0; places.size() < count && tries < 100000; ++tries) {
+    const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    const Place place{apart + part() * (width - 2 * apart), apart + part() * (height - 2 * apart)};
+    bool free = true;
+    for (const Place& other : places) free = free && std::hypot(other.x - place.x, other.y - place.y) > apart;
+    if (free) places.push_back(place);
+  }
+  return places;
+}
+
+using Paint = std::function<double(double x, double y)>;
+
+// Averages over 3 x 3 points a pixel, and noise of 2 grey levels.
+GrayFrame painted(int width, int height, const Paint& paint, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  GrayFrame frame;
+  frame.width = width;
+  frame.height = height;
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      double sum = 0;
+      for (int i = -1; i <= 1; ++i)
+        for (int j = -1; j <= 1; ++j) sum += paint(column + i / 3.0, row + j / 3.0) / 9;
+      double noise = -6;
+      for (int k = 0; k < 12; ++k) noise += static_cast<double>(random()) / 4294967296.0;
+      frame.pixels.push_back(static_cast<float>(sum + 2 * noise));
+    }
+  return frame;
+}
+
+const Place* bead_at(const std::vector<Place>& places, double radius, double x, double y) {
+  for (const Place& place : places)
+    if (std::hypot(place.x - x, place.y - y) < radius) return &place;
+  return nullptr;
+}
+
+Survey survey_of(const std::vector<ChannelFrames::One>& channels) {
+  ChannelFrames frames;
+  frames.channels = channels;
+  frames.width = channels.front().frame.width;
+  frames.height = channels.front().frame.height;
+  return take_survey(frames);
+}
+
+struct Score {
+  std::size_t hits = 0, found = 0;
+};
+template <class Disks, class PlaceOf>
+Score score(const Disks& disks, const std::vector<Place>& truth, double radius, const PlaceOf& place_of) {
+  Score score;
+  score.found = disks.size();
+  for (const Place& place : truth)
+    for (const auto& disk : disks) {
+      const Place at = place_of(disk);
+      if (std::hypot(at.x - place.x, at.y - place.y) < 0.25 * radius) {
+        ++score.hits;
+        break;
+      }
+    }
+  return score;
+}
+
+// All of them, or at least `least`, and nothing else.
+void expect_all(const Survey& survey, const std::vector<Place>& truth, double radius, double least = 1) {
+  ASSERT_TRUE(survey.found) << survey.why_not;
+  const SurveyCandidate& best = survey.candidates.front();
+  EXPECT_NEAR(best.rims.radius_px, radius, 0.06 * radius);
+  const Score found = score(best.disks, truth, radius, [](const RimDisk& d) { return Place{d.circle.x, d.circle.y}; });
+  EXPECT_GE(static_cast<double>(found.hits), least * static_cast<double>(truth.size()));
+  EXPECT_EQ(found.found, found.hits);
+}
+
+TEST(Survey, FindsPhotoelasticDisksByTheirRims) {
+  const double radius = 19;
+  const std::vector<Place> truth = scattered(40, 2.1 * radius, 520, 460, 3);
+  const GrayFrame frame = painted(520, 460, [&](double x, double y) {
+    const Place* bead = bead_at(truth, radius, x, y);
+    if (bead == nullptr) return 210.0;
+    const double u = (x - bead->x) / radius, v = (y - bead->y) / radius;
+    return 95 + 55 * std::sin(9 * u * v + bead->x) * std::cos(4 * u + bead->y);  // fringes, another set in each
+  });
+  // Fringes that end at the rim hide parts of it: some disks stay below a probability of 0.8 and are not reported.
+  expect_all(survey_of({{Channel::automatic, frame}}), truth, radius, 0.9);
+}
+
+TEST(Survey, FindsBeadsOfTwoColoursInOneChannel) {
+  const double radius = 12;
+  const std::vector<Place> truth = scattered(45, 2.3 * radius, 400, 380, 5);
+  // In grey every second bead is as bright as the background.
+  const auto level = [&](bool grey) {
+    return painted(400, 380, [&, grey](double x, double y) {
+      const Place* bead = bead_at(truth, radius, x, y);
+      if (bead == nullptr) return grey ? 150.0 : 10.0;
+      const bool first = (bead - truth.data()) % 2 == 0;
+      return grey ? (first ? 70.0 : 150.0) : (first ? 120.0 : 140.0);
+    });
+  };
+  const Survey survey = survey_of({{Channel::grey, level(true)}, {Channel::saturation, level(false)}});
+  expect_all(survey, truth, radius);
+  EXPECT_EQ(survey.candidates.front().channel, Channel::saturation);
+}
+
+TEST(Survey, ALargerOutlineWinsOverTheHighlightInIt) {
+  const double radius = 16;
+  const std::vector<Place> truth = scattered(30, 2.2 * radius, 420, 400, 9);
+  const GrayFrame frame = painted(420, 400, [&](double x, double y) {
+    const Place* bead = bead_at(truth, radius, x, y);
+    if (bead == nullptr) return 180.0;
+    return std::hypot(x - bead->x + 3, y - bead->y + 3) < 6 ? 240.0 : 70.0;
+  });
+  expect_all(survey_of({{Channel::automatic, frame}}), truth, radius);
+}
+
+TEST(Survey, RefusesPicturesWithoutBeads) {
+  const int width = 360, height = 300;
+  std::mt19937 random(11);
+  std::vector<Place> waves;
+  for (int k = 0; k < 40; ++k)
+    waves.push_back(
+        {static_cast<double>(random() % 1000) / 1000 - 0.5, static_cast<double>(random() % 1000) / 1000 - 0.5});
+  const std::vector<std::pair<std::string, Paint>> pictures = {
+      {"nothing", [](double, double) { return 128.0; }},
+      {"a slope of light", [](double x, double y) { return 60 + 0.2 * x + 0.1 * y; }},
+      {"a texture of waves",
+       [&](double x, double y) {
+         double sum = 128;
+         for (const Place& wave : waves) sum += 8 * std::sin(wave.x * x + wave.y * y + 40 * wave.x);
+         return sum;
+       }},
+      {"stripes", [](double x, double y) { return std::sin(0.3 * x + 0.2 * y) > 0 ? 200.0 : 60.0; }},
+      {"a chessboard",
+       [](double x, double y) {
+         return (static_cast<int>(x / 20 + 50) + static_cast<int>(y / 20 + 50)) % 2 ? 220.0 : 40.0;
+       }},
+      {"a plot",
+       [](double x, double y) {
+         const bool frame = std::abs(x - 40) < 1 || std::abs(y - 260) < 1;
+         const bool curve = std::abs(y - 150 - 80 * std::sin(x / 40)) < 1.5 && x > 40;
+         const bool grid = std::fmod(x + 20, 60) < 1 || std::fmod(y + 20, 50) < 1;
+         return frame || curve ? 20.0 : grid ? 200.0 : 250.0;
+       }},
+      {"bars of a histogram", [](double x, double y) {
+         return y > 280 - 200 * std::exp(-std::pow(std::floor(x / 24) - 7, 2) / 8) ? 60.0 : 250.0;
+       }}};
+  for (const auto& [name, paint] : pictures) {
+    const Survey survey = survey_of({{Channel::automatic, painted(width, height, paint)}});
+    EXPECT_FALSE(survey.found) << name << ": " << survey.candidates.front().disks.size() << " disks";
+    EXPECT_FALSE(survey.why_not.empty()) << name;
+  }
+  // Noise alone.
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    std::mt19937 more(seed);
+    GrayFrame noise = painted(width, height, [](double, double) { return 120.0; });
+    for (float& level : noise.pixels) level += static_cast<float>(more() % 61) - 30.0F;
+    EXPECT_FALSE(survey_of({{Channel::automatic, noise}}).found) << seed;
+  }
+}
+
+TEST(Survey, DarkSurroundingsHoldNoBeads) {
+  const double radius = 11;
+  std::vector<Place> truth;
+  for (const Place& place : scattered(45, 2.1 * radius, 300, 300, 21)) truth.push_back({place.x + 80, place.y + 20});
+  const GrayFrame frame = painted(460, 340, [&](double x, double y) {
+    const bool inside = x > 78 && x < 382 && y > 18 && y < 322;
+    if (!inside) return 35.0;  // as dark as the beads
+    return bead_at(truth, radius, x, y) != nullptr ? 40.0 : 200.0;
+  });
+  const Survey survey = survey_of({{Channel::automatic, frame}});
+  ASSERT_TRUE(survey.found) << survey.why_not;
+  MeasureOptions options;
+  options.bead_diameter_m = 0.006;
+  options.find.seen = BeadsSeen{survey.candidates.front().rims.polarity, survey.candidates.front().rims.radius_px};
+  FrameSource source = FrameSource::from_frames({frame});
+  const Measurement measured = measure_bed(source, options);
+  const Score found = score(measured.disks, truth, radius, [](const MeasuredDisk& d) { return Place{d.x_px, d.y_px}; });
+  EXPECT_EQ(found.hits, truth.size());
+  EXPECT_EQ(found.found, truth.size());
+}
+
+TEST(Survey, ReducedFramesGiveThePlacesOfTheRecordedOnes) {
+  const double radius = 40;
+  const std::vector<Place> truth = scattered(30, 2.1 * radius, 900, 800, 31);
+  const GrayFrame frame =
+      painted(900, 800, [&](double x, double y) { return bead_at(truth, radius, x, y) != nullptr ? 60.0 : 200.0; });
+  GrayFrame small;
+  constexpr int factor = 3;
+  small.width = frame.width / factor;
+  small.height = frame.height / factor;
+  for (int row = 0; row < small.height; ++row)
+    for (int column = 0; column < small.width; ++column) {
+      float sum = 0;
+      for (int i = 0; i < factor; ++i)
+        for (int j = 0; j < factor; ++j) sum += frame.at(factor * column + i, factor * row + j);
+      small.pixels.push_back(sum / (factor * factor));
+    }
+  MeasureOptions options;
+  options.bead_diameter_m = 0.006;
+  options.reduction = factor;
+  options.find.seen = BeadsSeen{Polarity::dark_beads, radius};
+  FrameSource source = FrameSource::from_frames({small});
+  const Measurement measured = measure_bed(source, options);
+  EXPECT_NEAR(measured.calibration.radius_px, radius, 0.1);
+  EXPECT_NEAR(measured.calibration.scale_m_per_px, 0.006 / (2 * radius), 0.006 / (2 * radius) * 0.003);
+  ASSERT_EQ(measured.disks.size(), truth.size());
+  for (const MeasuredDisk& disk : measured.disks) {
+    double nearest = 1e9;
+    for (const Place& place : truth) nearest = std::min(nearest, std::hypot(disk.x_px - place.x, disk.y_px - place.y));
+    EXPECT_LT(nearest, 0.15);
+  }
+}
+
+// Strangers' photographs with truth checked by hand; SHAKEBED_PHOTOGRAPHS names their folder (index.csv, a CSV a
+// picture).
+TEST(Survey, StrangersPhotographs) {
+  const char* folder = std::getenv("SHAKEBED_PHOTOGRAPHS");
+  if (folder == nullptr) GTEST_SKIP() << "SHAKEBED_PHOTOGRAPHS names no folder of photographs: not tested";
+  for (const char* name : {"mlund_N20-light_f000", "mlund_N20-light_f200", "mlund_N55-light_f000", "trackpy_bf_0025"}) {
+    std::vector<Place> truth;
+    double radius = 0;
+    std::ifstream table(std::filesystem::path(folder) / (std::string(name) + ".csv"));
+    ASSERT_TRUE(table) << name;
+    for (std::string line; std::getline(table, line);) {
+      std::stringstream cells(line);
+      std::string file, x, y, r;
+      std::getline(cells, file, ','), std::getline(cells, x, ','), std::getline(cells, y, ','),
+          std::getline(cells, r, ',');
+      if (file == "file") continue;
+      truth.push_back({std::stod(x), std::stod(y)});
+      radius = std::stod(r);
+    }
+    const Survey survey = take_survey(read_channels(std::filesystem::path(folder) / (std::string(name) + ".png")));
+    ASSERT_TRUE(survey.found) << name << ": " << survey.why_not;
+    const Score found = score(survey.candidates.front().disks, truth, radius, [](const RimDisk& d) {
+      return Place{d.circle.x, d.circle.y};
+    });
+    EXPECT_EQ(found.hits, truth.size()) << name;
+    EXPECT_EQ(found.found, truth.size()) << name;
+  }
+  for (const char* name : {"none_bells_beach.jpg", "none_mlund_experiment.png"})
+    EXPECT_FALSE(take_survey(read_channels(std::filesystem::path(folder) / name)).found) << name;
+}
+
+}  // namespace
+}  // namespace shakebed::ingest
