@@ -285,7 +285,7 @@ int command_reproduce(const Arguments& arguments) {
 
 int preview_images(const Arguments& arguments) {
   const ImageArguments& image = arguments.images;
-  PreviewRequest request{.files = image.files, .diameter = image.diameter};
+  PreviewRequest request{.files = image.files, .diameter = image.diameter, .options = {}, .folder = {}};
   ExtractOptions& options = request.options;
   options.roi = image.roi;
   options.radius = image.radius;
