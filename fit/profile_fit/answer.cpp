@@ -14,7 +14,7 @@ namespace {
 
 // Temperatures that differ by less than this part of the smaller are one.
 constexpr double same_temperature = 0.20;
-// A difference counts from so many standard errors on; between the kinetic T_x and T_z, whose own errors are told by
+// A difference counts from so many standard errors on; between the kinetic T_x and T_z, whose own errors come from
 // fewer samples, from two.
 constexpr double significant = 3.0, significant_kinetic = 2.0;
 // A reading checks the answer where its uncertainty is below this part of it.

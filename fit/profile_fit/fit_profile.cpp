@@ -76,6 +76,7 @@ class ProfileFitter {
     FitStatus status = measure_profile(profile_, measured_, result_);
     if (status == FitStatus::ok) status = make_setup(options_, measured_, setup_, result_);
     if (status != FitStatus::ok) return status;
+    measured_.robust = options_.robust;
     for (std::size_t i = 0; i < measured_.size(); ++i) {
       result_.residuals.push_back(
           {measured_.height[i], measured_.density[i], measured_.errors_known ? measured_.error[i] : 0.0, 0.0, false});

@@ -71,7 +71,8 @@ struct FitOptions {
   Kernel kernel;  // what the profile was measured through
   WindowOptions window;
 
-  // Huber's loss: residuals beyond `robust_threshold` standard errors count linearly. [Huber1964]
+  // Huber's loss: residuals beyond `robust_threshold` standard errors count linearly. [Huber1964] Bins then weigh by
+  // their own errors even where there is a covariance, through which the error of T still comes.
   bool robust = false;
   double robust_threshold = 1.345;
 

@@ -7,7 +7,7 @@ namespace shakebed::fit {
 
 namespace {
 
-// A tail of 100 T much shorter than a bin is a step: T below this part of a bin cannot be told from zero.
+// A tail of 100 T much shorter than a bin is a step: T below this part of a bin is not resolved.
 constexpr double lowest_temperature_in_bins = 1e-5;
 // However the user rounded 2/sqrt 3.
 constexpr double rounding = 1e-12;

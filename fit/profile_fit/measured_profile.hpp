@@ -16,6 +16,7 @@ struct MeasuredProfile {
   Eigen::MatrixXd covariance;                  // empty: diagonal
   int covariance_samples = 0;                  // independent ones behind it, 0 if not known
   bool errors_known = false;
+  bool robust = false;   // FitOptions::robust: bins must keep their outliers to themselves
   double spacing = 0.0;  // median distance of neighbouring heights
   double area = 0.0;
   std::vector<double> one_diameter_mean;  // density averaged over one diameter about each height

@@ -22,7 +22,7 @@ constexpr std::array<Thermometer, thermometer_count> table{{
 // rows, 0.3 to 45 T_c (tests/reproduction/thermometer_beds.hpp), measured as the program does, through a Gaussian of
 // 0.5 D. A row holds what beds nearest to its T say: the greatest error of the model of the first thermometer; then, of
 // each thermometer, the mean of ln(T fitted/T) and its scatter from bed to bed beyond the stated errors, the mean's own
-// uncertainty included, and no less than 0.4 %, which is all that some 40 beds a row can tell. Measured anew by
+// uncertainty included, and no less than 0.4 %, the resolution of some 40 beds a row. Measured anew by
 // `ctest -L study -R ThermometerTable -V`.
 // clang-format off
 constexpr std::array<KnownBiases, 14> biases{{

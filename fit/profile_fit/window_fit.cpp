@@ -9,7 +9,7 @@ namespace shakebed::fit {
 
 namespace {
 
-// Starts: T on so many steps, from the least that bins can tell from zero to thirty windows; two starts count as
+// Starts: T on so many steps, from the least that bins resolve to thirty windows; two starts count as
 // different when their ln T differ by more than a grid step of the widest range; so many are tried.
 constexpr int start_temperatures = 36;
 constexpr double start_highest_in_windows = 30.0, start_distinct = 1.0;

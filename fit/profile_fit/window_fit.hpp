@@ -33,7 +33,7 @@ FittedWindow fit_window(const MeasuredProfile& measured, const Window& window, F
                         const std::vector<FitModel::Parameters>& starts);
 
 // Whether T came out as more than an upper bound: its error is below half of it, and it lies above the least T that the
-// bins can tell from zero.
+// bins resolve.
 bool temperature_is_resolved(const Solution& solution, double std_error);
 
 }  // namespace shakebed::fit
