@@ -41,6 +41,11 @@ std::string number(double value, int digits = 3) {
 
 std::string per_cent(double part) { return number(100.0 * part, 2) + " %"; }
 
+// "37 %", "a factor of 8.4"; of the ratio of two temperatures less one.
+std::string how_far(double ratio_less_one) {
+  return ratio_less_one < 1 ? per_cent(ratio_less_one) : "a factor of " + number(1 + ratio_less_one, 2);
+}
+
 double ratio_above_one(double a, double b) { return std::max(a, b) / std::min(a, b) - 1.0; }
 
 class AnswerFinder {
@@ -147,7 +152,9 @@ class AnswerFinder {
     answer_.bias_uncertainty = chosen_->temperature * chosen_->bias_uncertainty;
   }
 
-  static double statistical(const ThermometerReading& reading) { return reading.fitted.std_error / reading.fitted.value; }
+  static double statistical(const ThermometerReading& reading) {
+    return reading.fitted.std_error / reading.fitted.value;
+  }
 
   // How far the admissible readings are from the chosen one, in ln T.
   void compare_readings() {
@@ -182,7 +189,7 @@ class AnswerFinder {
     answer_.verdict = Verdict::no_single_temperature;
     if (x && z && differ(*x, *z, significant_kinetic)) {
       answer_.why = "The disks' velocities have two temperatures: T_x = " + number(x->value) +
-                    " and T_z = " + number(z->value) + " m g D, " + per_cent(ratio_above_one(x->value, z->value)) +
+                    " and T_z = " + number(z->value) + " m g D, " + how_far(ratio_above_one(x->value, z->value)) +
                     " apart.";
       answer_.advice = "Quote the range, or T_x and T_z by name; no equilibrium curve holds for this bed.";
       return;
@@ -299,7 +306,7 @@ class AnswerFinder {
   Answer answer_;
   std::vector<const Thermometer*> votes_;  // of the readings
   const ThermometerReading* chosen_ = nullptr;
-  const ThermometerReading* farthest_ = nullptr;                 // of those that contradict the chosen one
+  const ThermometerReading* farthest_ = nullptr;      // of those that contradict the chosen one
   double spread_of_all_ = 0.0, spread_beyond_ = 0.0;  // in ln T
   int compared_ = 0;
 };

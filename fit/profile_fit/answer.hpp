@@ -58,7 +58,7 @@ struct Answer {
   Interval interval;
   Estimate solid_height;                                 // of the Enskog tail at this T [D]
   std::optional<Estimate> temperature_x, temperature_z;  // kinetic, as given
-  std::vector<ThermometerReading> readings;                         // of all thermometers
+  std::vector<ThermometerReading> readings;              // of all thermometers
   [[nodiscard]] bool ok() const { return status == FitStatus::ok; }
 };
 

@@ -22,9 +22,9 @@
 #include "pipelines/runner/run.hpp"
 #include "pipelines/runner/slurm.hpp"
 #include "pipelines/runner/sweep.hpp"
+#include "pipelines/stages/images_module.hpp"
 #include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/scene_options.hpp"
-#include "pipelines/stages/images_module.hpp"
 #include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {

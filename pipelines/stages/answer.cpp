@@ -61,6 +61,8 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   put_temperature(out, "temperature", answer.temperature, answer.std_error, diameter);
   out["interval"] = Json{{"low", quantity_json(answer.interval.low, "m g D")},
                          {"high", quantity_json(answer.interval.high, "m g D")},
+                         {"low_open", answer.interval.low_open},
+                         {"high_open", answer.interval.high_open},
                          {"confidence", answer.interval.confidence}};
   out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
   out["bias_uncertainty"] = quantity_json(answer.bias_uncertainty, "m g D");
@@ -68,7 +70,8 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   out["bias"] = answer.bias;
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;
-  out["solid_height"] = quantity_json(answer.solid_height.value, "D", answer.solid_height.std_error);
+  const bool solid = answer.solid_height.value > 0 || answer.solid_height.std_error > 0;
+  out["solid_height"] = solid ? quantity_json(answer.solid_height.value, "D", answer.solid_height.std_error) : Json();
   if (answer.temperature_x)
     put_temperature(out, "temperature_x", answer.temperature_x->value, answer.temperature_x->std_error, diameter);
   if (answer.temperature_z)

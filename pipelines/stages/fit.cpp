@@ -359,7 +359,8 @@ void write_tables(RunContext& context, const fit::FitResult& result) {
 Json Fit::answer_of(const fit::Profile& profile, const fit::FitOptions& options, const RunContext& context,
                     std::optional<double> diameter) const {
   fit::AnswerInput input;
-  input.profile = profile, input.kernel = options.kernel, input.base = options.base;
+  input.profile = profile, input.kernel = options.kernel;
+  if (options.base != fit::FitOptions{}.base) input.base = options.base;  // else that of a hexagonal bed
   input.column_number = options.column_number;
   for (const Input& upstream : context.inputs()) {
     const KineticTemperatures kinetic = kinetic_temperatures(upstream, diameter);

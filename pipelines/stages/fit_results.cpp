@@ -117,13 +117,15 @@ class FitStatement {
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
     list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
     list_.number("/answer/interval/confidence", "1", "confidence of the interval", found);
+    list_.truth("/answer/interval/low_open", "whether the data set no lower end", found);
+    list_.truth("/answer/interval/high_open", "whether the data set no upper end", found);
     list_.quantity("/answer/statistical_error", "m g D", "statistical error of T", found);
     list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
     list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);
     list_.number("/answer/bias", "1", "known bias that has been taken off, relative", found);
     list_.text("/answer/thermometer", "model and window that gave T", found);
     list_.text("/answer/model", "model that gave T", found);
-    list_.quantity("/answer/solid_height", "D", "height of the solid at this T", found);
+    list_.quantity("/answer/solid_height", "D", "height of the solid at this T", found, true);
     const std::string row = "/answer/readings/#/";
     list_.text(row + "thermometer", "a model and window", found);
     list_.text(row + "model", "its model", found);

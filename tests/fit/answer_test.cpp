@@ -67,12 +67,12 @@ TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
 TEST(Answer, TakesTheKnownBiasOff) {
   const Answer answer = find_answer(column(1.0));
   ASSERT_TRUE(answer.ok());
-  for (const Reading& reading : answer.readings) {
+  for (const ThermometerReading& reading : answer.readings) {
     if (reading.status != FitStatus::ok) continue;
     EXPECT_NEAR(reading.temperature * (1.0 + reading.bias), reading.fitted.value, 1e-9) << reading.thermometer;
   }
   const auto chosen = std::find_if(answer.readings.begin(), answer.readings.end(),
-                                   [&](const Reading& r) { return r.thermometer == answer.thermometer; });
+                                   [&](const ThermometerReading& r) { return r.thermometer == answer.thermometer; });
   ASSERT_NE(chosen, answer.readings.end());
   EXPECT_EQ(chosen->temperature, answer.temperature);
 }

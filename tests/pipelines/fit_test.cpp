@@ -90,7 +90,9 @@ TEST_F(FitStage, SaysWhatALibraryLacks) {
   result = run(bed("a", 0.5, 2) + bed("b", 0.7, 3, R"(, "profile": { "kernel": { "kind": "top_hat", "width": 1 } })") +
                measured + R"({ "stage": "fit", "from": ["measured", "a", "b"], "model": "simulation" })");
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_THAT(result.err, HasSubstr("b: its profile was measured through the kernel top_hat:1, the one to be fitted through gaussian:0.5"));
+  EXPECT_THAT(
+      result.err,
+      HasSubstr("b: its profile was measured through the kernel top_hat:1, the one to be fitted through gaussian:0.5"));
   // No library, and one where there is no use for it.
   write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.1\n");
   result = run(R"({ "stage": "fit", "profile": "p.csv", "model": "simulation" })");
