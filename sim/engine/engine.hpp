@@ -29,6 +29,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -195,6 +196,7 @@ class Engine final : public Simulation {
   void hit_floor(std::uint32_t i, Motion& motion);
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
+  std::optional<double> unusual_restitution(std::uint32_t i, std::uint32_t j, TwoLanes d, TwoLanes dv);
   bool locked();
   void relieve();
   std::uint64_t events_between_checks() const { return 4096 + 200 * static_cast<std::uint64_t>(count_); }
@@ -205,7 +207,6 @@ class Engine final : public Simulation {
   static constexpr bool rests_apply = Space::falls && Rule::dissipates;
   void plan_rest(bool wanted);
   void act_rest();
-  bool is_slow(double approach);
   bool is_calm(const FloorMotion::Motion& floor);
   void lay_down(const FloorMotion::Motion& floor);
   void stop(std::uint32_t i, const FloorMotion::Motion& floor);
@@ -264,6 +265,7 @@ class Engine final : public Simulation {
   FloorMotion floor_;
   bool hard_sides_ = false;
   Contact disk_surface_, side_surface_, floor_surface_, lid_surface_;
+  bool unusual_ = false;  // contacts of disks may be more than their surface's: it varies, or one of them rests
   double contact_duration_ = 0;
   double inverse_inertia_ratio_ = 2;  // 1/q
   [[no_unique_address]] Sizes sizes_;
@@ -306,7 +308,6 @@ class Engine final : public Simulation {
   // --- rest
   std::vector<double> rest_height_;  // above the floor's, of disks at rest; `never` of the others
   std::uint32_t resting_ = 0;
-  bool chatters_ = false;                     // the bed lies on the floor, but for its contacts' hops
   bool woken_ = false;                        // a disk has lost its rest, and others perhaps their support
   double rest_at_ = never, look_at_ = never;  // the next hop or look; the next look
   double rest_period_ = 1;

@@ -67,6 +67,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (!floor_.moves()) intervals_ = 16;
   event_rate_ = 8.0 * count_;
   initial_energy_ = kinetic_energy() + potential_energy();
+  unusual_ = disk_surface_.varies();
   plan_rest(scene.rests);
   begin_interval();
 }
@@ -686,6 +687,16 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   return elastic;
 }
 
+// The restitution of two disks where it may depend on their approach; none if they touch as smooth elastic disks do.
+template <class Space, class Rule, class Sizes>
+[[gnu::noinline]] std::optional<double> Engine<Space, Rule, Sizes>::unusual_restitution(std::uint32_t i,
+                                                                                        std::uint32_t j, TwoLanes d,
+                                                                                        TwoLanes dv) {
+  if (too_soon(i, j)) return {};
+  const double approach = -(d[0] * dv[0] + d[1] * dv[1]) / std::sqrt(d[0] * d[0] + d[1] * d[1]);
+  return disk_surface_.restitution_at(approach);
+}
+
 template <class Space, class Rule, class Sizes>
 template <Order order>
 void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
@@ -730,26 +741,21 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   // shells there as now.
   if constexpr (Space::wraps_x || Space::wraps_z)
     d += Period::to_nearest(period_x_, period_z_, pair_at(&disks_[j].x) - pair_at(&disks_[i].x));
-  if constexpr (rests_apply) {
-    if (resting_ > 0 && is_at_rest(i) != is_at_rest(j)) [[unlikely]] {
-      if (push_off_rest(i, j, first, second, d)) return;
-    }
-  }
   const TwoLanes dv = second.velocity - first.velocity;
 
   double restitution = 1;
   bool elastic = true;
   if constexpr (Rule::dissipates) {
-    elastic = too_soon(i, j);
-    const auto approach = [&] { return -(d[0] * dv[0] + d[1] * dv[1]) / std::sqrt(d[0] * d[0] + d[1] * d[1]); };
-    if constexpr (rests_apply) {
-      if (chatters_ && !elastic) [[unlikely]]
-        elastic = is_slow(approach());
-    }
-    if (!elastic) {
-      restitution = disk_surface_.restitution;
-      if (disk_surface_.varies()) [[unlikely]]
-        restitution = disk_surface_.restitution_at(approach());
+    if (unusual_) [[unlikely]] {
+      if constexpr (rests_apply) {
+        if (is_at_rest(i) != is_at_rest(j) && push_off_rest(i, j, first, second, d)) return;
+      }
+      const std::optional<double> found = unusual_restitution(i, j, d, dv);
+      elastic = !found;
+      restitution = found.value_or(1);
+    } else {
+      elastic = too_soon(i, j);
+      if (!elastic) restitution = disk_surface_.restitution;
     }
   }
   const double inverse_first = 1 / sizes_.mass(i), inverse_second = 1 / sizes_.mass(j);
@@ -763,9 +769,8 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
       const double gt = -(-dvx * nz + dvz * nx) + ri * spins_[i] + rj * spins_[j];
       Surface varied;
       const Surface* surface = &disk_surface_;
-      if (disk_surface_.varies()) [[unlikely]] {
-        varied = disk_surface_;
-        varied.restitution = restitution;
+      if (unusual_) [[unlikely]] {
+        varied = disk_surface_.with(restitution);
         surface = &varied;
       }
       const RoughImpulse p = walton_impulse(nx, nz, gn, gt, reduced_mass, *surface, inverse_inertia_ratio_);
@@ -848,9 +853,7 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
   if (!(gn > 0)) return;  // grazed, by rounding
   Surface contact = surface;
   if constexpr (Rule::dissipates) {
-    bool elastic = too_soon(i, i);
-    if constexpr (rests_apply) elastic = elastic || (chatters_ && is_slow(gn));
-    if (elastic) {
+    if (too_soon(i, i)) {
       contact = Surface{};
     } else if (surface.varies()) [[unlikely]] {
       contact.restitution = surface.restitution_at(gn);
@@ -1191,7 +1194,6 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
     for (auto& height : self.rest_height_) visit(height);
     visit(self.resting_);
     visit(self.woken_);
-    visit(self.chatters_);
     visit(self.rest_at_);
     visit(self.look_at_);
     visit(self.contacts_at_look_);
@@ -1235,6 +1237,7 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
     throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
   random_.set_state(random_state);
+  unusual_ = disk_surface_.varies() || resting_ > 0;
   for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;

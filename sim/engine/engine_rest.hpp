@@ -9,12 +9,9 @@
 // touch them meanwhile. A disk that still moves meets them as it meets any other, but pushes them off the floor, which
 // does not give way: only a quick one wakes a disk at rest, and with it those that lose their support.
 //
-// Before that, while the bed chatters, slow contacts are elastic (see slow_contact): else they become faster and
-// faster.
-//
 // Rest is told from what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
-// too quick for it until it has done so. In beds that neither chatter nor rest nothing is changed,
-// not even by rounding.
+// too quick for it until it has done so. In beds that never rest nothing is changed, not even by
+// rounding.
 #pragma once
 
 namespace shakebed::sim {
@@ -30,8 +27,6 @@ inline constexpr double rest_contacts =
 inline constexpr double rest_gap = 1e-4;  // between disks that carry one another [D]; chattering ones have 1e-6
 inline constexpr double waking_speed =
     0.15;  // approach that wakes a disk [sqrt(g D)]; the pushes of hops are below 0.03
-inline constexpr double slow_contact = 0.03;  // approach below which contacts of a chattering bed are elastic [sqrt(g
-                                              // D)]: at 0.06 T_x is 15 % too high at Gamma = 3 (tests/bench/README.md)
 inline constexpr double looks_a_period = 64;  // of the floor, for rest
 inline constexpr double hops_a_period = 256;  // while a disk moves; they push by 1/256 of a period's fall
 inline constexpr double hops_of_all = 128;    // when none does
@@ -122,21 +117,12 @@ void Engine<Space, Rule, Sizes>::wake(std::uint32_t i) {
   mark_near_bounds(i);
 }
 
-// Does a contact of that approach lose nothing because the bed chatters?
-template <class Space, class Rule, class Sizes>
-bool Engine<Space, Rule, Sizes>::is_slow(double approach) {
-  const bool slow = approach < slow_contact;
-  counters_.elastic_contacts += slow;
-  return slow;
-}
-
 // Has the bed come to rest? Its contacts since the last look say at once that most have not.
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::is_calm(const FloorMotion::Motion& floor) {
   const std::uint64_t contacts = counters_.collisions() - contacts_at_look_;
   contacts_at_look_ = counters_.collisions();
-  chatters_ = static_cast<double>(contacts) > rest_contacts * count_;
-  if (resting_ == 0 && !chatters_) return false;
+  if (resting_ == 0 && static_cast<double>(contacts) < rest_contacts * count_) return false;
   if (time_pressed(rest_period_ / looks_a_period) < rest_period_ / looks_a_period) return false;
   double squares = 0;
   std::uint32_t slow = 0;
@@ -247,6 +233,7 @@ void Engine<Space, Rule, Sizes>::act_rest() {
     disks_[i].z = floor.position + rest_height_[i];
   }
   if (look && is_calm(floor)) lay_down(floor);
+  unusual_ = disk_surface_.varies() || resting_ > 0;
   rest_at_ = look_at_;
   if (resting_ == 0) return;
   const double usual = rest_period_ / (resting_ < count_ ? hops_a_period : hops_of_all);

@@ -31,6 +31,11 @@ struct Contact : Surface {
     softness = less;
   }
 
+  Surface with(double other_restitution) const {
+    Surface other = *this;
+    other.restitution = other_restitution;
+    return other;
+  }
   bool varies() const { return law != RestitutionLaw::constant; }
   [[gnu::noinline]] double restitution_at(double approach) const {
     const double ratio = approach / law_speed;
