@@ -26,6 +26,20 @@ Circle place_of(const FoundDisk& disk) {
   return circle;
 }
 
+// A face whose rim is doubtful is a bead where beads are.
+void drop_lonely_doubtful(FindResult& found, double radius) {
+  constexpr double doubtful = 0.8, near = 3.5;  // probability, radii
+  std::vector<FoundDisk> sure, kept;
+  for (const FoundDisk& disk : found.disks)
+    if (disk.probability >= doubtful) sure.push_back(disk);
+  const Nearby near_sure(sure.size(), near * radius,
+                         [&](std::size_t i) { return std::pair(sure[i].x_px, sure[i].y_px); });
+  for (const FoundDisk& disk : found.disks)
+    if (disk.probability >= doubtful || near_sure.any_near(disk.x_px, disk.y_px)) kept.push_back(disk);
+  found.rejected += found.disks.size() - kept.size();
+  found.disks = std::move(kept);
+}
+
 // Takes out faces without a rim, and gives the others their probability.
 void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& found) {
   std::vector<Circle> places;
@@ -43,6 +57,7 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
     kept.push_back(disk);
   }
   found.disks = std::move(kept);
+  drop_lonely_doubtful(found, rims.radius_px);
   if (found.disks.empty() && found.why_nothing.empty()) found.why_nothing = "no disk has a rim";
 }
 
@@ -87,6 +102,17 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.disks_used = rims.disks.size();
   calibration.rims = rims.model;
   calibration.by_rims = true;
+  double support = 0;
+  for (const RimDisk& disk : rims.disks) support += disk.circle.support / static_cast<double>(rims.disks.size());
+  constexpr double plainly_seen = 0.8;
+  if (support < plainly_seen) {
+    char text[240];
+    std::snprintf(text, sizeof text,
+                  "Beads were found by their rims alone, and on average only %.0f %% of a rim is seen: beads may be "
+                  "missed, and centres may be off by a tenth of a radius. Look at the overlays.",
+                  100 * support);
+    calibration.warnings.emplace_back(text);
+  }
   result.found = !rims.disks.empty();
   if (!result.found) result.why_not = "no rim of " + std::to_string(rims.model.radius_px) + " px is seen";
   return result;

@@ -1,6 +1,7 @@
 #include "ingest/find/survey.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -24,8 +25,26 @@ constexpr double few_wrong = 0.1;      // beyond it, beads must make up a good p
 constexpr double good_part = 0.15;
 constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
+// Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all.
+constexpr double least_side = 0.15;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 constexpr double least_mean_support = 0.42, support_for_few = 2.2;
+
+// Share of the rims seen in the eighth of all directions where least is seen.
+double least_seen_side(const std::vector<RimDisk>& disks) {
+  constexpr int sides = 8;
+  std::array<double, sides> met{}, looked{};
+  for (const RimDisk& disk : disks)
+    for (int k = 0; k < disk.circle.directions; ++k) {
+      const auto side = static_cast<std::size_t>(k * sides / disk.circle.directions);
+      ++looked[side];
+      met[side] += static_cast<double>(disk.circle.met >> static_cast<unsigned>(k) & 1U);
+    }
+  double least = 1;
+  for (std::size_t side = 0; side < sides; ++side)
+    if (looked[side] > 0) least = std::min(least, met[side] / looked[side]);
+  return least;
+}
 
 double likeness(const GrayFrame& a, const GrayFrame& b) {
   double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
@@ -100,6 +119,8 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   else if (support / count < least_mean_support + support_for_few / count)
     candidate.why_not =
         text_of("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
+  else if (least_seen_side(candidate.disks) < least_side)
+    candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
     candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
   else
