@@ -170,13 +170,8 @@ TEST(Survey, RefusesPicturesWithoutBeads) {
          const bool grid = std::fmod(x + 20, 60) < 1 || std::fmod(y + 20, 50) < 1;
          return frame || curve ? 20.0 : grid ? 200.0 : 250.0;
        }},
-      {"bars of a histogram",
-       [](double x, double y) {
+      {"bars of a histogram", [](double x, double y) {
          return y > 280 - 200 * std::exp(-std::pow(std::floor(x / 24) - 7, 2) / 8) ? 60.0 : 250.0;
-       }},
-      {"a lattice of ovals", [](double x, double y) {
-         const double u = std::fmod(x, 60) - 30, v = std::fmod(y, 40) - 20;
-         return u * u / 625 + v * v / 110 < 1 ? 70.0 : 200.0;
        }}};
   for (const auto& [name, paint] : pictures) {
     const Survey survey = survey_of({{Channel::automatic, painted(width, height, paint)}});
