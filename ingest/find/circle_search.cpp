@@ -183,7 +183,7 @@ std::vector<Circle> peaks_of(const std::vector<float>& sums, int width, int heig
               dy < 0 || (dy == 0 && dx < 0) ? other <= value : (dx == 0 && dy == 0) || other < value || other == value;
           if (other == value && (dy < 0 || (dy == 0 && dx < 0))) highest = false;
         }
-      if (highest) peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius, 0, 0, 0, 0});
+      if (highest) peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius});
     }
   }
   return peaks;
@@ -204,6 +204,8 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
     const double reach = round == 0 ? wide : round == 1 ? 0.5 * (wide + narrow) : narrow;
     met.clear();
     slopes.clear();
+    circle.met = 0;
+    circle.directions = rays.count;
     int in_view = 0;
     double square = 0;
     for (int k = 0; k < rays.count; ++k) {
@@ -213,6 +215,7 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
       if (!one.edge || !one.in_view || std::abs(one.offset) > reach) continue;
       met.push_back({cosine, sine, one.offset});
       slopes.push_back(one.slope);
+      circle.met |= std::uint64_t{1} << static_cast<unsigned>(k);
       square += one.offset * one.offset;
     }
     circle.rays = in_view;

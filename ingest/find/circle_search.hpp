@@ -2,6 +2,7 @@
 // Circles in a map of edges: every edge votes for centres one radius along its gradient; what many vote for is looked
 // at along rays, and its centre and radius are fitted to the edges met there.
 
+#include <cstdint>
 #include <vector>
 
 #include "ingest/calibrate/calibration.hpp"
@@ -14,7 +15,9 @@ struct Circle {
   double support = 0;               // share of the rim, as far as it is in view, where an edge is met, 0 .. 1
   double scatter = 0;               // rms distance of these edges from the circle, radii
   double contrast = 0;              // median step across the rim, grey levels
-  int rays = 0;                     // directions looked along
+  int rays = 0;                     // directions looked along, within view
+  int directions = 0;               // directions in all, and in which an edge was met, a bit each:
+  std::uint64_t met = 0;
 };
 
 // Ratio of the axes of the stretched copies that tell what chance makes up: no bead's rim is round any more, textures

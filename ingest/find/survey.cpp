@@ -1,6 +1,7 @@
 #include "ingest/find/survey.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -24,8 +25,28 @@ constexpr double few_wrong = 0.1;      // beyond it, beads must make up a good p
 constexpr double good_part = 0.15;
 constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
+// Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all.
+constexpr double least_side = 0.15;
+// px: below it a bead is not told from a speck, a pore or a dot of text, and its radius has to be given.
+constexpr double speck_px = 4;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
-constexpr double least_mean_support = 0.42, support_for_few = 2.2;
+constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
+
+// Share of the rims seen in the eighth of all directions where least is seen.
+double least_seen_side(const std::vector<RimDisk>& disks) {
+  constexpr int sides = 8;
+  std::array<double, sides> met{}, looked{};
+  for (const RimDisk& disk : disks)
+    for (int k = 0; k < disk.circle.directions; ++k) {
+      const auto side = static_cast<std::size_t>(k * sides / disk.circle.directions);
+      ++looked[side];
+      met[side] += static_cast<double>(disk.circle.met >> static_cast<unsigned>(k) & 1U);
+    }
+  double least = 1;
+  for (std::size_t side = 0; side < sides; ++side)
+    if (looked[side] > 0) least = std::min(least, met[side] / looked[side]);
+  return least;
+}
 
 double likeness(const GrayFrame& a, const GrayFrame& b) {
   double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
@@ -97,9 +118,11 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
     candidate.why_not = "no circle is seen more often than chance makes up";
   else if (at_worst > most_wrong || (at_worst > few_wrong && candidate.explained_share < good_part))
     candidate.why_not = text_of("of %.0f circles, chance makes up as many as %.0f %%", count, 100 * at_worst);
-  else if (support / count < least_mean_support + support_for_few / count)
+  else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
     candidate.why_not =
         text_of("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
+  else if (least_seen_side(candidate.disks) < least_side)
+    candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
     candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
   else
@@ -144,6 +167,11 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     judge(candidate, learned.edge_length_px);
     enlarge(candidate, frames.reduction);
     candidate.gain_px *= frames.reduction;
+    if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
+      candidate.credible = false;
+      candidate.why_not =
+          text_of("circles of %.1f px are seen, too small to be told from specks", candidate.rims.radius_px);
+    }
     survey.candidates.push_back(std::move(candidate));
   }
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),

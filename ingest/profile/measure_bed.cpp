@@ -459,7 +459,8 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
     return frame.width != recorded_width || frame.height != recorded_height;
   });
   constexpr int lens_rounds = 5;
-  const bool rims_alone = calibrated.calibration.by_rims;  // too coarse to tell the lens from
+  // Rims alone are too coarse for it, and where other things pass for beads, a lens would fit those.
+  const bool rims_alone = calibrated.calibration.by_rims || calibrated.calibration.rims_to_be_checked;
   for (int round = 0; round < lens_rounds && !rims_alone && !(options.pixel_aspect && options.lens_radial); ++round) {
     std::vector<const GrayFrame*> pointers;
     std::vector<FindResult> found;
@@ -496,7 +497,7 @@ Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
         std::abs(lens.pixel_aspect / before.pixel_aspect - 1) < small && std::abs(lens.radial - before.radial) < small;
     CalibrationResult again =
         little ? learn_again(pointers, find, calibrated.calibration) : learn_beads(pointers, find);
-    if (!again.found) {
+    if (!again.found || again.calibration.by_rims) {
       lens = before;
       break;
     }

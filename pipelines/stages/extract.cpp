@@ -53,6 +53,16 @@ class Extract : public Stage {
         "polarity", o.polarity,
         {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},
         {.help = "whether beads are darker or brighter than what is behind them"});
+    fields.choice("channel", o.channel,
+                  {{BeadChannel::automatic, "automatic"},
+                   {BeadChannel::red, "red"},
+                   {BeadChannel::green, "green"},
+                   {BeadChannel::blue, "blue"},
+                   {BeadChannel::grey, "grey"},
+                   {BeadChannel::saturation, "saturation"},
+                   {BeadChannel::background_distance, "background_distance"}},
+                  {.help = "which part of a colour picture is used: saturation is the largest of red, green and blue "
+                           "less the smallest, background_distance the distance from the most frequent colour"});
     fields.number("radius", o.radius,
                   {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
     fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
