@@ -15,6 +15,7 @@
 #include "pipelines/runner/pages.hpp"
 #include "pipelines/runner/shared_stages.hpp"
 #include "pipelines/runner/sweep_record.hpp"
+#include "pipelines/runner/sweep_table.hpp"
 
 namespace shakebed::pipelines {
 
@@ -40,16 +41,6 @@ Shard parse_shard(const std::optional<std::string>& text) {
   if (!good || shard.number < 1 || shard.number > shard.of)
     throw UsageError(fmt::format("--shard {}: expected K/N with K from 1 to N", *text));
   return shard;
-}
-
-std::string csv_cell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"') out += '"';
-    out += c;
-  }
-  return out + "\"";
 }
 
 using Clock = std::chrono::steady_clock;
@@ -232,10 +223,6 @@ class SweepRun {
     for (const std::string& pointer : pointers_) header.push_back(pointer), header.push_back(pointer + "/std_error");
     table_.push_back(std::move(header));
     for (const SweepPoint& point : all_) table_.push_back(row_of(point));
-    for (const std::vector<std::string>& row : table_) {
-      for (std::size_t i = 0; i < row.size(); ++i) csv_ += (i == 0 ? "" : ",") + csv_cell(row[i]);
-      csv_ += '\n';
-    }
   }
 
   std::vector<std::string> row_of(const SweepPoint& point) {
@@ -257,7 +244,9 @@ class SweepRun {
 
   // Shards that end at the same time write the same bytes; the last one sees all points.
   void write_results() {
-    write_file_atomically(options_.out / "sweep.csv", csv_);
+    const Table csv = sweep_table(plan_, pointers_, table_);
+    csv.write_atomically(options_.out / "sweep.csv");
+    csv_ = csv.csv();
     write_file_atomically(options_.out / "resolved.json", dump(plan_.resolved));
     try {
       pages_.write(plan_, SweepOutcome{.out = options_.out,

@@ -12,6 +12,7 @@
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 
 namespace shakebed::pipelines {
@@ -95,6 +96,7 @@ class Study : public Stage {
   void check_chain(Fields& fields, const Chain& chain) const;
   std::vector<Number> numbers(const std::vector<Input>& chain) const;
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
+  void write_described(RunContext& context, const std::string& file, const std::string& csv) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
   std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
 
@@ -376,12 +378,25 @@ Json Study::run_once(RunContext& context, const Point& point, const fs::path& fo
   return found;
 }
 
+// A table with the meaning and unit of its columns beside it, as results() states them.
+void Study::write_described(RunContext& context, const std::string& file, const std::string& csv) const {
+  ResultList stated;
+  results(stated);
+  std::vector<Column> columns;
+  for (const StatedColumn& column : stated.find_table(file)->columns)
+    columns.push_back(
+        {column.name, column.unit.empty() && column.name != "series" ? "1" : column.unit, column.meaning});
+  Table described(stated.find_table(file)->meaning, columns);
+  described.note("runs_per_point", replicas_);
+  write_file(context.output(file), csv);
+  write_file(metadata_path(context.output(file)), dump(described.metadata(file)));
+}
+
 // NAME.csv: series, parameter, key, then mean and error of every other column, and how many runs had the row.
 void Study::write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const {
   for (std::size_t k = 0; k < tables_.size(); ++k) {
     const auto& [name, table] = tables_[k];
-    std::string text =
-        fmt::format("# {} of the chain, means over the runs that have the row; errors from their spread\n", table.at);
+    std::string text;
     std::vector<std::string> header;
     for (std::size_t i = 0; i < all.size(); i += replicas_) {
       std::map<double, std::vector<std::vector<Number>>> columns;  // key → column → runs
@@ -417,7 +432,7 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
         text += fmt::format(",{}\n", values.front().size());
       }
     }
-    write_file(context.output(name + ".csv"), text);
+    write_described(context, name + ".csv", text);
   }
 }
 
@@ -465,8 +480,6 @@ void Study::run(RunContext& context) const {
     table += fmt::format(",{0},{0}_error", name);
   }
   runs += "\n", table += "\n";
-  std::string notes = fmt::format("# means over {} runs{}\n", replicas_,
-                                  replicas_ > 1 ? "; errors: standard errors of that mean, from the spread" : "");
   Json series = Json::object();
   std::size_t missing = 0;
   for (std::size_t i = 0; i < all.size(); i += replicas_) {
@@ -496,8 +509,8 @@ void Study::run(RunContext& context) const {
   if (missing > 0)
     context.warning(fmt::format("{} of {} numbers are missing: the chain did not give them", missing,
                                 all.size() * collect_.size()));
-  write_file(context.output("table.csv"), notes + table);
-  write_file(context.output("replicas.csv"), runs);
+  write_described(context, "table.csv", table);
+  write_described(context, "replicas.csv", runs);
   write_tables(context, all, kept);
   write_file(context.output("study.json"),
              dump(Json{{"replicas", replicas_}, {"runs", all.size()}, {"series", std::move(series)}}));

@@ -34,7 +34,7 @@ TEST(Answer, OfABedInEquilibriumIsItsTemperature) {
     run.bed = {231, 20.2};
     run.temperature = reduced * run.bed.critical();
     run.spacing = 0.25, run.frames = 150, run.interval = 2, run.seed = 8;
-    run.kernel = {sim::KernelKind::gaussian, 0.5};
+    run.kernel = {KernelKind::gaussian, 0.5};
     AnswerInput input;
     input.kernel = kernel;
     input.profile = average_frames(simulated::profiles_of(run)).profile;

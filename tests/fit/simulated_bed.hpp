@@ -59,7 +59,7 @@ ProfileFrames profiles_of(const BedRun& run, Look&& look) {
     simulation->advance_to(run.settle + run.interval * (frame + 1));
     simulation->snapshot(at);
     std::fill(density.begin(), density.end(), 0.0);
-    sim::add_density(grid, run.kernel, run.bed.width, at.z, 0.0, density);
+    add_density(grid, run.kernel, run.bed.width, at.z, 0.0, density);
     std::copy(density.begin(), density.end(),
               frames.number_density.begin() + static_cast<std::ptrdiff_t>(points) * frame);
     look(at);

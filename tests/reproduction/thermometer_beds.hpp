@@ -85,7 +85,7 @@ inline Measured measure(const EquilibriumBed& what) {
   run.bed = what.bed;
   run.temperature = what.temperature();
   run.settle = 100, run.interval = 2, run.frames = what.frames, run.seed = what.seed;
-  run.spacing = 0.25, run.kernel = {sim::KernelKind::gaussian, 0.5};
+  run.spacing = 0.25, run.kernel = {KernelKind::gaussian, 0.5};
   std::vector<double> x, z;
   const ProfileFrames frames = profiles_of(run, [&](const sim::Snapshot& at) {
     double vx2 = 0, vz2 = 0;
@@ -140,8 +140,8 @@ inline Measured measure(const ShakenBed& what) {
   scene.seed = what.seed;
   const auto simulation = sim::simulate(scene);
   const double column = what.count / what.width;
-  const sim::ProfileGrid grid{-6, 0.25, static_cast<std::size_t>((4 * column + 66) / 0.25)};
-  sim::BedObserver observer(scene, simulation->properties(), phases, grid, {sim::KernelKind::gaussian, 0.5});
+  const HeightGrid grid{-6, 0.25, static_cast<std::size_t>((4 * column + 66) / 0.25)};
+  sim::BedObserver observer(scene, simulation->properties(), phases, grid, {KernelKind::gaussian, 0.5});
   sim::Snapshot at;
   for (int period = 0; period < periods; ++period) {
     for (std::uint32_t phase = 0; phase < phases; ++phase) {
