@@ -348,8 +348,8 @@ TEST(Engine, SaysWhereDisksCollapse) {
   }
   scene.disks.contact_duration = 1e-4;
   const auto soft = simulate(scene);
-  soft->advance_to(30);
-  EXPECT_LT(soft->energy().kinetic, 0.01);  // the hops of disks at rest are all that is left
+  soft->advance_to(14);
+  EXPECT_LT(soft->energy().kinetic, 0.1);  // hops of a contact's duration are all that is left
   EXPECT_LE(soft->largest_overlap(), 1e-12);
 }
 
