@@ -7,8 +7,8 @@
 #include <numbers>
 #include <span>
 
-#include "statistics/kernel.hpp"
 #include "fit/theory/quadrature.hpp"
+#include "statistics/kernel.hpp"
 
 // A curve seen through a kernel. Internal to fit.
 namespace shakebed::fit {

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "statistics/kernel.hpp"
 #include "fit/theory/value.hpp"
+#include "statistics/kernel.hpp"
 
 // The Fermi profile of Hayakawa and Hong, for comparison. [HayakawaHong1997]
 namespace shakebed::fit {

@@ -138,8 +138,8 @@ TEST(Frames, BootstrapScattersByTheCovarianceOfTheWindows) {
   EXPECT_NEAR(result.temperature.std_error / std::sqrt(variance), 1.0, 4.0 / std::sqrt(2.0 * resamples));
 
   // 300 frames in windows of 30 (as long as three times they are correlated for): (3 300 + 2 30)/(4 30) = 8 independent
-  // samples, and Student's t of 7 degrees of freedom is 2.365. The percentiles of 2,000 normal numbers at 2.5 % are known
-  // to 2.7 % of 1.96, the interval between two to 1.9 %.
+  // samples, and Student's t of 7 degrees of freedom is 2.365. The percentiles of 2,000 normal numbers at 2.5 % are
+  // known to 2.7 % of 1.96, the interval between two to 1.9 %.
   ASSERT_EQ(average.window, 30);
   ASSERT_EQ(average.profile.covariance_samples, 8);
   const Interval& interval = result.temperature_interval;

@@ -176,9 +176,9 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   for (const auto& [set, says] : {std::pair{"/stages/bed/floor/frequency=\"20\"", "Write \"20 Hz\""},
                                   {"/stages/bed/box/width=\"0.06\"", "Write \"0.06 m\""},
                                   {"/stages/bed/settle=\"2\"", "Write \"2 s\""}}) {
-    const ProgramResult refused = run_shakebed({"validate", "r.json", "--set", set}, folder.path());
-    EXPECT_EQ(refused.exit_code, 3) << refused.err;
-    EXPECT_NE(refused.err.find(says), std::string::npos) << refused.err;
+    const ProgramResult result_of_set = run_shakebed({"validate", "r.json", "--set", set}, folder.path());
+    EXPECT_EQ(result_of_set.exit_code, 3) << result_of_set.err;
+    EXPECT_NE(result_of_set.err.find(says), std::string::npos) << result_of_set.err;
   }
 }
 

@@ -23,7 +23,7 @@ struct Known {
 // nu/(nu - 2) more than stated, in variance; the answer's interval allows for that.
 inline void add_readings(const Answer& answer, double truth, int samples, std::vector<Known>& known) {
   const double freedom = std::max(3.0, samples - 1.0), student = std::sqrt(freedom / (freedom - 2));
-  for (const Reading& reading : answer.readings) {
+  for (const ThermometerReading& reading : answer.readings) {
     if (reading.status != FitStatus::ok) continue;
     const auto all = thermometers();
     const auto at =
