@@ -289,7 +289,7 @@ class PlanBuilder {
     planned.reduced = common.reduced;
     planned.seed = common.seed;
     planned.stage->describe(fields);
-    if (problems_.empty()) planned.stage->check_chains(fields, read_chain);
+    if (problems_.size() == problems_before) planned.stage->check_chains(fields, read_chain);
     fields.finish();
     if (problems_.size() == problems_before) {
       if (auto bed = planned.stage->bed())

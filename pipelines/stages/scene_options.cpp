@@ -203,10 +203,6 @@ void SceneOptions::describe(Fields& fields) {
                  "Default: 1e-4 sqrt(D/g) where anything dissipates",
              .range = non_negative,
              .example = "\"1 us\""});
-        f.boolean(
-            "rests", d.rests,
-            {.help = "a dissipative bed that has come to rest on the floor lies there, moving with it, until it falls "
-                     "away; false: it goes on in small contacts, which costs up to a thousand times more"});
         f.object<SecondSpeciesOptions>(
             "second", d.second,
             [](Fields& g, SecondSpeciesOptions& s) {
@@ -398,7 +394,6 @@ double SceneOptions::bath_temperature() const {
 sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   const double length = length_unit(), time = time_unit(), speed = length / time;
   sim::Scene scene;
-  scene.rests = disks_.rests;
   scene.seed = seed;
   if (gravity_) scene.gravity = sim::UniformGravity{};
 

@@ -34,7 +34,6 @@ struct DiskOptions {
   SurfaceOptions surface;
   Inertia inertia = Inertia::disk;
   std::optional<double> contact_duration;
-  bool rests = true;
   std::optional<SecondSpeciesOptions> second;
 };
 

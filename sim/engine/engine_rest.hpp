@@ -10,8 +10,7 @@
 // does not give way: only a quick one wakes a disk at rest, and with it those that lose their support.
 //
 // Rest is told from what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
-// too quick for it until it has done so. In beds that never rest nothing is changed, not even by
-// rounding.
+// too quick for it until it has done so. In beds that never look calm nothing is changed, not even by rounding.
 #pragma once
 
 namespace shakebed::sim {
@@ -159,7 +158,11 @@ void Engine<Space, Rule, Sizes>::lay_down(const FloorMotion::Motion& floor) {
     if (!is_at_rest(i)) continue;
     enough ? stop(i, floor) : void(rest_height_[i] = never);
   }
-  if (!enough) resting_ = resting;
+  if (enough) return;
+  resting_ = resting;
+  if (resting > 0) return;  // the hop that follows predicts anew
+  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
+  predict_all();  // of those brought forward what was predicted no longer holds
 }
 
 // Wakes those that have lost their support, and those above them.

@@ -100,7 +100,7 @@ TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
   const Answer answer = find_answer(input);
   ASSERT_TRUE(answer.ok());
   EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
-  EXPECT_THAT(answer.why, testing::HasSubstr("T_x = 0.3 and T_z = 0.6 m g D, 1e+02 % apart"));
+  EXPECT_THAT(answer.why, testing::HasSubstr("T_x = 0.3 and T_z = 0.6 m g D, a factor of 2 apart"));
   EXPECT_EQ(answer.interval.low, 0.3);
   EXPECT_EQ(answer.interval.high, 0.6);
   EXPECT_NEAR(answer.temperature, 0.45, 1e-12);

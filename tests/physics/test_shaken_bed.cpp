@@ -95,6 +95,7 @@ BedResult run_gentle_bed(double gamma, int periods) {
   scene.box.sides = HardSides{{0.9, 0, 0}};
   scene.box.floor = SinusoidalFloor{gamma * gravity / std::pow(2 * std::numbers::pi * f, 2) / d, f * time_unit};
   scene.start_temperature = 0.01;
+  scene.rests = true;
   const auto simulation = simulate(scene);
   BedObserver observer(scene, simulation->properties(), 32, {-3, 0.25, 160}, {KernelKind::gaussian, 0.5});
   Snapshot at;

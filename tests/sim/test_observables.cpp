@@ -276,7 +276,7 @@ TEST(Observers, GoOnFromTheirBytes) {
     }
   };
   const auto make = [&] {
-    return All{{scene, disks, 4, {-1, 0.25, 100}, {}},
+    return All{{scene, disks, 4, {-1, 0.25, 100}, {KernelKind::gaussian, 0.5}},
                {scene, disks, layers},
                {scene, disks, 4, layers, false},
                {scene, disks.mass.size()},
