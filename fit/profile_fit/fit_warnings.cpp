@@ -27,11 +27,10 @@ constexpr double undetermined_plateau = 0.1;
 void warn_about_misfit(const MeasuredProfile& measured, FitResult& result) {
   if (!measured.errors_known || result.dof <= 0 || !(result.p_value < misfit_chance)) return;
   result.warnings.push_back(
-      "the model does not describe the data: chi2/dof = " + number(result.chi2_per_dof) + " (chance " +
-      number(result.p_value, 2) + ")" +
+      "The model does not fit: chi2/dof = " + number(result.chi2_per_dof) + ", p = " + number(result.p_value, 2) + "." +
       (result.model_error > 0.0
-           ? "; what it misses counts as an error of " + number(result.model_error) + " of every density"
-       : result.errors_scaled ? "; the errors were multiplied by " + number(std::sqrt(result.chi2_per_dof))
+           ? " A systematic error of " + number(result.model_error) + " was added to every density."
+       : result.errors_scaled ? " The errors were multiplied by " + number(std::sqrt(result.chi2_per_dof)) + "."
                               : ""));
 }
 

@@ -27,7 +27,7 @@ constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
 // Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all.
 constexpr double least_side = 0.15;
-// px: below it a bead is not told from a speck, a pore or a dot of text, and its radius has to be given.
+// px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
@@ -170,7 +170,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;
       candidate.why_not =
-          text_of("circles of %.1f px are seen, too small to be told from specks", candidate.rims.radius_px);
+          text_of("circles of %.1f px are seen, too small to distinguish from specks", candidate.rims.radius_px);
     }
     survey.candidates.push_back(std::move(candidate));
   }

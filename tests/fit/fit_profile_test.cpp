@@ -611,7 +611,7 @@ TEST(FitHardCases, AProfileOfAnotherModelIsDenounced) {
   fermi.sample(data.height, {}, data.number_density);
   for (const double d : data.number_density) data.std_error.push_back(synthetic::bin_error(d, 0.005));
   const FitResult fit = fit_profile(data, full_options());
-  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("does not describe the data")));
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("The model does not fit")));
   EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("changes with the window")));
   EXPECT_TRUE(fit.errors_scaled);
 }

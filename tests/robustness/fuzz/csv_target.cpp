@@ -14,7 +14,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const ProfileTable table = read_profile_csv(path);
     for (std::size_t i = 0; i < table.size(); ++i) {
       if (!std::isfinite(table.height[i]) || !std::isfinite(table.number_density[i]) ||
-          !std::isfinite(table.area_fraction[i]) || (!table.std_error.empty() && !(table.std_error[i] > 0)) || std::isnan(table.samples[i]))
+          !std::isfinite(table.area_fraction[i]) || (!table.std_error.empty() && !(table.std_error[i] > 0)) ||
+          std::isnan(table.samples[i]))
         shakebed::fuzz::fail("a number that is none");
       if (i > 0 && table.height[i] < table.height[i - 1]) shakebed::fuzz::fail("rows are not sorted");
     }
