@@ -8,6 +8,7 @@
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/runner/plan.hpp"
 #include "tests/pipelines/program.hpp"
 
@@ -102,9 +103,22 @@ class Comparison {
     each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t) {
       if (header.empty()) header = cells;
     });
-    for (const std::string& column : header)
-      if (misfit_of_column(*table, column))
-        fail("writes " + path.string() + " with the column " + column + ", which it does not state");
+    const Json metadata = read_json(metadata_path(path));
+    for (std::size_t i = 0; i < header.size(); ++i)
+      compare_column(*table, header[i], metadata["tableSchema"]["columns"][i], path.filename().string());
+  }
+
+  // The unit beside the table is the one stated, and so is the one at the end of a column's name.
+  void compare_column(const StatedTable& table, const std::string& name, const Json& described,
+                      const std::string& file) {
+    if (misfit_of_column(table, name)) return fail("writes " + file + " with the column " + name + ", unstated");
+    for (const StatedColumn& column : table.columns) {
+      if (column.name != name) continue;
+      const std::string unit = described.value("schema:unitText", "");
+      if (unit != column.unit)
+        fail("writes " + name + " of " + file + " in \"" + unit + "\", it states \"" + column.unit + "\"");
+      if (column.meaning.empty()) fail("says nothing of " + name + " of " + file);
+    }
   }
 
   const PlannedStage& stage_;
