@@ -147,6 +147,33 @@ std::string quick(const std::string& text) {
   return dump(document.to_json());
 }
 
+// `shakebed reference`: a page for every stage, with every option of the schema and every number and column stated.
+TEST(Reference, HasAPageForEveryStage) {
+  ScratchFolder folder;
+  const std::string index = run_shakebed({"reference"}, folder.path()).out;
+  for (const StageRow& row : stage_table()) {
+    EXPECT_NE(index.find("| `" + std::string(row.name) + "` |"), std::string::npos) << row.name;
+    const ProgramResult page = run_shakebed({"reference", std::string(row.name)}, folder.path());
+    ASSERT_EQ(page.exit_code, 0) << row.name << page.err;
+    Json schema;
+    Fields fields = Fields::schema(schema);
+    row.make()->describe(fields);
+    for (const auto& [option, unused] : schema["properties"].items())
+      EXPECT_NE(page.out.find("| `" + option + "` |"), std::string::npos) << row.name << " " << option;
+    ResultList results;
+    row.make()->results(results);
+    for (const StatedResult& one : results.all())
+      EXPECT_NE(page.out.find("| `" + one.pointer + "` |"), std::string::npos) << row.name << one.pointer;
+    for (const StatedTable& table : results.tables())
+      for (const StatedColumn& column : table.columns)
+        EXPECT_NE(page.out.find("| `" + column.name + "` |", page.out.find("### " + table.file)), std::string::npos)
+            << row.name << " " << table.file << " " << column.name;
+  }
+  const ProgramResult mistyped = run_shakebed({"reference", "simulte"}, folder.path());
+  EXPECT_EQ(mistyped.exit_code, 2);
+  EXPECT_NE(mistyped.err.find("did you mean \"simulate\"?"), std::string::npos) << mistyped.err;
+}
+
 TEST(StatedResults, OfTheStarterRecipe) { compare(quick(shipped("starter.json"))); }
 
 TEST(StatedResults, OfABedWithEverythingObserved) {
