@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <openssl/evp.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,7 +21,6 @@
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/json.hpp"
-#include "pipelines/formats/sha256_block.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -107,39 +107,28 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 
 // --- SHA-256
 
-Sha256::Sha256()
-    : state_{0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19} {}
+namespace {
+void require(bool done) {
+  if (!done) throw StageError("SHA-256 cannot be computed: the cryptography library refuses");
+}
+}  // namespace
 
-void Sha256::block(const unsigned char* bytes) { sha256_blocks(state_.data(), bytes, 1); }
+void Sha256::Free::operator()(EVP_MD_CTX* context) const { ::EVP_MD_CTX_free(context); }
+
+Sha256::Sha256() : context_(::EVP_MD_CTX_new()) {
+  require(context_ != nullptr && ::EVP_DigestInit_ex(context_.get(), ::EVP_sha256(), nullptr) == 1);
+}
 
 void Sha256::update(std::string_view bytes) {
-  if (bytes.empty()) return;
-  length_ += bytes.size();
-  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
-  std::size_t left = bytes.size();
-  if (buffered_ > 0) {
-    const std::size_t taken = std::min(left, 64 - buffered_);
-    std::memcpy(buffer_.data() + buffered_, data, taken);
-    buffered_ += taken, data += taken, left -= taken;
-    if (buffered_ < 64) return;
-    block(buffer_.data());
-    buffered_ = 0;
-  }
-  sha256_blocks(state_.data(), data, left / 64);
-  data += left - left % 64, left %= 64;
-  if (left > 0) std::memcpy(buffer_.data(), data, left);
-  buffered_ = left;
+  require(::EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1);
 }
 
 std::string Sha256::hex() {
-  const std::uint64_t bits = length_ * 8;
-  update(std::string_view("\x80", 1));
-  while (buffered_ != 56) update(std::string_view("\0", 1));
-  std::array<char, 8> tail;
-  for (std::size_t i = 0; i < 8; ++i) tail[i] = static_cast<char>(bits >> (56 - 8 * i) & 0xff);
-  update({tail.data(), tail.size()});
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+  unsigned size = 0;
+  require(::EVP_DigestFinal_ex(context_.get(), digest.data(), &size) == 1);
   std::string out;
-  for (const std::uint32_t word : state_) out += fmt::format("{:08x}", word);
+  for (unsigned i = 0; i < size; ++i) out += fmt::format("{:02x}", digest[i]);
   return out;
 }
 

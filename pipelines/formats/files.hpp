@@ -1,12 +1,13 @@
 // Files: written whole or not at all, read with errors that name the place, and fingerprints of their bytes.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+struct evp_md_ctx_st;  // of libcrypto
 
 namespace shakebed::pipelines {
 
@@ -27,11 +28,10 @@ class Sha256 {
   std::string hex();  // ends it
 
  private:
-  void block(const unsigned char* bytes);
-  std::array<std::uint32_t, 8> state_;
-  std::array<unsigned char, 64> buffer_{};
-  std::size_t buffered_ = 0;
-  std::uint64_t length_ = 0;
+  struct Free {
+    void operator()(evp_md_ctx_st* context) const;
+  };
+  std::unique_ptr<evp_md_ctx_st, Free> context_;
 };
 std::string sha256(std::string_view bytes);
 std::string sha256_of_file(const std::filesystem::path& path);

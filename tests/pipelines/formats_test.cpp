@@ -12,7 +12,6 @@
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/profile_csv.hpp"
-#include "pipelines/formats/sha256_block.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "tests/pipelines/program.hpp"
 
@@ -429,23 +428,6 @@ TEST(Bed, DescriptionComesBackTheSame) {
   EXPECT_EQ(dump(back.to_json()), dump(bed.to_json()));
   EXPECT_NEAR(bed.gamma(), 4.0243, 1e-4);
   EXPECT_NEAR(bed.column_number(), 337.0 / 30, 1e-12);
-}
-
-TEST(Sha256, IsTheSameWithAndWithoutTheProcessorsInstructions) {
-  std::mt19937 random(5);
-  std::vector<unsigned char> bytes(64 * 37);
-  for (unsigned char& byte : bytes) byte = static_cast<unsigned char>(random());
-  std::array<std::uint32_t, 8> a{}, b{};
-  for (std::size_t i = 0; i < 8; ++i) a[i] = b[i] = static_cast<std::uint32_t>(random());
-  sha256_blocks(a.data(), bytes.data(), 37);
-  sha256_blocks_portable(b.data(), bytes.data(), 37);
-  EXPECT_EQ(a, b);
-  // Of FIPS 180-4 and of `printf %s ... | sha256sum`.
-  EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  EXPECT_EQ(sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
-            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
-  EXPECT_EQ(sha256(std::string(1'000'000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ const Mistake mistakes[] = {
      "double"},
     {"TrailingComma", "\"plateau_density\": 1.1", "\"plateau_density\": 1.1,", 3, "/stages/1", "comma"},
     {"UnclosedText", "\"name\": \"small\"", "\"name\": \"small", 3, "/name", "line break"},
-    {"Comment", "\"name\": \"small\",", "\"name\": \"small\", // mine\n", 3, "", "double quotes"},
+    {"Comment", "\"name\": \"small\",", "\"name\": \"small\", // mine\n", 3, "", "a comment"},
     {"EmptyFile", "", " \n", 3, "", "empty"},
     {"ArrayAtTheTop", "", "[1, 2]", 3, "", "an object"},
     {"NotUtf8", "\"name\": \"small\"", "\"name\": \"sm\xff\xfe\"", 3, "/name", "UTF-8"},

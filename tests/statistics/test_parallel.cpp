@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "statistics/parallel.hpp"
+
+namespace shakebed {
+namespace {
+
+TEST(ForEachIndex, CallsEveryIndexOnce) {
+  for (const int threads : {0, 1, 2, 7}) {
+    std::vector<std::atomic<int>> calls(100);
+    for_each_index(calls.size(), threads, [&](std::size_t i) { ++calls[i]; });
+    for (const auto& count : calls) EXPECT_EQ(count, 1) << threads;
+  }
+  for_each_index(0, 4, [](std::size_t) { FAIL(); });
+}
+
+TEST(ForEachIndex, OneThreadGoesInOrder) {
+  std::vector<std::size_t> order;
+  for_each_index(5, 1, [&](std::size_t i) { order.push_back(i); });
+  EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 2, 3, 4}));
+}
+
+TEST(ForEachIndex, ThrowsTheFirstFailureAndBeginsNothingAfterIt) {
+  std::atomic<int> begun{0};
+  const auto work = [&](std::size_t i) {
+    ++begun;
+    if (i >= 2) throw std::runtime_error(std::to_string(i));
+  };
+  try {
+    for_each_index(1000, 1, work);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "2");
+  }
+  EXPECT_EQ(begun, 3);
+  begun = 0;
+  // Each of four threads fails at the latest with its third call.
+  EXPECT_THROW(for_each_index(1000, 4, work), std::runtime_error);
+  EXPECT_LE(begun, 2 + 4);
+}
+
+}  // namespace
+}  // namespace shakebed
