@@ -10,12 +10,15 @@
 namespace shakebed::ingest {
 
 // What the residuals of all beads have in common beyond the radial profile: the asymmetry of `current` with that added;
-// none when `current` has none and there is no more than noise (contrast units) and small flaws of the model would
-// give. Only every `row_step`-th row of pixels is used.
+// none when `current` has none and there is no more than noise and small flaws of the model would give.
+struct AsymmetryFit {
+  double radius_px = 0;
+  double noise = 0;  // contrast units
+  int row_step = 1;  // only every so many rows of pixels are used
+};
 std::shared_ptr<const BeadAsymmetry> learn_asymmetry(const std::vector<const JointFit*>& fits,
                                                      const std::vector<const std::vector<ModelDisk>*>& disks,
-                                                     const BeadProfile& current, double radius_px, double noise,
-                                                     int row_step);
+                                                     const BeadProfile& current, const AsymmetryFit& how);
 
 // The same bead seen from a point (by_x, by_y) px beside its centre. `profile` has an asymmetry.
 BeadProfile recentred(const BeadProfile& profile, double by_x, double by_y);
@@ -43,27 +46,40 @@ BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px);
 
 // Least squares of p(r), a cubic spline with knots `knot_px` apart that vanishes from `reach_px` on, over all pixels
 // within reach of any bead of any frame, overlaps taken into account. `fits` hold the residuals with `current` as the
-// model of `disks`. With `fourth_harmonic` also p4(r) around the rim. Only every `row_step`-th row of pixels is used.
+// model of `disks`.
+struct ProfileFit {
+  double reach_px = 0, knot_px = 0, radius_px = 0;
+  bool fourth_harmonic = false;  // learn p4(r) around the rim as well
+  int row_step = 1;              // only every so many rows of pixels are used
+};
 BeadProfile learn_profile(const std::vector<const JointFit*>& fits,
                           const std::vector<const std::vector<ModelDisk>*>& disks, const BeadProfile& current,
-                          double reach_px, double knot_px, double radius_px, bool fourth_harmonic, int row_step);
+                          const ProfileFit& how);
 
 // Radius and edge of a learned profile, started from a guess. Shading is fitted along with them: a sum of a flat disk,
 // a sphere's sqrt(1 - rho^2) and a parabola.
 RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_guess_px);
 
-// The same once more, with care: the profile's own errors are known from the `noise` of a pixel (contrast units), the
-// number of beads it was learned from and its knots, several shadings are tried (flat; sphere, parabola, cone, quartic
-// and pairs of them), each as recorded and in light if levels were encoded for display (see below), and the radius is
-// the mean of what explains the profile equally well, its error their scatter and each one's own. `linear_only`: as
-// recorded.
+// What is known of a profile whose rim is looked for.
+struct RimConditions {
+  double radius_px = 0, edge_px = 0;            // first values
+  double knot_px = 0;                           // distance of the profile's knots
+  double noise = 0;                             // of a pixel, contrast units
+  double beads = 0;                             // number it was learned from
+  double background_level = 0, bead_level = 0;  // grey levels
+  double from_px = 0;                           // the profile is known from here outwards
+  bool linear_only = false;                     // levels grow as light does: do not try an encoded camera
+};
+
+// The same as fit_rim, with care: the profile's own errors follow from the noise of a pixel, the number of beads and
+// the knots, several shadings are tried (flat; sphere, parabola, cone, quartic and pairs of them), each as recorded and
+// in light if levels were encoded for display (see below), and the radius is the mean of what explains the profile
+// equally well, its error their scatter and each one's own.
 struct RimChoice {
   RimFit rim;
   double exponent = 1;  // of the likeliest; radius and error go over both
 };
-RimChoice choose_rim(const BeadProfile& profile, double radius_px, double edge_px, double knot_px, double noise,
-                     double beads, double background_level, double bead_level, double from_px = 0,
-                     bool linear_only = false);
+RimChoice choose_rim(const BeadProfile& profile, const RimConditions& conditions);
 
 // What a camera that encodes for display makes of light: recorded level = light^0.45.
 constexpr double display_exponent = 0.45;

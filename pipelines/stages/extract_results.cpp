@@ -92,48 +92,44 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
   list.table({"profile_phase_*.csv", "density profile at a phase of the floor", profile_columns(),
               given_when("the phase of the frames is known")});
   list.table({"covariance.csv", "covariance of the densities of profile.csv", covariance_columns()});
-  const StatedColumn frame{"frame", "1", "number of the frame"}, x{"x_px", "px", "column of the centre"},
-      y{"y_px", "px", "row of the centre"};
-  list.table({"disks.csv",
-              "the disks found",
-              {frame,
-               x,
-               y,
-               {"radius_px", "px", "radius"},
-               {"x", "D", "distance from the left wall"},
-               {"z", "D", "height above the floor's mean position"},
-               {"quality", "1", "1 for a bead like all the others"}}});
-  list.table({"disk_details.csv",
-              "more about the disks found",
-              {frame,
-               x,
-               y,
-               {"std_error_x_px", "px", "standard error of the column"},
-               {"std_error_y_px", "px", "standard error of the row"},
-               {"correlation", "1", "correlation of the two"},
-               {"contrast", "1", "contrast of the bead over that of all"},
-               {"cut", "1", "1 at the frame's edge"},
-               {"half_hidden", "1", "1 when partly covered"},
-               {"species", "1", "1 or 2"}}});
+  const std::vector<StatedColumn> place{{"frame", "1", "number of the frame, from 0"},
+                                        {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
+                                        {"y_px", "px", "centre, from the centre of the top-left pixel downwards"}};
+  std::vector<StatedColumn> disks = place, details = place;
+  disks.insert(disks.end(), {{"radius_px", "px", "radius"},
+                             {"x", "D", "centre, from the left wall"},
+                             {"z", "D", "height of the centre above the floor's mean position"},
+                             {"quality", "1", "1 is a bead that looks like all the others, 0 is none"}});
+  details.insert(details.end(), {{"std_error_x_px", "px", "standard error of x_px"},
+                                 {"std_error_y_px", "px", "standard error of y_px"},
+                                 {"correlation", "1", "correlation of the two errors"},
+                                 {"contrast", "1", "contrast relative to that of the mean bead"},
+                                 {"cut", "1", "1 where the border of the frame cuts the bead"},
+                                 {"half_hidden", "1", "1 where something covers part of the bead"},
+                                 {"species", "1", "1: the first diameter, 2: the second"}});
+  list.table({"disks.csv", "disks found in each frame", disks});
+  list.table({"disk_details.csv", "errors and marks of the disks found, row by row as in disks.csv", details});
   list.table({"frames.csv",
-              "the frames read",
-              {frame,
+              "what was found in each frame",
+              {{"frame", "1", "number of the frame, from 0"},
                {"image", "", "file that holds the frame"},
-               {"page", "1", "page of the file"},
-               {"status", "", "whether it was used"},
+               {"page", "1", "page of the file or frame of the film, from 0"},
+               {"status", "", "good, nothing_found, unreadable or size_changed"},
                {"disks", "1", "disks found"},
-               {"second", "1", "disks of the second species"},
-               {"rejected", "1", "places rejected"},
+               {"second", "1", "disks of the second diameter among them"},
+               {"rejected", "1", "places that were looked at and rejected"},
                {"residual_level_grey_levels", "grey levels", "rms difference of the frame and its model"},
-               {"contrast_gain", "1", "light of the frame over that of the first"}}});
+               {"contrast_gain", "1", "contrast relative to that of all frames"}}});
   list.table({"quality.csv",
-              "number of disks by quality",
-              {{"from", "1", "lower bound"}, {"to", "1", "upper bound"}, {"disks", "1", "disks"}}});
+              "number of disks by quality; 1 is a bead that looks like all the others",
+              {{"from", "1", "lowest quality of the class"},
+               {"to", "1", "highest quality of the class"},
+               {"disks", "1", "disks in all frames"}}});
   list.table({"bead.csv",
-              "the bead as learned from the frames",
+              "the bead as learned from the frames, by distance from its centre",
               {{"radius_px", "px", "distance from the centre"},
-               {"contrast", "1", "level: 1 inside, 0 outside"},
-               {"fourth_harmonic", "1", "fourth harmonic of the rim"}}});
+               {"contrast", "1", "1 inside a flat bead, 0 far outside"},
+               {"fourth_harmonic", "1", "amplitude of the dependence on direction with four-fold symmetry"}}});
 }
 
 }  // namespace

@@ -44,11 +44,11 @@ class Render : public Stage {
     list.quantity("/scale", "m/px", "length of a pixel");
     list.quantity("/radius", "px", "radius of a bead");
     list.table({"truth.csv",
-                "true centres of the disks",
-                {{"frame", "1", "number of the frame"},
-                 {"disk", "1", "number of the disk"},
-                 {"x_px", "px", "column of the centre"},
-                 {"y_px", "px", "row of the centre"},
+                "true centres at the middle of the exposure",
+                {{"frame", "1", "number of the frame, from 0"},
+                 {"disk", "1", "number of the disk, from 0"},
+                 {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
+                 {"y_px", "px", "centre, from the centre of the top-left pixel downwards"},
                  {"radius_px", "px", "radius"}}});
   }
   void run(RunContext& context) const override { images_module().render(options_, context); }

@@ -65,7 +65,7 @@ TEST_P(Shadings, RadiusIsToldWithinItsErrorAndHundredthsOfAPixel) {
       const double error = errors[cell] + (place - static_cast<double>(cell)) * (errors[cell + 1] - errors[cell]);
       profile.level[k] += static_cast<float>(error * noise / std::sqrt(beads * 2 * 3.14159265 * r * knot));
     }
-    const RimChoice choice = choose_rim(profile, radius + 0.08, edge + 0.1, knot, noise, beads, 200, 60);
+    const RimChoice choice = choose_rim(profile, {radius + 0.08, edge + 0.1, knot, noise, beads, 200, 60});
     ASSERT_TRUE(choice.rim.good) << GetParam().name;
     EXPECT_EQ(choice.exponent, 1);
     EXPECT_NEAR(choice.rim.radius_px, radius, 0.02);
@@ -89,7 +89,7 @@ TEST(Rim, AToneCurveIsSeenAndUndone) {
   const double background = encoded(200), bead = encoded(60);
   for (float& level : profile.level)
     level = static_cast<float>((encoded(200 - 140 * static_cast<double>(level)) - background) / (bead - background));
-  const RimChoice choice = choose_rim(profile, radius, edge, knot, noise, beads, background, bead);
+  const RimChoice choice = choose_rim(profile, {radius, edge, knot, noise, beads, background, bead});
   EXPECT_TRUE(choice.rim.good);
   EXPECT_EQ(choice.exponent, 0.45);
   EXPECT_NEAR(choice.rim.radius_px, radius, 0.01);

@@ -1,0 +1,36 @@
+#pragma once
+// Places of a flattened frame where a bead may be, and the noise that decides how they are searched for.
+
+#include <vector>
+
+#include "ingest/find/disk_map.hpp"
+#include "ingest/find/joint_fit.hpp"
+
+namespace shakebed::ingest {
+
+// Two beads of one film are never seen nearer than this share of a diameter (beads a little in front of one another).
+constexpr double least_separation = 0.72;
+
+// Beyond this edge width, in radii, touching beads run into one another so much that the ideal disk's map no longer
+// separates them from the voids between them; the learned profile's does.
+constexpr double strong_blur = 0.14;
+
+// Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.
+double noise_of(const GrayFrame& flat);
+
+// Typical size of the residual, robust against what is no bead at all.
+double residual_spread(const JointFit& fit);
+
+// Places in the map of an ideal disk with at least this score, outside the unseen parts of the frame.
+std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double noise, double score);
+
+// A bead whose profile is known.
+struct KnownBead {
+  const BeadProfile& profile;
+  double radius_px = 0, edge_px = 0;
+};
+
+// The same once the bead's profile is known.
+std::vector<DiskCandidate> candidates_by(const KnownBead& bead, const GrayFrame& flat, double noise, double score);
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,139 @@
+#include "ingest/profile/bed_geometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "ingest/profile/floor.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Of the diameter: a scale given may differ by this from what the frames show without a warning.
+constexpr double fair_scale = 0.02;
+// D: beads that reach farther beyond the frame's side are cut, so the bed goes on there.
+constexpr double clearly_cut = 0.02;
+
+class GeometryFinder {
+ public:
+  GeometryFinder(const FilmCalibration& film, std::vector<FrameFindings>& frames, FinderCalibration& refined,
+                 BedCalibration& bed)
+      : film_(film), options_(film.options), frames_(frames), refined_(refined), bed_(bed) {}
+
+  std::vector<std::string> find() {
+    refine_radius();
+    set_scale();
+    set_floor();
+    set_walls();
+    return std::move(warnings_);
+  }
+
+ private:
+  void refine_radius() {
+    RadiusFromFrames radius;
+    for (const FrameFindings& frame : frames_) radius.add(frame.rim);
+    radius.refine(refined_);
+    for (FrameFindings& frame : frames_)
+      for (FoundDisk& disk : frame.disks) disk.radius_px = refined_.radius_px;
+  }
+
+  void set_scale() {
+    const FinderCalibration& finder = film_.finder;
+    bed_.radius_px = refined_.radius_px;
+    bed_.radius_std_error_px = refined_.radius_std_error_px;
+    bed_.edge_width_px = finder.edge_width_px;
+    bed_.noise_level = finder.noise_level;
+    bed_.contrast_level = finder.contrast_level;
+    bed_.polarity = finder.polarity;
+    bed_.scale_given = options_.scale_m_per_px.has_value();
+    bed_.scale_m_per_px =
+        bed_.scale_given ? *options_.scale_m_per_px : options_.bead_diameter_m / (2 * refined_.radius_px);
+    bed_.scale_relative_std_error = bed_.scale_given ? 0 : refined_.radius_std_error_px / refined_.radius_px;
+    diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
+    if (bed_.scale_given && std::abs(2 * refined_.radius_px / diameter_px_ - 1) > fair_scale)
+      warnings_.push_back("The scale given makes a bead " + std::to_string(diameter_px_) +
+                          " px wide, but the frames show " + std::to_string(2 * refined_.radius_px) + " px.");
+  }
+
+  void set_floor() {
+    bed_.floor_given = options_.floor_px.has_value();
+    if (bed_.floor_given) {
+      bed_.floor_px = *options_.floor_px;
+      bed_.floor_slope = options_.floor_slope.value_or(0.0);
+      return;
+    }
+    const Line floor = find_floor(frames_, diameter_px_, film_.finder.width);
+    bed_.floor_px = floor.offset;
+    bed_.floor_slope = options_.floor_slope.value_or(floor.slope);
+    if (!options_.floor_slope)
+      bed_.floor_tilt_std_error_degrees = floor.slope_std_error * 180 / std::numbers::pi;
+    else  // keep the line through the middle of the frame
+      bed_.floor_px = floor.offset + (floor.slope - bed_.floor_slope) * 0.5 * film_.finder.width;
+  }
+
+  void set_walls() {
+    bed_.walls_given = options_.left_wall_px && options_.right_wall_px;
+    std::vector<double> leftmost, rightmost;
+    for (const FrameFindings& frame : frames_) {
+      double low = 1e9, high = -1e9;
+      for (const FoundDisk& disk : frame.disks) {
+        low = std::min(low, disk.x_px - refined_.radius_px);
+        high = std::max(high, disk.x_px + refined_.radius_px);
+      }
+      if (frame.disks.empty()) continue;
+      leftmost.push_back(low);
+      rightmost.push_back(high);
+    }
+    const FrameSides frame = sides_of(film_);
+    bed_.left_wall_px = options_.left_wall_px ? *options_.left_wall_px : left_wall(leftmost, frame.left);
+    bed_.right_wall_px = options_.right_wall_px ? *options_.right_wall_px : right_wall(rightmost, frame.right);
+    bed_.width = (bed_.right_wall_px - bed_.left_wall_px) / diameter_px_;
+    if (!(bed_.width > 0)) {
+      bed_.left_wall_px = frame.left;
+      bed_.right_wall_px = frame.right;
+      bed_.width = (frame.right - frame.left) / diameter_px_;
+      warnings_.emplace_back("The side walls could not be determined from the disks: the whole frame's width is used.");
+    }
+    if (bed_.walls_are_frame_sides)
+      warnings_.emplace_back("The bed goes on beyond the frame: the profile is that of the part in view.");
+  }
+
+  // Where beads go on beyond the frame, only centres a radius inside are counted, so that each of them is seen whole.
+  double left_wall(const std::vector<double>& seen, double frame_side) {
+    const double extreme = quantile(seen, 0.1);
+    if (!(extreme < frame_side - clearly_cut * diameter_px_)) return extreme;
+    bed_.walls_are_frame_sides = true;
+    return frame_side + refined_.radius_px;
+  }
+  double right_wall(const std::vector<double>& seen, double frame_side) {
+    const double extreme = quantile(seen, 0.9);
+    if (!(extreme > frame_side + clearly_cut * diameter_px_)) return extreme;
+    bed_.walls_are_frame_sides = true;
+    return frame_side - refined_.radius_px;
+  }
+
+  const FilmCalibration& film_;
+  const MeasureOptions& options_;
+  std::vector<FrameFindings>& frames_;
+  FinderCalibration& refined_;
+  BedCalibration& bed_;
+  double diameter_px_ = 0;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+FrameSides sides_of(const FilmCalibration& film) {
+  if (!film.options.find.roi) return {-0.5, film.finder.width - 0.5};
+  const PixelRectangle& roi = *film.options.find.roi;
+  return {roi.left - 0.5, roi.left + roi.width - 0.5};
+}
+
+std::vector<std::string> find_geometry(const FilmCalibration& film, std::vector<FrameFindings>& frames,
+                                       FinderCalibration& refined, BedCalibration& bed) {
+  return GeometryFinder(film, frames, refined, bed).find();
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,291 @@
+#include "ingest/profile/film_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "ingest/find/learn_beads.hpp"
+
+namespace shakebed::ingest {
+
+GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder) {
+  GrayFrame left = residual_frame(frame, found, finder);
+  const LightField& light = finder.light;
+  const float background =
+      light.background[static_cast<std::size_t>(light.rows / 2) * static_cast<std::size_t>(light.columns) +
+                       static_cast<std::size_t>(light.columns / 2)];
+  for (float& level : left.pixels) level += background;
+  return left;
+}
+
+namespace {
+
+// One full frame is enough to learn the bead from, sparse ones are taken together; so many are tried.
+constexpr std::size_t enough_disks = 150, most_tried = 40;
+constexpr int lens_rounds = 5;
+// Of aspect and radial term: below a few thousandths it may as well be streaks or shading, and does no harm; once in
+// use, smaller corrections are followed; no lens bends more than the last.
+constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25;
+// Of aspect and radial term: a smaller correction needs no new search for the beads.
+constexpr double small_correction = 0.01;
+// Of the expected radius: what is found is the second species when it is nearer than this, by faces and by rims.
+constexpr double nearly_by_faces = 0.08, nearly_by_rims = 0.1;
+
+std::vector<const GrayFrame*> pointers_to(const std::vector<GrayFrame>& frames) {
+  std::vector<const GrayFrame*> pointers;
+  for (const GrayFrame& frame : frames) pointers.push_back(&frame);
+  return pointers;
+}
+
+// Beads of the second diameter by their rims, if they are seen.
+std::optional<FinderCalibration> learn_second_by_rims(const GrayFrame& frame, const FinderCalibration& first,
+                                                      const MeasureOptions& options) {
+  FindOptions find = options.find;
+  const double expected = first.radius_px * *options.second_diameter_m / options.bead_diameter_m;
+  find.seen = BeadsSeen{first.polarity, expected};
+  find.radius_px.reset();
+  constexpr double nearly = 0.1;
+  CalibrationResult result = learn_by_rims(frame, *find.seen);
+  if (!result.found || std::abs(result.calibration.radius_px / expected - 1) > nearly) return std::nullopt;
+  return std::move(result.calibration);
+}
+
+class FilmLearner {
+ public:
+  FilmLearner(FrameSource& source, const MeasureOptions& asked)
+      : source_(source), find_(asked.find), lens_{asked.pixel_aspect.value_or(1.0), asked.lens_radial.value_or(0.0)} {
+    film_.options = asked;
+    if (asked.scale_m_per_px && !find_.radius_px)  // a good first value; refined all the same
+      find_.radius_px = 0.5 * asked.bead_diameter_m / *asked.scale_m_per_px;
+  }
+
+  FilmCalibration learn() {
+    learn_from_first_frames();
+    learn_lens();
+    tell_radius(calibrated_);
+    if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
+    calibrated_.beads.reset();
+    if (film_.options.second_diameter_m) learn_second();
+    film_.lens = lens_;
+    if (!lens_.plain()) use_lens();
+    film_.finder = std::move(calibrated_.calibration);
+    return std::move(film_);
+  }
+
+ private:
+  [[nodiscard]] GrayFrame straightened(const GrayFrame& frame) const {
+    return lens_.plain() ? frame : LensMap(lens_, frame.width, frame.height).corrected(frame);
+  }
+
+  void straighten_all() {
+    straight_.clear();
+    for (const GrayFrame& frame : recorded_) straight_.push_back(straightened(frame));
+  }
+
+  // The bead from the first frames that show any.
+  void learn_from_first_frames() {
+    std::string first_reason, first_error;
+    std::size_t read = 0;
+    source_.rewind();
+    for (std::size_t tried = 0; tried < most_tried; ++tried) {
+      auto item = source_.next_item();
+      if (!item) break;
+      GrayFrame frame;
+      try {
+        frame = item->decode();
+      } catch (const InputError& error) {
+        if (first_error.empty()) first_error = error.what();
+        continue;
+      }
+      ++read;
+      if (!learns_from(std::move(frame), first_reason)) continue;
+      if (calibrated_.calibration.disks_used >= enough_disks || straight_.size() >= film_.options.calibration_frames)
+        break;
+    }
+    if (!calibrated_.found) refuse(read, first_reason, first_error);
+    film_.recorded_width = recorded_.front().width;
+    film_.recorded_height = recorded_.front().height;
+    std::erase_if(recorded_, [&](const GrayFrame& frame) {
+      return frame.width != film_.recorded_width || frame.height != film_.recorded_height;
+    });
+  }
+
+  // With the frames before it once beads are known. Whether it shows beads.
+  bool learns_from(GrayFrame frame, std::string& first_reason) {
+    straight_.push_back(straightened(frame));
+    recorded_.push_back(std::move(frame));
+    CalibrationResult attempt = learn_beads(
+        calibrated_.found ? pointers_to(straight_) : std::vector<const GrayFrame*>{&straight_.back()}, find_);
+    if (!attempt.found) {
+      if (first_reason.empty()) first_reason = attempt.why_not;
+      straight_.pop_back();
+      recorded_.pop_back();
+      return false;
+    }
+    calibrated_ = std::move(attempt);
+    return true;
+  }
+
+  [[noreturn]] static void refuse(std::size_t read, const std::string& reason, const std::string& error) {
+    if (read == 0)
+      throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
+                       "check the files");
+    throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
+                     "check that the beads are in view, or give their radius and polarity");
+  }
+
+  // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
+  void learn_lens() {
+    // Rims alone are too coarse for it, and where other things pass for beads, a lens would fit those.
+    if (calibrated_.calibration.by_rims || calibrated_.calibration.rims_to_be_checked) return;
+    if (film_.options.pixel_aspect && film_.options.lens_radial) return;
+    for (int round = 0; round < lens_rounds; ++round) {
+      const std::optional<Lens> better = better_lens();
+      if (!better) return;
+      const Lens before = lens_;
+      lens_ = *better;
+      straighten_all();
+      const bool little = std::abs(lens_.pixel_aspect / before.pixel_aspect - 1) < small_correction &&
+                          std::abs(lens_.radial - before.radial) < small_correction;
+      if (!learn_through_lens(little)) {
+        lens_ = before;
+        return;
+      }
+      // What a small correction leaves is its square and a share of its own: less than what would be worth it.
+      if (little) return;
+    }
+  }
+
+  // None when what rims still show is not worth a correction.
+  std::optional<Lens> better_lens() {
+    straighten_all();
+    std::vector<FindResult> found;
+    for (const GrayFrame& frame : straight_) found.push_back(find_disks(frame, calibrated_.calibration, find_));
+    const LensEstimate left = estimate_lens(pointers_to(straight_), found, calibrated_.calibration);
+    const MeasureOptions& options = film_.options;
+    film_.aspect_std_error = options.pixel_aspect ? 0 : left.aspect_std_error;
+    film_.lens_radial_std_error = options.lens_radial ? 0 : left.radial_std_error;
+    if (!left.known) return std::nullopt;
+    const auto clear = [&](double value, double std_error, bool in_use) {
+      return std::abs(value) > std::max(in_use ? settled : worth_it, 5 * std_error);
+    };
+    Lens better = lens_;
+    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error, lens_.pixel_aspect != 1))
+      better.pixel_aspect = std::clamp(lens_.pixel_aspect * left.lens.pixel_aspect, 1 - most_bend, 1 + most_bend);
+    if (!options.lens_radial && clear(left.lens.radial, left.radial_std_error, lens_.radial != 0))
+      better.radial = std::clamp(lens_.radial + left.lens.radial, -most_bend, most_bend);
+    if (better.pixel_aspect == lens_.pixel_aspect && better.radial == lens_.radial) return std::nullopt;
+    return better;
+  }
+
+  bool learn_through_lens(bool little) {
+    const FinderCalibration& before = calibrated_.calibration;
+    const std::vector<const GrayFrame*> pointers = pointers_to(straight_);
+    CalibrationResult again = little ? learn_again(pointers, find_, before) : learn_beads(pointers, find_);
+    if (!again.found || again.calibration.by_rims) return false;
+    if (little) {
+      again.calibration.rims = before.rims;
+      again.calibration.rims_to_be_checked = before.rims_to_be_checked;
+    }
+    calibrated_ = std::move(again);
+    return true;
+  }
+
+  void learn_second() {
+    const FinderCalibration& first = calibrated_.calibration;
+    if (find_.seen) {
+      film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
+      if (!film_.second)
+        film_.warnings.push_back("No beads of the second diameter were found: no rims of that radius are seen.");
+      return;
+    }
+    const double expected = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
+    std::vector<GrayFrame> painted;
+    for (const GrayFrame& frame : recorded_) {
+      const GrayFrame straight = straightened(frame);
+      painted.push_back(without_disks(straight, find_disks(straight, first, find_), first));
+    }
+    CalibrationResult result = learn_in_painted(painted, expected);
+    if (is_second(result, expected))
+      film_.second = std::move(result.calibration);
+    else
+      film_.warnings.push_back("No beads of the second diameter were found: " +
+                               (result.found
+                                    ? "what there is has a radius of " + std::to_string(result.calibration.radius_px) +
+                                          " px instead of " + std::to_string(expected) + " px."
+                                    : result.why_not + "."));
+  }
+
+  static bool is_second(const CalibrationResult& one, double expected) {
+    return one.found && std::abs(one.calibration.radius_px / expected - 1) < nearly_by_faces;
+  }
+
+  // Several small disks can stand in for a large one: what is found with nothing asked for must not do better.
+  [[nodiscard]] CalibrationResult learn_in_painted(const std::vector<GrayFrame>& painted, double expected) const {
+    FindOptions find = find_;
+    find.polarity = Polarity::automatic;
+    find.radius_px = expected;
+    const std::vector<const GrayFrame*> pointers = pointers_to(painted);
+    CalibrationResult result = calibrate_finder(pointers, find);
+    if (!is_second(result, expected)) return result;
+    find.radius_px.reset();
+    const auto left_by = [&](const FinderCalibration& calibration) {
+      double square = 0;
+      for (const GrayFrame& frame : painted)
+        for (const float level : residual_frame(frame, find_disks(frame, calibration, find), calibration).pixels)
+          square += static_cast<double>(level * level);
+      return square;
+    };
+    CalibrationResult free = calibrate_finder(pointers, find);
+    if (free.found && !is_second(free, expected) && left_by(free.calibration) < left_by(result.calibration))
+      return free;
+    return result;
+  }
+
+  // Places asked for become those of the true frame.
+  void use_lens() {
+    MeasureOptions& options = film_.options;
+    if (!(options.pixel_aspect && options.lens_radial)) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "Beads are no circles of one size in these frames: pixels are taken to be %.4f times as wide as "
+                    "high, and the lens to bend by %+.4f at the corners.",
+                    lens_.pixel_aspect, lens_.radial);
+      film_.warnings.emplace_back(text);
+    }
+    const LensMap map(lens_, film_.recorded_width, film_.recorded_height);
+    const auto place_of = [&](double x, double y) { return map.to_true({x, y}); };
+    if (options.floor_px) {
+      const double slope = options.floor_slope.value_or(0.0), right = film_.recorded_width - 1;
+      const PixelPlace a = place_of(0, *options.floor_px), b = place_of(right, *options.floor_px + slope * right);
+      options.floor_slope = (b.y - a.y) / (b.x - a.x);
+      options.floor_px = a.y - *options.floor_slope * a.x;
+    }
+    const double half_way = 0.5 * (film_.recorded_height - 1);
+    if (options.left_wall_px) options.left_wall_px = place_of(*options.left_wall_px, half_way).x;
+    if (options.right_wall_px) options.right_wall_px = place_of(*options.right_wall_px, half_way).x;
+    if (options.find.roi) {
+      const PixelRectangle& roi = *options.find.roi;
+      const PixelPlace a = place_of(roi.left, roi.top), b = place_of(roi.left + roi.width, roi.top + roi.height);
+      options.find.roi =
+          PixelRectangle{static_cast<int>(std::lround(a.x)), static_cast<int>(std::lround(a.y)),
+                         static_cast<int>(std::lround(b.x - a.x)), static_cast<int>(std::lround(b.y - a.y))};
+    }
+  }
+
+  FrameSource& source_;
+  FindOptions find_;
+  Lens lens_;
+  FilmCalibration film_;
+  std::vector<GrayFrame> recorded_, straight_;  // frames learned from, as recorded and true
+  CalibrationResult calibrated_;
+};
+
+}  // namespace
+
+FilmCalibration calibrate_film(FrameSource& source, const MeasureOptions& options) {
+  return FilmLearner(source, options).learn();
+}
+
+}  // namespace shakebed::ingest

@@ -1,0 +1,29 @@
+#pragma once
+// What a film's first frames show: the beads, pixels and lens, a second species.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/profile/lens.hpp"
+#include "ingest/profile/measure_bed.hpp"
+
+namespace shakebed::ingest {
+
+struct FilmCalibration {
+  MeasureOptions options;  // as asked for, but places are those of the true frame (see lens.hpp)
+  FinderCalibration finder;
+  std::optional<FinderCalibration> second;
+  Lens lens;
+  double aspect_std_error = 0, lens_radial_std_error = 0;  // of what was found
+  int recorded_width = 0, recorded_height = 0;
+  std::vector<std::string> warnings;
+};
+
+// Reads the first frames. Throws InputError when none can be read or none shows a disk.
+FilmCalibration calibrate_film(FrameSource& source, const MeasureOptions& options);
+
+// The frame with the disks found painted over by the background behind them.
+GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder);
+
+}  // namespace shakebed::ingest

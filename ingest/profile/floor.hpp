@@ -1,0 +1,47 @@
+#pragma once
+// Where the floor is, from the disks: a straight line through the bottoms of the lowest, and its motion in a film.
+
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "ingest/profile/frame_findings.hpp"
+#include "ingest/profile/shaking_frequency.hpp"
+
+namespace shakebed::ingest {
+
+double quantile(std::vector<double> values, double fraction);
+
+// A straight line y = offset + slope x.
+struct Line {
+  double offset = 0, slope = 0;
+  double slope_std_error = 0;
+  std::pair<double, double> middle;  // of the points
+};
+
+// The floor: per column of the frame, the lowest bottom seen in nearly all frames.
+Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, int width);
+
+// The lowest bottom in each column of a frame, a tilt taken out; columns without a bead are left out.
+struct LowestBottoms {
+  std::size_t frame = 0;
+  std::vector<double> y;
+};
+LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double diameter_px, int width);
+
+// Where the bed's bottom is in a frame: what lies lowest follows the floor, or at least its period.
+std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms);
+
+// The floor's motion, y = middle - amplitude sin(2 pi (turns + phase)), from what no bead ever passes.
+struct FloorMotion {
+  bool known = false;
+  double middle = 0, amplitude = 0, phase = 0;
+  std::size_t touching = 0;  // beads
+};
+
+// A bottom counts in full while it is below the floor or no more than a tolerance above; the tolerance shrinks, so that
+// what is left in the end are the beads that touch. Known only if such beads are seen all around the period.
+FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double diameter_px, double turns_per_frame);
+
+}  // namespace shakebed::ingest

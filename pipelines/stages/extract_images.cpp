@@ -1,0 +1,335 @@
+#include "pipelines/stages/extract_images.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <set>
+
+#include "ingest/profile/measure_bed.hpp"
+#include "ingest/profile/overlay.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/stages/disks_on_the_way.hpp"
+#include "pipelines/stages/extract_files.hpp"
+#include "pipelines/stages/preview.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+constexpr std::size_t most_bad_frames_named = 5;
+
+// Says what the first frame shows instead of beads.
+[[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look) {
+  const ingest::Survey& survey = look.survey;
+  const std::string diameter = fmt::format("{:g} mm", 1e3 * options.diameter);
+  write_preview(context.scratch(), look, options.images.texts, diameter);
+  std::string message =
+      fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (context.scratch() / "preview.html").string());
+  message += survey.candidates.empty()
+                 ? ". If there are beads, give their radius in pixels (--radius) and a region (--roi)"
+                 : ". If the beads are those of one of its pictures, crop to them with --roi, or try";
+  for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
+    message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
+  const bool any = std::any_of(survey.candidates.begin(), survey.candidates.end(),
+                               [](const ingest::SurveyCandidate& one) { return !one.disks.empty(); });
+  if (any) throw StageError(message);
+  throw InputError(message);
+}
+
+// The most credible beads; where their number is given, of what may be beads, the kind that is as numerous.
+const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options) {
+  const ingest::SurveyCandidate* chosen = &survey.candidates.front();
+  if (options.bead_number) {  // of what may be beads, the kind that is as numerous as told
+    const auto off = [&](const ingest::SurveyCandidate& one) {
+      return std::abs(std::log(static_cast<double>(std::max<std::size_t>(1, one.disks.size())) /
+                               static_cast<double>(*options.bead_number)));
+    };
+    constexpr double clearly = 0.1;
+    for (const ingest::SurveyCandidate& other : survey.candidates)
+      if (other.credible && off(other) + clearly < off(*chosen)) chosen = &other;
+  }
+  return *chosen;
+}
+
+// The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none.
+void use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
+                    ingest::MeasureOptions& measure) {
+  context.progress(0, "looking for beads");
+  const std::optional<FirstLook> look = look_at_first(film.paths, options);
+  if (!look) return;  // measure_bed() says which files cannot be read
+  if (!look->survey.found) refuse(options, context, *look);
+  const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
+  ingest::FrameSourceOptions& source = film.source;
+  source.channel = chosen->channel;
+  measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};
+  // Large beads need not be seen by every pixel: a radius of 12 to 24 px is enough.
+  constexpr double enough_px = 12, large_frame = 2e6;
+  if (static_cast<double>(look->width) * look->height > large_frame)
+    source.reduction = measure.reduction = std::max(1, static_cast<int>(chosen->rims.radius_px / enough_px));
+  context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
+                          options_for(*chosen), chosen->disks.size()));
+}
+
+// Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
+void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found,
+                 const DisksOnTheWay& on_the_way) {
+  constexpr double most_wrong = 0.2, worth_a_word = 0.02, far_off = 0.2;
+  const double wrong = on_the_way.expected_wrong_share();
+  if (wrong > most_wrong)
+    throw StageError(
+        fmt::format("{:.0f} % of the {} disks found may be wrong: too many to measure anything. Look at "
+                    "fit-images --preview, and give --radius, --polarity, --channel or --roi",
+                    100 * wrong, found.disk_total));
+  if (wrong > worth_a_word)
+    context.warning(
+        fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
+                    "numbers.",
+                    100 * wrong));
+  if (!options.bead_number) return;
+  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
+  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
+                                       found.disk_count_mean, *options.bead_number);
+  if (std::abs(ratio - 1) > far_off)
+    throw StageError(text +
+                     ": something else was found. Look at fit-images --preview, and give --radius, --polarity, "
+                     "--channel or --roi; or correct --bead-number");
+  if (std::abs(ratio - 1) > 1e-3)
+    context.warning(text + (ratio < 1 ? ": some are missed or out of view (count.svg, overlays)."
+                                      : ": something else passes for a bead (overlays), or there are more."));
+}
+
+// What the options ask of the measurement.
+ingest::MeasureOptions asked_for(const ExtractOptions& options) {
+  ingest::MeasureOptions measure;
+  measure.bead_diameter_m = options.diameter;
+  measure.scale_m_per_px = options.scale;
+  measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
+  measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
+  measure.second_diameter_m = options.second_diameter;
+  measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
+  measure.find.polarity = polarity_of(options.polarity);
+  measure.find.radius_px = options.radius;
+  measure.find.keep_half_hidden = options.keep_half_hidden;
+  if (options.roi.size() == 4) {
+    measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
+                                              static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
+  }
+  measure.kernel = options.kernel;
+  measure.bin_width = options.spacing;
+  measure.lowest = options.lowest, measure.highest = options.highest;
+  measure.shaking_frequency_hz = options.frequency;
+  return measure;
+}
+
+// What is named is used; of folders and patterns, what is a picture or a film.
+std::vector<std::string> named_pictures(const InputFiles& images) {
+  const auto name_of = [](std::string_view path) { return path.substr(path.find_last_of('/') + 1); };
+  std::set<std::string_view> named;
+  for (const std::string& text : images.texts) named.insert(name_of(text));
+  std::vector<std::string> paths;
+  for (const std::string& path : images.paths)
+    if (named.contains(name_of(path)) || ingest::FrameSource::is_frame_file(path)) paths.push_back(path);
+  if (paths.empty())
+    throw InputError(
+        fmt::format("{}: holds neither a picture nor a film; name files ending in .png, .tif, .jpg, .bmp, "
+                    ".pgm, .mp4, .avi, .mov or .mkv",
+                    images.texts.front()));
+  return paths;
+}
+
+class Extraction {
+ public:
+  Extraction(const ExtractOptions& options, RunContext& context)
+      : options_(options), context_(context), rendered_(context.find_input("render")), measure_(asked_for(options)) {}
+
+  void run() {
+    measure_.threads = static_cast<unsigned>(context_.jobs());
+    film_.source.stride = options_.stride;
+    film_.source.channel = channel_of(options_.channel);
+    if (rendered_ != nullptr) {
+      use_rendered();
+    } else {
+      film_.paths = named_pictures(options_.images);
+      use_first_look(options_, context_, film_, measure_);
+    }
+    std::optional<std::ifstream> truth_file;
+    if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
+    DisksOnTheWay on_the_way(context_, options_, truth_file ? &*truth_file : nullptr);
+    const ingest::Measurement found = measure(on_the_way);
+    if (rendered_ == nullptr) judge_disks(options_, context_, found, on_the_way);
+    warn(found);
+    write(found, on_the_way);
+  }
+
+ private:
+  // Scale, floor and walls of a render stage, unless they are to be found.
+  void use_rendered() {
+    const FrameGeometry geometry = FrameGeometry::read(rendered_->file("geometry.json"));
+    if (options_.use_geometry) {
+      if (!measure_.pixel_aspect) measure_.pixel_aspect = 1;
+      if (!measure_.lens_radial) measure_.lens_radial = 0;
+      if (!measure_.scale_m_per_px) measure_.scale_m_per_px = geometry.scale;
+      if (!measure_.floor_px) measure_.floor_px = geometry.floor;
+      if (!measure_.left_wall_px)
+        measure_.left_wall_px = geometry.left_wall, measure_.right_wall_px = geometry.right_wall;
+    }
+    if (!measure_.lowest) {
+      // Heights at multiples of the spacing, low enough for what lies below the floor's mean while it is down.
+      const double reach = kernel_reach(options_.kernel), spacing = options_.spacing;
+      measure_.lowest = (std::floor((std::min(0.0, geometry.lowest) - reach) / spacing) - 0.5) * spacing;
+    }
+    film_.paths.push_back((rendered_->directory / "frames").string());
+  }
+
+  ingest::Measurement measure(DisksOnTheWay& on_the_way) {
+    ingest::FrameSource source = ingest::FrameSource::open(film_.paths, film_.source);
+    // A film's own frame rate serves for the shaker's phase only: fast cameras write films to be watched slowly.
+    measure_.frame_rate_hz =
+        options_.frame_rate ? *options_.frame_rate / static_cast<double>(options_.stride) : source.film_rate_hz();
+    const std::optional<std::size_t> total = source.count_if_known();
+    measure_.progress = [&](std::size_t done) {
+      context_.check_interrupted();
+      if (total && *total > 0)
+        context_.progress(static_cast<double>(done) / static_cast<double>(*total), "finding disks");
+    };
+    measure_.disk_sink = [&](const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks) {
+      on_the_way.take(frame, disks);
+    };
+    ingest::Measurement found = ingest::measure_bed(source, measure_);
+    context_.check_interrupted();
+    on_the_way.close();
+    return found;
+  }
+
+  void warn(const ingest::Measurement& found) {
+    const ingest::BedCalibration& bed = found.calibration;
+    for (const std::string& warning : found.warnings) context_.warning(warning);
+    std::size_t bad = 0;
+    for (const ingest::FrameReport& frame : found.frames) {
+      if (frame.status == ingest::FrameStatus::good) continue;
+      if (++bad <= most_bad_frames_named)
+        context_.warning(fmt::format("frame {} ({}): {}", frame.index,
+                                     std::filesystem::path(frame.origin.path).filename().string(), frame.why));
+    }
+    if (bad > most_bad_frames_named)
+      context_.warning(
+          fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - most_bad_frames_named));
+    if (options_.frame_rate && !(bed.shaking_frequency_hz > 0))
+      context_.warning("No shaking is seen in the film (" + bed.why_no_frequency +
+                       "): there are no profiles by phase. Give frequency (--frequency) if the bed is shaken.");
+    if (bed.shaking_frequency_hz > 0 && !options_.frame_rate)
+      context_.warning(
+          fmt::format("Times are by the film's own {:g} frames/s; if it was recorded faster, give frame_rate "
+                      "(--frame-rate): the shaking's frequency grows with it, its phases stay.",
+                      *measure_.frame_rate_hz * static_cast<double>(options_.stride)));
+  }
+
+  void write(const ingest::Measurement& found, DisksOnTheWay& on_the_way) {
+    write_profiles(context_, found, found.disk_count_mean / found.calibration.width);
+    frames_table(context_.table("frames.csv"), found.frames).write(context_.output("frames.csv"));
+    Json result;
+    add_beads(found, result);
+    add_geometry(found, result);
+    add_disks(found, on_the_way, result);
+    add_velocities(on_the_way, result);
+    if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
+    write_file(context_.output("extract.json"), dump(result));
+    const BedDescription bed =
+        rendered_ != nullptr ? BedDescription::read(rendered_->file("bed.json")) : bed_seen(options_, found);
+    write_file(context_.output("bed.json"), dump(bed.to_json()));
+    on_the_way.quality_table(context_.table("quality.csv")).write(context_.output("quality.csv"));
+    write_file(context_.output("quality.svg"), on_the_way.quality_figure());
+    bead_table(context_.table("bead.csv"), found.finder).write(context_.output("bead.csv"));
+    ingest::write_png(context_.output("bead.png"), ingest::bead_picture(found.finder, 8));
+    write_file(context_.output("count.svg"), count_figure(found.frames));
+    if (options_.overlays > 0) draw_overlays(context_, film_, found, on_the_way);
+  }
+
+  void add_beads(const ingest::Measurement& found, Json& result) const {
+    const ingest::BedCalibration& bed = found.calibration;
+    result["frames"] = found.frames.size();
+    result["frames_used"] = found.profile.samples;
+    result["disks_per_frame"] = quantity_json(found.disk_count_mean, "1");
+    result["disks_per_frame_scatter"] = found.disk_count_std;
+    if (options_.bead_number) result["bead_number"] = *options_.bead_number;
+    result["diameter"] = quantity_json(options_.diameter, "m");
+    result["scale"] = quantity_json(bed.scale_m_per_px, "m/px", bed.scale_m_per_px * bed.scale_relative_std_error);
+    result["scale_given"] = bed.scale_given;
+    result["pixel_aspect"] = quantity_json(bed.lens.pixel_aspect, "1", bed.aspect_std_error);
+    result["lens"] = quantity_json(bed.lens.radial, "1", bed.lens_radial_std_error);
+    result["radius"] = quantity_json(bed.radius_px, "px", bed.radius_std_error_px);
+    result["edge_width"] = quantity_json(bed.edge_width_px, "px");
+    result["noise"] = quantity_json(bed.noise_level, "grey levels");
+    result["contrast"] = quantity_json(bed.contrast_level, "grey levels");
+    result["flicker"] = quantity_json(bed.flicker, "1");
+    result["polarity"] = bed.polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
+  }
+
+  static void add_geometry(const ingest::Measurement& found, Json& result) {
+    const ingest::BedCalibration& bed = found.calibration;
+    result["floor"] = quantity_json(bed.floor_px, "px");
+    result["floor_given"] = bed.floor_given;
+    result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
+    if (bed.shaking_frequency_hz > 0) {
+      result["frequency"] = quantity_json(bed.shaking_frequency_hz, "Hz", bed.shaking_frequency_std_error_hz);
+      result["frequency_given"] = bed.frequency_given;
+      if (!bed.frequency_given) result["frequency_false_alarm"] = bed.frequency_false_alarm;
+      result["floor_amplitude"] = quantity_json(bed.floor_amplitude_px * bed.scale_m_per_px, "m");
+      result["floor_phase"] = bed.floor_phase;
+    }
+    result["left_wall"] = quantity_json(bed.left_wall_px, "px");
+    result["right_wall"] = quantity_json(bed.right_wall_px, "px");
+    result["walls_given"] = bed.walls_given;
+    result["walls_are_frame_sides"] = bed.walls_are_frame_sides;
+    result["width"] = quantity_json(bed.width, "D");
+  }
+
+  void add_disks(const ingest::Measurement& found, const DisksOnTheWay& on_the_way, Json& result) const {
+    const double width = found.calibration.width;
+    const double samples = std::max<double>(1, static_cast<double>(found.profile.samples));
+    result["column_number"] =
+        quantity_json(found.disk_count_mean / width, "1", found.disk_count_std / width / std::sqrt(samples));
+    result["kernel"] = Json{{"kind", to_string(options_.kernel.kind)}, {"width", options_.kernel.width}};
+    result["profile"] = profile_numbers(found.profile);
+    if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
+    result["quality"] = on_the_way.quality();
+    if (found.second_finder) {
+      const ingest::FinderCalibration& finder = *found.second_finder;
+      std::size_t second = 0;
+      for (const ingest::FrameReport& frame : found.frames) second += frame.second;
+      result["second_species"] =
+          Json{{"radius", quantity_json(finder.radius_px, "px", finder.radius_std_error_px)},
+               {"disks_per_frame", static_cast<double>(second) / static_cast<double>(found.frames.size())}};
+    }
+    result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
+  }
+
+  void add_velocities(DisksOnTheWay& on_the_way, Json& result) {
+    const auto velocities = on_the_way.velocities();
+    if (!velocities) return;
+    for (const std::string& warning : velocities->warnings) context_.warning(warning);
+    const auto temperature = [](const ingest::KineticTemperature& t) {
+      Json json = quantity_json(t.over_mg_m, "m", t.std_error_m);
+      json["localisation_bias"] = t.localisation_bias_m, json["finite_time_factor"] = t.finite_time_factor;
+      return json;
+    };
+    result["velocities"] = Json{{"temperature_x_over_mg", temperature(velocities->horizontal)},
+                                {"temperature_z_over_mg", temperature(velocities->vertical)},
+                                {"linked_share", velocities->linked_share},
+                                {"mean_step", quantity_json(velocities->mean_step, "D")}};
+  }
+
+  const ExtractOptions& options_;
+  RunContext& context_;
+  const Input* rendered_;  // the render stage, if the frames are its
+  ingest::MeasureOptions measure_;
+  FilmFiles film_;
+};
+
+}  // namespace
+
+void extract_disks(const ExtractOptions& options, RunContext& context) { Extraction(options, context).run(); }
+
+}  // namespace shakebed::pipelines
