@@ -391,6 +391,31 @@ void Fields::texts(std::string_view key, std::vector<std::string>& values, const
   }
 }
 
+namespace {
+bool has_wildcards(const std::filesystem::path& path) {
+  return path.filename().string().find_first_of("*?") != std::string::npos;
+}
+
+// The file of this name, the files in the folder of this name, or those that fit a name with wildcards; in the order of
+// the numbers in their names: frame2 before frame10.
+std::vector<std::string> files_named(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) return {path.string()};
+  const bool folder = fs::is_directory(path, error);
+  if (!folder && !has_wildcards(path)) return {};
+  const std::string pattern = folder ? "*" : path.filename().string();
+  std::vector<std::string> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder ? path : path.parent_path(), error)) {
+    if (entry.is_regular_file(error) && fnmatch(pattern.c_str(), entry.path().filename().c_str(), FNM_PERIOD) == 0)
+      found.push_back(entry.path().string());
+  }
+  std::sort(found.begin(), found.end(),
+            [](const std::string& a, const std::string& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
+  return found;
+}
+}  // namespace
+
 void Fields::input_files(std::string_view key, InputFiles& files, const About& about) {
   namespace fs = std::filesystem;
   if (mode_ == Mode::schema) {
@@ -415,29 +440,13 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
     if (!item.is_string() || item.text.empty()) return wrong_type(item, where, "the path of a file", about);
     files.texts.push_back(item.text);
     const fs::path path = source_.directory / item.text;  // an absolute path replaces the directory
-    const std::string pattern = path.filename().string();
-    std::vector<std::string> found;
-    std::error_code error;
-    const bool folder = fs::is_directory(path, error);
-    const bool wildcards = pattern.find_first_of("*?") != std::string::npos;
-    if (fs::is_regular_file(path, error)) {
-      found.push_back(path.string());
-    } else if (folder || wildcards) {
-      for (const fs::directory_entry& entry : fs::directory_iterator(folder ? path : path.parent_path(), error)) {
-        const fs::path& name = entry.path().filename();
-        if (entry.is_regular_file(error) && fnmatch(folder ? "*" : pattern.c_str(), name.c_str(), FNM_PERIOD) == 0) {
-          found.push_back(entry.path().string());
-        }
-      }
-      std::sort(found.begin(), found.end(), [](const std::string& a, const std::string& b) {
-        return strverscmp(a.c_str(), b.c_str()) < 0;  // frame2 before frame10
-      });
-    }
+    std::vector<std::string> found = files_named(path);
     if (found.empty()) {
+      std::error_code error;
       complain(item, where,
-               folder      ? fmt::format("the folder \"{}\" holds no file", item.text)
-               : wildcards ? fmt::format("no file is named like \"{}\"", item.text)
-                           : fmt::format("there is no file \"{}\"", item.text),
+               fs::is_directory(path, error) ? fmt::format("the folder \"{}\" holds no file", item.text)
+               : has_wildcards(path)         ? fmt::format("no file is named like \"{}\"", item.text)
+                                             : fmt::format("there is no file \"{}\"", item.text),
                fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
     }
     files.paths.insert(files.paths.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));

@@ -14,6 +14,10 @@
 
 namespace shakebed::pipelines {
 
+// Both far above what any trajectory holds; a damaged or compressed file may claim gigabytes.
+constexpr std::size_t longest_line = 1 << 20;      // [bytes]
+constexpr std::size_t most_disks = 1'000'000'000;  // of a frame
+
 // --- writing
 
 struct TrajectoryWriter::Compressor {
@@ -155,9 +159,6 @@ bool TrajectoryReader::more() {
   }
 }
 
-// Far above what any trajectory holds; a compressed file may claim gigabytes.
-constexpr std::size_t longest_line = 1 << 20;
-
 bool TrajectoryReader::line(std::string_view& out) {
   std::size_t searched = position_;
   while (true) {
@@ -218,93 +219,119 @@ std::string_view next_word(std::string_view& line) {
 }
 }  // namespace
 
+// Where in a line of a disk its numbers stand; -1: they are not there.
+struct TrajectoryReader::Columns {
+  int all = 0, position = -1, position_size = 0, velocity = -1, velocity_size = 0, radius = -1, spin = -1;
+
+  bool hold_number(int column) const {
+    return (column >= position && column < position + position_size) ||
+           (velocity >= 0 && column >= velocity && column < velocity + velocity_size) || column == radius ||
+           column == spin;
+  }
+};
+
 bool TrajectoryReader::read(TrajectoryFrame& frame) {
+  std::size_t count = 0;
+  if (!read_count(count)) return false;
+  std::string_view text;
+  if (!line(text)) fail("the file ends before the comment line");
+  const std::string comment(text);
+  read_moment(comment, frame);
+  read_disks(count, read_columns(comment), frame);
+  return true;
+}
+
+// The first line of a frame that is not empty; false at the end of the file.
+bool TrajectoryReader::read_count(std::size_t& count) {
   std::string_view text;
   do {
     if (!line(text)) return false;
   } while (text.find_first_not_of(" \t") == std::string_view::npos);
-  std::size_t count = 0;
-  {
-    std::string_view rest = text;
-    const std::string_view word = next_word(rest);
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
-    if (error != std::errc() || end != word.data() + word.size())
-      fail(fmt::format("expected the number of disks, found \"{}\"", text));
-    if (count > 1000000000) fail("more than a thousand million disks");
-  }
-  if (!line(text)) fail("the file ends before the comment line");
-  const std::string comment(text);
-  const auto number = [&](std::string_view key, double fallback) {
+  std::string_view rest = text;
+  const std::string_view word = next_word(rest);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+  if (error != std::errc() || end != word.data() + word.size())
+    fail(fmt::format("expected the number of disks, found \"{}\"", text));
+  if (count > most_disks) fail("more than a thousand million disks");
+  return true;
+}
+
+void TrajectoryReader::read_moment(std::string_view comment, TrajectoryFrame& frame) const {
+  const auto number = [&](std::string_view key) {
     const std::string_view found = comment_value(comment, key);
-    if (found.empty()) return fallback;
     double value = 0;
-    if (!to_double(found, value)) fail(fmt::format("{}={} is not a number", key, found));
+    if (!found.empty() && !to_double(found, value)) fail(fmt::format("{}={} is not a number", key, found));
     return value;
   };
-  frame.time = number("Time", 0), frame.phase = number("Phase", 0);
-  frame.floor_position = number("Floor", 0), frame.floor_velocity = number("FloorVelocity", 0);
-  frame.width = number("Width", 0), frame.height = 0;
+  frame.time = number("Time"), frame.phase = number("Phase");
+  frame.floor_position = number("Floor"), frame.floor_velocity = number("FloorVelocity");
+  frame.width = number("Width"), frame.height = 0;
   const std::string_view pbc = comment_value(comment, "pbc");
   frame.periodic = !pbc.empty() && pbc.front() == 'T';
-  if (std::string_view lattice = comment_value(comment, "Lattice"); !lattice.empty()) {
-    for (int i = 0; i < 9; ++i) {
-      const std::string_view word = next_word(lattice);
-      double value = 0;
-      if (!to_double(word, value)) fail("Lattice must hold nine numbers");
-      if (i == 0 && frame.width == 0) frame.width = value;
-      if (i == 8) frame.height = value;
-    }
+  std::string_view lattice = comment_value(comment, "Lattice");
+  if (lattice.empty()) return;
+  for (int i = 0; i < 9; ++i) {
+    double value = 0;
+    if (!to_double(next_word(lattice), value)) fail("Lattice must hold nine numbers");
+    if (i == 0 && frame.width == 0) frame.width = value;
+    if (i == 8) frame.height = value;
   }
-  // Columns.
+}
+
+// From Properties=name:type:count:name:type:count...
+TrajectoryReader::Columns TrajectoryReader::read_columns(std::string_view comment) const {
   const std::string_view properties = comment_value(comment, "Properties");
-  int columns = 0, pos = -1, pos_size = 0, velo = -1, velo_size = 0, radius = -1, spin = -1;
-  {
-    std::vector<std::string_view> parts;
-    std::size_t begin = 0;
-    while (begin <= properties.size() && !properties.empty()) {
-      const std::size_t end = std::min(properties.find(':', begin), properties.size());
-      parts.push_back(properties.substr(begin, end - begin));
-      begin = end + 1;
-    }
-    if (parts.size() % 3 != 0) fail("Properties must be triples name:type:count");
-    for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {
-      int size = 0;
-      std::from_chars(parts[i + 2].data(), parts[i + 2].data() + parts[i + 2].size(), size);
-      if (size < 1 || size > 100) fail("Properties names a column count that is not 1 to 100");
-      if (parts[i] == "pos")
-        pos = columns, pos_size = size;
-      else if (parts[i] == "velo")
-        velo = columns, velo_size = size;
-      else if (parts[i] == "radius")
-        radius = columns;
-      else if (parts[i] == "spin")
-        spin = columns;
-      columns += size;
-    }
+  std::vector<std::string_view> parts;
+  std::size_t begin = 0;
+  while (begin <= properties.size() && !properties.empty()) {
+    const std::size_t end = std::min(properties.find(':', begin), properties.size());
+    parts.push_back(properties.substr(begin, end - begin));
+    begin = end + 1;
   }
-  if (pos < 0 || pos_size < 2 || pos_size > 3) fail("Properties must name pos:R:2 or pos:R:3");
+  if (parts.size() % 3 != 0) fail("Properties must be triples name:type:count");
+  Columns columns;
+  for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {
+    int size = 0;
+    std::from_chars(parts[i + 2].data(), parts[i + 2].data() + parts[i + 2].size(), size);
+    if (size < 1 || size > 100) fail("Properties names a column count that is not 1 to 100");
+    if (parts[i] == "pos")
+      columns.position = columns.all, columns.position_size = size;
+    else if (parts[i] == "velo")
+      columns.velocity = columns.all, columns.velocity_size = size;
+    else if (parts[i] == "radius")
+      columns.radius = columns.all;
+    else if (parts[i] == "spin")
+      columns.spin = columns.all;
+    columns.all += size;
+  }
+  if (columns.position < 0 || columns.position_size < 2 || columns.position_size > 3)
+    fail("Properties must name pos:R:2 or pos:R:3");
+  return columns;
+}
+
+void TrajectoryReader::read_disks(std::size_t count, const Columns& columns, TrajectoryFrame& frame) {
   // Grow with the lines that are really there: a count in a damaged header must not ask for gigabytes.
-  const auto clear = [](std::vector<double>& values) { values.clear(); };
-  clear(frame.x), clear(frame.z), clear(frame.vx), clear(frame.vz), clear(frame.spin), clear(frame.radius);
-  std::vector<double> row(static_cast<std::size_t>(columns));
+  for (std::vector<double>* values : {&frame.x, &frame.z, &frame.vx, &frame.vz, &frame.spin, &frame.radius})
+    values->clear();
+  std::vector<double> row(static_cast<std::size_t>(columns.all));
+  const auto at = [&](int column) { return row[static_cast<std::size_t>(column)]; };
+  const int height = columns.position + columns.position_size - 1;
+  const int upwards = columns.velocity + columns.velocity_size - 1;
   for (std::size_t i = 0; i < count; ++i) {
+    std::string_view text;
     if (!line(text)) fail(fmt::format("the file ends after {} of {} disks", i, count));
-    for (int column = 0; column < columns; ++column) {
+    for (int column = 0; column < columns.all; ++column) {
       const std::string_view word = next_word(text);
-      if (word.empty()) fail(fmt::format("{} columns, {} are announced", column, columns));
-      const bool wanted = (column >= pos && column < pos + pos_size) ||
-                          (velo >= 0 && column >= velo && column < velo + velo_size) || column == radius ||
-                          column == spin;
-      if (wanted && !to_double(word, row[static_cast<std::size_t>(column)]))
+      if (word.empty()) fail(fmt::format("{} columns, {} are announced", column, columns.all));
+      if (columns.hold_number(column) && !to_double(word, row[static_cast<std::size_t>(column)]))
         fail(fmt::format("\"{}\" is not a number", word));
     }
-    const auto at = [&](int column) { return row[static_cast<std::size_t>(column)]; };
-    frame.x.push_back(at(pos)), frame.z.push_back(at(pos + pos_size - 1));
-    frame.vx.push_back(velo >= 0 ? at(velo) : 0), frame.vz.push_back(velo >= 0 ? at(velo + velo_size - 1) : 0);
-    frame.radius.push_back(radius >= 0 ? at(radius) : 0.5);
-    if (spin >= 0) frame.spin.push_back(at(spin));
+    frame.x.push_back(at(columns.position)), frame.z.push_back(at(height));
+    frame.vx.push_back(columns.velocity >= 0 ? at(columns.velocity) : 0);
+    frame.vz.push_back(columns.velocity >= 0 ? at(upwards) : 0);
+    frame.radius.push_back(columns.radius >= 0 ? at(columns.radius) : 0.5);
+    if (columns.spin >= 0) frame.spin.push_back(at(columns.spin));
   }
-  return true;
 }
 
 std::size_t count_frames(const std::filesystem::path& path) {

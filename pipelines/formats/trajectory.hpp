@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace shakebed::pipelines {
@@ -55,6 +56,11 @@ class TrajectoryReader {
   bool read(TrajectoryFrame& frame);
 
  private:
+  struct Columns;
+  bool read_count(std::size_t& count);
+  void read_moment(std::string_view comment, TrajectoryFrame& frame) const;
+  Columns read_columns(std::string_view comment) const;
+  void read_disks(std::size_t count, const Columns& columns, TrajectoryFrame& frame);
   bool line(std::string_view& out);
   bool more();
   [[noreturn]] void fail(const std::string& what) const;

@@ -34,6 +34,55 @@ namespace {
 Json file_entry(const std::string& name, std::uint64_t bytes, const std::string& sha) {
   return Json{{"file", name}, {"bytes", bytes}, {"sha256", sha}};
 }
+
+Json recipe_json(const Plan& plan, const RunOptions& options) {
+  Json recipe;
+  recipe["file"] = plan.file;
+  std::error_code error;
+  if (fs::is_regular_file(plan.file, error)) {
+    recipe["sha256"] = sha256_of_file(plan.file);
+    recipe["directory"] = fs::absolute(plan.directory, error).string();
+  }
+  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
+  recipe["settings"] = Json::object();
+  for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
+  return recipe;
+}
+
+// The files of the stages before it, then those of the user's own.
+Json inputs_json(const PlannedStage& planned, const StageRecord& record) {
+  Json inputs = Json::array();
+  for (const Fingerprint& file : record.inputs) {
+    if (!file.sha256.empty()) inputs.push_back(file_entry(file.file, file.bytes, file.sha256));
+  }
+  for (const auto& [pointer, path] : planned.input_files) {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) continue;
+    Json external = file_entry(path, fs::file_size(path, error), sha256_of_file(path));
+    external["external"] = true;
+    inputs.push_back(std::move(external));
+  }
+  return inputs;
+}
+
+Json stage_json(const PlannedStage& planned, const StageOutcome& stage) {
+  Json entry;
+  entry["id"] = stage.id;
+  entry["stage"] = stage.kind;
+  if (stage.record) entry["code"] = stage.record->code;
+  if (planned.row->uses_seed) entry["seed"] = planned.seed;
+  entry["state"] = to_string(stage.state);
+  if (!stage.reasons.empty()) entry["why"] = stage.reasons;
+  if (!stage.error.empty()) entry["error"] = stage.error;
+  if (!stage.record) return entry;
+  if (stage.cost) entry["cost"] = stage.cost->to_json();
+  entry["warnings"] = stage.record->warnings;
+  entry["inputs"] = inputs_json(planned, *stage.record);
+  entry["outputs"] = Json::array();
+  for (const Fingerprint& file : stage.record->outputs)
+    entry["outputs"].push_back(file_entry(stage.id + "/" + file.file, file.bytes, file.sha256));
+  return entry;
+}
 }  // namespace
 
 Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome& outcome, const std::string& started) {
@@ -52,52 +101,15 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
   if (!outcome.error.empty()) out["error"] = outcome.error;
   out["warnings"] = outcome.warnings;
   out["failed_checks"] = outcome.failed_checks;
-  Json recipe;
-  recipe["file"] = plan.file;
-  std::error_code error;
-  if (fs::is_regular_file(plan.file, error)) {
-    recipe["sha256"] = sha256_of_file(plan.file);
-    recipe["directory"] = fs::absolute(plan.directory, error).string();
-  }
-  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
-  recipe["settings"] = Json::object();
-  for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
-  out["recipe"] = std::move(recipe);
+  out["recipe"] = recipe_json(plan, options);
   out["document"] = plan.document.to_json();
   out["stages"] = Json::array();
-  for (std::size_t i = 0; i < outcome.stages.size(); ++i) {
-    const StageOutcome& stage = outcome.stages[i];
-    Json entry;
-    entry["id"] = stage.id;
-    entry["stage"] = stage.kind;
-    if (stage.record) entry["code"] = stage.record->code;
-    if (plan.stages[i].row->uses_seed) entry["seed"] = plan.stages[i].seed;
-    entry["state"] = to_string(stage.state);
-    if (!stage.reasons.empty()) entry["why"] = stage.reasons;
-    if (!stage.error.empty()) entry["error"] = stage.error;
-    if (stage.record) {
-      if (stage.cost) entry["cost"] = stage.cost->to_json();
-      entry["warnings"] = stage.record->warnings;
-      entry["inputs"] = Json::array();
-      for (const Fingerprint& file : stage.record->inputs) {
-        if (!file.sha256.empty()) entry["inputs"].push_back(file_entry(file.file, file.bytes, file.sha256));
-      }
-      for (const auto& [pointer, path] : plan.stages[i].input_files) {
-        if (!fs::is_regular_file(path, error)) continue;
-        Json external = file_entry(path, fs::file_size(path, error), sha256_of_file(path));
-        external["external"] = true;
-        entry["inputs"].push_back(std::move(external));
-      }
-      entry["outputs"] = Json::array();
-      for (const Fingerprint& file : stage.record->outputs) {
-        entry["outputs"].push_back(file_entry(stage.id + "/" + file.file, file.bytes, file.sha256));
-      }
-    }
-    out["stages"].push_back(std::move(entry));
-  }
+  for (std::size_t i = 0; i < outcome.stages.size(); ++i)
+    out["stages"].push_back(stage_json(plan.stages[i], outcome.stages[i]));
   out["outputs"] = Json::array();
   for (const char* name : {"resolved.json", "summary.json", "summary.md", "report.html"}) {
     const fs::path path = outcome.out / name;
+    std::error_code error;
     if (fs::is_regular_file(path, error))
       out["outputs"].push_back(file_entry(name, fs::file_size(path), sha256_of_file(path)));
   }

@@ -15,6 +15,7 @@ namespace shakebed::pipelines {
 
 namespace {
 
+// What a page can carry: 200,000 positions are 0.8 MB, 1.1 MB in base64.
 constexpr std::size_t most_disks = 5000, most_frames = 96, most_positions = 200'000;
 
 // Plays what `scene` describes on the canvas in `figure`. Positions are 16-bit fractions of the drawn width and height.
@@ -93,82 +94,113 @@ std::string still_picture(const TrajectoryFrame& frame, double low, double high)
                    -high, -frame.floor_position, frame.width, -high);
 }
 
+// The first frames, as many as a page can carry, all with the same disks. None: too many disks in one.
+std::vector<TrajectoryFrame> first_frames(const std::filesystem::path& trajectory) {
+  std::vector<TrajectoryFrame> frames;
+  TrajectoryReader reader(trajectory);
+  TrajectoryFrame frame;
+  std::size_t most = most_frames;
+  while (frames.size() < most && reader.read(frame)) {
+    if (frame.size() == 0 || frame.size() > most_disks) return {};
+    most = std::clamp<std::size_t>(most_positions / frame.size(), 1, most_frames);
+    if (!frames.empty() && frame.size() != frames.front().size()) break;
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+// Frames so far apart that the floor's motion between them is not seen.
+bool is_stroboscopic(const std::vector<TrajectoryFrame>& frames, double period) {
+  return period > 0 && frames.size() > 1 && frames[1].time - frames[0].time > period / 8;
+}
+
+// By the floor's phase: cycle after cycle, each made of one frame of every phase.
+std::vector<TrajectoryFrame> by_phase(const std::vector<TrajectoryFrame>& frames) {
+  std::vector<std::size_t> order(frames.size()), times_seen(frames.size(), 0);
+  std::iota(order.begin(), order.end(), 0u);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) times_seen[i] += frames[k].phase == frames[i].phase;
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(times_seen[a], frames[a].phase) < std::pair(times_seen[b], frames[b].phase);
+  });
+  std::vector<TrajectoryFrame> sorted;
+  for (const std::size_t i : order) sorted.push_back(frames[i]);
+  return sorted;
+}
+
+// Heights that are drawn [D].
+struct Extent {
+  double low = 0, high = 1;
+};
+Extent extent_of(const std::vector<TrajectoryFrame>& frames) {
+  Extent extent;
+  for (const TrajectoryFrame& frame : frames) {
+    extent.low = std::min(extent.low, frame.floor_position);
+    for (std::size_t i = 0; i < frame.size(); ++i)
+      extent.high = std::max(extent.high, frame.z[i] + (frame.radius.empty() ? 0.5 : frame.radius[i]));
+  }
+  extent.high += 0.3, extent.low -= 0.3;
+  // Not taller than twice its width: of a disk thrown far up only the bed below is worth a page.
+  extent.high = std::min(extent.high, extent.low + std::max(2 * frames.front().width, 10.0));
+  return extent;
+}
+
+// x and z of every disk of every frame, as the player reads them.
+std::string position_bytes(const std::vector<TrajectoryFrame>& frames, const Extent& extent) {
+  const double width = frames.front().width;
+  std::string bytes;
+  bytes.reserve(frames.size() * frames.front().size() * 4);
+  const auto put = [&](double fraction) {
+    const auto value = static_cast<std::uint16_t>(std::lround(65535 * std::clamp(fraction, 0.0, 1.0)));
+    bytes += static_cast<char>(value & 0xFF);
+    bytes += static_cast<char>(value >> 8);
+  };
+  for (const TrajectoryFrame& frame : frames) {
+    for (std::size_t k = 0; k < frame.size(); ++k) {
+      double x = frame.x[k];
+      if (frame.periodic) x -= std::floor(x / width) * width;
+      put(x / width), put((frame.z[k] - extent.low) / (extent.high - extent.low));
+    }
+  }
+  return bytes;
+}
+
+// What the player must know besides the positions.
+std::string scene_json(const std::vector<TrajectoryFrame>& frames, const Extent& extent, bool has_phase) {
+  const TrajectoryFrame& first = frames.front();
+  std::vector<double> floor;
+  std::string labels, tones;
+  for (const TrajectoryFrame& frame : frames) {
+    labels += fmt::format("{}\"{}t = {:.1f} √(D/g)\"", floor.empty() ? "" : ",",
+                          has_phase ? fmt::format("phase {:.2f}, ", frame.phase) : "", frame.time);
+    floor.push_back(frame.floor_position);
+  }
+  // Two tones by the height in the first frame show how the bed mixes.
+  for (std::size_t k = 0; k < first.size(); ++k)
+    tones += fmt::format("{}{}", k == 0 ? "" : ",", static_cast<long>(std::floor(std::max(0.0, first.z[k]) / 2)) % 2);
+  return fmt::format(
+      "{{\"width\":{:.6g},\"low\":{:.6g},\"high\":{:.6g},\"walls\":{},\"radius\":{},\"floor\":{},\"tone\":[{}],"
+      "\"label\":[{}]}}",
+      first.width, extent.low, extent.high, first.periodic ? "false" : "true",
+      numbers(first.radius.empty() ? std::vector<double>(first.size(), 0.5) : first.radius), numbers(floor), tones,
+      labels);
+}
+
+std::string attribute_text(std::string_view text) {
+  std::string out;
+  for (const char c : text) out += c == '"' ? std::string("&quot;") : std::string(1, c);
+  return out;
+}
+
 }  // namespace
 
 std::string animation_html(const std::filesystem::path& trajectory, double period) {
-  // The first frames, as many as a page can carry.
-  std::vector<TrajectoryFrame> frames;
-  {
-    TrajectoryReader reader(trajectory);
-    TrajectoryFrame frame;
-    std::size_t most = most_frames;
-    while (frames.size() < most && reader.read(frame)) {
-      if (frame.size() == 0 || frame.size() > most_disks) return "";
-      most = std::clamp<std::size_t>(most_positions / frame.size(), 1, most_frames);
-      if (!frames.empty() && frame.size() != frames.front().size()) break;
-      frames.push_back(frame);
-    }
-  }
+  std::vector<TrajectoryFrame> frames = first_frames(trajectory);
   if (frames.empty()) return "";
-  const TrajectoryFrame& first = frames.front();
-  const std::size_t n = first.size();
-
-  // Played as time went, or by the floor's phase: cycle after cycle, each made of one frame of every phase.
-  std::vector<std::size_t> order(frames.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const bool strobe = period > 0 && frames.size() > 1 && frames[1].time - frames[0].time > period / 8;
-  if (strobe) {
-    std::vector<std::size_t> times_seen(frames.size(), 0);
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      for (std::size_t k = 0; k < i; ++k) times_seen[i] += frames[k].phase == frames[i].phase;
-    }
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return std::pair(times_seen[a], frames[a].phase) < std::pair(times_seen[b], frames[b].phase);
-    });
-  }
-
-  double high = 1, low = 0;
-  for (const TrajectoryFrame& frame : frames) {
-    low = std::min(low, frame.floor_position);
-    for (std::size_t i = 0; i < n; ++i)
-      high = std::max(high, frame.z[i] + (frame.radius.empty() ? 0.5 : frame.radius[i]));
-  }
-  high += 0.3, low -= 0.3;
-  // Not taller than twice its width: of a disk thrown far up only the bed below is worth a page.
-  high = std::min(high, low + std::max(2 * first.width, 10.0));
-
-  std::string positions;
-  positions.reserve(frames.size() * n * 4);
-  const auto put = [&](double fraction) {
-    const auto value = static_cast<std::uint16_t>(std::lround(65535 * std::clamp(fraction, 0.0, 1.0)));
-    positions += static_cast<char>(value & 0xFF);
-    positions += static_cast<char>(value >> 8);
-  };
-  std::vector<double> floor, radius(n, 0.5);
-  std::string labels = "[", tones = "[";
-  for (const std::size_t i : order) {
-    const TrajectoryFrame& frame = frames[i];
-    for (std::size_t k = 0; k < n; ++k) {
-      double x = frame.x[k];
-      if (frame.periodic) x -= std::floor(x / first.width) * first.width;
-      put(x / first.width), put((frame.z[k] - low) / (high - low));
-    }
-    floor.push_back(frame.floor_position);
-    labels += fmt::format("{}\"{}t = {:.1f} √(D/g)\"", floor.size() == 1 ? "" : ",",
-                          period > 0 ? fmt::format("phase {:.2f}, ", frame.phase) : "", frame.time);
-  }
-  if (!first.radius.empty()) radius = first.radius;
-  // Two tones by the height in the first frame show how the bed mixes.
-  for (std::size_t k = 0; k < n; ++k)
-    tones += fmt::format("{}{}", k == 0 ? "" : ",",
-                         static_cast<long>(std::floor(std::max(0.0, frames[order[0]].z[k]) / 2)) % 2);
-  const std::string scene = fmt::format(
-      "{{\"width\":{:.6g},\"low\":{:.6g},\"high\":{:.6g},\"walls\":{},\"radius\":{},\"floor\":{},\"tone\":{}],"
-      "\"label\":{}]}}",
-      first.width, low, high, first.periodic ? "false" : "true", numbers(radius), numbers(floor), tones, labels);
-
-  std::string quoted;
-  for (const char c : scene) quoted += c == '"' ? std::string("&quot;") : std::string(1, c);
+  const bool strobe = is_stroboscopic(frames, period);
+  if (strobe) frames = by_phase(frames);
+  const Extent extent = extent_of(frames);
   return fmt::format(
       "<figure id=\"bed-in-motion\" data-scene=\"{}\" data-positions=\"{}\">\n<canvas role=\"img\" aria-label=\"the "
       "bed in "
@@ -178,7 +210,8 @@ std::string animation_html(const std::filesystem::path& trajectory, double perio
       "frames of "
       "the trajectory{}. Two tones by the height at the beginning show how the bed mixes.</figcaption></figure>\n"
       "<script>{}</script>\n",
-      quoted, base64(positions), still_picture(frames[order[0]], low, high), n, frames.size(),
+      attribute_text(scene_json(frames, extent, period > 0)), base64(position_bytes(frames, extent)),
+      still_picture(frames.front(), extent.low, extent.high), frames.front().size(), frames.size(),
       strobe ? ", in the order of the floor's phase: each is from another cycle, as under a stroboscope"
              : " as time went",
       player);

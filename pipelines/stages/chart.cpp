@@ -169,6 +169,146 @@ Json power_json(const std::vector<double>& x, const std::vector<double>& y, cons
   return out;
 }
 
+// The points that fits and comparisons use.
+struct Used {
+  std::vector<double> x, y, error;
+  bool weighted = false;  // every point has an error
+};
+Used used_points(const Data& data, const PointsOptions& options) {
+  Used used;
+  for (std::size_t i = 0; i < data.x.size(); ++i) {
+    if ((options.fit_least && data.x[i] < *options.fit_least) || (options.fit_most && data.x[i] > *options.fit_most))
+      continue;
+    used.x.push_back(data.x[i]), used.y.push_back(data.y[i]), used.error.push_back(data.error[i]);
+  }
+  used.weighted = data.has_errors && !used.error.empty() &&
+                  std::all_of(used.error.begin(), used.error.end(), [](double e) { return e > 0; });
+  return used;
+}
+
+// The weighted straight line and where it crosses zero.
+void add_line_fit(const Used& used, Json& found) {
+  const fit::StraightLine line =
+      used.weighted ? fit::fit_straight_line(used.x, used.y, used.error) : fit::StraightLine{};
+  found["line_fit"] = line.ok ? "ok" : "needs two points with errors";
+  if (!line.ok) return;
+  found["slope"] = quantity_json(line.slope, "1", line.slope_error);
+  found["intercept"] = quantity_json(line.intercept, "1", line.intercept_error);
+  found["chi2"] = line.chi2, found["dof"] = line.dof, found["p_value"] = line.p_value;
+  if (line.slope == 0) return;
+  const double zero = -line.intercept / line.slope;
+  const double variance = line.intercept_error * line.intercept_error + 2 * zero * line.covariance +
+                          zero * zero * line.slope_error * line.slope_error;
+  found["zero"] = quantity_json(zero, "1", std::sqrt(std::max(0.0, variance)) / std::abs(line.slope));
+}
+
+// How far the points are from a curve.
+Json against_json(const CurveOptions& curve, const Used& used, bool has_errors) {
+  Json against{{"curve", curve.name}, {"points", used.x.size()}};
+  if (used.x.empty()) {
+    for (const char* key : {"chi2", "p_value", "mean_difference", "rms_difference", "largest_difference"})
+      against[key] = nullptr;
+    return against;
+  }
+  double chi2 = 0, sum = 0, squares = 0, propagated = 0, largest = 0;
+  for (std::size_t i = 0; i < used.x.size(); ++i) {
+    const double difference = used.y[i] - value_at(curve, used.x[i]);
+    if (used.weighted) chi2 += std::pow(difference / used.error[i], 2);
+    propagated += std::pow(difference * used.error[i], 2);
+    sum += difference, squares += difference * difference, largest = std::max(largest, std::abs(difference));
+  }
+  const auto n = static_cast<double>(used.x.size());
+  if (used.weighted) {
+    const int dof = static_cast<int>(used.x.size());
+    against["chi2"] = chi2, against["dof"] = dof;
+    against["chi2_per_dof"] = chi2 / n, against["p_value"] = fit::chance_of_chi2(chi2, dof);
+  }
+  const double mean = sum / n;
+  against["mean_difference"] =
+      used.x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
+                        : quantity_json(mean, "1");
+  // d rms = sum d_i delta_i/(n rms); rms is never less than the errors make it.
+  const double rms = std::sqrt(squares / n);
+  against["rms_difference"] =
+      has_errors && rms > 0 ? quantity_json(rms, "1", std::sqrt(propagated) / (n * rms)) : quantity_json(rms, "1");
+  against["largest_difference"] = largest;
+  if (const std::optional<double> ratio = rms_log_ratio(curve, used.x, used.y)) against["rms_log_ratio"] = *ratio;
+  return against;
+}
+
+// For each level of y the x at which the points, joined by straight lines, first cross it.
+Json crossings_json(const Data& data, const std::vector<double>& levels) {
+  Json crossings = Json::object();
+  for (const double level : levels) {
+    Json at = Json::object();
+    at["value"] = nullptr;
+    for (std::size_t i = 1; i < data.x.size(); ++i) {
+      const double a = data.y[i - 1] - level, b = data.y[i] - level;
+      if ((a > 0) == (b > 0)) continue;
+      const double u = a / (a - b), slope = (b - a) / (data.x[i] - data.x[i - 1]);
+      at = quantity_json(data.x[i - 1] + u * (data.x[i] - data.x[i - 1]), "1",
+                         std::hypot((1 - u) * data.error[i - 1], u * data.error[i]) / std::abs(slope));
+      break;
+    }
+    crossings[fmt::format("{:g}", level)] = std::move(at);
+  }
+  return crossings;
+}
+
+const CurveOptions& curve_named(const ChartOptions& chart, const std::string& name) {
+  return *std::find_if(chart.curves.begin(), chart.curves.end(),
+                       [&](const CurveOptions& curve) { return curve.name == name; });
+}
+
+// What chart.json says about some points.
+Json numbers_of(const ChartOptions& chart, const PointsOptions& options, const Data& data) {
+  const Used used = used_points(data, options);
+  Json found = Json::object();
+  found["points"] = data.x.size();
+  if (options.line_fit) add_line_fit(used, found);
+  if (options.power_fit)
+    found["power"] = power_json(used.x, used.y, used.weighted ? used.error : std::vector<double>{});
+  if (!options.against.empty())
+    found["against"] = against_json(curve_named(chart, options.against), used, data.has_errors);
+  if (!options.levels.empty()) found["crossings"] = crossings_json(data, options.levels);
+  return found;
+}
+
+Picture empty_picture(const ChartOptions& chart) {
+  return {.x_label = chart.x_label,
+          .y_label = chart.y_label,
+          .x_low = chart.x_low,
+          .x_high = chart.x_high,
+          .y_low = chart.y_low,
+          .y_high = chart.y_high,
+          .lower_label = chart.residual_label.empty() ? "difference" : chart.residual_label,
+          .logarithmic_x = chart.logarithmic_x,
+          .logarithmic_y = chart.logarithmic_y};
+}
+
+// In the panel below: the differences of a drawn series from a curve, where the curve is given.
+void add_residuals(const CurveOptions& curve, const Series& series, Picture& picture) {
+  Series below{series.label, series.style, series.color, {}, {}, {}};
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    if (series.x[i] < curve.from || series.x[i] > curve.to) continue;
+    below.x.push_back(series.x[i]), below.y.push_back(series.y[i] - value_at(curve, series.x[i]));
+    if (!series.error.empty()) below.error.push_back(series.error[i]);
+  }
+  if (below.x.empty()) return;
+  if (picture.lower.empty())
+    picture.lower.push_back({"zero", Series::Style::line, curve.color, {curve.from, curve.to}, {0, 0}, {}});
+  picture.lower.push_back(std::move(below));
+}
+
+void add_curve(const CurveOptions& curve, Picture& picture) {
+  Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}, true};
+  for (int i = 0; i <= 200; ++i) {
+    const double x = curve.from + (curve.to - curve.from) * i / 200;
+    series.x.push_back(x), series.y.push_back(value_at(curve, x));
+  }
+  picture.series.push_back(std::move(series));
+}
+
 class Chart : public Stage {
  public:
   void describe(Fields& fields) override;
@@ -419,128 +559,29 @@ void Chart::describe(Fields& fields) {
 }
 
 Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
-  Picture picture{.x_label = chart.x_label,
-                  .y_label = chart.y_label,
-                  .x_low = chart.x_low,
-                  .x_high = chart.x_high,
-                  .y_low = chart.y_low,
-                  .y_high = chart.y_high,
-                  .lower_label = chart.residual_label.empty() ? "difference" : chart.residual_label,
-                  .logarithmic_x = chart.logarithmic_x,
-                  .logarithmic_y = chart.logarithmic_y};
+  Picture picture = empty_picture(chart);
   Json out = Json::object();
   if (!chart.caption.empty()) out["caption"] = chart.caption;
   int color = 1;
   for (const PointsOptions& options : chart.points) {
     Data data = read_data(input_named(context, options.from).file(options.file), options);
     if (data.has_errors) data.error = pooled(data.error, options.pool);
-    const bool drawn = options.look != Look::none;
-    const int own = options.color >= 0 ? options.color : drawn ? color++ : 0;
-    const bool bars = data.has_errors && options.look == Look::points;
-    if (drawn)
-      picture.series.push_back({options.label, style_of(options.look), own, data.x, data.y,
-                                bars ? data.error : std::vector<double>{}, true});
-    Json found = Json::object();
-    found["points"] = data.x.size();
-    // What fits and comparisons use.
-    std::vector<double> x, y, error;
-    for (std::size_t i = 0; i < data.x.size(); ++i) {
-      if ((options.fit_least && data.x[i] < *options.fit_least) || (options.fit_most && data.x[i] > *options.fit_most))
-        continue;
-      x.push_back(data.x[i]), y.push_back(data.y[i]), error.push_back(data.error[i]);
+    if (options.look != Look::none) {
+      const bool bars = data.has_errors && options.look == Look::points;
+      const Series series{options.label,
+                          style_of(options.look),
+                          options.color >= 0 ? options.color : color++,
+                          data.x,
+                          data.y,
+                          bars ? data.error : std::vector<double>{},
+                          true};
+      picture.series.push_back(series);
+      if (options.residuals) add_residuals(curve_named(chart, options.against), series, picture);
     }
-    const bool weighted =
-        data.has_errors && !error.empty() && std::all_of(error.begin(), error.end(), [](double e) { return e > 0; });
-    if (options.line_fit) {
-      const fit::StraightLine line = weighted ? fit::fit_straight_line(x, y, error) : fit::StraightLine{};
-      found["line_fit"] = line.ok ? "ok" : "needs two points with errors";
-      if (line.ok) {
-        found["slope"] = quantity_json(line.slope, "1", line.slope_error);
-        found["intercept"] = quantity_json(line.intercept, "1", line.intercept_error);
-        found["chi2"] = line.chi2, found["dof"] = line.dof, found["p_value"] = line.p_value;
-        if (line.slope != 0) {
-          const double zero = -line.intercept / line.slope;
-          const double variance = line.intercept_error * line.intercept_error + 2 * zero * line.covariance +
-                                  zero * zero * line.slope_error * line.slope_error;
-          found["zero"] = quantity_json(zero, "1", std::sqrt(std::max(0.0, variance)) / std::abs(line.slope));
-        }
-      }
-    }
-    if (options.power_fit) found["power"] = power_json(x, y, weighted ? error : std::vector<double>{});
-    if (!options.against.empty()) {
-      const CurveOptions& curve = *std::find_if(chart.curves.begin(), chart.curves.end(),
-                                                [&](const CurveOptions& c) { return c.name == options.against; });
-      Series below{options.label, style_of(options.look), own, {}, {}, {}};
-      double chi2 = 0, sum = 0, squares = 0, propagated = 0, largest = 0;
-      for (std::size_t i = 0; i < x.size(); ++i) {
-        const double difference = y[i] - value_at(curve, x[i]);
-        if (weighted) chi2 += std::pow(difference / error[i], 2);
-        propagated += std::pow(difference * error[i], 2);
-        sum += difference, squares += difference * difference, largest = std::max(largest, std::abs(difference));
-      }
-      for (std::size_t i = 0; i < data.x.size(); ++i) {
-        if (data.x[i] < curve.from || data.x[i] > curve.to) continue;
-        below.x.push_back(data.x[i]), below.y.push_back(data.y[i] - value_at(curve, data.x[i]));
-        if (bars) below.error.push_back(data.error[i]);
-      }
-      const auto n = static_cast<double>(x.size());
-      Json against{{"curve", curve.name}, {"points", x.size()}};
-      if (x.empty()) {
-        for (const char* key : {"chi2", "p_value", "mean_difference", "rms_difference", "largest_difference"})
-          against[key] = nullptr;
-        found["against"] = std::move(against);
-      } else {
-        if (weighted) {
-          const int dof = static_cast<int>(x.size());
-          against["chi2"] = chi2, against["dof"] = dof;
-          against["chi2_per_dof"] = chi2 / n, against["p_value"] = fit::chance_of_chi2(chi2, dof);
-        }
-        const double mean = sum / n;
-        against["mean_difference"] =
-            x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
-                         : quantity_json(mean, "1");
-        // d rms = sum d_i delta_i/(n rms); rms is never less than the errors make it.
-        const double rms = std::sqrt(squares / n);
-        against["rms_difference"] = data.has_errors && rms > 0
-                                        ? quantity_json(rms, "1", std::sqrt(propagated) / (n * rms))
-                                        : quantity_json(rms, "1");
-        against["largest_difference"] = largest;
-        if (const std::optional<double> ratio = rms_log_ratio(curve, x, y)) against["rms_log_ratio"] = *ratio;
-        found["against"] = std::move(against);
-      }
-      if (options.residuals && !below.x.empty()) {
-        if (picture.lower.empty())
-          picture.lower.push_back({"zero", Series::Style::line, curve.color, {curve.from, curve.to}, {0, 0}, {}});
-        picture.lower.push_back(std::move(below));
-      }
-    }
-    if (!options.levels.empty()) {
-      Json crossings = Json::object();
-      for (const double level : options.levels) {
-        Json at = Json::object();
-        at["value"] = nullptr;
-        for (std::size_t i = 1; i < data.x.size(); ++i) {
-          const double a = data.y[i - 1] - level, b = data.y[i] - level;
-          if ((a > 0) == (b > 0)) continue;
-          const double u = a / (a - b), slope = (b - a) / (data.x[i] - data.x[i - 1]);
-          at = quantity_json(data.x[i - 1] + u * (data.x[i] - data.x[i - 1]), "1",
-                             std::hypot((1 - u) * data.error[i - 1], u * data.error[i]) / std::abs(slope));
-          break;
-        }
-        crossings[fmt::format("{:g}", level)] = std::move(at);
-      }
-      found["crossings"] = std::move(crossings);
-    }
-    out[options.name] = std::move(found);
+    out[options.name] = numbers_of(chart, options, data);
   }
   for (const CurveOptions& curve : chart.curves) {
-    if (curve.label.empty()) continue;
-    Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}, true};
-    for (int i = 0; i <= 200; ++i) {
-      const double x = curve.from + (curve.to - curve.from) * i / 200;
-      series.x.push_back(x), series.y.push_back(value_at(curve, x));
-    }
-    picture.series.push_back(std::move(series));
+    if (!curve.label.empty()) add_curve(curve, picture);
   }
   draw_picture(picture, context.output_directory(), chart.name);
   return out;

@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipelines/formats/files.hpp"
 
 namespace shakebed::pipelines {
 namespace {
+
+// Half the 95 % interval of a normal distribution, in standard errors.
+constexpr double interval_95 = 1.96;
 
 struct Claim {
   std::string claim, place, pointer, note, measured_as;
@@ -28,6 +32,100 @@ std::string_view name_of(Verdict verdict) {
     default:
       return "not measured";
   }
+}
+
+// The measured number that a claim points at; NaN: it was not measured.
+struct Measured {
+  double value = NAN, error = 0;
+  std::string unit;
+};
+Measured read_number(const Claim& claim, const std::vector<Input>& inputs) {
+  const auto input =
+      std::find_if(inputs.begin(), inputs.end(),
+                   [id = split_pointer(claim.pointer).front()](const Input& one) { return one.id == id; });
+  if (input == inputs.end()) throw InputError(fmt::format("{}: \"from\" names no such stage", claim.pointer));
+  const Json result = input->result();
+  const Json* found =
+      find_pointer(result, std::string_view(claim.pointer).substr(1 + escape_pointer_token(input->id).size()));
+  if (found == nullptr)
+    throw InputError(fmt::format("{}: there is no such number in {}", claim.pointer, input->result_name));
+  Measured measured;
+  if (found->is_object() && found->contains("value")) {
+    if ((*found)["value"].is_number()) measured.value = (*found)["value"].get<double>();
+    if (found->contains("std_error") && (*found)["std_error"].is_number())
+      measured.error = (*found)["std_error"].get<double>();
+    measured.unit = found->value("unit", "");
+  } else if (found->is_number()) {
+    measured.value = found->get<double>();
+  } else if (found->is_boolean()) {
+    measured.value = found->get<bool>() ? 1 : 0;
+  }
+  return measured;
+}
+
+Verdict verdict_of(const Claim& claim, const Measured& measured) {
+  if (!std::isfinite(measured.value)) return Verdict::missing;
+  const double low = claim.value ? *claim.value - claim.tolerance : claim.least.value_or(-INFINITY),
+               high = claim.value ? *claim.value + claim.tolerance : claim.most.value_or(INFINITY);
+  const double least = measured.value - interval_95 * measured.error,
+               most = measured.value + interval_95 * measured.error;
+  if (least >= low && most <= high) return Verdict::holds;
+  return most < low || least > high ? Verdict::fails : Verdict::open;
+}
+
+std::string claimed_text(const Claim& claim) {
+  std::string text = claim.value ? fmt::format("{:g}", *claim.value) : "";
+  if (claim.value && claim.tolerance > 0) text += fmt::format(" ± {:g}", claim.tolerance);
+  if (claim.least) text += fmt::format("at least {:g}", *claim.least);
+  if (claim.most) text += fmt::format("{}at most {:g}", claim.least ? ", " : "", *claim.most);
+  return text;
+}
+
+// Two digits of the error, and the value as far as they go.
+std::string measured_text(const Claim& claim, const Measured& measured) {
+  if (!std::isfinite(measured.value)) return "–";
+  std::string text;
+  if (measured.error > 0) {
+    const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(measured.error))), 0, 9);
+    text = fmt::format("{:.{}f} ± {:.{}f}", measured.value, decimals, measured.error, decimals);
+  } else if (claim.pointer.ends_with("/p_value")) {
+    text = measured.value < 1e-10 ? "below 1e-10" : fmt::format("{:.4g}", measured.value);
+  } else {
+    text = fmt::format("{:.4g} (no error bar)", measured.value);
+  }
+  if (!measured.unit.empty() && measured.unit != "1") text += " " + measured.unit;
+  return text;
+}
+
+struct Judged {
+  std::string claimed, measured;
+  Verdict verdict;
+};
+
+Json claim_json(const Claim& c, const Measured& number, const Judged& judged) {
+  Json row{{"claim", c.claim},
+           {"claimed", judged.claimed},
+           {"measured", judged.measured},
+           {"verdict", name_of(judged.verdict)}};
+  row["value"] = std::isfinite(number.value) ? Json(number.value) : Json();
+  if (number.error > 0) row["std_error"] = number.error;
+  if (!c.place.empty()) row["place"] = c.place;
+  if (!c.measured_as.empty()) row["measured_as"] = c.measured_as;
+  if (!c.note.empty()) row["note"] = c.note;
+  row["number"] = c.pointer;
+  return row;
+}
+
+std::string markdown_row(const Claim& c, const Judged& judged) {
+  const auto cell = [](const std::string& text) {
+    std::string out;
+    for (const char letter : text) out += letter == '|' ? std::string("\\|") : std::string(1, letter);
+    return out;
+  };
+  return fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
+                     c.measured_as.empty() ? "" : " (" + cell(c.measured_as) + ")", judged.claimed,
+                     cell(judged.measured), name_of(judged.verdict), c.note.empty() ? "" : ": " + cell(c.note),
+                     cell(c.place));
 }
 
 class Claims : public Stage {
@@ -82,71 +180,14 @@ class Claims : public Stage {
   void run(RunContext& context) const override {
     Json rows = Json::array();
     Table verdicts = context.table("claims.csv");
-    std::string table = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
-    const auto cell = [](const std::string& text) {
-      std::string out;
-      for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
-      return out;
-    };
-    for (const Claim& c : claims_) {
-      const auto tokens = split_pointer(c.pointer);
-      const Json* found = nullptr;
-      Json result;
-      for (const Input& input : context.inputs()) {
-        if (input.id != tokens.front()) continue;
-        result = input.result();
-        found = find_pointer(result, std::string_view(c.pointer).substr(1 + escape_pointer_token(input.id).size()));
-        if (found == nullptr)
-          throw InputError(fmt::format("{}: there is no such number in {}", c.pointer, input.result_name));
-      }
-      if (found == nullptr) throw InputError(fmt::format("{}: \"from\" names no such stage", c.pointer));
-      double value = NAN, error = 0;
-      std::string unit;
-      if (found->is_object() && found->contains("value")) {
-        if ((*found)["value"].is_number()) value = (*found)["value"].get<double>();
-        if (found->contains("std_error") && (*found)["std_error"].is_number())
-          error = (*found)["std_error"].get<double>();
-        unit = found->value("unit", "");
-      } else if (found->is_number()) {
-        value = found->get<double>();
-      } else if (found->is_boolean()) {
-        value = found->get<bool>() ? 1 : 0;
-      }
-      const double low = c.value ? *c.value - c.tolerance : c.least.value_or(-INFINITY),
-                   high = c.value ? *c.value + c.tolerance : c.most.value_or(INFINITY);
-      const double reach = 1.96 * error;
-      const Verdict verdict = !std::isfinite(value)                           ? Verdict::missing
-                              : value - reach >= low && value + reach <= high ? Verdict::holds
-                              : value + reach < low || value - reach > high   ? Verdict::fails
-                                                                              : Verdict::open;
-      std::string claimed = c.value ? fmt::format("{:g}", *c.value) : "";
-      if (c.value && c.tolerance > 0) claimed += fmt::format(" ± {:g}", c.tolerance);
-      if (c.least) claimed += fmt::format("at least {:g}", *c.least);
-      if (c.most) claimed += fmt::format("{}at most {:g}", c.least ? ", " : "", *c.most);
-      std::string measured = "–";
-      if (std::isfinite(value)) {
-        if (error > 0) {
-          const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9);
-          measured = fmt::format("{:.{}f} ± {:.{}f}", value, decimals, error, decimals);
-        } else {
-          const bool chance = c.pointer.ends_with("/p_value");
-          measured = chance && value < 1e-10 ? "below 1e-10" : fmt::format("{:.4g}", value);
-          if (!chance) measured += " (no error bar)";
-        }
-        if (!unit.empty() && unit != "1") measured += " " + unit;
-      }
-      Json row{{"claim", c.claim}, {"claimed", claimed}, {"measured", measured}, {"verdict", name_of(verdict)}};
-      row["value"] = std::isfinite(value) ? Json(value) : Json();
-      if (error > 0) row["std_error"] = error;
-      if (!c.place.empty()) row["place"] = c.place;
-      if (!c.measured_as.empty()) row["measured_as"] = c.measured_as;
-      if (!c.note.empty()) row["note"] = c.note;
-      row["number"] = c.pointer;
-      rows.push_back(std::move(row));
-      verdicts.add({c.claim, c.measured_as, claimed, value, error > 0 ? error : no_number, name_of(verdict), c.place});
-      table += fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
-                           c.measured_as.empty() ? "" : " (" + cell(c.measured_as) + ")", claimed, cell(measured),
-                           name_of(verdict), c.note.empty() ? "" : ": " + cell(c.note), cell(c.place));
+    std::string markdown = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
+    for (const Claim& claim : claims_) {
+      const Measured number = read_number(claim, context.inputs());
+      const Judged judged{claimed_text(claim), measured_text(claim, number), verdict_of(claim, number)};
+      rows.push_back(claim_json(claim, number, judged));
+      verdicts.add({claim.claim, claim.measured_as, judged.claimed, number.value,
+                    number.error > 0 ? number.error : no_number, name_of(judged.verdict), claim.place});
+      markdown += markdown_row(claim, judged);
     }
     write_file(context.output("claims.json"),
                dump(Json{{"verdict_is",
@@ -154,7 +195,7 @@ class Claims : public Stage {
                           "what is claimed (holds), outside of it (does not hold), or in both (open)"},
                          {"claims", std::move(rows)}}));
     verdicts.write(context.output("claims.csv"));
-    write_file(context.output("claims.md"), table);
+    write_file(context.output("claims.md"), markdown);
   }
 
  private:

@@ -9,95 +9,103 @@
 namespace shakebed::pipelines {
 namespace {
 
+// The photographs, and where in them the bed is.
+void describe_geometry(Fields& fields, ExtractOptions& o) {
+  fields.input_files("images", o.images,
+                     {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
+                      .example = "\"photos/*.tif\""});
+  fields.boolean(
+      "use_geometry", o.use_geometry,
+      {.help = "take scale, floor and walls of rendered frames from the render stage instead of finding them"});
+  fields.quantity("scale", o.scale, dimension::length_per_pixel,
+                  {.help = "length of a pixel; found from the diameter if left out", .range = positive});
+  fields.number("floor", o.floor,
+                {.help = "row of the floor's surface at the left edge, pixels from the top; found if left out"});
+  fields.number("floor_slope", o.floor_slope, {.help = "pixels down per pixel right", .range = from_to(-1, 1)});
+  fields.number("left_wall", o.left_wall,
+                {.help = "column of the left wall's inner face in pixels; found if left out"});
+  fields.number("right_wall", o.right_wall,
+                {.help = "column of the right wall's inner face in pixels; found if left out"});
+  fields.numbers("roi", o.roi, {.help = "region of interest in pixels: left, top, width, height"});
+  fields.number(
+      "pixel_aspect", o.pixel_aspect,
+      {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
+  fields.number("lens", o.lens_radial,
+                {.help = "the lens's bend: how far the frame's corners truly lie further out, in half diagonals (a "
+                         "barrel is positive); found on the beads' rims if left out",
+                 .range = from_to(-0.3, 0.3)});
+}
+
+// How beads look.
+void describe_beads(Fields& fields, ExtractOptions& o) {
+  fields.choice(
+      "polarity", o.polarity,
+      {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},
+      {.help = "whether beads are darker or brighter than what is behind them"});
+  fields.choice("channel", o.channel,
+                {{BeadChannel::automatic, "automatic"},
+                 {BeadChannel::red, "red"},
+                 {BeadChannel::green, "green"},
+                 {BeadChannel::blue, "blue"},
+                 {BeadChannel::grey, "grey"},
+                 {BeadChannel::saturation, "saturation"},
+                 {BeadChannel::background_distance, "background_distance"}},
+                {.help = "which part of a colour picture is used: saturation is the largest of red, green and blue "
+                         "less the smallest, background_distance the distance from the most frequent colour"});
+  fields.number("radius", o.radius,
+                {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
+  fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
+}
+
+void describe_profile(Fields& fields, ExtractOptions& o) {
+  fields.object<Kernel>("kernel", o.kernel, describe_measuring_kernel,
+                        {.help = "the window through which density is measured"});
+  fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
+  fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
+  fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
+  fields.quantity("frequency", o.frequency, dimension::frequency,
+                  {.help = "of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
+                   .range = positive});
+  fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
+                  {.help = "of the film as recorded; given, velocities are measured", .range = positive});
+}
+
+void describe_frames(Fields& fields, ExtractOptions& o) {
+  fields.integer("bead_number", o.bead_number,
+                 {.help = "how many beads there are in view, if known: beads missed or seen twice are then told",
+                  .range = at_least(1)});
+  fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
+  fields.integer("overlays", o.overlays,
+                 {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
+}
+
+void check(Fields& fields, const ExtractOptions& o) {
+  const bool from_render = fields.has_upstream("render");
+  fields.require(from_render != fields.has("images"), from_render ? "images" : "",
+                 from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
+                             : "there are no frames: neither \"images\" nor a render stage in \"from\"",
+                 "Give one of the two");
+  fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
+  if (o.roi.size() == 4)
+    fields.require(o.roi[2] >= 8 && o.roi[3] >= 8, "roi", "width and height must be at least 8 pixels");
+  fields.require(o.left_wall.has_value() == o.right_wall.has_value(), "left_wall", "both walls or none must be given");
+  if (o.left_wall && o.right_wall)
+    fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
+  fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
+}
+
 class Extract : public Stage {
  public:
   void describe(Fields& fields) override {
-    ExtractOptions& o = options_;
-    fields.quantity("diameter", diameter_, dimension::length,
-                    {.help = "diameter of a bead; needed for photographs of your own, else that of the simulated bed",
-                     .range = positive,
-                     .example = "\"2.99 mm\""});
-    fields.quantity("second_diameter", o.second_diameter, dimension::length,
-                    {.help = "diameter of beads of another size that are to be found too; left out, they are counted "
-                             "as rejected",
-                     .range = positive});
-    fields.quantity(
-        "gravity", gravity_, dimension::acceleration,
-        {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "
-                 "m/s^2",
-         .range = positive});
-    fields.input_files("images", o.images,
-                       {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
-                        .example = "\"photos/*.tif\""});
-    fields.boolean(
-        "use_geometry", o.use_geometry,
-        {.help = "take scale, floor and walls of rendered frames from the render stage instead of finding them"});
-    fields.quantity("scale", o.scale, dimension::length_per_pixel,
-                    {.help = "length of a pixel; found from the diameter if left out", .range = positive});
-    fields.number("floor", o.floor,
-                  {.help = "row of the floor's surface at the left edge, pixels from the top; found if left out"});
-    fields.number("floor_slope", o.floor_slope, {.help = "pixels down per pixel right", .range = from_to(-1, 1)});
-    fields.number("left_wall", o.left_wall,
-                  {.help = "column of the left wall's inner face in pixels; found if left out"});
-    fields.number("right_wall", o.right_wall,
-                  {.help = "column of the right wall's inner face in pixels; found if left out"});
-    fields.numbers("roi", o.roi, {.help = "region of interest in pixels: left, top, width, height"});
-    fields.number(
-        "pixel_aspect", o.pixel_aspect,
-        {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
-    fields.number("lens", o.lens_radial,
-                  {.help = "the lens's bend: how far the frame's corners truly lie further out, in half diagonals (a "
-                           "barrel is positive); found on the beads' rims if left out",
-                   .range = from_to(-0.3, 0.3)});
-    fields.choice(
-        "polarity", o.polarity,
-        {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},
-        {.help = "whether beads are darker or brighter than what is behind them"});
-    fields.choice("channel", o.channel,
-                  {{BeadChannel::automatic, "automatic"},
-                   {BeadChannel::red, "red"},
-                   {BeadChannel::green, "green"},
-                   {BeadChannel::blue, "blue"},
-                   {BeadChannel::grey, "grey"},
-                   {BeadChannel::saturation, "saturation"},
-                   {BeadChannel::background_distance, "background_distance"}},
-                  {.help = "which part of a colour picture is used: saturation is the largest of red, green and blue "
-                           "less the smallest, background_distance the distance from the most frequent colour"});
-    fields.number("radius", o.radius,
-                  {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
-    fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
-    fields.object<Kernel>("kernel", o.kernel, describe_measuring_kernel,
-                          {.help = "the window through which density is measured"});
-    fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
-    fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
-    fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
-    fields.quantity("frequency", o.frequency, dimension::frequency,
-                    {.help = "of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
-                     .range = positive});
-    fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
-                    {.help = "of the film as recorded; given, velocities are measured", .range = positive});
-    fields.integer("bead_number", o.bead_number,
-                   {.help = "how many beads there are in view, if known: beads missed or seen twice are then told",
-                    .range = at_least(1)});
-    fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
-    fields.integer("overlays", o.overlays,
-                   {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
+    describe_bed(fields);
+    describe_geometry(fields, options_);
+    describe_beads(fields, options_);
+    describe_profile(fields, options_);
+    describe_frames(fields, options_);
     if (!fields.decoding()) return;
     take_bed_facts(fields);
-    const bool from_render = fields.has_upstream("render");
-    fields.require(from_render != fields.has("images"), from_render ? "images" : "",
-                   from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
-                               : "there are no frames: neither \"images\" nor a render stage in \"from\"",
-                   "Give one of the two");
-    fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
-    if (o.roi.size() == 4)
-      fields.require(o.roi[2] >= 8 && o.roi[3] >= 8, "roi", "width and height must be at least 8 pixels");
-    fields.require(o.left_wall.has_value() == o.right_wall.has_value(), "left_wall",
-                   "both walls or none must be given");
-    if (o.left_wall && o.right_wall)
-      fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
-    fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
-    if (fields.has("diameter") && o.diameter > 0) warn_of_bead(fields, "/diameter", o.diameter);
+    check(fields, options_);
+    if (fields.has("diameter") && options_.diameter > 0) warn_of_bead(fields, "/diameter", options_.diameter);
   }
   void results(ResultList& list) const override { state_extract_results(list, options_); }
   void run(RunContext& context) const override { images_module().extract(options_, context); }
@@ -111,6 +119,22 @@ class Extract : public Stage {
   }
 
  private:
+  void describe_bed(Fields& fields) {
+    fields.quantity("diameter", diameter_, dimension::length,
+                    {.help = "diameter of a bead; needed for photographs of your own, else that of the simulated bed",
+                     .range = positive,
+                     .example = "\"2.99 mm\""});
+    fields.quantity("second_diameter", options_.second_diameter, dimension::length,
+                    {.help = "diameter of beads of another size that are to be found too; left out, they are counted "
+                             "as rejected",
+                     .range = positive});
+    fields.quantity(
+        "gravity", gravity_, dimension::acceleration,
+        {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "
+                 "m/s^2",
+         .range = positive});
+  }
+
   // What the simulated bed knows need not be stated again, and may not be stated otherwise.
   void take_bed_facts(Fields& fields) {
     if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->bed.reduced) {

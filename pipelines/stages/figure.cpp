@@ -17,6 +17,12 @@
 namespace shakebed::pipelines {
 namespace {
 
+// Density in 1/D^2 above which a profile is on the picture: a line thinner than that is on the axis (the y axis is
+// about 1.2 high and 480 pixels long).
+constexpr double drawn_density = 2e-3;
+// Density in 1/D^2 from which frames are compared with the simulation: below, few disks are seen.
+constexpr double compared_density = 0.1;
+
 // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
 constexpr std::array palette = {"#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
 enum Color { black, blue, vermilion, green, purple, orange, sky };
@@ -43,10 +49,6 @@ std::string plain(std::string_view text) {
   }
   return out;
 }
-
-}  // namespace
-
-namespace {
 
 // Characters of UTF-8.
 std::size_t letters(std::string_view text) {
@@ -173,88 +175,112 @@ std::string plot_elements(const std::vector<Series>& all, const std::string& nam
   return script;
 }
 
+// One block of NAME.dat a series.
+std::string data_blocks(const std::vector<Series>& all) {
+  std::string data;
+  for (const Series& series : all) {
+    data += fmt::format("# {}\n# x y{}\n", series.label, series.error.empty() ? "" : " std_error");
+    for (std::size_t i = 0; i < series.x.size(); ++i) {
+      data += number_text(series.x[i]) + ' ' + number_text(series.y[i]);
+      if (!series.error.empty()) data += ' ' + number_text(std::max(0.0, series.error[i]));
+      data += '\n';
+    }
+    data += "\n\n";
+  }
+  return data;
+}
+
+// The same for both panels: upper axis label, title, ranges, scales, lines.
+std::string frame_script(const Picture& picture) {
+  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
+  std::string script = fmt::format("set ylabel {}\n", gnuplot_text(picture.y_label));
+  if (!picture.title.empty()) script += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
+  script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
+                        bound(picture.y_low), bound(picture.y_high));
+  if (picture.logarithmic_x) script += "set logscale x\n";
+  if (picture.logarithmic_y) script += "set logscale y\n";
+  return script +
+         "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
+         "pointintervalbox 0\n";
+}
+
+std::string bands_script(const Picture& picture) {
+  std::string script;
+  int object = 1;
+  for (const auto& [low, high] : picture.bands) {
+    script += fmt::format(
+        "set object {} rectangle from {}, graph 0 to {}, graph 1 behind fillcolor rgb '#f0f0f0' fillstyle solid "
+        "noborder\n",
+        object++, number_text(low), number_text(high));
+  }
+  return script;
+}
+
+std::string upper_panel(const Picture& picture, const std::string& name) {
+  std::string script;
+  if (picture.lower.empty()) {
+    script += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
+  } else {
+    script +=
+        "set multiplot\nset lmargin at screen panel_left\nset rmargin at screen 0.97\nset tmargin at screen "
+        "panel_top\nset bmargin at screen 0.38\nset format x ''\n";
+  }
+  script += "plot ";
+  if (!picture.band_label.empty()) {
+    script += fmt::format("NaN with boxes fillcolor rgb '#e4e4e4' fillstyle solid noborder title {}, \\\n     ",
+                          gnuplot_text(plain(picture.band_label)));
+  }
+  return script + plot_elements(picture.series, name, 0, true) + "\n";
+}
+
+std::string lower_panel(const Picture& picture, const std::string& name) {
+  std::string script = fmt::format(
+      "set tmargin at screen 0.35\nset bmargin at screen 0.13\nunset key\nunset title\nset format x '% h'\nset "
+      "xlabel {}\nset ylabel {}\nset yrange [*:*]\nunset logscale y\nset xzeroaxis lc rgb "
+      "'#404040' lw 1\n",
+      gnuplot_text(picture.x_label), gnuplot_text(picture.lower_label));
+  if (const double distance = tic_distance(picture.lower); distance > 0)
+    script += "set ytics " + number_text(distance) + "\n";
+  // The two share their x: where the upper one found it by itself, the lower one takes it over.
+  if (!picture.x_low || !picture.x_high) script += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
+  return script + "plot " + plot_elements(picture.lower, name, picture.series.size(), false) + "\nunset multiplot\n";
+}
+
+// The key stands above the picture, where it hides nothing, in as many columns as its labels allow.
+struct Sheets {
+  Sheet svg, pdf;
+};
+Sheets sheets_of(const Picture& picture) {
+  std::size_t entries = picture.band_label.empty() ? 0 : 1, longest = letters(picture.band_label);
+  for (const Series& series : picture.series) {
+    entries += !series.label.empty();
+    longest = std::max(longest, letters(series.label));
+  }
+  const bool many = entries > 4, two = !picture.lower.empty();
+  const std::size_t svg_columns = many && longest <= 27 ? 3 : 2;
+  const std::size_t pdf_columns = many && longest <= 14 ? 3 : longest <= 26 ? 2 : 1;
+  return {picture_sheet(entries, svg_columns, svg_columns == 3 && longest > 18 ? -3 : 0, two ? 640 : 480, 24, 0.14),
+          picture_sheet(entries, pdf_columns, 0, two ? 200 : 150, 9.2, 0.17)};
+}
+
 }  // namespace
 
 void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name) {
-  std::string data;
-  const auto add = [&](const std::vector<Series>& all) {
-    for (const Series& series : all) {
-      data += fmt::format("# {}\n# x y{}\n", series.label, series.error.empty() ? "" : " std_error");
-      for (std::size_t i = 0; i < series.x.size(); ++i) {
-        data += number_text(series.x[i]) + ' ' + number_text(series.y[i]);
-        if (!series.error.empty()) data += ' ' + number_text(std::max(0.0, series.error[i]));
-        data += '\n';
-      }
-      data += "\n\n";
-    }
-  };
-  // An empty one would not count as an index of gnuplot's.
+  // gnuplot does not give an index to an empty block.
   Picture drawn = picture;
   const auto is_empty = [](const Series& series) { return series.x.empty(); };
   std::erase_if(drawn.series, is_empty);
   std::erase_if(drawn.lower, is_empty);
   if (drawn.series.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
-  add(drawn.series), add(drawn.lower);
-  write_file(directory / (name + ".dat"), data);
+  write_file(directory / (name + ".dat"), data_blocks(drawn.series) + data_blocks(drawn.lower));
 
-  const bool two = !drawn.lower.empty();
-  std::string body;
-  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
-  body += fmt::format("set ylabel {}\n", gnuplot_text(picture.y_label));
-  if (!picture.title.empty()) body += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
-  body += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
-                      bound(picture.y_low), bound(picture.y_high));
-  if (picture.logarithmic_x) body += "set logscale x\n";
-  if (picture.logarithmic_y) body += "set logscale y\n";
-  body +=
-      "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
-      "pointintervalbox 0\n";
-  // Above the picture, where it hides nothing, in as many columns as the labels allow.
-  std::size_t entries = picture.band_label.empty() ? 0 : 1, longest = letters(picture.band_label);
-  for (const Series& series : drawn.series) {
-    entries += !series.label.empty();
-    longest = std::max(longest, letters(series.label));
-  }
-  const bool many = entries > 4;
-  const std::size_t svg_columns = many && longest <= 27 ? 3 : 2;
-  const std::size_t pdf_columns = many && longest <= 14 ? 3 : longest <= 26 ? 2 : 1;
+  std::string body = frame_script(drawn);
   body += "set key above vertical maxrows key_rows Left reverse font keyfont spacing 1.2 samplen 1.5 width key_width\n";
-  int object = 1;
-  for (const auto& [low, high] : picture.bands) {
-    body += fmt::format(
-        "set object {} rectangle from {}, graph 0 to {}, graph 1 behind fillcolor rgb '#f0f0f0' fillstyle solid "
-        "noborder\n",
-        object++, number_text(low), number_text(high));
-  }
-  if (two) {
-    body +=
-        "set multiplot\nset lmargin at screen panel_left\nset rmargin at screen 0.97\nset tmargin at screen "
-        "panel_top\nset bmargin at screen 0.38\nset format x ''\n";
-  } else {
-    body += fmt::format("set xlabel {}\n", gnuplot_text(picture.x_label));
-  }
-  body += "plot ";
-  if (!picture.band_label.empty()) {
-    body += fmt::format("NaN with boxes fillcolor rgb '#e4e4e4' fillstyle solid noborder title {}, \\\n     ",
-                        gnuplot_text(plain(picture.band_label)));
-  }
-  body += plot_elements(drawn.series, name, 0, true) + "\n";
-  if (two) {
-    body += fmt::format(
-        "set tmargin at screen 0.35\nset bmargin at screen 0.13\nunset key\nunset title\nset format x '% h'\nset "
-        "xlabel {}\nset ylabel {}\nset yrange [*:*]\nunset logscale y\nset xzeroaxis lc rgb "
-        "'#404040' lw 1\n",
-        gnuplot_text(picture.x_label), gnuplot_text(picture.lower_label));
-    if (const double distance = tic_distance(drawn.lower); distance > 0)
-      body += "set ytics " + number_text(distance) + "\n";
-    // The two share their x: where the upper one found it by itself, the lower one takes it over.
-    if (!picture.x_low || !picture.x_high) body += "set xrange [GPVAL_X_MIN:GPVAL_X_MAX]\n";
-    body += "plot " + plot_elements(drawn.lower, name, drawn.series.size(), false) + "\nunset multiplot\n";
-  }
-  const Sheet svg =
-      picture_sheet(entries, svg_columns, svg_columns == 3 && longest > 18 ? -3 : 0, two ? 640 : 480, 24, 0.14);
-  const Sheet pdf = picture_sheet(entries, pdf_columns, 0, two ? 200 : 150, 9.2, 0.17);
-  run_gnuplot(directory, name, twice(name, svg, pdf, body));
+  body += bands_script(drawn);
+  body += upper_panel(drawn, name);
+  if (!drawn.lower.empty()) body += lower_panel(drawn, name);
+  const Sheets sheets = sheets_of(drawn);
+  run_gnuplot(directory, name, twice(name, sheets.svg, sheets.pdf, body));
 }
 
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
@@ -389,140 +415,182 @@ class Figure : public Stage {
   std::optional<double> highest_;
 };
 
-void Figure::run(RunContext& context) const {
-  Picture picture{.x_label = "height above the floor's mean position,  z/D",
-                  .y_label = "number density,  φ = n D^2",
-                  .title = title_};
-  Json comparisons = Json::array();
-  Json named = Json::object();  // for checks: by a name that is easy to point at
-  Curve frames, simulated, fitted, bare;
-  std::string fitted_label;
+// The picture as it grows, the curves in it and how far they are from one another.
+class ProfilePicture {
+ public:
+  ProfilePicture(RunContext& context, const std::string& title) : context_(context) {
+    picture_.x_label = "height above the floor's mean position,  z/D";
+    picture_.y_label = "number density,  φ = n D^2";
+    picture_.title = title;
+  }
 
-  if (const Input* extract = context.find_input("extract")) {
-    frames = curve_of(read_profile_csv(extract->file("profile.csv")));
-    picture.series.push_back({"from the frames", Series::Style::points, black, frames.x, frames.y, frames.error});
+  void add_frames() {
+    const Input* extract = context_.find_input("extract");
+    if (extract == nullptr) return;
+    frames_ = curve_of(read_profile_csv(extract->file("profile.csv")));
+    picture_.series.push_back({"from the frames", Series::Style::points, black, frames_.x, frames_.y, frames_.error});
   }
-  if (const Input* simulate = context.find_input("simulate")) {
-    simulated = curve_of(read_profile_csv(simulate->file("profile.csv")));
-    picture.series.push_back({"the simulation itself", frames.empty() ? Series::Style::points : Series::Style::line,
-                              sky, simulated.x, simulated.y, frames.empty() ? simulated.error : std::vector<double>{}});
+
+  // Beside frames a line, alone points with errors.
+  void add_simulation() {
+    const Input* simulate = context_.find_input("simulate");
+    if (simulate == nullptr) return;
+    simulated_ = curve_of(read_profile_csv(simulate->file("profile.csv")));
+    const bool alone = frames_.empty();
+    picture_.series.push_back({"the simulation itself", alone ? Series::Style::points : Series::Style::line, sky,
+                               simulated_.x, simulated_.y, alone ? simulated_.error : std::vector<double>{}});
+    if (alone) return;
+    compare_by_name("frames_against_simulation", "simulation", simulated_);
     // The same moments as the frames, where the simulation kept them apart.
-    const Curve same_moments = simulate->has("profile_frames.csv")
-                                   ? curve_of(read_profile_csv(simulate->file("profile_frames.csv")))
-                                   : simulated;
-    if (!frames.empty()) {
-      Json row = comparison("frames", "simulation", frames, simulated, 0.1);
-      if (row.contains("rms_difference")) named["frames_against_simulation"] = row["rms_difference"];
-      comparisons.push_back(std::move(row));
-      Json same = comparison("frames", "simulation at the moments of the frames", frames, same_moments, 0.1);
-      if (same.contains("rms_difference")) named["frames_against_simulation_same_moments"] = same["rms_difference"];
-      comparisons.push_back(std::move(same));
-    }
+    compare_by_name("frames_against_simulation_same_moments", "simulation at the moments of the frames",
+                    simulate->has("profile_frames.csv")
+                        ? curve_of(read_profile_csv(simulate->file("profile_frames.csv")))
+                        : simulated_);
   }
-  const Input* fit = context.find_input("fit");
-  Json fit_result;
-  if (fit != nullptr) {
-    fit_result = fit->result();
-    fitted = read_columns(fit->file("curve.csv"), "height", "smoothed_density");
-    bare = read_columns(fit->file("curve.csv"), "height", "number_density");
-    const Json* t = find_pointer(fit_result, "/temperature_over_mg/value");
-    const Json* reduced = find_pointer(fit_result, "/temperature/value");
-    fitted_label = "our fit";
-    if (t != nullptr && t->is_number())
-      fitted_label += fmt::format(", T/mg = {:.3g} mm", t->get<double>() * 1e3);
-    else if (reduced != nullptr && reduced->is_number())
-      fitted_label += fmt::format(", T = {:.3g} mgD", reduced->get<double>());
-    if (!fitted.empty()) {
-      picture.series.push_back({fitted_label, Series::Style::line, vermilion, fitted.x, fitted.y, {}});
-      const Json* low = find_pointer(fit_result, "/window/low/value");
-      const Json* high = find_pointer(fit_result, "/window/high/value");
-      if (low != nullptr && high != nullptr) {
-        picture.bands.emplace_back(low->get<double>(), high->get<double>());
-        picture.band_label = "window of the fit";
+
+  void add_fit() {
+    const Input* fit = context_.find_input("fit");
+    if (fit == nullptr) return;
+    const Json result = fit->result();
+    fitted_ = read_columns(fit->file("curve.csv"), "height", "smoothed_density");
+    bare_ = read_columns(fit->file("curve.csv"), "height", "number_density");
+    if (fitted_.empty()) return;
+    picture_.series.push_back({label_of_fit(result), Series::Style::line, vermilion, fitted_.x, fitted_.y, {}});
+    const Json *low = find_pointer(result, "/window/low/value"), *high = find_pointer(result, "/window/high/value");
+    if (low == nullptr || high == nullptr) return;
+    picture_.bands.emplace_back(low->get<double>(), high->get<double>());
+    picture_.band_label = "window of the fit";
+  }
+
+  // To be called when all measured and fitted profiles are in: the axis ends where they do.
+  void find_end() {
+    for (const Series& series : picture_.series) {
+      for (std::size_t i = 0; i < series.x.size(); ++i) {
+        if (series.y[i] > drawn_density) end_ = std::max(end_, series.x[i]);
       }
     }
   }
-  double end = 0;
-  for (const Series& series : picture.series) {
-    for (std::size_t i = 0; i < series.x.size(); ++i) {
-      if (series.y[i] > 2e-3) end = std::max(end, series.x[i]);
-    }
-  }
-  Curve published;
-  if (reference_ == Reference::clement_rajchenbach) {
+
+  void add_published() {
     const fit::PublishedFit parameters;
     const fit::HydrostaticProfile profile = fit::published_profile(parameters);
-    const double top = std::max(end, parameters.shift() + 3);
+    const double top = std::max(end_, parameters.shift() + 3);
     for (int i = 0; i <= 800; ++i) {
       const double height = top * i / 800;
-      published.x.push_back(height), published.y.push_back(profile.density(height));
+      published_.x.push_back(height), published_.y.push_back(profile.density(height));
     }
-    picture.series.push_back({fmt::format("published fit, T/mg = {:g} mm", parameters.temperature_over_mg_in_mm),
-                              Series::Style::dashed,
-                              blue,
-                              published.x,
-                              published.y,
-                              {}});
-    end = std::max(end, parameters.shift() + 2);
-    if (!fitted.empty())
-      comparisons.push_back(comparison("our fit", "published fit", bare.empty() ? fitted : bare, published, 0.0));
-    if (!frames.empty())
-      comparisons.push_back(comparison("frames", "published fit", frames, published, 0.0));
-    else if (!simulated.empty())
-      comparisons.push_back(comparison("simulation", "published fit", simulated, published, 0.0));
+    picture_.series.push_back({fmt::format("published fit, T/mg = {:g} mm", parameters.temperature_over_mg_in_mm),
+                               Series::Style::dashed,
+                               blue,
+                               published_.x,
+                               published_.y,
+                               {}});
+    end_ = std::max(end_, parameters.shift() + 2);
+    if (!fitted_.empty()) compare("our fit", bare_.empty() ? fitted_ : bare_, "published fit", published_);
+    if (!frames_.empty())
+      compare("frames", frames_, "published fit", published_);
+    else if (!simulated_.empty())
+      compare("simulation", simulated_, "published fit", published_);
   }
-  int color = green;
-  for (const std::string& path : data_.paths) {
-    const ProfileTable points = read_profile_csv(path);
-    for (const std::string& note : points.notes) context.warning(note);
-    const Curve data = curve_of(points);
-    const std::string label = std::filesystem::path(path).filename().string();
-    picture.series.push_back({label, Series::Style::points, color, data.x, data.y, data.error});
-    color = color == green ? purple : color == purple ? orange : green;
-    for (const double x : data.x) end = std::max(end, x);
-    for (const auto& [name, curve] : {std::pair<std::string, const Curve*>{"our fit", &fitted},
-                                      {"frames", &frames},
-                                      {"simulation", &simulated},
-                                      {"published fit", &published}}) {
-      if (!curve->empty()) comparisons.push_back(comparison(label, name, data, *curve, 0.0));
-    }
-  }
-  if (picture.series.empty()) throw InputError("there is nothing to draw: \"from\" names no profile and no fit");
-  picture.x_low = 0;
-  picture.x_high = highest_ ? *highest_ : std::ceil(end + 0.5);
-  picture.y_low = 0;
-  context.progress(0.3, "drawing");
-  draw_picture(picture, context.output_directory(), "profile");
 
-  if (fit != nullptr) {
-    const Curve windows = [&] {
-      // Only windows whose fit succeeded.
-      const Curve all = read_columns(fit->file("windows.csv"), "low", "temperature", "std_error");
-      Curve good;
-      for (std::size_t i = 0; i < all.x.size(); ++i) {
-        if (all.y[i] > 0) good.x.push_back(all.x[i]), good.y.push_back(all.y[i]), good.error.push_back(all.error[i]);
+  void add_points(const InputFiles& files) {
+    int color = green;
+    for (const std::string& path : files.paths) {
+      const ProfileTable points = read_profile_csv(path);
+      for (const std::string& note : points.notes) context_.warning(note);
+      const Curve data = curve_of(points);
+      const std::string label = std::filesystem::path(path).filename().string();
+      picture_.series.push_back({label, Series::Style::points, color, data.x, data.y, data.error});
+      color = color == green ? purple : color == purple ? orange : green;
+      for (const double x : data.x) end_ = std::max(end_, x);
+      for (const auto& [name, curve] : {std::pair<std::string, const Curve*>{"our fit", &fitted_},
+                                        {"frames", &frames_},
+                                        {"simulation", &simulated_},
+                                        {"published fit", &published_}}) {
+        if (!curve->empty()) compare(label, data, name, *curve);
       }
-      return good;
-    }();
-    if (windows.x.size() >= 2) {
-      Picture sweep{.x_label = "lower edge of the window,  z/D", .y_label = "T / (m g D)"};
-      sweep.series.push_back({"fitted temperature", Series::Style::points, black, windows.x, windows.y, windows.error});
-      if (const Json* t = find_pointer(fit_result, "/temperature/value"); t != nullptr && t->is_number()) {
-        const auto [low, high] = std::minmax_element(windows.x.begin(), windows.x.end());
-        sweep.series.push_back({"in the window used",
-                                Series::Style::line,
-                                vermilion,
-                                {*low, *high},
-                                {t->get<double>(), t->get<double>()},
-                                {}});
-      }
-      draw_picture(sweep, context.output_directory(), "windows");
     }
   }
-  Json out;
-  for (const auto& [name, value] : named.items()) out[name] = value;
-  out["comparisons"] = std::move(comparisons);
-  write_file(context.output("figure.json"), dump(out));
+
+  void draw(const std::optional<double>& highest) {
+    if (picture_.series.empty()) throw InputError("there is nothing to draw: \"from\" names no profile and no fit");
+    picture_.x_low = 0;
+    picture_.x_high = highest ? *highest : std::ceil(end_ + 0.5);
+    picture_.y_low = 0;
+    context_.progress(0.3, "drawing");
+    draw_picture(picture_, context_.output_directory(), "profile");
+  }
+
+  void write_comparisons() {
+    Json out;
+    for (const auto& [name, value] : named_.items()) out[name] = value;
+    out["comparisons"] = std::move(comparisons_);
+    write_file(context_.output("figure.json"), dump(out));
+  }
+
+ private:
+  static std::string label_of_fit(const Json& result) {
+    const Json* t = find_pointer(result, "/temperature_over_mg/value");
+    const Json* reduced = find_pointer(result, "/temperature/value");
+    if (t != nullptr && t->is_number()) return fmt::format("our fit, T/mg = {:.3g} mm", t->get<double>() * 1e3);
+    if (reduced != nullptr && reduced->is_number())
+      return fmt::format("our fit, T = {:.3g} mgD", reduced->get<double>());
+    return "our fit";
+  }
+
+  void compare(const std::string& of, const Curve& a, const std::string& with, const Curve& b) {
+    comparisons_.push_back(comparison(of, with, a, b, 0.0));
+  }
+  // The frames with a curve; the result has a name of its own, at which a check can point.
+  void compare_by_name(const std::string& name, const std::string& with, const Curve& curve) {
+    Json row = comparison("frames", with, frames_, curve, compared_density);
+    if (row.contains("rms_difference")) named_[name] = row["rms_difference"];
+    comparisons_.push_back(std::move(row));
+  }
+
+  RunContext& context_;
+  Picture picture_;
+  Json comparisons_ = Json::array();
+  Json named_ = Json::object();
+  Curve frames_, simulated_, fitted_, bare_, published_;
+  double end_ = 0;
+};
+
+// Temperature against the lower edge of the window, of those windows whose fit succeeded.
+void draw_windows(const RunContext& context, const Input& fit) {
+  const Curve all = read_columns(fit.file("windows.csv"), "low", "temperature", "std_error");
+  Curve windows;
+  for (std::size_t i = 0; i < all.x.size(); ++i) {
+    if (!(all.y[i] > 0)) continue;
+    windows.x.push_back(all.x[i]), windows.y.push_back(all.y[i]), windows.error.push_back(all.error[i]);
+  }
+  if (windows.x.size() < 2) return;
+  Picture sweep{.x_label = "lower edge of the window,  z/D", .y_label = "T / (m g D)"};
+  sweep.series.push_back({"fitted temperature", Series::Style::points, black, windows.x, windows.y, windows.error});
+  const Json result = fit.result();
+  if (const Json* t = find_pointer(result, "/temperature/value"); t != nullptr && t->is_number()) {
+    const auto [low, high] = std::minmax_element(windows.x.begin(), windows.x.end());
+    sweep.series.push_back({"in the window used",
+                            Series::Style::line,
+                            vermilion,
+                            {*low, *high},
+                            {t->get<double>(), t->get<double>()},
+                            {}});
+  }
+  draw_picture(sweep, context.output_directory(), "windows");
+}
+
+void Figure::run(RunContext& context) const {
+  ProfilePicture picture(context, title_);
+  picture.add_frames();
+  picture.add_simulation();
+  picture.add_fit();
+  picture.find_end();
+  if (reference_ == Reference::clement_rajchenbach) picture.add_published();
+  picture.add_points(data_);
+  picture.draw(highest_);
+  if (const Input* fit = context.find_input("fit")) draw_windows(context, *fit);
+  picture.write_comparisons();
 }
 
 }  // namespace

@@ -36,9 +36,62 @@ struct WindowChoice {
 
 const std::string simulation = "simulation";
 
+// The tail of a bed: densities below this one, in 1/D^2, about half that of the solid.
+constexpr double tail_density = 0.6;
+
+void describe_window(Fields& f, WindowChoice& w) {
+  f.number("low", w.low, {.help = "lowest height used in D; found by the rule if left out"});
+  f.number("high", w.high, {.help = "highest height used in D; found by the rule if left out"});
+  f.number("floor_exclusion", w.floor_exclusion,
+           {.help = "rule: nothing below this height above the base, in D", .range = non_negative});
+  f.number("plateau_fraction", w.plateau_fraction,
+           {.help = "rule: begin where the smoothed profile first reaches this part of its greatest value",
+            .range = zero_to_one});
+  f.number("lowest_fraction", w.lowest_fraction,
+           {.help = "rule: end where the density falls below this part of its greatest value", .range = zero_to_one});
+  f.number("lowest_significance", w.lowest_significance,
+           {.help = "rule: or below so many standard errors", .range = non_negative});
+  f.require(!w.low || !w.high || *w.low < *w.high, "low", "the window ends below where it begins");
+}
+
+// What goes into a fit.
+struct FitTask {
+  const Input* source = nullptr;  // the first stage of "from"
+  std::filesystem::path path;     // of the profile
+  MeasuredProfile measured;
+  fit::FitOptions options;  // with what the inputs say in place of what was left out
+  std::optional<double> diameter;
+};
+
+// A bed of the library: its temperature is that of its reservoir, or else its kinetic one.
+struct LibraryBed {
+  std::string id;
+  fit::SimulatedProfile profile;
+  Kernel kernel;
+};
+
 class Fit : public Stage {
  public:
   void describe(Fields& fields) override {
+    describe_model(fields);
+    describe_data(fields);
+    describe_results(fields);
+    if (!fields.decoding()) return;
+    check_bed(fields);
+    check_bootstrap(fields);
+    check_inputs(fields);
+    check_model(fields);
+  }
+
+  void results(ResultList& list) const override {
+    state_fit_results(list, {.matched = options_.model == simulation,
+                             .bootstrap = bootstrap_ > 0,
+                             .answer = answer_ && options_.model != simulation});
+  }
+  void run(RunContext& context) const override;
+
+ private:
+  void describe_model(Fields& fields) {
     fields.input_files(
         "profile", profile_,
         {.help = "a profile of your own (CSV with height and number_density); left out, that of the stage in \"from\"",
@@ -66,27 +119,14 @@ class Fit : public Stage {
     fields.number("base", options_.base, {.help = "lower edge of the bed in D"});
     fields.quantity("diameter", diameter_, dimension::length,
                     {.help = "D, for T/(m g) as a length; left out, what the measurement says", .range = positive});
+  }
+
+  // The window and the errors of the data.
+  void describe_data(Fields& fields) {
     fields.object<Kernel>("kernel", kernel_, describe_kernel,
                           {.help = "the window through which the profile was measured: the model is put through it "
                                    "before the two are compared; left out, what the profile itself says"});
-    fields.object<WindowChoice>(
-        "window", window_,
-        [](Fields& f, WindowChoice& w) {
-          f.number("low", w.low, {.help = "lowest height used in D; found by the rule if left out"});
-          f.number("high", w.high, {.help = "highest height used in D; found by the rule if left out"});
-          f.number("floor_exclusion", w.floor_exclusion,
-                   {.help = "rule: nothing below this height above the base, in D", .range = non_negative});
-          f.number("plateau_fraction", w.plateau_fraction,
-                   {.help = "rule: begin where the smoothed profile first reaches this part of its greatest value",
-                    .range = zero_to_one});
-          f.number("lowest_fraction", w.lowest_fraction,
-                   {.help = "rule: end where the density falls below this part of its greatest value",
-                    .range = zero_to_one});
-          f.number("lowest_significance", w.lowest_significance,
-                   {.help = "rule: or below so many standard errors", .range = non_negative});
-          f.require(!w.low || !w.high || *w.low < *w.high, "low", "the window ends below where it begins");
-        },
-        {.help = "which part of the profile is fitted"});
+    fields.object<WindowChoice>("window", window_, describe_window, {.help = "which part of the profile is fitted"});
     fields.choice(
         "errors", errors_,
         {{ErrorSource::automatic, "automatic"},
@@ -95,6 +135,10 @@ class Fit : public Stage {
         {.help = "covariance: that between heights, which simulate and extract measure; diagonal: the profile's "
                  "standard errors, as if heights were independent (for a measured profile these are too "
                  "small); automatic: covariance where there is one"});
+  }
+
+  // How it is fitted, and what else is to be found.
+  void describe_results(Fields& fields) {
     fields.boolean("robust", options_.robust, {.help = "Huber's loss: outliers count linearly"});
     fields.boolean("sweep", options_.sweep, {.help = "also T against window"});
     fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
@@ -106,17 +150,26 @@ class Fit : public Stage {
         {.help = "resamples over windows of frames, for the error of T that frames show by themselves: of an "
                  "extract stage, or of a simulate stage that kept its frames; 0: none",
          .range = from_to(0, 100'000)});
-    if (!fields.decoding()) return;
+  }
+
+  // What the bed knows may not be stated otherwise.
+  void check_bed(Fields& fields) const {
     if (const KnownBed* known = fields.known_bed()) {
       require_same_as_bed(fields, "diameter", diameter_, known->bed.diameter, dimension::length);
       if (fields.has_upstream("simulate") && !known->bed.reduced)
         require_same_as_bed(fields, "column_number", options_.column_number, known->bed.column_number(),
                             dimension::none);
     }
+  }
+
+  void check_bootstrap(Fields& fields) const {
     fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
                    "there are no frames to resample: no extract or simulate stage in \"from\"");
     fields.require(bootstrap_ == 0 || options_.model != simulation, "bootstrap",
                    "the model simulation has its own errors, from the library's repeats");
+  }
+
+  void check_inputs(Fields& fields) const {
     fields.require(options_.model != simulation || fields.has_upstream("simulate"), "model",
                    "the model simulation needs simulate stages in \"from\" as its library");
     fields.require(options_.model == simulation || fields.upstream().size() <= 2, "from",
@@ -130,6 +183,9 @@ class Fit : public Stage {
                    "there is no profile: neither \"profile\" nor a stage in \"from\"", "Give one of the two");
     fields.require(profile_.paths.size() <= 1, "profile",
                    fmt::format("names {} files, one profile is fitted at a time", profile_.paths.size()));
+  }
+
+  void check_model(Fields& fields) const {
     const std::string& model = options_.model;
     bool known = model == "enskog-rectangle" || model == "fermi" || model == "rectangle" || model == simulation;
     std::vector<std::string> names{"enskog-rectangle", "fermi", "rectangle", simulation};
@@ -143,16 +199,11 @@ class Fit : public Stage {
                                    : fmt::format("Did you mean \"{}\"?", nearest));
   }
 
-  void results(ResultList& list) const override {
-    state_fit_results(list, {.matched = options_.model == simulation,
-                             .bootstrap = bootstrap_ > 0,
-                             .answer = answer_ && options_.model != simulation});
-  }
-  void run(RunContext& context) const override;
-
- private:
-  Json answer_of(const fit::Profile& profile, const fit::FitOptions& options, const RunContext& context,
-                 std::optional<double> diameter) const;
+  FitTask read_profile(RunContext& context) const;
+  void take_bed_facts(const RunContext& context, FitTask& task) const;
+  void set_options(FitTask& task) const;
+  std::vector<LibraryBed> read_library(const RunContext& context, const FitTask& task) const;
+  Json bootstrap(const FitTask& task, RunContext& context) const;
 
   InputFiles profile_;
   fit::FitOptions options_;
@@ -165,12 +216,6 @@ class Fit : public Stage {
   std::uint32_t bootstrap_ = 0;
 };
 
-// A bed of the library: its temperature is that of its reservoir, or else its kinetic one.
-struct LibraryBed {
-  std::string id;
-  fit::SimulatedProfile profile;
-  Kernel kernel;
-};
 LibraryBed library_bed(const Input& input) {
   const MeasuredProfile measured = read_measured_profile(input.file("profile.csv"));
   LibraryBed bed{input.id, {0, measured.profile, 0}, measured.kernel.value_or(Kernel{})};
@@ -192,8 +237,58 @@ struct Matched {
   double interpolation_error = 0;
   std::optional<double> scatter;  // relative, of the library's own beds matched against one another
 };
-Matched match(const fit::Profile& measured, const std::vector<LibraryBed>& beds, const WindowChoice& window,
-              const fit::FitOptions& options) {
+
+// T_c by Enskog's equation, where the column number is known.
+void add_critical_temperature(const fit::FitOptions& options, fit::FitResult& fit) {
+  fit.plateau_density = {options.plateau_density, 0, true};
+  if (!options.column_number) return;
+  fit.column_number = {*options.column_number, 0, true};
+  const fit::Value critical =
+      fit::critical_temperature(fit::enskog(), {*options.column_number, options.plateau_density});
+  fit.critical_status = critical.status;
+  if (!critical.ok()) return;
+  fit.critical_temperature = {critical.value, 0, true};
+  fit.reduced_temperature = {fit.temperature.value / critical.value, fit.temperature.std_error / critical.value};
+}
+
+// With T known the tail says where the solid ends.
+void add_solid_height(const fit::Profile& measured, const fit::FitOptions& options, fit::FitResult& fit) {
+  fit::FitOptions tail = options;
+  tail.model = "enskog-rectangle";
+  tail.window = {};
+  tail.window.below_density = tail_density;
+  tail.interval = tail.sweep = tail.compare = false;
+  tail.curve_points = 0;
+  const auto at = [&](double temperature) {
+    tail.fixed_temperature = temperature;
+    return fit::fit_profile(measured, tail);
+  };
+  const fit::FitResult best = at(fit.temperature.value), warmer = at(fit.temperature.value + fit.temperature.std_error);
+  if (best.ok() && warmer.ok()) {
+    fit.shift = best.shift, fit.solid_height = best.solid_height;
+    fit.shift.std_error = std::hypot(best.shift.std_error, warmer.shift.value - best.shift.value);
+    fit.solid_height.std_error =
+        std::hypot(best.solid_height.std_error, warmer.solid_height.value - best.solid_height.value);
+    fit.solid_height_by_sum_rule = best.solid_height_by_sum_rule;
+  }
+  fit.area = best.area;
+}
+
+// The matched profile beside the measured one, height by height.
+void add_curve(const fit::Profile& measured, const fit::MatchResult& found, fit::FitResult& fit) {
+  for (std::size_t i = 0; i < measured.height.size(); ++i) {
+    fit::Residual r{measured.height[i], measured.number_density[i],
+                    measured.std_error.empty() ? 0 : measured.std_error[i], 0, false};
+    for (std::size_t k = 0; k < found.height.size(); ++k) {
+      if (found.height[k] == r.height) r.model = found.density[k], r.used = true;
+    }
+    if (r.used) fit.curve.push_back({r.height, r.model, r.model});
+    fit.residuals.push_back(r);
+  }
+}
+
+Matched match(const FitTask& task, const std::vector<LibraryBed>& beds, const WindowChoice& window) {
+  const fit::Profile& measured = task.measured.profile;
   Matched out;
   std::vector<fit::SimulatedProfile> library;
   for (const LibraryBed& bed : beds) {
@@ -206,61 +301,21 @@ Matched match(const fit::Profile& measured, const std::vector<LibraryBed>& beds,
   const fit::MatchResult found = fit::match_simulated(measured, library, how);
   fit::FitResult& fit = out.fit;
   fit.status = found.status, fit.message = found.message, fit.model = simulation;
+  fit.kernel = task.options.kernel;
   fit.temperature = found.temperature, fit.temperature_interval = found.interval;
   fit.warnings = found.warnings;
   fit.chi2 = found.chi2, fit.dof = found.dof, fit.chi2_per_dof = found.chi2_per_dof, fit.bins = found.bins;
   out.interpolation_error = found.interpolation_error;
-  const auto tests = fit::test_library(library, how);
-  if (const fit::Value scatter = fit::library_scatter(tests, found.temperature.value);
-      found.status == fit::FitStatus::ok && scatter.ok()) {
+  const fit::Value scatter = fit::library_scatter(fit::test_library(library, how), found.temperature.value);
+  if (found.status == fit::FitStatus::ok && scatter.ok()) {
     out.scatter = scatter.value;
     fit.temperature.std_error = std::max(fit.temperature.std_error, scatter.value * found.temperature.value);
   }
   if (!found.height.empty()) fit.window_low = found.height.front(), fit.window_high = found.height.back();
   fit.window_rule = "every bin from " + number_text(how.low) + " D up";
-  fit.plateau_density = {options.plateau_density, 0, true};
-  if (options.column_number) {
-    fit.column_number = {*options.column_number, 0, true};
-    const fit::Value critical =
-        fit::critical_temperature(fit::enskog(), {*options.column_number, options.plateau_density});
-    fit.critical_status = critical.status;
-    if (critical.ok()) {
-      fit.critical_temperature = {critical.value, 0, true};
-      fit.reduced_temperature = {fit.temperature.value / critical.value, fit.temperature.std_error / critical.value};
-    }
-  }
-  // With T known the tail says where the solid ends.
-  if (found.status == fit::FitStatus::ok) {
-    fit::FitOptions tail = options;
-    tail.model = "enskog-rectangle";
-    tail.window = {};
-    tail.window.below_density = 0.6;
-    tail.interval = tail.sweep = tail.compare = false;
-    tail.curve_points = 0;
-    const auto at = [&](double temperature) {
-      tail.fixed_temperature = temperature;
-      return fit::fit_profile(measured, tail);
-    };
-    const fit::FitResult best = at(fit.temperature.value),
-                         warmer = at(fit.temperature.value + fit.temperature.std_error);
-    if (best.ok() && warmer.ok()) {
-      fit.shift = best.shift, fit.solid_height = best.solid_height;
-      fit.shift.std_error = std::hypot(best.shift.std_error, warmer.shift.value - best.shift.value);
-      fit.solid_height.std_error =
-          std::hypot(best.solid_height.std_error, warmer.solid_height.value - best.solid_height.value);
-      fit.solid_height_by_sum_rule = best.solid_height_by_sum_rule;
-    }
-    fit.area = best.area;
-  }
-  for (std::size_t i = 0; i < measured.height.size(); ++i) {
-    fit::Residual r{measured.height[i], measured.number_density[i],
-                    measured.std_error.empty() ? 0 : measured.std_error[i], 0, false};
-    for (std::size_t k = 0; k < found.height.size(); ++k) {
-      if (found.height[k] == r.height) r.model = found.density[k], r.used = true;
-    }
-    if (r.used) fit.curve.push_back({r.height, r.model, r.model});
-    fit.residuals.push_back(r);
-  }
+  add_critical_temperature(task.options, fit);
+  if (found.status == fit::FitStatus::ok) add_solid_height(measured, task.options, fit);
+  add_curve(measured, found, fit);
   return out;
 }
 
@@ -342,95 +397,107 @@ void write_tables(RunContext& context, const fit::FitResult& result) {
 }
 
 // From the profile alone, whatever model the stage fits, and the kinetic temperatures of the first input that has some.
-Json Fit::answer_of(const fit::Profile& profile, const fit::FitOptions& options, const RunContext& context,
-                    std::optional<double> diameter) const {
+Json answer_of(const FitTask& task, const RunContext& context) {
+  const fit::FitOptions& options = task.options;
   fit::AnswerInput input;
-  input.profile = profile, input.kernel = options.kernel;
+  input.profile = task.measured.profile, input.kernel = options.kernel;
   if (options.base != fit::FitOptions{}.base) input.base = options.base;  // else that of a hexagonal bed
   input.column_number = options.column_number;
   for (const Input& upstream : context.inputs()) {
-    const KineticTemperatures kinetic = kinetic_temperatures(upstream, diameter);
+    const KineticTemperatures kinetic = kinetic_temperatures(upstream, task.diameter);
     if (!input.temperature_x) input.temperature_x = kinetic.x, input.temperature_z = kinetic.z;
   }
-  return answer_json(fit::find_answer(input), diameter);
+  return answer_json(fit::find_answer(input), task.diameter);
+}
+
+// Our own file, else the profile of the first stage of "from", with its covariance where that is asked for.
+FitTask Fit::read_profile(RunContext& context) const {
+  FitTask task;
+  task.options = options_;
+  task.diameter = diameter_;
+  task.source = context.inputs().empty() ? nullptr : &context.inputs().front();
+  task.path = !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : task.source->file("profile.csv");
+  const bool has_covariance = task.source != nullptr && profile_.empty() && task.source->has("covariance.csv");
+  if (errors_ == ErrorSource::covariance && !has_covariance)
+    throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
+  const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options_.model != simulation;
+  task.measured = read_measured_profile(
+      task.path, use_covariance ? std::optional(task.source->file("covariance.csv")) : std::nullopt);
+  for (const std::string& warning : task.measured.warnings) context.warning(warning);
+  return task;
+}
+
+// What the options leave out: diameter, column number, temperature. The description of the bed goes on with the fit.
+void Fit::take_bed_facts(const RunContext& context, FitTask& task) const {
+  fit::FitOptions& options = task.options;
+  for (const Input& input : context.inputs()) {
+    if (!input.has("bed.json")) continue;
+    const BedDescription bed = BedDescription::read(input.file("bed.json"));
+    if (!task.diameter && !bed.reduced) task.diameter = bed.diameter;
+    if (!options.column_number && input.stage == "simulate") options.column_number = bed.column_number();
+    write_file(context.output("bed.json"), dump(bed.to_json()));
+  }
+  if (!options.column_number) options.column_number = task.measured.column_number;
+  if (!temperature_measured_) return;
+  const Json bed = context.input("simulate").result();
+  const Json *x = find_pointer(bed, "/temperature_x/value"), *z = find_pointer(bed, "/temperature_z/value");
+  if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
+    throw InputError("the simulated bed has no kinetic temperature at which T could be held");
+  options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
+}
+
+void Fit::set_options(FitTask& task) const {
+  task.options.kernel = kernel_ ? *kernel_ : task.measured.kernel.value_or(Kernel{});
+  fit::WindowOptions& window = task.options.window;
+  window.low = window_.low, window.high = window_.high;
+  window.floor_exclusion = window_.floor_exclusion, window.plateau_fraction = window_.plateau_fraction;
+  window.lowest_fraction = window_.lowest_fraction, window.lowest_significance = window_.lowest_significance;
+}
+
+// All simulated beds but the one that is fitted.
+std::vector<LibraryBed> Fit::read_library(const RunContext& context, const FitTask& task) const {
+  std::vector<LibraryBed> beds;
+  for (const Input& input : context.inputs()) {
+    if (input.stage != "simulate" || (profile_.empty() && &input == task.source)) continue;
+    beds.push_back(library_bed(input));
+    if (beds.back().kernel != task.options.kernel)
+      throw InputError(
+          fmt::format("{}: its profile was measured through the kernel {}, the one to be fitted through {}. Measure "
+                      "both through the same kernel.",
+                      input.id, to_string(beds.back().kernel), to_string(task.options.kernel)));
+  }
+  return beds;
+}
+
+Json Fit::bootstrap(const FitTask& task, RunContext& context) const {
+  context.progress(0.3, "resampling");
+  fit::BootstrapOptions how;
+  how.resamples = static_cast<int>(bootstrap_);
+  const fit::ProfileFrames frames = frames_of(*task.source, task.measured.profile.height, task.options.kernel);
+  const fit::BootstrapResult found = fit::bootstrap_fit(frames, task.options, how);
+  if (found.status != fit::FitStatus::ok) context.warning("bootstrap: " + found.message);
+  return bootstrap_json(found, bootstrap_);
 }
 
 void Fit::run(RunContext& context) const {
-  fit::FitOptions options = options_;
-  std::optional<double> diameter = diameter_;
-  // What goes into the fit: our own file, else the first stage of "from".
-  const Input* source = context.inputs().empty() ? nullptr : &context.inputs().front();
-  const std::filesystem::path path =
-      !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : source->file("profile.csv");
-  const bool has_covariance = source != nullptr && profile_.empty() && source->has("covariance.csv");
-  if (errors_ == ErrorSource::covariance && !has_covariance)
-    throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
-  const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options.model != simulation;
-  const MeasuredProfile measured =
-      read_measured_profile(path, use_covariance ? std::optional(source->file("covariance.csv")) : std::nullopt);
-  for (const std::string& warning : measured.warnings) context.warning(warning);
-  const fit::Profile& profile = measured.profile;
-  for (const Input& input : context.inputs()) {
-    if (input.has("bed.json")) {
-      const BedDescription bed = BedDescription::read(input.file("bed.json"));
-      if (!diameter && !bed.reduced) diameter = bed.diameter;
-      if (!options.column_number && input.stage == "simulate") options.column_number = bed.column_number();
-      write_file(context.output("bed.json"), dump(bed.to_json()));
-    }
-  }
-  if (!options.column_number) options.column_number = measured.column_number;
-  if (temperature_measured_) {
-    const Json bed = context.input("simulate").result();
-    const Json *x = find_pointer(bed, "/temperature_x/value"), *z = find_pointer(bed, "/temperature_z/value");
-    if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
-      throw InputError("the simulated bed has no kinetic temperature at which T could be held");
-    options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
-  }
-  options.kernel = kernel_ ? *kernel_ : measured.kernel.value_or(Kernel{});
-  options.window.low = window_.low, options.window.high = window_.high;
-  options.window.floor_exclusion = window_.floor_exclusion, options.window.plateau_fraction = window_.plateau_fraction;
-  options.window.lowest_fraction = window_.lowest_fraction,
-  options.window.lowest_significance = window_.lowest_significance;
-
+  FitTask task = read_profile(context);
+  take_bed_facts(context, task);
+  set_options(task);
   context.progress(0.1, "fitting");
-  Matched matched;
-  fit::FitResult result;
-  if (options.model == simulation) {
-    std::vector<LibraryBed> beds;
-    for (const Input& input : context.inputs()) {
-      if (input.stage != "simulate" || (profile_.empty() && &input == source)) continue;
-      beds.push_back(library_bed(input));
-      if (beds.back().kernel != options.kernel)
-        throw InputError(
-            fmt::format("{}: its profile was measured through the kernel {}, the one to be fitted through {}. Measure "
-                        "both through the same kernel.",
-                        input.id, to_string(beds.back().kernel), to_string(options.kernel)));
-    }
-    matched = match(profile, beds, window_, options);
-    result = std::move(matched.fit);
-    result.kernel = options.kernel;
-  } else {
-    result = fit::fit_profile(profile, options);
-  }
+  const bool matching = options_.model == simulation;
+  const Matched matched = matching ? match(task, read_library(context, task), window_) : Matched{};
+  const fit::FitResult result = matching ? matched.fit : fit::fit_profile(task.measured.profile, task.options);
   if (result.status == fit::FitStatus::bad_input)
-    throw InputError(fmt::format("{}: {}", path.string(), result.message));
+    throw InputError(fmt::format("{}: {}", task.path.string(), result.message));
   for (const std::string& warning : result.warnings) context.warning(warning);
-  Json json = fit_json(result, diameter);
-  if (options.model == simulation) {
-    json["library"] = std::move(matched.library);
+  Json json = fit_json(result, task.diameter);
+  if (matching) {
+    json["library"] = matched.library;
     json["interpolation_error"] = quantity_json(matched.interpolation_error, "m g D");
     json["library_scatter"] = matched.scatter ? Json(*matched.scatter) : Json();
   }
-  if (answer_ && options.model != simulation) json["answer"] = answer_of(profile, options, context, diameter);
-  if (bootstrap_ > 0) {
-    context.progress(0.3, "resampling");
-    fit::BootstrapOptions how;
-    how.resamples = static_cast<int>(bootstrap_);
-    const fit::BootstrapResult found =
-        fit::bootstrap_fit(frames_of(*source, profile.height, options.kernel), options, how);
-    if (found.status != fit::FitStatus::ok) context.warning("bootstrap: " + found.message);
-    json["bootstrap"] = bootstrap_json(found, bootstrap_);
-  }
+  if (answer_ && !matching) json["answer"] = answer_of(task, context);
+  if (bootstrap_ > 0) json["bootstrap"] = bootstrap(task, context);
   if (!json["describes_data"].get<bool>()) {
     context.warning(
         fmt::format("{} does not describe this profile: {}", result.model, json["why_not"].get<std::string>()));

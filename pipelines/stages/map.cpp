@@ -99,48 +99,72 @@ class Map : public Stage {
     question.restitution = restitution_;
     question.equation = equation_;
     if (plateau_density_) question.plateau_density = *plateau_density_;
-    if (const Input* fitted = context.find_input("fit")) {
-      const Json fit = fitted->result();
-      const auto number = [&](const char* pointer) -> std::optional<double> {
-        const Json* found = find_pointer(fit, pointer);
-        return found != nullptr && found->is_number() ? std::optional<double>(found->get<double>()) : std::nullopt;
-      };
-      if (!plateau_density_)
-        question.plateau_density = number("/plateau_density/value").value_or(question.plateau_density);
-      question.measured_temperature = number("/temperature/value");
-      question.measured_std_error = number("/temperature/std_error");
-    }
-    std::optional<double> bead_restitution = bead_restitution_, bead_friction = bead_friction_;
-    const auto source = std::find_if(context.inputs().begin(), context.inputs().end(),
-                                     [](const Input& input) { return input.has("bed.json"); });
-    if (source != context.inputs().end()) {
-      const BedDescription bed = BedDescription::read(source->file("bed.json"));
-      if (!bead_restitution) bead_restitution = bed.restitution;
-      if (!bead_friction) bead_friction = bed.friction;
-      if (bed.reduced && !(diameter_ && frequency_))
-        throw InputError("the bed is in reduced units: give diameter and frequency here");
-      question.gamma = bed.gamma();
-      question.frequency = bed.frequency.value_or(0), question.diameter = bed.diameter;
-      if (!bed.reduced && bed.gravity) question.gravity = *bed.gravity;
-      question.initial_height = bed.column_number() / question.plateau_density;
-    }
-    if (gamma_) question.gamma = *gamma_;
-    if (frequency_) question.frequency = *frequency_;
-    if (diameter_) question.diameter = *diameter_;
-    if (gravity_) question.gravity = *gravity_;
-    if (initial_height_) question.initial_height = *initial_height_;
+    take_fit(context, question);
+    const Beads beads = take_bed(context, question);
+    take_options(question);
     if (!(question.gamma > 0) || !(question.frequency > 0))
       throw InputError("the floor of this bed does not shake: there is no Gamma to map");
     Json json = map_json(question);
     if (const Input* study = context.find_input("study"); study != nullptr || !table_.empty()) {
       const StudyTable table =
           read_study_table(table_.empty() ? study->file("table.csv") : std::filesystem::path(table_.paths.front()));
-      json["simulated"] = simulated(context, table, question, bead_restitution, bead_friction, json);
+      json["simulated"] = simulated(context, table, question, beads, json);
     }
     write_file(context.output("map.json"), dump(json));
+    write_readings(context, json["readings"]);
+  }
+
+ private:
+  // Of the beads, for a table of simulated beds.
+  struct Beads {
+    std::optional<double> restitution, friction;
+  };
+
+  // Its temperature, and its plateau density where none is given.
+  void take_fit(const RunContext& context, MapQuestion& question) const {
+    const Input* fitted = context.find_input("fit");
+    if (fitted == nullptr) return;
+    const Json fit = fitted->result();
+    const auto number = [&](const char* pointer) -> std::optional<double> {
+      const Json* found = find_pointer(fit, pointer);
+      return found != nullptr && found->is_number() ? std::optional<double>(found->get<double>()) : std::nullopt;
+    };
+    if (!plateau_density_)
+      question.plateau_density = number("/plateau_density/value").value_or(question.plateau_density);
+    question.measured_temperature = number("/temperature/value");
+    question.measured_std_error = number("/temperature/std_error");
+  }
+
+  // What the first input that describes a bed says of it.
+  Beads take_bed(const RunContext& context, MapQuestion& question) const {
+    Beads beads{bead_restitution_, bead_friction_};
+    const auto source = std::find_if(context.inputs().begin(), context.inputs().end(),
+                                     [](const Input& input) { return input.has("bed.json"); });
+    if (source == context.inputs().end()) return beads;
+    const BedDescription bed = BedDescription::read(source->file("bed.json"));
+    if (!beads.restitution) beads.restitution = bed.restitution;
+    if (!beads.friction) beads.friction = bed.friction;
+    if (bed.reduced && !(diameter_ && frequency_))
+      throw InputError("the bed is in reduced units: give diameter and frequency here");
+    question.gamma = bed.gamma();
+    question.frequency = bed.frequency.value_or(0), question.diameter = bed.diameter;
+    if (!bed.reduced && bed.gravity) question.gravity = *bed.gravity;
+    question.initial_height = bed.column_number() / question.plateau_density;
+    return beads;
+  }
+
+  void take_options(MapQuestion& question) const {
+    if (gamma_) question.gamma = *gamma_;
+    if (frequency_) question.frequency = *frequency_;
+    if (diameter_) question.diameter = *diameter_;
+    if (gravity_) question.gravity = *gravity_;
+    if (initial_height_) question.initial_height = *initial_height_;
+  }
+
+  static void write_readings(RunContext& context, const Json& rows) {
     Table readings = context.table("map.csv");
     std::size_t in_range = 0;
-    for (const Json& row : json["readings"]) {
+    for (const Json& row : rows) {
       const auto value = [&](const char* key) {
         return row[key].is_null() ? no_number : row[key]["value"].get<double>();
       };
@@ -150,14 +174,13 @@ class Map : public Stage {
       in_range += row["in_range"].get<bool>();
     }
     readings.write(context.output("map.csv"));
-    if (in_range < json["readings"].size()) {
+    if (in_range < rows.size()) {
       context.warning(fmt::format(
           "{} of the {} formulas that predict T from Gamma do not apply at this Gamma (see map.csv, column in_range).",
-          json["readings"].size() - in_range, json["readings"].size()));
+          rows.size() - in_range, rows.size()));
     }
   }
 
- private:
   static void state_readings(ResultList& list, const Given& measured) {
     const std::string row = "/readings/#/";
     list.text(row + "name", "name of the reading");
@@ -239,25 +262,25 @@ class Map : public Stage {
     return std::nullopt;
   }
 
-  // T of simulated beds, interpolated at the question.
-  Json simulated(RunContext& context, const StudyTable& table, const MapQuestion& question,
-                 std::optional<double> bead_restitution, std::optional<double> bead_friction, const Json& map) const {
-    std::vector<fit::MapAxis> axes;
+  // Where the bed lies along the axes of a table of simulated beds.
+  std::vector<double> place_of(const MapQuestion& question, const Beads& beads) const {
     std::vector<double> here;
-    Json asked = Json::object();
     for (const std::string& axis : columns_.axes) {
-      axes.push_back({axis, false});
       const std::optional<double> value = axis == "gamma"         ? std::optional(question.gamma)
                                           : axis == "frequency"   ? std::optional(question.frequency)
-                                          : axis == "restitution" ? bead_restitution
-                                          : axis == "friction"    ? bead_friction
+                                          : axis == "restitution" ? beads.restitution
+                                          : axis == "friction"    ? beads.friction
                                                                   : std::optional(question.initial_height);
       if (!value)
         throw InputError(
             fmt::format("the table is over {} of the beads, which no bed in \"from\" tells: give bead_{}", axis, axis));
       here.push_back(*value);
-      asked[axis] = *value;
     }
+    return here;
+  }
+
+  // Each row of the table with a temperature.
+  std::vector<fit::MapPoint> points_of(const StudyTable& table) const {
     std::vector<fit::MapPoint> points;
     for (std::size_t r = 0; r < table.rows.size(); ++r) {
       const auto t = table.number(r, table.column(columns_.temperature));
@@ -272,7 +295,11 @@ class Map : public Stage {
       }
       points.push_back(std::move(point));
     }
-    const std::size_t number = points.size();
+    return points;
+  }
+
+  void warn_of_few_levels(RunContext& context, const std::vector<fit::MapPoint>& points,
+                          const std::vector<double>& here) const {
     for (std::size_t a = 0; a < here.size(); ++a) {
       std::set<double> levels;
       for (const fit::MapPoint& point : points) levels.insert(point.position[a]);
@@ -281,17 +308,32 @@ class Map : public Stage {
             fmt::format("the table has {} values of {}: how T bends between them is not in the interpolation's error",
                         levels.size(), columns_.axes[a]));
     }
-    const fit::EmpiricalMap beds(std::move(axes), std::move(points));
-    const fit::EmpiricalMap::Prediction found = beds.at(here);
+  }
+
+  // T of simulated beds, interpolated at the question.
+  Json simulated(RunContext& context, const StudyTable& table, const MapQuestion& question, const Beads& beads,
+                 const Json& map) const {
+    const std::vector<double> here = place_of(question, beads);
+    std::vector<fit::MapPoint> points = points_of(table);
+    warn_of_few_levels(context, points, here);
+    std::vector<fit::MapAxis> axes;
+    Json asked = Json::object();
+    for (std::size_t a = 0; a < here.size(); ++a) {
+      axes.push_back({columns_.axes[a], false});
+      asked[columns_.axes[a]] = here[a];
+    }
+    const std::size_t number = points.size();
+    const fit::EmpiricalMap library(std::move(axes), std::move(points));
+    const fit::EmpiricalMap::Prediction found = library.at(here);
     Json out{{"status", fit::to_string(found.status)}, {"beds", number}, {"at", std::move(asked)}};
-    if (!beds.message().empty()) out["message"] = beds.message();
+    if (!library.message().empty()) out["message"] = library.message();
     if (found.status != fit::FitStatus::ok) {
       context.warning(fmt::format("the table of simulated beds gives no temperature: {}",
-                                  beds.message().empty() ? fit::to_string(found.status) : beds.message()));
+                                  library.message().empty() ? fit::to_string(found.status) : library.message()));
       return out;
     }
     out["inside"] = found.inside;
-    out["interpolation_error"] = beds.interpolation_error();
+    out["interpolation_error"] = library.interpolation_error();
     const auto put = [&](const char* key, double factor, const char* unit) {
       out[key] = quantity_json(found.temperature.value * factor, unit, found.temperature.std_error * factor);
     };

@@ -95,6 +95,139 @@ void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<d
     fields.comment(fmt::format("gamma {:.6g}", s.amplitude * omega * omega / *gravity));
 }
 
+void describe_disks(Fields& f, DiskOptions& d) {
+  f.integer("count", d.count, {.help = "number of disks N", .required = true, .range = at_least(1), .example = "337"});
+  f.quantity("diameter", d.diameter, dimension::length,
+             {.help = "diameter D", .required = !f.reduced(), .range = positive, .example = "\"2.99 mm\""});
+  f.quantity("density", d.density, dimension::density, {.help = "mass density of the material", .range = positive});
+  describe_surface(f, d.surface);
+  f.choice("inertia", d.inertia, {{Inertia::disk, "disk"}, {Inertia::sphere, "sphere"}},
+           {.help = "moment of inertia: m R^2/2 (disk) or 2 m R^2/5 (sphere)"});
+  f.quantity(
+      "contact_duration", d.contact_duration, dimension::time,
+      {.help = "t_c of the TC model: a contact is elastic if either partner was hit less than t_c ago; 0 for none. "
+               "Default: 1e-4 sqrt(D/g) where anything dissipates",
+       .range = non_negative,
+       .example = "\"1 us\""});
+  f.object<SecondSpeciesOptions>(
+      "second", d.second,
+      [](Fields& g, SecondSpeciesOptions& s) {
+        g.integer("count", s.count,
+                  {.help = "number of disks of the second species", .required = true, .range = at_least(1)});
+        g.quantity("diameter", s.diameter, dimension::length,
+                   {.help = "their diameter", .required = true, .range = positive});
+        g.quantity("density", s.density, dimension::density,
+                   {.help = "their density (default: as the first)", .range = positive});
+      },
+      {.help = "a second species"});
+  f.require(!f.reduced() || d.diameter == 1, "diameter", "in reduced units the first species has diameter 1",
+            "Leave it out, or leave out \"units\": \"reduced\"");
+}
+
+void describe_box(Fields& f, BoxOptions& b) {
+  f.quantity("width", b.width, dimension::length,
+             {.help = "distance of the sides W", .required = true, .range = positive, .example = "\"89.7 mm\""});
+  f.variant("sides", b.sides, {.help = "the sides"},
+            alternative<HardSidesOptions>("hard", "walls with their own restitution and friction",
+                                          [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
+            alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
+  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "nothing"),
+            alternative<FixedLidOptions>(
+                "fixed", "a wall",
+                [](Fields& g, FixedLidOptions& l) {
+                  g.quantity("height", l.height, dimension::length,
+                             {.help = "above the floor's mean position", .required = true, .range = positive});
+                  describe_surface(g, l.surface);
+                }),
+            alternative<PeriodicLidOptions>("periodic", "no floor and no lid: periodic upwards (weightless scenes)",
+                                            [](Fields& g, PeriodicLidOptions& l) {
+                                              g.quantity("height", l.height, dimension::length,
+                                                         {.help = "period", .required = true, .range = positive});
+                                            }));
+}
+
+void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravity) {
+  f.tagged(
+      "motion", floor.motion, {.help = "how the floor moves"}, alternative<StillFloorOptions>("still", "not at all"),
+      alternative<SinusoidalFloorOptions>(
+          "sinusoidal", "a sin(2 pi f t)",
+          [gravity](Fields& g, SinusoidalFloorOptions& s) { describe_shaking(g, s, gravity); }),
+      alternative<TableFloorOptions>(
+          "table", "one period of measured positions, equally spaced in time; a periodic cubic spline between them",
+          [](Fields& g, TableFloorOptions& t) {
+            g.quantity("period", t.period, dimension::time,
+                       {.help = "period (default: that of the file's times)", .range = positive});
+            g.quantities("heights", t.heights, dimension::length,
+                         {.help = "positions in the order of time", .example = "[\"0 mm\", \"1 mm\", ...]"});
+            g.input_files("file", t.file,
+                          {.help = "instead of heights: a CSV with the columns time,height in s and m "
+                                   "(reduced: sqrt(D/g) and D), or height alone"});
+            read_table(g, t);
+          }));
+  describe_surface(f, floor.surface);
+}
+
+void describe_bath(Fields& fields, BathOptions& bath) {
+  fields.variant(
+      "bath", bath, {.help = "a reservoir"}, alternative<NoBathOptions>("none", "none: driven by the floor only"),
+      alternative<LangevinOptions>(
+          "langevin", "every interval v -> v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi",
+          [](Fields& f, LangevinOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "T/(m g)", .required = true, .range = positive});
+            f.quantity("rate", b.rate, dimension::frequency,
+                       {.help = "friction rate", .required = true, .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between kicks", .required = true, .range = positive});
+          }),
+      alternative<AndersenOptions>(
+          "andersen", "redraws single disks' velocities at random moments",
+          [](Fields& f, AndersenOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "T/(m g)", .required = true, .range = positive});
+            f.quantity("rate", b.rate, dimension::frequency,
+                       {.help = "redraws a disk and unit of time", .required = true, .range = positive});
+          }),
+      alternative<WhiteNoiseOptions>(
+          "white_noise", "random kicks without friction: heats against dissipation",
+          [](Fields& f, WhiteNoiseOptions& b) {
+            f.quantity("heating", b.heating, cube_over_time,
+                       {.help = "H/m: growth of the variance of each velocity component per time",
+                        .required = true,
+                        .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between kicks", .required = true, .range = positive});
+            f.boolean("conserve_momentum", b.conserve_momentum, {.help = "take the mean kick away"});
+          }),
+      alternative<ThermalFloorOptions>("thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
+                                       [](Fields& f, ThermalFloorOptions& b) {
+                                         f.quantity("temperature", b.temperature, dimension::length,
+                                                    {.help = "T/(m g)", .required = true, .range = positive});
+                                       }));
+}
+
+void describe_start(Fields& fields, StartOptions& start) {
+  fields.variant(
+      "start", start, {.help = "where the disks are at first"},
+      alternative<HexagonalStartOptions>(
+          "hexagonal", "staggered rows from the floor up, or filling a closed box evenly",
+          [](Fields& f, HexagonalStartOptions& s) {
+            f.integer("disks_a_row", s.disks_a_row, {.help = "0: as many as fit"});
+            f.number("spacing", s.spacing,
+                     {.help = "distance of neighbours in a row in D; 0: chosen from the width", .range = non_negative});
+          }),
+      alternative<RandomStartOptions>("random", "random sequential insertion",
+                                      [](Fields& f, RandomStartOptions& s) {
+                                        f.quantity(
+                                            "height", s.height, dimension::length,
+                                            {.help = "fills the box up to here; 0: chosen", .range = non_negative});
+                                      }),
+      alternative<FileStartOptions>("file", "the last frame of a trajectory (extended XYZ, lengths in D)",
+                                    [](Fields& f, FileStartOptions& s) {
+                                      f.input_files("file", s.file, {.help = "trajectory", .required = true});
+                                    }));
+}
+
 // speed_unit: sqrt(g D) [m/s].
 sim::Surface to_sim(const SurfaceOptions& s, double speed_unit) {
   return {s.restitution, s.friction, s.tangential_restitution, s.law, s.law_speed ? *s.law_speed / speed_unit : 1};
@@ -182,169 +315,41 @@ sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks&
 
 void SceneOptions::describe(Fields& fields) {
   reduced_ = fields.reduced();
-  const bool reduced = reduced_;
-  if (!reduced && fields.mode() != Fields::Mode::encode) disks_.density = 2500;  // glass
-  fields.object<DiskOptions>(
-      "disks", disks_,
-      [reduced](Fields& f, DiskOptions& d) {
-        f.integer("count", d.count,
-                  {.help = "number of disks N", .required = true, .range = at_least(1), .example = "337"});
-        f.quantity("diameter", d.diameter, dimension::length,
-                   {.help = "diameter D", .required = !reduced, .range = positive, .example = "\"2.99 mm\""});
-        f.quantity("density", d.density, dimension::density,
-                   {.help = "mass density of the material", .range = positive});
-        describe_surface(f, d.surface);
-        f.choice("inertia", d.inertia, {{Inertia::disk, "disk"}, {Inertia::sphere, "sphere"}},
-                 {.help = "moment of inertia: m R^2/2 (disk) or 2 m R^2/5 (sphere)"});
-        f.quantity(
-            "contact_duration", d.contact_duration, dimension::time,
-            {.help =
-                 "t_c of the TC model: a contact is elastic if either partner was hit less than t_c ago; 0 for none. "
-                 "Default: 1e-4 sqrt(D/g) where anything dissipates",
-             .range = non_negative,
-             .example = "\"1 us\""});
-        f.object<SecondSpeciesOptions>(
-            "second", d.second,
-            [](Fields& g, SecondSpeciesOptions& s) {
-              g.integer("count", s.count,
-                        {.help = "number of disks of the second species", .required = true, .range = at_least(1)});
-              g.quantity("diameter", s.diameter, dimension::length,
-                         {.help = "their diameter", .required = true, .range = positive});
-              g.quantity("density", s.density, dimension::density,
-                         {.help = "their density (default: as the first)", .range = positive});
-            },
-            {.help = "a second species"});
-        f.require(!reduced || d.diameter == 1, "diameter", "in reduced units the first species has diameter 1",
-                  "Leave it out, or leave out \"units\": \"reduced\"");
-      },
-      {.help = "the disks", .required = true});
-  if (fields.decoding() || fields.mode() == Fields::Mode::schema) {
-    gravity_ = reduced ? 1.0 : 9.81;
-  }
-  bool none = false;
-  if (reduced) {
-    double g = gravity_.value_or(0);
-    fields.number("gravity", g, {.help = "1, or 0 for a weightless scene (reduced units)", .range = from_to(0, 1)});
-    fields.require(g == 0 || g == 1, "gravity", "in reduced units gravity is 1 or 0");
-    none = g == 0;
-    gravity_ = none ? std::nullopt : std::optional<double>(g);
-  } else {
+  if (!reduced_ && fields.mode() != Fields::Mode::encode) disks_.density = 2500;  // glass
+  fields.object<DiskOptions>("disks", disks_, describe_disks, {.help = "the disks", .required = true});
+  describe_gravity(fields);
+  fields.object<BoxOptions>("box", box_, describe_box, {.help = "the box", .required = true});
+  fields.object<FloorOptions>(
+      "floor", floor_, [gravity = gravity_](Fields& f, FloorOptions& floor) { describe_floor(f, floor, gravity); },
+      {.help = "the floor"});
+  describe_bath(fields, bath_);
+  describe_start(fields, start_);
+  if (fields.decoding() || fields.mode() == Fields::Mode::schema)
+    start_temperature_ = weightless() ? 1.0 : 0.01 * (reduced_ ? 1.0 : disks_.diameter);
+  fields.quantity(
+      "start_temperature", start_temperature_, dimension::length,
+      {.help = "T/(m g) of the first velocities (weightless: 1, the unit of energy)", .range = non_negative});
+  if (fields.decoding() && fields.problem_count() == 0) check_scene(fields);
+}
+
+// Of 9.81 m/s^2 where nothing else is said; in reduced units 1, or 0 for none.
+void SceneOptions::describe_gravity(Fields& fields) {
+  if (fields.decoding() || fields.mode() == Fields::Mode::schema) gravity_ = reduced_ ? 1.0 : 9.81;
+  if (!reduced_) {
     fields.quantity("gravity", gravity_, dimension::acceleration,
                     {.help = "acceleration g; a weightless scene is written in reduced units",
                      .range = positive,
                      .example = "\"9.81 m/s^2\""});
+    return;
   }
-  fields.object<BoxOptions>(
-      "box", box_,
-      [](Fields& f, BoxOptions& b) {
-        f.quantity("width", b.width, dimension::length,
-                   {.help = "distance of the sides W", .required = true, .range = positive, .example = "\"89.7 mm\""});
-        f.variant("sides", b.sides, {.help = "the sides"},
-                  alternative<HardSidesOptions>("hard", "walls with their own restitution and friction",
-                                                [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
-                  alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
-        f.variant(
-            "lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "nothing"),
-            alternative<FixedLidOptions>(
-                "fixed", "a wall",
-                [](Fields& g, FixedLidOptions& l) {
-                  g.quantity("height", l.height, dimension::length,
-                             {.help = "above the floor's mean position", .required = true, .range = positive});
-                  describe_surface(g, l.surface);
-                }),
-            alternative<PeriodicLidOptions>("periodic", "no floor and no lid: periodic upwards (weightless scenes)",
-                                            [](Fields& g, PeriodicLidOptions& l) {
-                                              g.quantity("height", l.height, dimension::length,
-                                                         {.help = "period", .required = true, .range = positive});
-                                            }));
-      },
-      {.help = "the box", .required = true});
-  fields.object<FloorOptions>(
-      "floor", floor_,
-      [gravity = gravity_](Fields& f, FloorOptions& floor) {
-        f.tagged("motion", floor.motion, {.help = "how the floor moves"},
-                 alternative<StillFloorOptions>("still", "not at all"),
-                 alternative<SinusoidalFloorOptions>(
-                     "sinusoidal", "a sin(2 pi f t)",
-                     [gravity](Fields& g, SinusoidalFloorOptions& s) { describe_shaking(g, s, gravity); }),
-                 alternative<TableFloorOptions>(
-                     "table",
-                     "one period of measured positions, equally spaced in time; a periodic cubic spline between them",
-                     [](Fields& g, TableFloorOptions& t) {
-                       g.quantity("period", t.period, dimension::time,
-                                  {.help = "period (default: that of the file's times)", .range = positive});
-                       g.quantities("heights", t.heights, dimension::length,
-                                    {.help = "positions in the order of time", .example = "[\"0 mm\", \"1 mm\", ...]"});
-                       g.input_files("file", t.file,
-                                     {.help = "instead of heights: a CSV with the columns time,height in s and m "
-                                              "(reduced: sqrt(D/g) and D), or height alone"});
-                       read_table(g, t);
-                     }));
-        describe_surface(f, floor.surface);
-      },
-      {.help = "the floor"});
-  fields.variant(
-      "bath", bath_, {.help = "a reservoir"}, alternative<NoBathOptions>("none", "none: driven by the floor only"),
-      alternative<LangevinOptions>(
-          "langevin", "every interval v -> v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi",
-          [](Fields& f, LangevinOptions& b) {
-            f.quantity("temperature", b.temperature, dimension::length,
-                       {.help = "T/(m g)", .required = true, .range = positive});
-            f.quantity("rate", b.rate, dimension::frequency,
-                       {.help = "friction rate", .required = true, .range = positive});
-            f.quantity("interval", b.interval, dimension::time,
-                       {.help = "time between kicks", .required = true, .range = positive});
-          }),
-      alternative<AndersenOptions>(
-          "andersen", "redraws single disks' velocities at random moments",
-          [](Fields& f, AndersenOptions& b) {
-            f.quantity("temperature", b.temperature, dimension::length,
-                       {.help = "T/(m g)", .required = true, .range = positive});
-            f.quantity("rate", b.rate, dimension::frequency,
-                       {.help = "redraws a disk and unit of time", .required = true, .range = positive});
-          }),
-      alternative<WhiteNoiseOptions>(
-          "white_noise", "random kicks without friction: heats against dissipation",
-          [](Fields& f, WhiteNoiseOptions& b) {
-            f.quantity("heating", b.heating, cube_over_time,
-                       {.help = "H/m: growth of the variance of each velocity component per time",
-                        .required = true,
-                        .range = positive});
-            f.quantity("interval", b.interval, dimension::time,
-                       {.help = "time between kicks", .required = true, .range = positive});
-            f.boolean("conserve_momentum", b.conserve_momentum, {.help = "take the mean kick away"});
-          }),
-      alternative<ThermalFloorOptions>("thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
-                                       [](Fields& f, ThermalFloorOptions& b) {
-                                         f.quantity("temperature", b.temperature, dimension::length,
-                                                    {.help = "T/(m g)", .required = true, .range = positive});
-                                       }));
-  fields.variant(
-      "start", start_, {.help = "where the disks are at first"},
-      alternative<HexagonalStartOptions>(
-          "hexagonal", "staggered rows from the floor up, or filling a closed box evenly",
-          [](Fields& f, HexagonalStartOptions& s) {
-            f.integer("disks_a_row", s.disks_a_row, {.help = "0: as many as fit"});
-            f.number("spacing", s.spacing,
-                     {.help = "distance of neighbours in a row in D; 0: chosen from the width", .range = non_negative});
-          }),
-      alternative<RandomStartOptions>("random", "random sequential insertion",
-                                      [](Fields& f, RandomStartOptions& s) {
-                                        f.quantity(
-                                            "height", s.height, dimension::length,
-                                            {.help = "fills the box up to here; 0: chosen", .range = non_negative});
-                                      }),
-      alternative<FileStartOptions>("file", "the last frame of a trajectory (extended XYZ, lengths in D)",
-                                    [](Fields& f, FileStartOptions& s) {
-                                      f.input_files("file", s.file, {.help = "trajectory", .required = true});
-                                    }));
-  if (fields.decoding() || fields.mode() == Fields::Mode::schema)
-    start_temperature_ = none ? 1.0 : 0.01 * (reduced ? 1.0 : disks_.diameter);
-  fields.quantity(
-      "start_temperature", start_temperature_, dimension::length,
-      {.help = "T/(m g) of the first velocities (weightless: 1, the unit of energy)", .range = non_negative});
+  double g = gravity_.value_or(0);
+  fields.number("gravity", g, {.help = "1, or 0 for a weightless scene (reduced units)", .range = from_to(0, 1)});
+  fields.require(g == 0 || g == 1, "gravity", "in reduced units gravity is 1 or 0");
+  gravity_ = g == 0 ? std::nullopt : std::optional<double>(g);
+}
 
-  if (!fields.decoding() || fields.problem_count() > 0) return;
+// Whether such a bed can be, and whether its disks can be laid out.
+void SceneOptions::check_scene(Fields& fields) const {
   const auto* file = std::get_if<FileStartOptions>(&start_);
   if (file != nullptr && file->file.paths.size() != 1) {
     fields.problem("/start/file",

@@ -85,6 +85,9 @@ struct ThermalFloorOptions {
   double temperature = 0;
 };
 
+using BathOptions =
+    std::variant<NoBathOptions, LangevinOptions, AndersenOptions, WhiteNoiseOptions, ThermalFloorOptions>;
+
 struct HexagonalStartOptions {
   std::uint32_t disks_a_row = 0;
   double spacing = 0;
@@ -95,6 +98,7 @@ struct RandomStartOptions {
 struct FileStartOptions {
   InputFiles file;
 };
+using StartOptions = std::variant<HexagonalStartOptions, RandomStartOptions, FileStartOptions>;
 
 // The disks of the last frame of a trajectory (lengths in D). Throws InputError where it is none, holds another number
 // of disks than the scene, or a disk that is of neither species.
@@ -143,6 +147,8 @@ class SceneOptions {
   Json facts() const;
 
  private:
+  void describe_gravity(Fields& fields);
+  void check_scene(Fields& fields) const;
   void warn_of_shaking(Fields& fields) const;
   void warn_of_size(Fields& fields) const;
   void warn_of_locking(Fields& fields) const;
@@ -153,8 +159,8 @@ class SceneOptions {
   std::optional<double> gravity_;
   BoxOptions box_;
   FloorOptions floor_;
-  std::variant<NoBathOptions, LangevinOptions, AndersenOptions, WhiteNoiseOptions, ThermalFloorOptions> bath_;
-  std::variant<HexagonalStartOptions, RandomStartOptions, FileStartOptions> start_;
+  BathOptions bath_;
+  StartOptions start_;
   double start_temperature_ = -1;  // as T/(m g), a length; below 0: 0.01 D, weightless 1
   bool reduced_ = false;
 };

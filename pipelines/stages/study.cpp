@@ -98,6 +98,14 @@ class Study : public Stage {
   Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
   void write_described(RunContext& context, const std::string& file, const std::string& csv) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
+  std::vector<Json> run_all(RunContext& context, const std::vector<Point>& all) const;
+  std::string replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const;
+  struct Averages {
+    std::string csv;
+    Json series = Json::object();
+    std::size_t missing = 0;
+  };
+  Averages average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const;
   std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
 
   Json chain_;
@@ -358,6 +366,13 @@ std::string quoted(const std::string& name) {
   for (const char c : name) out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + "\"";
 }
+// The numbers of a run, as run_once() wrote them.
+std::vector<Number> kept_numbers(const Json& run) {
+  const auto number = [](const Json& j) { return j.is_number() ? j.get<double>() : NAN; };
+  std::vector<Number> out;
+  for (const Json& pair : run["numbers"]) out.push_back({number(pair[0]), number(pair[1])});
+  return out;
+}
 std::string cell(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
 }  // namespace
 
@@ -434,9 +449,8 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
   }
 }
 
-void Study::run(RunContext& context) const {
-  const std::vector<Point> all = points();
-  std::vector<std::vector<Number>> found(all.size());
+// Every point once, on as many threads as allowed. A run that is kept from an earlier attempt is not run again.
+std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& all) const {
   std::vector<Json> kept(all.size());
   const fs::path scratch = context.scratch();
   std::atomic<std::size_t> next{0}, done{0};
@@ -452,10 +466,6 @@ void Study::run(RunContext& context) const {
           fs::remove_all(folder);
         }
         kept[i] = read_json(file);
-        for (const Json& pair : kept[i]["numbers"]) {
-          const auto number = [](const Json& j) { return j.is_number() ? j.get<double>() : NAN; };
-          found[i].push_back({number(pair[0]), number(pair[1])});
-        }
       } catch (...) {
         const std::lock_guard lock(guard);
         if (!failure) failure = std::current_exception();
@@ -471,47 +481,64 @@ void Study::run(RunContext& context) const {
     work();
   }
   if (failure) std::rethrow_exception(failure);
+  return kept;
+}
 
-  std::string runs = "series," + parameter_.name + ",replica", table = "series," + parameter_.name;
-  for (const auto& [name, ignored] : collect_) {
-    runs += "," + name;
-    table += fmt::format(",{0},{0}_error", name);
+// replicas.csv: every run with its numbers.
+std::string Study::replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
+  std::string text = "series," + parameter_.name + ",replica";
+  for (const auto& [name, ignored] : collect_) text += "," + name;
+  text += "\n";
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    text +=
+        fmt::format("{},{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value], all[i].replica);
+    for (const Number& number : found[i]) text += "," + cell(number.value);
+    text += "\n";
   }
-  runs += "\n", table += "\n";
-  Json series = Json::object();
-  std::size_t missing = 0;
+  return text;
+}
+
+// table.csv and the rows of study.json: means over the replicas of a point, with their errors.
+Study::Averages Study::average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
+  Averages out;
+  out.csv = "series," + parameter_.name;
+  for (const auto& [name, ignored] : collect_) out.csv += fmt::format(",{0},{0}_error", name);
+  out.csv += "\n";
   for (std::size_t i = 0; i < all.size(); i += replicas_) {
-    const std::string where = fmt::format("{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value]);
-    table += where;
+    out.csv += fmt::format("{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value]);
     Json row;
     row[parameter_.name] = parameter_.values[all[i].value];
     for (std::size_t c = 0; c < collect_.size(); ++c) {
       std::vector<Number> values;
       for (std::size_t r = i; r < i + replicas_; ++r) values.push_back(found[r][c]);
       const auto [n, mean, error] = Mean(values);
-      missing += replicas_ - static_cast<std::size_t>(n);
-      table += "," + cell(mean) + "," + cell(error);
+      out.missing += replicas_ - static_cast<std::size_t>(n);
+      out.csv += "," + cell(mean) + "," + cell(error);
       Json quantity{{"value", std::isfinite(mean) ? Json(mean) : Json()}};
       if (std::isfinite(error)) quantity["std_error"] = error;
       quantity["runs"] = static_cast<int>(n);
       row[collect_[c].first] = std::move(quantity);
     }
-    table += "\n";
-    series[series_name(all[i].series)].push_back(std::move(row));
-    for (std::size_t r = i; r < i + replicas_; ++r) {
-      runs += where + fmt::format(",{}", all[r].replica);
-      for (const Number& number : found[r]) runs += "," + cell(number.value);
-      runs += "\n";
-    }
+    out.csv += "\n";
+    out.series[series_name(all[i].series)].push_back(std::move(row));
   }
-  if (missing > 0)
-    context.warning(fmt::format("{} of {} numbers are missing: the chain did not give them", missing,
+  return out;
+}
+
+void Study::run(RunContext& context) const {
+  const std::vector<Point> all = points();
+  const std::vector<Json> kept = run_all(context, all);
+  std::vector<std::vector<Number>> found;
+  for (const Json& one : kept) found.push_back(kept_numbers(one));
+  const Averages averages = average(all, found);
+  if (averages.missing > 0)
+    context.warning(fmt::format("{} of {} numbers are missing: the chain did not give them", averages.missing,
                                 all.size() * collect_.size()));
-  write_described(context, "table.csv", table);
-  write_described(context, "replicas.csv", runs);
+  write_described(context, "table.csv", averages.csv);
+  write_described(context, "replicas.csv", replicas_csv(all, found));
   write_tables(context, all, kept);
   write_file(context.output("study.json"),
-             dump(Json{{"replicas", replicas_}, {"runs", all.size()}, {"series", std::move(series)}}));
+             dump(Json{{"replicas", replicas_}, {"runs", all.size()}, {"series", averages.series}}));
 }
 
 }  // namespace

@@ -13,6 +13,12 @@
 
 namespace shakebed::pipelines {
 
+namespace {
+// Largest relative misfit (rms inside the window over the greatest density there) at which a model is said to describe
+// a profile: a convention of this program, not a test of significance.
+constexpr double tolerable_misfit = 0.05;
+}  // namespace
+
 const fit::EquationOfState& equation_named(const std::string& name) {
   if (const fit::EquationOfState* found = fit::find_equation_of_state(name)) return *found;
   std::vector<std::string> names;
@@ -213,55 +219,48 @@ Json interval_json(const fit::Interval& interval, double factor = 1) {
       {"status", fit::to_string(interval.status)}, {"low", interval.low * factor},  {"high", interval.high * factor},
       {"confidence", interval.confidence},         {"low_open", interval.low_open}, {"high_open", interval.high_open}};
 }
-}  // namespace
 
-Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
-  Json out;
-  out["status"] = fit::to_string(result.status);
-  if (!result.message.empty()) out["message"] = result.message;
-  out["model"] = result.model;
-  const bool has_numbers = result.ok() || result.status == fit::FitStatus::not_converged;
-  if (has_numbers) {
-    out["temperature"] = estimate_json(result.temperature, "m g D");
-    if (diameter) out["temperature_over_mg"] = estimate_json(result.temperature, "m", *diameter);
-    out["shift"] = estimate_json(result.shift, "D");
-    out["solid_height"] = estimate_json(result.solid_height, "D");
-    out["plateau_density"] = estimate_json(result.plateau_density, "1/D^2");
-    out["column_number"] = estimate_json(result.column_number, "1");
-    if (result.critical_status == fit::ValueStatus::ok) {
-      out["critical_temperature"] = estimate_json(result.critical_temperature, "m g D");
-      if (diameter) out["critical_temperature_over_mg"] = estimate_json(result.critical_temperature, "m", *diameter);
-      out["reduced_temperature"] = estimate_json(result.reduced_temperature, "1");
-      out["solid_height_by_sum_rule"] = quantity_json(result.solid_height_by_sum_rule, "D");
-    } else {
-      out["critical_temperature_status"] = fit::to_string(result.critical_status);
-    }
-    out["temperature_interval"] = interval_json(result.temperature_interval);
-    out["chi2"] = result.chi2;
-    out["dof"] = result.dof;
-    out["chi2_per_dof"] = result.chi2_per_dof;
-    out["p_value"] = result.p_value;
-    out["aic"] = result.aic;
-    out["bic"] = result.bic;
-    out["errors_scaled"] = result.errors_scaled;
-    out["parameters"] = result.parameters;
-    Json rows = Json::array();
-    const std::size_t n = result.parameters.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      Json row = Json::array();
-      for (std::size_t j = 0; j < n; ++j) row.push_back(result.covariance[i * n + j]);
-      rows.push_back(std::move(row));
-    }
-    out["covariance"] = std::move(rows);
+// The fitted parameters, what follows from them, and how good the fit is.
+void add_parameters(const fit::FitResult& result, std::optional<double> diameter, Json& out) {
+  out["temperature"] = estimate_json(result.temperature, "m g D");
+  if (diameter) out["temperature_over_mg"] = estimate_json(result.temperature, "m", *diameter);
+  out["shift"] = estimate_json(result.shift, "D");
+  out["solid_height"] = estimate_json(result.solid_height, "D");
+  out["plateau_density"] = estimate_json(result.plateau_density, "1/D^2");
+  out["column_number"] = estimate_json(result.column_number, "1");
+  if (result.critical_status == fit::ValueStatus::ok) {
+    out["critical_temperature"] = estimate_json(result.critical_temperature, "m g D");
+    if (diameter) out["critical_temperature_over_mg"] = estimate_json(result.critical_temperature, "m", *diameter);
+    out["reduced_temperature"] = estimate_json(result.reduced_temperature, "1");
+    out["solid_height_by_sum_rule"] = quantity_json(result.solid_height_by_sum_rule, "D");
+  } else {
+    out["critical_temperature_status"] = fit::to_string(result.critical_status);
   }
-  out["window"] = Json{{"low", quantity_json(result.window_low, "D")},
-                       {"high", quantity_json(result.window_high, "D")},
-                       {"bins", result.bins},
-                       {"rule", result.window_rule}};
-  out["kernel"] = Json{{"kind", to_string(result.kernel.kind)}, {"width", result.kernel.width}};
-  out["area"] = quantity_json(result.area, "1");
+  out["temperature_interval"] = interval_json(result.temperature_interval);
+  out["chi2"] = result.chi2;
+  out["dof"] = result.dof;
+  out["chi2_per_dof"] = result.chi2_per_dof;
+  out["p_value"] = result.p_value;
+  out["aic"] = result.aic;
+  out["bic"] = result.bic;
+  out["errors_scaled"] = result.errors_scaled;
+}
+
+// Row by row, in the order of "parameters".
+Json covariance_json(const fit::FitResult& result) {
+  Json rows = Json::array();
+  const std::size_t n = result.parameters.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    Json row = Json::array();
+    for (std::size_t j = 0; j < n; ++j) row.push_back(result.covariance[i * n + j]);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json models_json(const std::vector<fit::ModelFit>& fits) {
   Json models = Json::array();
-  for (const fit::ModelFit& model : result.model_comparison) {
+  for (const fit::ModelFit& model : fits) {
     Json row;
     row["model"] = model.model;
     row["plateau_density_free"] = model.plateau_density_free;
@@ -276,9 +275,12 @@ Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
     }
     models.push_back(std::move(row));
   }
-  out["models"] = std::move(models);
+  return models;
+}
+
+Json windows_json(const std::vector<fit::WindowFit>& fits) {
   Json sweep = Json::array();
-  for (const fit::WindowFit& window : result.window_sweep) {
+  for (const fit::WindowFit& window : fits) {
     Json row{
         {"low", window.low}, {"high", window.high}, {"bins", window.bins}, {"status", fit::to_string(window.status)}};
     if (window.status == fit::FitStatus::ok) {
@@ -289,34 +291,60 @@ Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
     }
     sweep.push_back(std::move(row));
   }
-  out["temperature_by_window"] = std::move(sweep);
+  return sweep;
+}
 
-  // Whether the model describes these data: a number of ours, not a test of significance (with many frames any model
-  // is off by more than the errors): the typical misfit inside the window against the greatest density there.
+// The rms misfit inside the window over the greatest density there. It is no test of significance: with many frames any
+// model is off by more than the errors.
+double relative_misfit(const std::vector<fit::Residual>& residuals) {
   double squares = 0, greatest = 0;
   std::size_t used = 0;
-  for (const fit::Residual& residual : result.residuals) {
+  for (const fit::Residual& residual : residuals) {
     if (!residual.used) continue;
     squares += (residual.density - residual.model) * (residual.density - residual.model);
     greatest = std::max(greatest, residual.density);
     ++used;
   }
-  const double misfit = used > 0 && greatest > 0 ? std::sqrt(squares / static_cast<double>(used)) / greatest : 0;
-  constexpr double tolerable_misfit = 0.05;
-  out["relative_misfit"] = misfit;
-  std::string why;
-  if (!result.ok()) {
-    why = result.message.empty() ? std::string(fit::to_string(result.status)) : result.message;
-  } else if (misfit > tolerable_misfit) {
-    why = fmt::format("inside the window the model misses the data by {:.1f} % of the greatest density", 100 * misfit);
-  } else if (result.model != "simulation" && result.critical_status == fit::ValueStatus::ok &&
-             result.reduced_temperature.value > 1) {
-    why = fmt::format(
+  return used > 0 && greatest > 0 ? std::sqrt(squares / static_cast<double>(used)) / greatest : 0;
+}
+
+// Why the model does not describe the data; "": it does.
+std::string why_not_described(const fit::FitResult& result, double misfit) {
+  if (!result.ok()) return result.message.empty() ? std::string(fit::to_string(result.status)) : result.message;
+  if (misfit > tolerable_misfit)
+    return fmt::format("inside the window the model misses the data by {:.1f} % of the greatest density", 100 * misfit);
+  if (result.model != "simulation" && result.critical_status == fit::ValueStatus::ok &&
+      result.reduced_temperature.value > 1)
+    return fmt::format(
         "T/T_c = {:.2f} is above 1: by this model there is no solid, and the fitted rectangle means nothing",
         result.reduced_temperature.value);
+  return "";
+}
+}  // namespace
+
+Json fit_json(const fit::FitResult& result, std::optional<double> diameter) {
+  Json out;
+  out["status"] = fit::to_string(result.status);
+  if (!result.message.empty()) out["message"] = result.message;
+  out["model"] = result.model;
+  if (result.ok() || result.status == fit::FitStatus::not_converged) {
+    add_parameters(result, diameter, out);
+    out["parameters"] = result.parameters;
+    out["covariance"] = covariance_json(result);
   }
-  out["describes_data"] = why.empty();
-  if (!why.empty()) out["why_not"] = why;
+  out["window"] = Json{{"low", quantity_json(result.window_low, "D")},
+                       {"high", quantity_json(result.window_high, "D")},
+                       {"bins", result.bins},
+                       {"rule", result.window_rule}};
+  out["kernel"] = Json{{"kind", to_string(result.kernel.kind)}, {"width", result.kernel.width}};
+  out["area"] = quantity_json(result.area, "1");
+  out["models"] = models_json(result.model_comparison);
+  out["temperature_by_window"] = windows_json(result.window_sweep);
+  const double misfit = relative_misfit(result.residuals);
+  const std::string why_not = why_not_described(result, misfit);
+  out["relative_misfit"] = misfit;
+  out["describes_data"] = why_not.empty();
+  if (!why_not.empty()) out["why_not"] = why_not;
   out["warnings"] = result.warnings;
   return out;
 }
