@@ -5,15 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <mutex>
-#include <thread>
 
 #include "fit/profile_fit/fit_profile.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
-#include "sim/engine/simulation.hpp"
+#include "sim/measure/measure.hpp"
 #include "sim/measure/observables.hpp"
 
 namespace shakebed::pipelines {
@@ -60,6 +58,22 @@ double student_t(int freedom) {
   return z + (z * z * z + z) / (4 * freedom) +
          (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96.0 * freedom * freedom);
 }
+
+constexpr double profile_spacing = 0.25;  // of the heights [D]
+
+// Of a bed up to its last look.
+class CollisionCount final : public sim::RunObserver {
+ public:
+  std::uint64_t collisions() const { return collisions_; }
+  void look(sim::Simulation& simulation, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {
+    collisions_ = simulation.counters().collisions();
+  }
+  void save(sim::ArchiveWriter& out) override { out(collisions_); }
+  void load(sim::ArchiveReader& in) override { in(collisions_); }
+
+ private:
+  std::uint64_t collisions_ = 0;
+};
 
 class Infer : public Stage {
  public:
@@ -159,39 +173,32 @@ Bed Infer::simulate(const Point& point, std::uint64_t seed, const RunContext& co
   SceneOptions bed = bed_;
   bed.set_material(point.restitution, point.friction, point.side_friction);
   const sim::Scene scene = bed.scene(seed);
-  const auto simulation = sim::simulate(scene);
-  const double period = bed.period(), column = scene.count() / scene.box.width;
-  const double first = std::ceil(settle_ / bed.time_unit() / period * (1 - 1e-12)) * period;
-  const auto periods = static_cast<std::uint64_t>(measure_ / bed.time_unit() / period * (1 + 1e-12));
-  const double spacing = 0.25;
-  const HeightGrid grid{-std::ceil((6 * kernel_width_ + 3) / spacing) * spacing, spacing,
-                        static_cast<std::size_t>((5 * column + 30) / spacing)};
-  sim::BedObserver observer(scene, simulation->properties(), phases_, grid, {KernelKind::gaussian, kernel_width_});
-  sim::Snapshot at;
-  const auto run_to = [&](double time) {  // a period at a time, to be interrupted
-    while (simulation->time() < time) {
-      context.check_interrupted();
-      simulation->advance_to(std::min(time, simulation->time() + period));
-    }
-  };
-  for (std::uint64_t p = 0; p < periods; ++p) {
-    for (std::uint32_t phase = 0; phase < phases_; ++phase) {
-      run_to(first + (static_cast<double>(p) + static_cast<double>(phase) / phases_) * period);
-      simulation->snapshot(at);
-      observer.observe(at, phase);
-    }
-  }
-  const sim::Profile profile = observer.density(false);
+  sim::MeasurementSchedule times;
+  times.period = bed.period();
+  times.settle = std::ceil(settle_ / bed.time_unit() / times.period * (1 - 1e-12)) * times.period;
+  times.periods = static_cast<std::uint64_t>(measure_ / bed.time_unit() / times.period * (1 + 1e-12));
+  times.phases = phases_;
+  const double column = scene.count() / scene.box.width;
+  const double lowest = -std::ceil((6 * kernel_width_ + 3) / profile_spacing) * profile_spacing;
+  const HeightGrid grid{lowest, profile_spacing, static_cast<std::size_t>((5 * column + 30) / profile_spacing)};
+  sim::Observing<sim::BedObserver> observer([&](const sim::DiskProperties& disks) {
+    return sim::BedObserver(scene, disks, phases_, grid, {KernelKind::gaussian, kernel_width_});
+  });
+  CollisionCount count;
+  sim::RunControl control;
+  control.stop = [&context] { return context.interrupted(); };
+  if (!sim::measure(scene, times, {&observer, &count}, control).finished) throw Interrupted();
+  const sim::Profile profile = observer->density(false);
   const auto greatest = static_cast<std::size_t>(
       std::max_element(profile.number_density.begin(), profile.number_density.end()) - profile.number_density.begin());
   out.density = {profile.number_density[greatest], profile.std_error[greatest]};
-  out.temperature_x = observer.temperature_x();
-  out.temperature_z = observer.temperature_z();
-  out.temperature_z_local = observer.temperature_z_local();
-  out.rise = observer.centre_of_mass();
+  out.temperature_x = observer->temperature_x();
+  out.temperature_z = observer->temperature_z();
+  out.temperature_z_local = observer->temperature_z_local();
+  out.rise = observer->centre_of_mass();
   out.rise.value -= sim::ideal_centre_of_mass(scene.count(), scene.box.width,
                                               std::holds_alternative<sim::HardSides>(scene.box.sides));
-  out.collisions = simulation->counters().collisions();
+  out.collisions = count.collisions();
 
   fit::Profile measured{profile.height, profile.number_density, profile.std_error, {}, 0};
   fit::FitOptions options;
@@ -294,34 +301,19 @@ void Infer::run(RunContext& context) const {
   std::vector<Point> all = points();
   std::vector<Bed> beds(all.size() * replicas_);
   const std::filesystem::path& finished = context.scratch();
-  std::atomic<std::size_t> next = 0, done = 0;
-  std::mutex failure_guard;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < beds.size(); i = next++) {
-      try {
-        const std::filesystem::path kept = finished / fmt::format("bed-{}.json", i);
-        if (std::filesystem::exists(kept)) {
-          beds[i] = bed_from(read_json(kept));
-        } else {
-          beds[i] = simulate(all[i / replicas_], replica_seed(context.seed(), i % replicas_), context);
-          write_file_atomically(kept, dump(to_json(beds[i])));
-        }
-      } catch (...) {
-        const std::lock_guard lock(failure_guard);
-        if (!failure) failure = std::current_exception();
-        next = beds.size();
-      }
-      context.progress(static_cast<double>(++done) / static_cast<double>(beds.size()),
-                       fmt::format("{} beds", beds.size()));
+  std::atomic<std::size_t> done = 0;
+  sim::each_replica(static_cast<std::uint32_t>(beds.size()), context.jobs(), [&](std::uint32_t i) {
+    const std::filesystem::path kept = finished / fmt::format("bed-{}.json", i);
+    if (std::filesystem::exists(kept)) {
+      beds[i] = bed_from(read_json(kept));
+    } else {
+      beds[i] = simulate(all[i / replicas_], replica_seed(context.seed(), i % replicas_), context);
+      write_file_atomically(kept, dump(to_json(beds[i])));
     }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (int k = 1; k < context.jobs(); ++k) helpers.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
+    context.progress(static_cast<double>(++done) / static_cast<double>(beds.size()),
+                     fmt::format("{} beds", beds.size()));
+    return true;
+  });
   for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
 
   points_table(context.table("infer.csv"), all).write(context.output("infer.csv"));

@@ -34,6 +34,7 @@ struct DiskOptions {
   SurfaceOptions surface;
   Inertia inertia = Inertia::disk;
   std::optional<double> contact_duration;
+  bool rests = true;
   std::optional<SecondSpeciesOptions> second;
 };
 

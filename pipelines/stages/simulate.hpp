@@ -18,24 +18,11 @@
 //   phases        phases.csv, phases_floor_frame.csv: density, mean velocities, temperatures by phase and height
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <vector>
-
 #include "pipelines/stages/stage.hpp"
-#include "sim/engine/simulation.hpp"
 
 namespace shakebed::pipelines {
 
 StageRow simulate_stage();
 StagePages simulate_pages();  // simulate_report.cpp
-
-// What a run is gone on from after a kill: a state behind its hash.
-void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
-
-// Where the simulation has lost its precision (sim/measure/observables.hpp): writes the last sound state, if there is
-// one, and throws StageError, which says what is wrong, when, and where that state is.
-void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
-                       const std::filesystem::path& checkpoint);
 
 }  // namespace shakebed::pipelines

@@ -74,6 +74,7 @@ class Engine final : public Simulation {
   EnergyLedger energy() const override;
   Counters counters() const override { return counters_; }
   double largest_overlap() const override;
+  bool foresees_contacts() const override;
   std::size_t bytes() const override;
   std::vector<std::uint8_t> checkpoint() const override;
   void restore(const std::vector<std::uint8_t>& bytes) override;
@@ -156,6 +157,7 @@ class Engine final : public Simulation {
     pending_[0].is(i, next_event(i, exit), exit);
   }
   void predict_all();
+  bool foresees_contacts_of(std::uint32_t i) const;
 
   // --- shells
   void centre_shell(std::uint32_t i);
@@ -332,6 +334,7 @@ class Engine final : public Simulation {
 
 }  // namespace shakebed::sim
 
+#include "sim/engine/engine_checks.hpp"
 #include "sim/engine/engine_impl.hpp"
 #include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_tiles.hpp"

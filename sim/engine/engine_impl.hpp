@@ -1291,8 +1291,8 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
     if constexpr (Rule::spins) out.spin[label] = spins_[i];
     if constexpr (rests_apply) {
       if (!is_at_rest(i)) continue;
-      out.z[label] = out.floor_position + rest_height_[i];
-      out.vz[label] = out.floor_velocity;
+      out.vz[label] = out.floor_velocity;  // the mean over its hop
+      if (resting_ == count_) out.z[label] = out.floor_position + rest_height_[i];
     }
   }
 }

@@ -7,11 +7,15 @@
 // They do so by hops. All disks at rest are thrown up together, with the velocity that brings them back to their
 // heights above the floor at the hop's end, and fly freely like every other disk; neither the floor nor they themselves
 // touch them meanwhile. A disk that still moves meets them as it meets any other, but pushes them off the floor, which
-// does not give way: only a quick one wakes a disk at rest, and with it those that lose their support.
+// does not give way: only a quick one wakes a disk at rest, and with it those that lose their support. Snapshots give
+// them the floor's velocity, which is their mean over a hop, and where some disks move the place in their flight (2e-5
+// D above that of rest): there they touch no disk.
 //
 // Rest is told from what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
 // too quick for it until it has done so. In beds that never look calm nothing is changed, not even by rounding.
 #pragma once
+
+#include <cassert>
 
 namespace shakebed::sim {
 
@@ -24,6 +28,7 @@ inline constexpr double rest_contacts =
     8;                                    // of all disks together, for each disk, between two looks: a bed that lies
                                           // on the floor makes 15 to 130 (Gamma 1.2 to 1.5), one at Gamma = 4 at most 2
 inline constexpr double rest_gap = 1e-4;  // between disks that carry one another [D]; chattering ones have 1e-6
+inline constexpr double rest_clearance = 1e-3;  // to a lid, never met by hops: they are 1.2e-4 high at most [D]
 inline constexpr double waking_speed =
     0.15;  // approach that wakes a disk [sqrt(g D)]; the pushes of hops are below 0.03
 inline constexpr double looks_a_period = 64;  // of the floor, for rest
@@ -150,7 +155,9 @@ void Engine<Space, Rule, Sizes>::lay_down(const FloorMotion::Motion& floor) {
   const std::uint32_t resting = resting_;
   for (const auto& [z, i] : slow) {
     if (!is_supported(i, floor.position)) continue;
-    rest_height_[i] = z - floor.position;
+    const double height = z - floor.position;
+    if (floor_.highest() + height + sizes_.radius(i) + rest_clearance > lid_height_) continue;
+    rest_height_[i] = height;
     ++resting_;
   }
   const bool enough = resting_ >= rest_share * count_;
@@ -163,6 +170,7 @@ void Engine<Space, Rule, Sizes>::lay_down(const FloorMotion::Motion& floor) {
   if (resting > 0) return;  // the hop that follows predicts anew
   for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
   predict_all();  // of those brought forward what was predicted no longer holds
+  assert(foresees_contacts());
 }
 
 // Wakes those that have lost their support, and those above them.
@@ -256,6 +264,7 @@ void Engine<Space, Rule, Sizes>::act_rest() {
     hop(length, floor);
     rest_at_ = now_ + length;
   }
+  assert(foresees_contacts());
   tell_all();
 }
 

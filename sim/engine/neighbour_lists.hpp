@@ -55,9 +55,14 @@ class NeighbourLists {
 
   // Calls visit(k) for every neighbour.
   template <class Visit>
-  void each_neighbour(std::uint32_t i, Visit visit) {
+  void each_neighbour(std::uint32_t i, Visit visit) const {
     const std::uint32_t neighbours = disks_[i].neighbours;
-    for (std::uint32_t place = 0; place < neighbours; ++place) visit(*slot(i, place));
+    for (std::uint32_t place = 0; place < std::min(neighbours, inline_neighbours); ++place)
+      visit(lists_[i].disk[place]);
+    std::uint32_t left = neighbours - std::min(neighbours, inline_neighbours);
+    further_blocks(i, [&](const NeighbourBlock& block) {
+      for (std::uint32_t place = 0; place < inline_neighbours && left > 0; ++place, --left) visit(block.disk[place]);
+    });
   }
 
   // Makes neighbours of i and those `found` whose number is lower, in both their lists: by rounding the two might not

@@ -79,6 +79,9 @@ class Simulation {
   virtual Counters counters() const = 0;
   // Largest overlap of any two disks now, in D, 0 if none (brute force over cells, O(N)).
   virtual double largest_overlap() const = 0;
+  // Has every contact that the disks will make an event, no later than it? It always must; tests and builds with
+  // assertions ask. O(N), between events; also where advance_towards() has returned early.
+  virtual bool foresees_contacts() const = 0;
   virtual std::size_t bytes() const = 0;  // memory held
   // The engine canonicalises its state at moments that only the run itself decides (see engine.hpp). checkpoint() gives
   // everything needed to go on to the same bytes from there; it may be called only when time() is such a moment, right

@@ -18,9 +18,44 @@ class Run {
  public:
   Run(const Scene& scene, const MeasurementSchedule& schedule, const std::vector<RunObserver*>& observers,
       const RunControl& control)
-      : schedule_(schedule), observers_(observers), control_(control), simulation_(simulate(scene)) {}
+      : schedule_(schedule), observers_(observers), control_(control), simulation_(simulate(scene)) {
+    for (RunObserver* one : observers_) one->prepare(*simulation_);
+  }
 
   void go_on_from(const std::vector<std::uint8_t>& kept) {
+    try {
+      take_up(kept);
+    } catch (const std::exception& error) {
+      throw StateError(error.what());
+    }
+    if (control_.gone_on) control_.gone_on(*simulation_);
+  }
+
+  // False where it was stopped.
+  bool operator()() {
+    for (; step_ < schedule_.bath.size(); ++step_) {
+      simulation_->set_bath_temperature(schedule_.bath[step_].temperature);
+      if (!advance_to(schedule_.bath[step_].until, RunPart::annealing)) return false;
+      for (RunObserver* one : observers_) one->step(*simulation_, step_);
+    }
+    Snapshot at;
+    for (; look_ < schedule_.looks(); ++look_) {
+      if (!advance_to(schedule_.moment(look_), look_ == 0 ? RunPart::settling : RunPart::measuring)) return false;
+      if (look_ == 0)
+        for (RunObserver* one : observers_) one->begin(*simulation_);
+      simulation_->snapshot(at);
+      const auto phase = static_cast<std::uint32_t>(look_ % schedule_.phases);
+      for (RunObserver* one : observers_) one->look(*simulation_, at, look_, phase);
+    }
+    if (!advance_to(schedule_.end(), RunPart::measuring)) return false;
+    for (RunObserver* one : observers_) one->end(*simulation_);
+    return true;
+  }
+
+  std::unique_ptr<Simulation> simulation() { return std::move(simulation_); }
+
+ private:
+  void take_up(const std::vector<std::uint8_t>& kept) {
     ArchiveReader in(kept);
     std::vector<std::uint8_t> engine;
     visit(in, engine);
@@ -35,29 +70,6 @@ class Run {
       for (RunObserver* one : observers_) one->go_on(*simulation_);
   }
 
-  // False where it was stopped.
-  bool operator()() {
-    for (; step_ < schedule_.bath.size(); ++step_) {
-      simulation_->set_bath_temperature(schedule_.bath[step_].temperature);
-      if (!advance_to(schedule_.bath[step_].until)) return false;
-    }
-    Snapshot at;
-    for (; look_ < schedule_.looks(); ++look_) {
-      if (!advance_to(schedule_.moment(look_))) return false;
-      if (look_ == 0)
-        for (RunObserver* one : observers_) one->begin(*simulation_);
-      simulation_->snapshot(at);
-      const auto phase = static_cast<std::uint32_t>(look_ % schedule_.phases);
-      for (RunObserver* one : observers_) one->look(*simulation_, at, look_, phase);
-    }
-    if (!advance_to(schedule_.end())) return false;
-    for (RunObserver* one : observers_) one->end(*simulation_);
-    return true;
-  }
-
-  std::unique_ptr<Simulation> simulation() { return std::move(simulation_); }
-
- private:
   template <class Archive>
   void visit(Archive& archive, std::vector<std::uint8_t>& engine) {
     std::uint64_t form = state_form;
@@ -67,29 +79,30 @@ class Run {
   }
 
   // By way of the engine's synchronisations, where the state may be kept.
-  bool advance_to(double time) {
-    const double end = schedule_.end();
+  bool advance_to(double time, RunPart part) {
     while (simulation_->time() < time) {
       const double synchronisation = simulation_->next_synchronisation();
-      const bool keeps = control_.keep && synchronisation <= time && (!control_.keep_due || control_.keep_due());
-      const double goal = keeps ? synchronisation : time;
-      while (!simulation_->advance_towards(goal, control_.events_between_questions)) {
-        if (control_.stop && control_.stop()) return false;
-        if (control_.progress) control_.progress(std::min(simulation_->time() / end, 1.0));
-      }
-      if (keeps) keep();
-      if (control_.stop && control_.stop()) return false;
-      if (control_.progress) control_.progress(std::min(simulation_->time() / end, 1.0));
+      const bool synchronises = synchronisation <= time;
+      if (stops(part)) return false;
+      while (!simulation_->advance_towards(synchronises ? synchronisation : time, control_.events_between_questions))
+        if (stops(part)) return false;
+      if (synchronises && control_.keep && (!control_.keep_due || control_.keep_due(*simulation_)))
+        control_.keep(*simulation_, [this] { return state(); });
     }
     return true;
   }
 
-  void keep() {
+  bool stops(RunPart part) const {
+    if (control_.progress) control_.progress(std::min(simulation_->time() / schedule_.end(), 1.0), part);
+    return control_.stop && control_.stop();
+  }
+
+  std::vector<std::uint8_t> state() {
     std::vector<std::uint8_t> engine = simulation_->checkpoint();
     ArchiveWriter out;
     visit(out, engine);
     for (RunObserver* one : observers_) one->save(out);
-    control_.keep(out.take());
+    return out.take();
   }
 
   const MeasurementSchedule& schedule_;
@@ -105,7 +118,7 @@ void check(const MeasurementSchedule& schedule) {
   if (!counts) throw std::invalid_argument("a schedule needs a period, and at least one period and one look in it");
   double before = 0;
   for (const BathStep& step : schedule.bath) {
-    if (step.until < before || step.until > schedule.settle)
+    if (step.until < before || step.until > schedule.settle * (1 + 1e-12))
       throw std::invalid_argument("the reservoir's steps are not in the order of time before the first look");
     before = step.until;
   }

@@ -104,9 +104,8 @@ struct Scene {
   Box box;
   Bath bath;
   Start start;
-  // A dissipative bed that has come to rest on the floor lies there (see engine_rest.hpp). Off, and not offered in
-  // recipes: in a column of 20 disks on a still floor disks that are woken one by one come to overlap by 0.02 D.
-  bool rests = false;
+  // A dissipative bed with contact clocks that has come to rest on the floor lies there (engine_rest.hpp).
+  bool rests = true;
   double start_temperature = 1;  // of the Maxwellian velocities at the start (placed disks keep their own)
   std::uint64_t seed = 1;
 

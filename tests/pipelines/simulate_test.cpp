@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "pipelines/formats/json.hpp"
-#include "pipelines/stages/simulate.hpp"
+#include "pipelines/stages/simulate_run.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/sim/spoilt_simulation.hpp"
 

@@ -30,6 +30,7 @@ class Spoilt : public Simulation {
   EnergyLedger energy() const override { return ledger; }
   Counters counters() const override { return sound_->counters(); }
   double largest_overlap() const override { return overlap; }
+  bool foresees_contacts() const override { return sound_->foresees_contacts(); }
   std::size_t bytes() const override { return sound_->bytes(); }
   double next_synchronisation() const override { return sound_->next_synchronisation(); }
   std::vector<std::uint8_t> checkpoint() const override { return sound_->checkpoint(); }

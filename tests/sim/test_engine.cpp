@@ -71,7 +71,39 @@ Scene gentle_bed(double gamma = 1.3) {
   Scene scene = shaken_bed();
   scene.box.width = 12.3;
   scene.box.floor = SinusoidalFloor{gamma / std::pow(2 * std::numbers::pi * 0.35, 2), 0.35};
-  scene.rests = true;
+  return scene;
+}
+
+// 5 to 30 disks in rows of random length, close above one another, in a box 1.2 to 4 D wide; every second floor shakes
+// with Gamma from 0.2 to 1.5, every third stack is rough.
+Scene random_stack(std::uint64_t seed) {
+  Random random(seed);
+  const auto between = [&](double low, double high) { return low + (high - low) * random.uniform_positive(); };
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  const auto count = static_cast<std::uint32_t>(between(5, 30));
+  scene.disks.species = {{count, 1, 1}};
+  const Surface surface{between(0, 0.6), seed % 3 == 1 ? between(0, 0.5) : 0, 0};
+  scene.disks.contact = scene.box.floor_surface = surface;
+  scene.disks.contact_duration = 1e-3;
+  scene.box.width = between(1.2, 4);
+  scene.box.sides = HardSides{surface};
+  double z = 0.51;
+  if (seed % 2 == 1) {
+    const double frequency = between(0.1, 0.5);
+    const double amplitude = between(0.2, 1.5) / std::pow(2 * std::numbers::pi * frequency, 2);
+    scene.box.floor = SinusoidalFloor{amplitude, frequency};
+    z += amplitude;
+  }
+  PlacedStart start;
+  while (start.disks.size() < count) {
+    const double fit = std::floor(scene.box.width / 1.01);
+    const auto row = static_cast<int>(std::min(std::ceil(between(0, fit)), double(count - start.disks.size())));
+    const double gap = scene.box.width / row, play = (gap - 1.005) / 2;
+    for (int k = 0; k < row; ++k) start.disks.push_back({gap * (k + 0.5) + between(-play, play), z, 0, 0, 0, 0});
+    z += between(1.0001, 1.3);
+  }
+  scene.start = start;
   return scene;
 }
 
@@ -112,6 +144,21 @@ TEST(Engine, ReturnsAfterSoManyEventsAndMakesTheSameBytes) {
   }
 }
 
+void expect_resumes(const Scene& scene, double saved_at, double end) {
+  const auto a = simulate(scene);
+  std::vector<std::uint8_t> saved;
+  while (a->time() < saved_at) {
+    a->advance_to(a->next_synchronisation());
+    saved = a->checkpoint();
+  }
+  const auto b = simulate(scene);
+  b->restore(saved);
+  EXPECT_EQ(a->time(), b->time());
+  a->advance_to(end);
+  b->advance_to(end);
+  expect_same(*a, *b);
+}
+
 TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   std::vector<Scene> scenes(8, shaken_bed());
   scenes[1].bath = LangevinBath{2, 1, 0.37};
@@ -124,20 +171,9 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[5].start = RandomStart{};
   scenes[6] = gentle_bed();
   scenes[7] = gentle_bed(0.5);
-  for (const Scene& scene : scenes) {
-    const auto a = simulate(scene);
-    std::vector<std::uint8_t> saved;
-    while (a->time() < 60) {
-      a->advance_to(a->next_synchronisation());
-      saved = a->checkpoint();
-    }
-    const auto b = simulate(scene);
-    b->restore(saved);
-    EXPECT_EQ(a->time(), b->time());
-    a->advance_to(150);
-    b->advance_to(150);
-    expect_same(*a, *b);
-  }
+  for (const Scene& scene : scenes) expect_resumes(scene, 60, 150);
+  for (std::uint64_t seed = 0; seed < 10; ++seed)
+    expect_resumes(random_stack(seed), 6, 18);  // some of the disks at rest
 }
 
 // Below Gamma = 1 nothing moves against anything once it has come to rest, and nothing is done for it.
@@ -200,6 +236,41 @@ TEST(Engine, LetsARestingBedTakeOff) {
   EXPECT_GE(rests, 10);
   EXPECT_NEAR(bed->energy().imbalance(), 0, 1e-10 * bed->energy().dissipated);
   EXPECT_LT(bed->largest_overlap(), 1e-12);
+}
+
+// Stacks of 5 to 30 disks in narrow boxes, on still and on shaken floors: disks lie down, are woken one by one and lie
+// down again. Every contact has its event, after each of 2,000 events and after every 1/32 of the time unit.
+TEST(Engine, ForeseesEveryContactOfStacksThatRestAndWake) {
+  int rested = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    SCOPED_TRACE(seed);
+    const auto stack = simulate(random_stack(seed));
+    Snapshot at;
+    double deepest = 0;
+    bool foreseen = true, lay = false;
+    for (int k = 1; k <= 32 * 12; ++k) {
+      if (k % 32 == 0) {
+        for (int event = 0; event < 160; ++event)
+          if (!stack->advance_towards(k / 32.0, 1)) foreseen = foreseen && stack->foresees_contacts();
+      }
+      stack->advance_to(k / 32.0);
+      stack->snapshot(at);
+      foreseen = foreseen && stack->foresees_contacts();
+      deepest = std::max(deepest, stack->largest_overlap());
+      int still = 0;
+      for (std::size_t i = 0; i < at.z.size(); ++i) {
+        deepest = std::max(deepest, at.floor_position + 0.5 - at.z[i]);
+        still += at.vx[i] == 0 && at.vz[i] == at.floor_velocity;
+      }
+      lay = lay || still > 0;
+    }
+    rested += lay;
+    EXPECT_TRUE(foreseen);
+    EXPECT_LE(deepest, 1e-12);
+    const EnergyLedger energy = stack->energy();
+    EXPECT_NEAR(energy.imbalance(), 0, 1e-10 * (energy.initial + energy.dissipated + std::abs(energy.floor_work)));
+  }
+  EXPECT_GE(rested, 10);
 }
 
 // What lies on the floor presses on it with its weight, whether its contacts are made or not.

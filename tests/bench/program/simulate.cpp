@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include "sim/engine/checkpoint_bytes.hpp"
-#include "sim/engine/simulation.hpp"
+#include "sim/measure/measure.hpp"
 #include "sim/measure/observables.hpp"
 #include "tests/bench/program/results.hpp"
 
@@ -64,34 +67,60 @@ struct BedRun {
   double energy_error = 0, overlap = 0;
 };
 
+// Processor time and collisions of a run from its first look on, without the time that observers take: `starts` is the
+// last of them, `stops` the first.
+struct RunCost {
+  class Part final : public sim::RunObserver {
+   public:
+    using Do = std::function<void(sim::Simulation&)>;
+    explicit Part(Do at_look) : at_look_(std::move(at_look)) {}
+    void look(sim::Simulation& simulation, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {
+      at_look_(simulation);
+    }
+    void end(sim::Simulation& simulation) override { at_look_(simulation); }
+    void save(sim::ArchiveWriter&) override {}  // these runs are never kept
+    void load(sim::ArchiveReader&) override {}
+
+   private:
+    Do at_look_;
+  };
+  double cpu = 0;  // [s]
+  std::uint64_t collisions = 0;
+  double started = 0;  // 0: not yet
+  std::uint64_t collisions_before = 0;
+  Part stops{[this](sim::Simulation& simulation) {
+    if (started > 0) cpu += cpu_seconds() - started;
+    collisions = simulation.counters().collisions() - collisions_before;
+  }};
+  Part starts{[this](sim::Simulation& simulation) {
+    if (started == 0) collisions_before = simulation.counters().collisions();
+    started = cpu_seconds();
+  }};
+};
+
 BedRun run_bed(const sim::Scene& scene, std::uint64_t periods, const Effort& effort) {
-  constexpr std::uint32_t phases = 32;
-  constexpr std::uint64_t settling = 100;
-  const auto simulation = sim::simulate(scene);
+  constexpr double settling = 100;  // periods
   const double period = 1 / std::get<sim::SinusoidalFloor>(scene.box.floor).frequency;
-  sim::BedObserver observer(scene, simulation->properties(), phases, {-2, 0.25, 240}, {});
-  sim::Snapshot at;
+  sim::Observing<sim::BedObserver> bed([&](const sim::DiskProperties& disks) {
+    return sim::BedObserver(scene, disks, 32, {-2, 0.25, 240}, {});
+  });
+  RunCost cost;
+  sim::RunControl control;
+  control.stop = [&] { return effort.check_interrupted(), false; };
+  const sim::RunResult done =
+      sim::measure(scene, {.bath = {}, .settle = settling * period, .period = period, .periods = periods, .phases = 32},
+                   {&cost.stops, &bed, &cost.starts}, control);
   BedRun run;
-  simulation->advance_to(settling * period);
-  const std::uint64_t collisions = simulation->counters().collisions();
-  double cpu = 0;
-  for (std::uint64_t k = 0; k < periods * phases; ++k) {
-    effort.check_interrupted();
-    cpu += cpu_seconds_of(
-        [&] { simulation->advance_to((static_cast<double>(settling) + static_cast<double>(k) / phases) * period); });
-    simulation->snapshot(at);
-    observer.observe(at, static_cast<std::uint32_t>(k % phases));
-  }
-  run.rise = observer.centre_of_mass();
+  run.rise = bed->centre_of_mass();
   run.rise.value -= sim::ideal_centre_of_mass(scene.count(), scene.box.width, true);
-  run.temperature_x = observer.temperature_x();
-  const sim::Counters counters = simulation->counters();
-  const sim::EnergyLedger energy = simulation->energy();
-  run.cpu_per_period = cpu / static_cast<double>(periods);
-  run.collisions_per_second = static_cast<double>(counters.collisions() - collisions) / cpu;
+  run.temperature_x = bed->temperature_x();
+  const sim::Counters counters = done.simulation->counters();
+  const sim::EnergyLedger energy = done.simulation->energy();
+  run.cpu_per_period = cost.cpu / static_cast<double>(periods);
+  run.collisions_per_second = static_cast<double>(cost.collisions) / cost.cpu;
   run.elastic_share = static_cast<double>(counters.elastic_contacts) / static_cast<double>(counters.collisions());
   run.energy_error = std::abs(energy.imbalance()) / energy.dissipated;
-  run.overlap = simulation->largest_overlap();
+  run.overlap = done.simulation->largest_overlap();
   return run;
 }
 

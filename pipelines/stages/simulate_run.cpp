@@ -1,0 +1,236 @@
+#include "pipelines/stages/simulate_run.hpp"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <string_view>
+#include <utility>
+
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/trajectory.hpp"
+#include "sim/measure/observables.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// A state is kept in memory at least so often in a run, so that a loss of precision costs a sixteenth of it at most ...
+constexpr double keeps_a_run = 16;
+// ... and as often as costs at most a fiftieth of the time, but not oftener than every two seconds.
+constexpr int keeping_share = 50;
+constexpr std::chrono::seconds shortest_keeping{2};
+constexpr std::size_t hash_size = 32;  // characters before the state in a checkpoint file
+
+double thread_cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+const char* name_of(sim::RunPart part) {
+  return part == sim::RunPart::annealing ? "annealing" : part == sim::RunPart::settling ? "settling" : "measuring";
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------ observers
+
+void RunMeasurement::prepare(sim::Simulation& simulation) {
+  properties_ = simulation.properties();
+  bed_.emplace(plan_.scene, properties_, plan_.measurement);
+  frames_.reset();
+  if (plan_.lead && plan_.frames.count > 0) frames_.emplace(plan_.folder / plan_.frames.file, properties_.mass.size());
+}
+
+void RunMeasurement::begin(sim::Simulation& simulation) {
+  if (frames_) frames_->start();
+  bed_->begin(simulation);
+}
+
+void RunMeasurement::look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look,
+                          std::uint32_t phase) {
+  const bool frame = plan_.frames.takes(look);
+  bed_->look(simulation, at, phase, frame);
+  if (!frame || !frames_) return;
+  const double part = plan_.frames.phases ? static_cast<double>(phase) / plan_.schedule.phases : 0;
+  frames_->add(frame_of(at, plan_.scene, properties_, part));
+}
+
+void RunMeasurement::load(sim::ArchiveReader& in) {
+  visit(in);
+  if (frames_) frames_->go_on();
+}
+
+void RunMeasurement::finish_frames(const fs::path& destination) {
+  if (frames_) frames_->finish(destination);
+}
+
+void CpuClock::prepare(sim::Simulation&) {
+  before_ = 0;
+  start_ = thread_cpu_seconds();
+}
+double CpuClock::seconds() const { return before_ + thread_cpu_seconds() - start_; }
+void CpuClock::save(sim::ArchiveWriter& out) {
+  double so_far = seconds();
+  out(so_far);
+}
+
+// ------------------------------------------------------------------------------------------------ the run
+
+BedRun::BedRun(RunPlan plan, RunContext& context)
+    : plan_(std::move(plan)),
+      context_(context),
+      checkpoint_(plan_.folder / "checkpoint"),
+      annealing_(plan_.annealing, plan_.bath_temperature),
+      measurement_(plan_) {
+  plan_.schedule.bath = annealing_.bath();
+  fs::create_directories(plan_.folder);
+}
+
+void BedRun::operator()() {
+  last_saved_ = Clock::now();
+  sim::RunResult result;
+  try {
+    result = measured(read_checkpoint());
+  } catch (const sim::StateError& error) {
+    warn_of_checkpoint(error.what());
+    result = measured({});
+  }
+  simulation_ = std::move(result.simulation);
+  if (!result.finished) {
+    if (plan_.checkpoint_seconds > 0 && kept_at_ > last_saved_) save();
+    throw Interrupted();
+  }
+  require_precision(*simulation_, sound_, checkpoint_);
+  cpu_seconds_ = clock_.seconds();
+}
+
+sim::RunResult BedRun::measured(const std::vector<std::uint8_t>& kept) {
+  try {
+    return sim::measure(plan_.scene, plan_.schedule, {&annealing_, &measurement_, &clock_}, control(), kept);
+  } catch (const std::bad_alloc&) {
+    throw;  // the runner says that memory is short
+  } catch (const std::exception& error) {
+    if (measurement_.begun()) throw;
+    throw StageError(error.what());
+  }
+}
+
+sim::RunControl BedRun::control() {
+  sim::RunControl control;
+  control.stop = [this] { return context_.interrupted(); };
+  if (plan_.lead)
+    control.progress = [this](double fraction, sim::RunPart part) { context_.progress(fraction, name_of(part)); };
+  control.gone_on = [this](const sim::Simulation& simulation) {
+    context_.log(fmt::format("goes on at {:.6g} of {:.6g} time units", simulation.time(), plan_.schedule.end()));
+  };
+  control.keep_due = [this](const sim::Simulation& simulation) { return keep_is_due(simulation); };
+  control.keep = [this](const sim::Simulation& simulation, const sim::RunControl::State& state) {
+    keep(simulation, state);
+  };
+  return control;
+}
+
+// Empty where there is none, or none that can be used.
+std::vector<std::uint8_t> BedRun::read_checkpoint() const {
+  if (!fs::exists(checkpoint_)) return {};
+  const std::string text = read_file(checkpoint_);
+  if (text.size() < hash_size || fast_hash(std::string_view(text).substr(hash_size)) != text.substr(0, hash_size))
+    throw sim::StateError("it is damaged");
+  return {text.begin() + hash_size, text.end()};
+}
+
+void BedRun::warn_of_checkpoint(const char* why) {
+  context_.warning(fmt::format("{}: cannot be used ({}); the run begins anew", checkpoint_.string(), why));
+}
+
+bool BedRun::save_is_due() const {
+  return plan_.checkpoint_seconds > 0 &&
+         std::chrono::duration<double>(Clock::now() - last_saved_).count() >= plan_.checkpoint_seconds;
+}
+
+bool BedRun::keep_is_due(const sim::Simulation& simulation) const {
+  return save_is_due() || simulation.time() >= keep_at_ || Clock::now() >= keep_after_;
+}
+
+void BedRun::keep(const sim::Simulation& simulation, const sim::RunControl::State& state) {
+  require_precision(simulation, sound_, checkpoint_);
+  const auto start = Clock::now();
+  sound_ = state();
+  kept_at_ = Clock::now();
+  keep_after_ = kept_at_ + std::max<Clock::duration>(keeping_share * (kept_at_ - start), shortest_keeping);
+  keep_at_ = simulation.time() + plan_.schedule.end() / keeps_a_run;
+  if (save_is_due()) save();
+}
+
+void BedRun::save() {
+  write_checkpoint(checkpoint_, sound_);
+  last_saved_ = Clock::now();
+}
+
+// ------------------------------------------------------------------------------------------------ results
+
+Json BedRun::results(const SceneOptions& options) const {
+  Json out;
+  measurement().results(options, plan_.scene, out);
+  const BedDescription bed = options.description();
+  const sim::EnergyLedger energy = simulation_->energy();
+  const sim::Counters counters = simulation_->counters();
+  out["gamma"] = quantity_json(options.gamma(), "1");
+  out["column_number"] = quantity_json(bed.column_number(), "1");
+  out["energy_ledger"] = {{"unit", options.weightless() ? "T0" : "m g D"},
+                          {"initial", energy.initial},
+                          {"kinetic", energy.kinetic},
+                          {"potential", energy.potential},
+                          {"dissipated", energy.dissipated},
+                          {"floor_work", energy.floor_work},
+                          {"bath_work", energy.bath_work},
+                          {"imbalance", energy.imbalance()}};
+  out["collisions"] = counters.collisions();
+  out["disk_collisions"] = counters.disk_collisions;
+  out["wall_collisions"] = counters.wall_collisions;
+  out["floor_collisions"] = counters.floor_collisions;
+  out["elastic_contacts"] = counters.elastic_contacts;
+  out["events"] = counters.events();
+  out["periods"] = measurement().bed().periods();
+  out["max_overlap"] = quantity_json(simulation_->largest_overlap(), "D");
+  return out;
+}
+
+void BedRun::write() {
+  measurement().write(context_, plan_.frames.count > 0);
+  measurement_.finish_frames(context_.output(plan_.frames.file));
+  TrajectoryWriter final(context_.output("final.extxyz"));
+  sim::Snapshot at;
+  simulation_->snapshot(at);
+  final.write(frame_of(at, plan_.scene, measurement_.properties(), 0));
+  final.close();
+  if (!plan_.annealing.empty()) annealing_.rows(context_.table("schedule.csv")).write(context_.output("schedule.csv"));
+  if (measurement().above_profile() > 0)
+    context_.warning(std::to_string(measurement().above_profile()) +
+                     " disk positions lay above the highest bin of the profile and are missing from it");
+}
+
+void write_checkpoint(const fs::path& path, const std::vector<std::uint8_t>& state) {
+  const std::string_view bytes(reinterpret_cast<const char*>(state.data()), state.size());
+  write_file_atomically(path, fast_hash(bytes) + std::string(bytes));
+}
+
+void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
+                       const fs::path& checkpoint) {
+  const std::string trouble = sim::precision_lost(simulation);
+  if (trouble.empty()) return;
+  if (!last_sound.empty()) write_checkpoint(checkpoint, last_sound);
+  throw StageError(fmt::format(
+      "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
+      simulation.time(), simulation.counters().collisions(), trouble,
+      last_sound.empty() ? std::string("there is no earlier sound state")
+                         : "its last sound state is kept in " + checkpoint.string()));
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,128 @@
+// One run of a bed by a simulate stage: what is measured of it, its frames, its checkpoints.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipelines/stages/annealing.hpp"
+#include "pipelines/stages/bed_measurement.hpp"
+#include "pipelines/stages/frame_store.hpp"
+#include "pipelines/stages/stage.hpp"
+#include "sim/measure/measure.hpp"
+
+namespace shakebed::pipelines {
+
+struct FramePlan {
+  std::uint64_t stride = 0, count = 0;  // every stride-th look, so many; 0: none
+  bool phases = false;                  // frames have phases of the floor's period
+  std::string file;                     // in the stage's output
+  bool takes(std::uint64_t look) const { return count > 0 && look % stride == 0 && look / stride < count; }
+};
+
+struct RunPlan {
+  sim::Scene scene;
+  sim::MeasurementSchedule schedule;  // without the bath, which `annealing` gives
+  std::vector<AnnealingStep> annealing;
+  double bath_temperature = 0;  // before the annealing
+  MeasurementPlan measurement;
+  FramePlan frames;
+  double checkpoint_seconds = 0;
+  std::filesystem::path folder;  // for checkpoints and the growing trajectory
+  bool lead = true;              // the run whose trajectory is kept and whose progress is shown
+};
+
+// BedMeasurement and the trajectory as observers of a run.
+class RunMeasurement final : public sim::RunObserver {
+ public:
+  explicit RunMeasurement(const RunPlan& plan) : plan_(plan) {}
+  bool begun() const { return bed_.has_value(); }  // there is a simulation: the scene could be made
+  const BedMeasurement& bed() const { return *bed_; }
+  void finish_frames(const std::filesystem::path& destination);
+  const sim::DiskProperties& properties() const { return properties_; }
+
+  void prepare(sim::Simulation& simulation) override;
+  void begin(sim::Simulation& simulation) override;
+  void look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look, std::uint32_t phase) override;
+  void end(sim::Simulation& simulation) override { bed_->end(simulation); }
+  void go_on(sim::Simulation& simulation) override { bed_->go_on(simulation); }
+  void save(sim::ArchiveWriter& out) override { visit(out); }
+  void load(sim::ArchiveReader& in) override;
+
+ private:
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(*bed_);
+    if (frames_) archive(*frames_);
+  }
+  const RunPlan& plan_;
+  sim::DiskProperties properties_;
+  std::optional<BedMeasurement> bed_;
+  std::optional<FrameStore> frames_;
+};
+
+// Processor time of the run's thread [s], of all its parts where it was killed and went on.
+class CpuClock final : public sim::RunObserver {
+ public:
+  double seconds() const;
+  void prepare(sim::Simulation&) override;
+  void look(sim::Simulation&, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {}
+  void save(sim::ArchiveWriter& out) override;
+  void load(sim::ArchiveReader& in) override { in(before_); }
+
+ private:
+  double before_ = 0, start_ = 0;
+};
+
+class BedRun {
+ public:
+  BedRun(RunPlan plan, RunContext& context);
+
+  // Runs the bed to its end, from its checkpoint where there is one. Throws StageError, Interrupted.
+  void operator()();
+
+  const BedMeasurement& measurement() const { return measurement_.bed(); }
+  double cpu_seconds() const { return cpu_seconds_; }
+  sim::Counters counters() const { return simulation_->counters(); }
+  Json results(const SceneOptions& bed) const;  // of observables.json
+  void write();                                 // everything but observables.json and bed.json
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  sim::RunResult measured(const std::vector<std::uint8_t>& kept);
+  sim::RunControl control();
+  std::vector<std::uint8_t> read_checkpoint() const;
+  bool keep_is_due(const sim::Simulation& simulation) const;
+  bool save_is_due() const;
+  void keep(const sim::Simulation& simulation, const sim::RunControl::State& state);
+  void save();
+  void warn_of_checkpoint(const char* why);
+
+  RunPlan plan_;
+  RunContext& context_;
+  std::filesystem::path checkpoint_;
+  Annealing annealing_;
+  RunMeasurement measurement_;
+  CpuClock clock_;
+  std::unique_ptr<sim::Simulation> simulation_;
+  double cpu_seconds_ = 0;
+
+  // The latest sound state, in memory, and when it was made and is to be made anew.
+  std::vector<std::uint8_t> sound_;
+  double keep_at_ = 0;  // of the run's time
+  Clock::time_point last_saved_, kept_at_, keep_after_;
+};
+
+// What a run is gone on from after a kill: a state behind its hash.
+void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
+
+// Where the simulation has lost its precision (sim/measure/observables.hpp): writes the last sound state, if there is
+// one, and throws StageError, which says what is wrong, when, and where that state is.
+void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
+                       const std::filesystem::path& checkpoint);
+
+}  // namespace shakebed::pipelines
