@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 
+#include "pipelines/cli/command_pages.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/exit_code.hpp"
 #include "pipelines/formats/errors.hpp"
@@ -250,6 +251,12 @@ int run_program(int argc, char** argv) {
   add_preset(*slurm, arguments.run);
   slurm->add_option("--set", arguments.run.settings, "change the recipe")->type_name("POINTER=VALUE");
   slurm->add_flag("--dry-run", arguments.run.dry_run, "write the scripts, submit nothing");
+
+  // For the install rules: manual pages and completions.
+  if (argc == 3 && std::string_view(argv[1]) == "--write-command-pages") {
+    write_command_pages(app, argv[2]);
+    return exit_ok;
+  }
 
   // A mistyped command: say which one was meant.
   if (argc > 1 && argv[1][0] != '-') {
