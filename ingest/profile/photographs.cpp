@@ -14,10 +14,14 @@ namespace shakebed::ingest {
 
 namespace {
 
-// Large frames are averaged down to a radius of 12 to 24 px, as the stage `extract` does (pipelines/stages). [px, pixels]
+// Large frames are averaged down to a radius of 12 to 24 px, as the stage `extract` does (pipelines/stages). [px,
+// pixels]
 constexpr double enough_radius_px = 12, large_frame_pixels = 2e6;
 constexpr std::size_t most_surveyed_pixels = 6'000'000;
 constexpr std::size_t most_tried = 10;  // files that are tried for a first frame that can be read
+// Shares of disks that may be wrong: above the first nothing is measured, above the second there is a warning, as in
+// the stage `extract`.
+constexpr double most_wrong = 0.2, worth_a_word = 0.02;
 constexpr double levels_16_bit = 65535.0 / 255.0;
 
 std::string text_of(const char* format, ...) {
@@ -66,10 +70,27 @@ double wrong_share(const std::vector<FoundDisk>& disks) {
   return disks.empty() ? 0 : wrong / static_cast<double>(disks.size());
 }
 
-BedFound finished(Measurement measurement) {
+// Measures with the disks kept, and judges them.
+BedFound measured(FrameSource& source, MeasureOptions options) {
   BedFound out;
-  out.status = FindStatus::ok;
-  out.measurement = std::move(measurement);
+  std::vector<MeasuredDisk> kept;
+  double wrong = 0;
+  options.disk_sink = [&, sink = options.disk_sink](const FrameReport& frame, const std::vector<MeasuredDisk>& disks) {
+    for (const MeasuredDisk& disk : disks) wrong += 1 - disk.probability;
+    if (sink) return sink(frame, disks);
+    kept.insert(kept.end(), disks.begin(), disks.end());
+  };
+  out.measurement = measure_bed(source, options);
+  out.measurement.disks = std::move(kept);
+  const std::size_t total = out.measurement.disk_total;
+  out.expected_wrong = total > 0 ? wrong / static_cast<double>(total) : 0;
+  out.status = out.expected_wrong > most_wrong ? FindStatus::doubtful : FindStatus::ok;
+  if (out.expected_wrong > worth_a_word) {
+    const std::string warning = text_of(
+        "%.1f %% of the disks found may be wrong: look at them before the numbers are used", 100 * out.expected_wrong);
+    if (!out.ok()) out.message = warning;
+    out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
+  }
   return out;
 }
 
@@ -127,6 +148,8 @@ std::string_view to_string(FindStatus status) {
       return "ok";
     case FindStatus::no_beads:
       return "no beads";
+    case FindStatus::doubtful:
+      return "doubtful";
     case FindStatus::bad_input:
       return "bad input";
   }
@@ -206,7 +229,8 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     break;
   }
   FrameSource frames = FrameSource::open(paths, source);
-  return finished(measure_bed(frames, measure));
+  if (!measure.frame_rate_hz) measure.frame_rate_hz = frames.film_rate_hz();
+  return measured(frames, std::move(measure));
 }
 
 BedFound measure_bed(std::vector<GrayFrame> frames, const MeasureOptions& options) {
@@ -218,7 +242,7 @@ BedFound measure_bed(std::vector<GrayFrame> frames, const MeasureOptions& option
   MeasureOptions measure = options;
   measure.find.seen = survey.seen;
   FrameSource source = FrameSource::from_frames(std::move(frames));
-  return finished(measure_bed(source, measure));
+  return measured(source, std::move(measure));
 }
 
 std::string DisksFound::brief() const {

@@ -34,6 +34,7 @@ GrayFrame frame_of(const ImageView& image);
 enum class FindStatus {
   ok,
   no_beads,   // nothing that is a bead by the survey, or by the finder
+  doubtful,   // more than a fifth of the disks found may be wrong
   bad_input,  // the image is empty, or the options make no sense
 };
 std::string_view to_string(FindStatus status);
@@ -65,10 +66,13 @@ struct BedFound {
   FindStatus status = FindStatus::bad_input;
   std::string message;  // one sentence, unless ok
   Measurement measurement;
+  double expected_wrong = 0;  // share of the disks that are no beads, by their probabilities
   [[nodiscard]] bool ok() const { return status == FindStatus::ok; }
   [[nodiscard]] std::string brief() const;
   [[nodiscard]] std::string full() const;
 };
+// The disks come back in measurement.disks unless options.disk_sink takes them. Floor and walls follow from the first
+// options.geometry_frames frames, as in the stage `extract`.
 // Files, folders, wildcards or one film, as FrameSource::open() takes them. Throws InputError where files cannot be
 // read.
 BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions& options,

@@ -17,6 +17,7 @@ namespace {
 constexpr double looks_a_time = 4, fewest_looks = 100, most_looks = 20'000;
 constexpr double most_periods = 1e12;    // more are a mistake in the units
 constexpr double longest_profile = 2e5;  // heights
+constexpr double empty_density = 1e-12;  // [1/D^2], below it a height is left out, as in the stage `simulate`
 
 std::string text_of(const char* format, ...) {
   char buffer[256];
@@ -97,13 +98,10 @@ class Observer final : public RunObserver {
                                    virial_rate_.std_error() / (2 * n * kinetic)};
   }
   void covariance() const {
-    const std::vector<double>& density = out_.profile.number_density;
-    const auto filled = [](double value) { return value > 0; };
-    const auto first = std::find_if(density.begin(), density.end(), filled);
-    const auto last = std::find_if(density.rbegin(), density.rend(), filled).base();
-    if (first >= last) return;
-    out_.covariance_first = static_cast<std::size_t>(first - density.begin());
-    out_.covariance_last = static_cast<std::size_t>(last - density.begin());
+    const FilledHeights filled = filled_heights(out_.profile);
+    if (filled.first == filled.last) return;
+    out_.covariance_first = filled.first;
+    out_.covariance_last = filled.last;
     out_.covariance = bed_->density_covariance(out_.covariance_first, out_.covariance_last);
     out_.covariance_samples = bed_->covariance_blocks();
   }
@@ -201,6 +199,13 @@ std::vector<std::string> MeasureOptions::validate(const Scene& scene) const {
                                static_cast<unsigned long long>(frames),
                                static_cast<unsigned long long>(plan_looks(scene, *this).schedule.looks())));
   return problems;
+}
+
+FilledHeights filled_heights(const Profile& profile) {
+  FilledHeights filled{0, profile.height.size()};
+  while (filled.first < filled.last && profile.number_density[filled.first] < empty_density) ++filled.first;
+  while (filled.last > filled.first && profile.number_density[filled.last - 1] < empty_density) --filled.last;
+  return filled;
 }
 
 MeasuredBed measure(const Scene& scene, const MeasureOptions& options) {

@@ -52,6 +52,13 @@ double floor_period(const Scene& scene);
 // Heights from below the lowest place of the floor to above the loosest bed.
 HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options);
 
+// The heights of a profile from the lowest to the highest that holds anything: first to last - 1. Below 1e-12/D^2 there
+// is only the tail of the kernel.
+struct FilledHeights {
+  std::size_t first = 0, last = 0;
+};
+FilledHeights filled_heights(const Profile& profile);
+
 enum class MeasureStatus {
   ok,
   stopped,         // options.stop() ended it: nothing was measured
