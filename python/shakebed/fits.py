@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -20,7 +21,10 @@ class Fit:
 
     def __init__(self, fit: Any) -> None:
         self._fit = fit
-        self._numbers: dict[str, Any] = fit.to_dict()
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        return self._fit.to_dict()
 
     @property
     def status(self) -> str:
