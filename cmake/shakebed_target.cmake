@@ -9,7 +9,7 @@ include(CheckCXXSourceRuns)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
-if(NOT CMAKE_BUILD_TYPE)
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release or RelWithDebInfo" FORCE)
 endif()
 
@@ -28,11 +28,12 @@ if(NOT DEFINED SHAKEBED_ARCH)
   set(SHAKEBED_ARCH "${default_arch}" CACHE STRING "Value of -march, empty for the compiler's default")
 endif()
 
+# -Wno-psabi: without AVX, g++ warns of every vector of four that is passed between functions. Here they are inline.
 add_library(shakebed_options INTERFACE)
 target_compile_features(shakebed_options INTERFACE cxx_std_20)
 target_include_directories(shakebed_options INTERFACE "${PROJECT_SOURCE_DIR}")
 target_compile_options(shakebed_options INTERFACE
-  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off -fno-math-errno $<$<BOOL:${SHAKEBED_WERROR}>:-Werror>)
+  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off -fno-math-errno -Wno-psabi $<$<BOOL:${SHAKEBED_WERROR}>:-Werror>)
 if(SHAKEBED_ARCH)
   target_compile_options(shakebed_options INTERFACE "-march=${SHAKEBED_ARCH}")
 endif()

@@ -14,12 +14,12 @@
 namespace shakebed::fit {
 
 struct AnswerInput {
-  Profile profile;
-  Kernel kernel;  // what it was measured through
+  Profile profile{};
+  Kernel kernel{};  // what it was measured through
   // The lower edge of the bed [D]: that of a hexagonal bed on a flat floor at 0.
   double base = 0.5 - 0.43301270189221932;
-  std::optional<double> column_number;                   // N D/W, where all disks are seen
-  std::optional<Estimate> temperature_x, temperature_z;  // kinetic, where velocities are known [m g D]
+  std::optional<double> column_number{};                     // N D/W, where all disks are seen
+  std::optional<Estimate> temperature_x{}, temperature_z{};  // kinetic, where velocities are known [m g D]
   double confidence = 0.95;
 };
 

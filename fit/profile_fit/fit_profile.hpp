@@ -39,12 +39,12 @@ struct WindowOptions {
   //   high: the last bin, going up, before the density first falls below `lowest_fraction` of its greatest value or
   //   below
   //         `lowest_significance` standard errors.
-  std::optional<double> low;
-  std::optional<double> high;
+  std::optional<double> low{};
+  std::optional<double> high{};
   // The tail only: low is the first height, going up, above which the density averaged over one diameter stays below
   // this [1/D^2]. With 0.6 the Enskog curve has no bias on true disks in the local-density picture (the whole profile:
   // -15 %).
-  std::optional<double> below_density;
+  std::optional<double> below_density{};
   double floor_exclusion = 1.5;  // [D]
   double plateau_fraction = 0.95;
   double lowest_fraction = 0.005;
@@ -59,17 +59,17 @@ struct FitOptions {
 
   double plateau_density = close_packing_density;  // phi_0, or where its search starts when free
   bool plateau_density_free = false;
-  std::optional<double> fixed_temperature;  // [m g D]
-  std::optional<double> fixed_shift;        // [D]
+  std::optional<double> fixed_temperature{};  // [m g D]
+  std::optional<double> fixed_shift{};        // [D]
 
   // N D/W where it is known. It decides T_c and is checked against the area under the profile; with constrain_column
   // it also ties the shift to the temperature (sum rule). The hydrostatic models hold it fixed whenever it is given.
-  std::optional<double> column_number;
+  std::optional<double> column_number{};
   bool constrain_column = false;
   double base = 0.0;  // lower edge of the bed [D]; 0.5 - sqrt(3)/4 = 0.067 for a hexagonal bed on a flat floor
 
-  Kernel kernel;  // what the profile was measured through
-  WindowOptions window;
+  Kernel kernel{};  // what the profile was measured through
+  WindowOptions window{};
 
   // Huber's loss: residuals beyond `robust_threshold` standard errors count linearly. [Huber1964] Bins then weigh by
   // their own errors even where there is a covariance, through which the error of T still comes.
@@ -89,6 +89,9 @@ struct FitOptions {
   bool compare = true;       // other models, and phi_0 free, beside this one
   int curve_points = 200;    // of the sampled model curve; 0: none
   int max_iterations = 100;
+
+  // Why no profile can be fitted with these options, a sentence each; empty when one can.
+  [[nodiscard]] std::vector<std::string> validate() const;
 };
 
 enum class FitStatus {
@@ -178,7 +181,7 @@ struct FitResult {
   double window_low = 0.0, window_high = 0.0;  // centres of the first and last bin used [D]
   int bins = 0;
   std::string window_rule;  // in words
-  Kernel kernel;
+  Kernel kernel{};
 
   Interval temperature_interval;
   std::vector<WindowFit> window_sweep;
@@ -189,6 +192,8 @@ struct FitResult {
   std::vector<std::string> warnings;  // plain sentences
 
   [[nodiscard]] bool ok() const { return status == FitStatus::ok; }
+  [[nodiscard]] std::string brief() const;  // one line
+  [[nodiscard]] std::string full() const;   // a line a number, then the warnings
 };
 
 FitResult fit_profile(const Profile& profile, const FitOptions& options = {});

@@ -14,7 +14,7 @@ constexpr double rounding = 1e-12;
 
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 
-FitStatus check_options(const FitOptions& options, const FitModel& model, FitResult& result) {
+FitStatus check_numbers(const FitOptions& options, const FitModel& model, FitResult& result) {
   if (!positive(options.plateau_density)) return bad_input(result, "the plateau density must be positive");
   if (options.column_number && !positive(*options.column_number)) {
     return bad_input(result, "the column number N D/W must be positive");
@@ -74,17 +74,32 @@ FitModel::Parameters first_guess(const FitOptions& options, const FitModel& mode
 
 }  // namespace
 
-FitStatus make_setup(const FitOptions& options, const MeasuredProfile& measured, FitSetup& setup, FitResult& result) {
+namespace {
+
+// Sets the model and checks the options against it.
+FitStatus make_model(const FitOptions& options, double resolution, std::unique_ptr<FitModel>& model,
+                     FitResult& result) {
   if (options.constrain_column && !options.column_number) {
     return bad_input(result, "constrain_column needs the column number N D/W");
   }
+  model = make_fit_model(options.model, options.base, options.constrain_column, resolution);
+  if (!model) return bad_input(result, "there is no model named '" + options.model + "'");
+  const FitStatus status = check_numbers(options, *model, result);
+  return status == FitStatus::ok ? check_plateau(options, *model, result) : status;
+}
+
+}  // namespace
+
+FitStatus check_options(const FitOptions& options, FitResult& result) {
+  std::unique_ptr<FitModel> model;
+  return make_model(options, 1.0, model, result);
+}
+
+FitStatus make_setup(const FitOptions& options, const MeasuredProfile& measured, FitSetup& setup, FitResult& result) {
   const double resolution = measured.spacing > 0.0 ? measured.spacing : 1.0;
-  setup.model = make_fit_model(options.model, options.base, options.constrain_column, resolution);
-  if (!setup.model) return bad_input(result, "there is no model named '" + options.model + "'");
-  const FitModel& model = *setup.model;
-  FitStatus status = check_options(options, model, result);
-  if (status == FitStatus::ok) status = check_plateau(options, model, result);
+  const FitStatus status = make_model(options, resolution, setup.model, result);
   if (status != FitStatus::ok) return status;
+  const FitModel& model = *setup.model;
 
   LeastSquaresOptions& least_squares = setup.least_squares;
   least_squares.free = free_parameters(options, model);

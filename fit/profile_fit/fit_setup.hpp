@@ -17,6 +17,9 @@ struct FitSetup {
   bool model_error = false;  // a misfit becomes an error of the model [FitOptions::model_error]
 };
 
+// What can be said of the options before there are data. bad_input or undefined_model, with a message in `result`.
+FitStatus check_options(const FitOptions& options, FitResult& result);
+
 // bad_input or undefined_model, with a message in `result`, where the options describe no curve.
 FitStatus make_setup(const FitOptions& options, const MeasuredProfile& measured, FitSetup& setup, FitResult& result);
 

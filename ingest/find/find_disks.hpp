@@ -39,10 +39,10 @@ struct BeadsSeen {
 // Everything is found when left alone; each member overrides one finding.
 struct FindOptions {
   Polarity polarity = Polarity::automatic;
-  std::optional<double> radius_px;    // a first value, refined unless hold_radius
-  bool hold_radius = false;           // keep radius_px exactly
-  std::optional<BeadsSeen> seen;      // for learn_beads()
-  std::optional<PixelRectangle> roi;  // centres outside are not reported
+  std::optional<double> radius_px{};    // a first value, refined unless hold_radius
+  bool hold_radius = false;             // keep radius_px exactly
+  std::optional<BeadsSeen> seen{};      // for learn_beads()
+  std::optional<PixelRectangle> roi{};  // centres outside are not reported
   int joint_fit_sweeps =
       20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
   bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge

@@ -43,37 +43,37 @@ struct FrameReport {
 // Only the diameter is needed; each other member overrides something that is otherwise found. Places are those of the
 // recorded frame.
 struct MeasureOptions {
-  double bead_diameter_m = 0;            // required, > 0
-  std::optional<double> scale_m_per_px;  // else bead_diameter_m / (2 radius_px)
-  std::optional<double> floor_px;        // y_px of the floor's surface at the left edge of the frame
-  std::optional<double> floor_slope;     // px down per px right; 0 when floor_px is given without it
-  std::optional<double> left_wall_px;    // x_px of the walls' inner faces
-  std::optional<double> right_wall_px;
+  double bead_diameter_m = 0;              // required, > 0
+  std::optional<double> scale_m_per_px{};  // else bead_diameter_m / (2 radius_px)
+  std::optional<double> floor_px{};        // y_px of the floor's surface at the left edge of the frame
+  std::optional<double> floor_slope{};     // px down per px right; 0 when floor_px is given without it
+  std::optional<double> left_wall_px{};    // x_px of the walls' inner faces
+  std::optional<double> right_wall_px{};
   // Beads of another size that are to be found too, filled like the first or in a shade of their own. They come with
   // the disks as species 2 and have a profile of their own; the first's is that of the first alone.
-  std::optional<double> second_diameter_m;
+  std::optional<double> second_diameter_m{};
   // Found on the beads' rims unless given (1 and 0: taken for plain); scale_m_per_px is that of rows.
-  std::optional<double> pixel_aspect;
-  std::optional<double> lens_radial;
-  FindOptions find;                            // polarity, radius, roi, ...
-  Kernel kernel{KernelKind::top_hat, 0.25};    // widths in D
-  double bin_width = 0.25;                     // D
-  std::optional<double> highest;               // D; else just above the highest centre
-  std::optional<double> lowest;                // D; else 0
-  std::optional<double> shaking_frequency_hz;  // needs frame_rate_hz; found from the film if left out and it shakes
-  std::optional<double> frame_rate_hz;         // of the stream: then profiles are told by the shaker's phase
+  std::optional<double> pixel_aspect{};
+  std::optional<double> lens_radial{};
+  FindOptions find{};                            // polarity, radius, roi, ...
+  Kernel kernel{KernelKind::top_hat, 0.25};      // widths in D
+  double bin_width = 0.25;                       // D
+  std::optional<double> highest{};               // D; else just above the highest centre
+  std::optional<double> lowest{};                // D; else 0
+  std::optional<double> shaking_frequency_hz{};  // needs frame_rate_hz; found from the film if left out and it shakes
+  std::optional<double> frame_rate_hz{};         // of the stream: then profiles are told by the shaker's phase
   std::size_t phase_bins = 8;
   // The source's frames are reduced by this factor (FrameSourceOptions::reduction). All places and lengths, in and out,
   // are px of the frames as recorded.
   int reduction = 1;
-  std::size_t calibration_frames = 3;                     // taken evenly from the first calibration_window frames
-  bool profile_from_coverage = true;                      // also measure covered area, independently
-  unsigned threads = 1;                                   // results do not depend on it
-  std::function<void(std::size_t frames_done)> progress;  // called from one thread at a time
+  std::size_t calibration_frames = 3;                       // taken evenly from the first calibration_window frames
+  bool profile_from_coverage = true;                        // also measure covered area, independently
+  unsigned threads = 1;                                     // results do not depend on it
+  std::function<void(std::size_t frames_done)> progress{};  // called from one thread at a time
   // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
   // that memory hardly grows with the film. Floor and walls, unless given, are then told from the first geometry_frames
   // frames of the film (rim_frames at least, which tell the radius) instead of from all.
-  std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink;
+  std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink{};
   std::size_t geometry_frames = 100;
 };
 

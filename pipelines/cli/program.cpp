@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
+#include "pipelines/cli/command_pages.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/runner/manifest.hpp"
 
@@ -67,6 +69,11 @@ void Program::refuse_unknown_command() const {
 }
 
 int Program::run() {
+  // For the install rules: manual pages and completions.
+  if (argc_ == 3 && std::string_view(argv_[1]) == "--write-command-pages") {
+    write_command_pages(app_, argv_[2]);
+    return exit_ok;
+  }
   refuse_unknown_command();
   try {
     app_.parse(argc_, argv_);

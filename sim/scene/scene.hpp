@@ -25,10 +25,10 @@ struct Species {
   double mass = 1;
 };
 struct Disks {
-  std::vector<Species> species;  // one or two; the first has diameter 1 and mass 1
-  Surface contact;               // disk against disk
-  double inertia_ratio = 0.5;    // q = I/(m R^2): 1/2 disk, 2/5 sphere
-  double contact_duration = 0;   // t_c of the TC model [LudingMcNamara1998], 0 for none
+  std::vector<Species> species{};  // one or two; the first has diameter 1 and mass 1
+  Surface contact{};               // disk against disk
+  double inertia_ratio = 0.5;      // q = I/(m R^2): 1/2 disk, 2/5 sphere
+  double contact_duration = 0;     // t_c of the TC model [LudingMcNamara1998], 0 for none
 };
 
 // --- the box: x from 0 to width; the floor's mean position is z = 0
@@ -52,10 +52,10 @@ using Floor = std::variant<StillFloor, SinusoidalFloor, TabulatedFloor>;
 
 struct Box {
   double width = 0;
-  Sides sides;
-  Top top;
-  Floor floor;
-  Surface floor_surface;
+  Sides sides{};
+  Top top{};
+  Floor floor{};
+  Surface floor_surface{};
 };
 
 // --- reservoirs
@@ -99,11 +99,11 @@ struct PlacedStart {
 using Start = std::variant<HexagonalStart, RandomStart, PlacedStart>;
 
 struct Scene {
-  Gravity gravity;
-  Disks disks;
-  Box box;
-  Bath bath;
-  Start start;
+  Gravity gravity{};
+  Disks disks{};
+  Box box{};
+  Bath bath{};
+  Start start{};
   // A dissipative bed with contact clocks that has come to rest on the floor lies there (engine_rest.hpp).
   bool rests = true;
   double start_temperature = 1;  // of the Maxwellian velocities at the start (placed disks keep their own)

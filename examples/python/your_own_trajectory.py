@@ -1,0 +1,32 @@
+# %% [markdown]
+# # A trajectory of your own
+# Extended XYZ, as LAMMPS, ASE and OVITO write it, lengths in the diameter of a disk. Name a file and the width of the bed
+# as arguments. Without them, one is written here, of an ideal gas: its density falls as exp(-z/T).
+
+# %%
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import shakebed
+
+if len(sys.argv) > 1:
+    file, width = sys.argv[1], float(sys.argv[2])
+else:
+    width, temperature = 2000.0, 3.0
+    random = np.random.default_rng(4)
+    file = str(Path(tempfile.mkdtemp()) / "gas.extxyz")
+    with open(file, "w") as out:
+        for frame in range(200):
+            out.write(f'100\nLattice="{width} 0 0 0 1 0 0 0 60" Properties=species:S:1:pos:R:3 Time={frame}\n')
+            for x, z in zip(random.uniform(0, width, 100), random.exponential(temperature, 100)):
+                out.write(f"A {x} 0 {z}\n")
+
+# %%
+trajectory = shakebed.read_trajectory(file)
+print("frames x disks:", trajectory.array.shape[:2])
+profile = shakebed.density_profile(trajectory.array[:, :, 1], width, highest=15)
+fit = shakebed.fit_profile(profile.height, profile.number_density, profile.std_error, kernel=profile.kernel)
+print(fit.brief())
+print(fit.full())

@@ -1,0 +1,232 @@
+// The compiled half of the Python module that touches images: it alone loads OpenCV, when it is first used.
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "ingest/profile/photographs.hpp"
+#include "python/module.hpp"
+
+namespace shakebed::python {
+
+namespace {
+
+ingest::Polarity polarity_named(const std::string& name) {
+  if (name == "automatic") return ingest::Polarity::automatic;
+  if (name == "dark") return ingest::Polarity::dark_beads;
+  if (name == "bright") return ingest::Polarity::bright_beads;
+  throw py::value_error("polarity is \"" + name + "\"; it must be automatic, dark or bright");
+}
+
+// A view of a grey numpy image (rows x columns). What cannot be viewed is refused.
+ingest::ImageView view_of(const py::array& image) {
+  if (image.ndim() != 2)
+    throw py::value_error("the image has " + std::to_string(image.ndim()) +
+                          " dimensions; pass a grey image (rows x columns), or one channel of a colour image");
+  ingest::ImageView view;
+  view.height = static_cast<int>(image.shape(0));
+  view.width = static_cast<int>(image.shape(1));
+  view.pixels = image.data();
+  if (py::isinstance<py::array_t<std::uint8_t>>(image))
+    view.type = ingest::PixelType::u8;
+  else if (py::isinstance<py::array_t<std::uint16_t>>(image))
+    view.type = ingest::PixelType::u16;
+  else if (py::isinstance<py::array_t<float>>(image))
+    view.type = ingest::PixelType::f32;
+  else if (py::isinstance<py::array_t<double>>(image))
+    view.type = ingest::PixelType::f64;
+  else
+    throw py::value_error("levels must be uint8, uint16, float32 or float64");
+  if (view.width > 1 && image.strides(1) != image.itemsize())
+    throw py::value_error("the pixels of a row are not side by side in memory: pass numpy.ascontiguousarray(image)");
+  if (view.height > 1 && image.strides(0) < 0)
+    throw py::value_error("the rows are in reverse order in memory: pass numpy.ascontiguousarray(image)");
+  view.row_bytes = static_cast<std::size_t>(view.height > 1 ? image.strides(0) : 0);
+  return view;
+}
+
+ingest::FindOptions find_options(const py::dict& wanted) {
+  ingest::FindOptions out;
+  if (wanted.contains("polarity")) out.polarity = polarity_named(wanted["polarity"].cast<std::string>());
+  if (wanted.contains("radius")) out.radius_px = wanted["radius"].cast<std::optional<double>>();
+  if (wanted.contains("keep_half_hidden")) out.keep_half_hidden = wanted["keep_half_hidden"].cast<bool>();
+  if (wanted.contains("roi") && !wanted["roi"].is_none()) {
+    const auto roi = wanted["roi"].cast<std::array<int, 4>>();
+    out.roi = ingest::PixelRectangle{roi[0], roi[1], roi[2], roi[3]};
+  }
+  return out;
+}
+
+ingest::MeasureOptions measure_options(const py::dict& wanted) {
+  ingest::MeasureOptions out;
+  const auto take = [&](const char* name, auto& value) {
+    using Value = std::remove_reference_t<decltype(value)>;
+    if (wanted.contains(name) && !wanted[name].is_none()) value = wanted[name].cast<Value>();
+  };
+  out.find = find_options(wanted);
+  out.kernel = {KernelKind::gaussian, 0.5};  // as in the stage `extract`
+  take("diameter", out.bead_diameter_m);
+  take("scale", out.scale_m_per_px);
+  take("floor", out.floor_px);
+  take("floor_slope", out.floor_slope);
+  take("left_wall", out.left_wall_px);
+  take("right_wall", out.right_wall_px);
+  take("pixel_aspect", out.pixel_aspect);
+  take("lens_radial", out.lens_radial);
+  take("spacing", out.bin_width);
+  take("lowest", out.lowest);
+  take("highest", out.highest);
+  take("frame_rate", out.frame_rate_hz);
+  take("frequency", out.shaking_frequency_hz);
+  take("threads", out.threads);
+  if (wanted.contains("kernel")) {
+    const auto kernel = kernel_from(wanted["kernel"].cast<std::string>());
+    if (!kernel) throw py::value_error("kernel: write gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)");
+    out.kernel = *kernel;
+  }
+  return out;
+}
+
+// One array a member of a list of structures.
+template <class Row, class Member>
+py::array_t<double> column(const std::vector<Row>& rows, Member member) {
+  std::vector<double> values;
+  values.reserve(rows.size());
+  for (const Row& row : rows) values.push_back(static_cast<double>(row.*member));
+  return array_of(std::move(values));
+}
+
+py::dict disks_of(const ingest::DisksFound& found) {
+  using Disk = ingest::FoundDisk;
+  py::dict out;
+  out["x"] = column(found.disks, &Disk::x_px);
+  out["y"] = column(found.disks, &Disk::y_px);
+  out["variance_x"] = column(found.disks, &Disk::variance_x);
+  out["variance_y"] = column(found.disks, &Disk::variance_y);
+  out["quality"] = column(found.disks, &Disk::quality);
+  out["contrast"] = column(found.disks, &Disk::contrast);
+  out["probability"] = column(found.disks, &Disk::probability);
+  return out;
+}
+
+py::dict profile_of(const ingest::DensityProfile& profile) {
+  std::vector<double> heights;
+  for (std::size_t bin = 0; bin < profile.bins.count; ++bin) heights.push_back(profile.bins.middle(bin));
+  py::dict out;
+  out["height"] = array_of(std::move(heights));
+  out["number_density"] = array_of(profile.number_density);
+  out["std_error"] = array_of(profile.std_error);
+  out["covariance"] = profile.covariance;
+  out["covariance_samples"] = profile.independent_samples;
+  out["samples"] = profile.samples;
+  out["kernel"] = to_string(profile.kernel);
+  return out;
+}
+
+py::dict table_of(const std::vector<ingest::MeasuredDisk>& disks) {
+  using Disk = ingest::MeasuredDisk;
+  py::dict out;
+  out["frame"] = column(disks, &Disk::frame);
+  out["x_px"] = column(disks, &Disk::x_px);
+  out["y_px"] = column(disks, &Disk::y_px);
+  out["radius_px"] = column(disks, &Disk::radius_px);
+  out["x"] = column(disks, &Disk::x);
+  out["z"] = column(disks, &Disk::z);
+  out["quality"] = column(disks, &Disk::quality);
+  return out;
+}
+
+// Runs `work` without the GIL; Ctrl-C and exceptions of the caller's progress function end it between frames.
+struct Stopped : std::exception {};
+ingest::BedFound measured(const std::function<ingest::BedFound(const ingest::MeasureOptions&)>& work,
+                          const py::dict& wanted, py::object progress, std::size_t frames) {
+  ingest::MeasureOptions options = measure_options(wanted);
+  Caller caller(std::move(progress));
+  options.progress = [&](std::size_t done) {
+    if (frames > 0) caller.progress(static_cast<double>(done) / static_cast<double>(frames));
+    if (caller.stop()) throw Stopped();
+  };
+  ingest::BedFound found;
+  try {
+    const py::gil_scoped_release release;
+    found = work(options);
+  } catch (const Stopped&) {
+    caller.raise_if_stopped();
+  }
+  return found;
+}
+
+ingest::BedFound measure_arrays(const std::vector<py::array>& images, const py::dict& wanted, py::object progress) {
+  std::vector<ingest::GrayFrame> frames;
+  for (const py::array& image : images) frames.push_back(ingest::frame_of(view_of(image)));
+  const std::size_t count = frames.size();
+  return measured(
+      [&](const ingest::MeasureOptions& options) { return ingest::measure_bed(std::move(frames), options); }, wanted,
+      std::move(progress), count);
+}
+
+ingest::BedFound measure_files(const std::vector<std::string>& paths, const py::dict& wanted, py::object progress) {
+  const std::size_t count = ingest::FrameSource::open(paths).count_if_known().value_or(0);
+  return measured([&](const ingest::MeasureOptions& options) { return ingest::measure_bed(paths, options); }, wanted,
+                  std::move(progress), count);
+}
+
+// errors.py holds the exceptions; a file that cannot be read is an InputError there, too.
+void translate_errors() {
+  py::register_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const ingest::InputError& error) {
+      const py::object raised = py::module_::import("shakebed.errors").attr("input_error")(error.what(), error.path());
+      PyErr_SetObject(py::type::of(raised).ptr(), raised.ptr());
+    }
+  });
+}
+
+}  // namespace
+
+}  // namespace shakebed::python
+
+PYBIND11_MODULE(_images, m) {
+  using namespace shakebed::python;
+  namespace ingest = shakebed::ingest;
+  translate_errors();
+  py::class_<ingest::DisksFound>(m, "Disks")
+      .def_property_readonly("status", [](const ingest::DisksFound& f) { return std::string(to_string(f.status)); })
+      .def_property_readonly("ok", [](const ingest::DisksFound& f) { return f.ok(); })
+      .def_property_readonly("message", [](const ingest::DisksFound& f) { return f.message; })
+      .def_property_readonly("radius", [](const ingest::DisksFound& f) { return f.calibration.radius_px; })
+      .def_property_readonly("radius_std_error",
+                             [](const ingest::DisksFound& f) { return f.calibration.radius_std_error_px; })
+      .def_property_readonly(
+          "bright",
+          [](const ingest::DisksFound& f) { return f.calibration.polarity == ingest::Polarity::bright_beads; })
+      .def_property_readonly("expected_wrong", [](const ingest::DisksFound& f) { return f.expected_wrong; })
+      .def_property_readonly("warnings", [](const ingest::DisksFound& f) { return f.calibration.warnings; })
+      .def("columns", &disks_of)
+      .def("brief", &ingest::DisksFound::brief)
+      .def("full", &ingest::DisksFound::full);
+  m.def("find_disks", [](const py::array& image, const py::dict& options) {
+    const ingest::ImageView view = view_of(image);
+    const ingest::FindOptions wanted = find_options(options);
+    const py::gil_scoped_release release;
+    return ingest::find_disks(view, wanted);
+  });
+  py::class_<ingest::BedFound>(m, "Bed")
+      .def_property_readonly("status", [](const ingest::BedFound& f) { return std::string(to_string(f.status)); })
+      .def_property_readonly("ok", [](const ingest::BedFound& f) { return f.ok(); })
+      .def_property_readonly("message", [](const ingest::BedFound& f) { return f.message; })
+      .def_property_readonly("width", [](const ingest::BedFound& f) { return f.measurement.calibration.width; })
+      .def_property_readonly("scale",
+                             [](const ingest::BedFound& f) { return f.measurement.calibration.scale_m_per_px; })
+      .def_property_readonly("radius", [](const ingest::BedFound& f) { return f.measurement.calibration.radius_px; })
+      .def_property_readonly("floor", [](const ingest::BedFound& f) { return f.measurement.calibration.floor_px; })
+      .def_property_readonly("frames", [](const ingest::BedFound& f) { return f.measurement.frames.size(); })
+      .def_property_readonly("disks_a_frame", [](const ingest::BedFound& f) { return f.measurement.disk_count_mean; })
+      .def_property_readonly("warnings", [](const ingest::BedFound& f) { return f.measurement.warnings; })
+      .def("profile", [](const ingest::BedFound& f) { return profile_of(f.measurement.profile); })
+      .def("disks", [](const ingest::BedFound& f) { return table_of(f.measurement.disks); })
+      .def("brief", &ingest::BedFound::brief)
+      .def("full", &ingest::BedFound::full);
+  m.def("measure_arrays", &measure_arrays);
+  m.def("measure_files", &measure_files);
+}

@@ -1,0 +1,243 @@
+"""Disks and beds in photographs. OpenCV is loaded when one of these functions is first called."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Optional, Sequence, Union
+
+import numpy as np
+
+from .errors import StageError, UsageError
+from .quantities import Number, Progress, in_si, reporter, table_html
+from .scenes import Profile, profile_from
+
+_find_options = {"polarity", "radius", "roi", "keep_half_hidden"}
+_measure_options = _find_options | {"scale", "floor", "floor_slope", "left_wall", "right_wall", "pixel_aspect",
+                                    "lens_radial", "spacing", "lowest", "highest", "frame_rate", "frequency", "kernel"}
+
+
+def _checked(options: dict[str, Any], known: set[str], function: str) -> dict[str, Any]:
+    if unknown := set(options) - known:
+        raise TypeError(f"{function}() has no option {sorted(unknown)[0]!r}; it has {', '.join(sorted(known))}")
+    return {name: value for name, value in options.items() if value is not None}
+
+
+class Disks:
+    """Disks found in one image. Pixels: the centre of the top-left one is (0, 0), x to the right, y downwards."""
+
+    def __init__(self, found: Any) -> None:
+        self._found = found
+        self._columns = found.columns()
+
+    @property
+    def x(self) -> np.ndarray:
+        """Of the centres, in px: shape (disks,)."""
+        return self._columns["x"]
+
+    @property
+    def y(self) -> np.ndarray:
+        return self._columns["y"]
+
+    @property
+    def std_error(self) -> np.ndarray:
+        """Of the centres, in px, along x and y: shape (disks, 2)."""
+        return np.sqrt(np.column_stack([self._columns["variance_x"], self._columns["variance_y"]]))
+
+    @property
+    def quality(self) -> np.ndarray:
+        """0 to 1; 1 is a bead like all the others."""
+        return self._columns["quality"]
+
+    @property
+    def probability(self) -> np.ndarray:
+        """That it is a bead."""
+        return self._columns["probability"]
+
+    @property
+    def radius(self) -> float:
+        """Of a bead, in px."""
+        return self._found.radius
+
+    @property
+    def radius_std_error(self) -> float:
+        return self._found.radius_std_error
+
+    @property
+    def bright(self) -> bool:
+        """Whether the beads are brighter than their background."""
+        return self._found.bright
+
+    @property
+    def expected_wrong(self) -> float:
+        """Share of the disks that are no beads, by their probabilities."""
+        return self._found.expected_wrong
+
+    @property
+    def warnings(self) -> list[str]:
+        return self._found.warnings
+
+    @property
+    def message(self) -> str:
+        """Why there are none."""
+        return self._found.message
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def brief(self) -> str:
+        """The result in one line."""
+        return self._found.brief()
+
+    def full(self) -> str:
+        """The result, a line a number, then the warnings."""
+        return self._found.full()
+
+    def __repr__(self) -> str:
+        return f"<shakebed.Disks: {self.brief()}>"
+
+
+def find_disks(image: np.ndarray, **options: Any) -> Disks:
+    """Find the disks of one image, with nothing to guess.
+
+    Parameters
+    ----------
+    image : ndarray, shape (rows, columns)
+        Grey levels: uint8, uint16, float32 or float64 (0 to 255). It is read in place, not copied first.
+    **options
+        polarity ("dark", "bright"), radius (px, good to a quarter), roi (left, top, width, height in px),
+        keep_half_hidden.
+
+    Returns
+    -------
+    Disks
+        Of length 0, with a `message`, where there are no beads.
+    """
+    wanted = _checked(options, _find_options, "find_disks")
+    from . import _images
+
+    found = _images.find_disks(np.asarray(image), wanted)
+    if found.status == "bad input":
+        raise UsageError(found.message)
+    return Disks(found)
+
+
+class MeasuredBed:
+    """A bed measured in photographs."""
+
+    def __init__(self, bed: Any) -> None:
+        self._bed = bed
+
+    @property
+    def profile(self) -> Profile:
+        """Density against the height above the floor, in D."""
+        return profile_from(self._bed.profile())
+
+    @property
+    def disks(self) -> dict[str, np.ndarray]:
+        """Columns of disks.csv: frame, x_px, y_px, radius_px, x, z (D), quality."""
+        columns = self._bed.disks()
+        columns["frame"] = columns["frame"].astype(np.int64)
+        return columns
+
+    @property
+    def scale(self) -> float:
+        """m per px."""
+        return self._bed.scale
+
+    @property
+    def width(self) -> float:
+        """Between the walls, in D."""
+        return self._bed.width
+
+    @property
+    def radius(self) -> float:
+        """Of a bead, in px."""
+        return self._bed.radius
+
+    @property
+    def floor(self) -> float:
+        """Row of the floor, in px."""
+        return self._bed.floor
+
+    @property
+    def frames(self) -> int:
+        return self._bed.frames
+
+    @property
+    def disks_a_frame(self) -> float:
+        return self._bed.disks_a_frame
+
+    @property
+    def warnings(self) -> list[str]:
+        return self._bed.warnings
+
+    def brief(self) -> str:
+        """The result in one line."""
+        return self._bed.brief()
+
+    def full(self) -> str:
+        """The result, a line a number, then the warnings."""
+        return self._bed.full()
+
+    def __repr__(self) -> str:
+        return f"<shakebed.MeasuredBed: {self.brief()}>"
+
+    def _repr_html_(self) -> str:
+        rows = {"frames": self.frames, "disks a frame": f"{self.disks_a_frame:.2f}", "radius": f"{self.radius:.3f} px",
+                "width": f"{self.width:.3f} D", "scale": f"{1e3 * self.scale:.6g} mm/px"}
+        return table_html("bed in photographs", rows, self.warnings)
+
+
+Frames = Union[str, "os.PathLike[str]", Sequence[Any], np.ndarray]
+
+
+def measure_bed(
+    frames: Frames, diameter: Union[str, Number], *, threads: int = 1, progress: Progress = None, **options: Any
+) -> MeasuredBed:
+    """Measure the density profile of a bed in photographs or a film.
+
+    Parameters
+    ----------
+    frames : str, path, sequence of them, ndarray (frames, rows, columns), or sequence of ndarray (rows, columns)
+        Files, folders, wildcards or one film; or grey images in memory.
+    diameter : str or float
+        Of a bead: "2.99 mm", or in m.
+    threads : int
+        The result does not depend on it.
+    progress : callable or True, optional
+        Called with the fraction done.
+    **options
+        polarity, radius, roi, keep_half_hidden as for `find_disks`; scale (m/px), floor, left_wall, right_wall (px),
+        floor_slope, pixel_aspect, lens_radial, kernel ("gaussian:0.5"), spacing, lowest, highest (D), frame_rate and
+        frequency (Hz).
+
+    Returns
+    -------
+    MeasuredBed
+
+    Raises
+    ------
+    InputError
+        With the file, where it cannot be read.
+    StageError
+        Where there are no beads.
+    """
+    wanted = _checked(options, _measure_options, "measure_bed")
+    wanted.update(diameter=in_si(diameter, "length", "diameter"), threads=threads)
+    from . import _images
+
+    call, close = reporter(progress, "finding disks")
+    try:
+        if isinstance(frames, (str, os.PathLike)):
+            bed = _images.measure_files([os.fspath(frames)], wanted, call)
+        elif len(frames) > 0 and isinstance(frames[0], (str, os.PathLike)):
+            bed = _images.measure_files([os.fspath(f) for f in frames], wanted, call)
+        else:
+            bed = _images.measure_arrays([np.asarray(f) for f in frames], wanted, call)
+    finally:
+        close()
+    if bed.status == "bad input":
+        raise UsageError(bed.message)
+    if not bed.ok:
+        raise StageError(bed.message)
+    return MeasuredBed(bed)

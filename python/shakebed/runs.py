@@ -1,0 +1,279 @@
+"""Recipes that are run by the program, and the folders of results that it leaves."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any, Mapping, Optional, Union
+
+import numpy as np
+
+from . import _core
+from ._place import program as _program_place
+from .errors import CheckFailed, InputError, StageError, error_of_code
+from .quantities import Progress, Quantity, reporter, table_html
+from .scenes import Trajectory, read_trajectory
+
+_percent = re.compile(r"^(\S+?):.*?(\d+) ?%")
+
+
+def program() -> str:
+    """The path of the program `shakebed` that belongs to this module."""
+    if given := os.environ.get("SHAKEBED_PROGRAM"):
+        return given
+    beside = (Path(__file__).resolve().parent / _program_place).resolve()
+    if beside.is_file():
+        return str(beside)
+    if found := shutil.which("shakebed"):
+        return found
+    raise StageError(f"the program shakebed is neither at {beside} nor on the PATH; install it with this module")
+
+
+class Table:
+    """A CSV of results.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray
+    units : dict of str to str
+        "1" for a plain number.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.units: dict[str, str] = {}
+        with open(path, encoding="utf-8", newline="") as file:
+            lines = csv.reader(line for line in file if not line.startswith("#"))
+            names = next(lines, [])
+            rows = list(lines)
+        self.columns: dict[str, np.ndarray] = {}
+        for index, name in enumerate(names):
+            cells = [row[index] for row in rows]
+            try:
+                self.columns[name] = np.array([float(cell) if cell else np.nan for cell in cells])
+            except ValueError:
+                self.columns[name] = np.array(cells)
+        about = path.with_name(path.name + "-metadata.json")
+        if about.is_file():
+            for column in json.loads(about.read_text(encoding="utf-8"))["tableSchema"]["columns"]:
+                self.units[column["name"]] = column.get("schema:unitText", "1")
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_") or name == "columns" or name not in self.columns:
+            raise AttributeError(f"the table has no column {name!r}")
+        return self.columns[name]
+
+    def keys(self) -> Any:
+        return self.columns.keys()
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __repr__(self) -> str:
+        return f"<shakebed.Table {self.path.name}: {len(self)} rows of {', '.join(self.columns)}>"
+
+
+def _with_quantities(value: Any) -> Any:
+    if isinstance(value, dict):
+        if "value" in value and set(value) <= {"value", "std_error", "unit", "spread"}:
+            number = np.nan if value["value"] is None else value["value"]
+            return Quantity(number, value.get("std_error"), value.get("unit", "1"))
+        return {key: _with_quantities(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_with_quantities(entry) for entry in value]
+    return value
+
+
+class StageResults:
+    """What one stage left: `numbers` (its result file, quantities as Quantity) and `tables` by name."""
+
+    def __init__(self, folder: Path, numbers: Any) -> None:
+        self.folder = folder
+        self.numbers = _with_quantities(numbers)
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        return {path.stem: Table(path) for path in sorted(self.folder.glob("*.csv"))}
+
+    def table(self, name: str) -> Table:
+        """One CSV, by its name without .csv."""
+        path = self.folder / f"{name}.csv"
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such table; there are "
+                             f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}")
+        return Table(path)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.numbers[name]
+
+    def trajectory(self) -> Trajectory:
+        """The frames of a simulation, as one array (see Trajectory)."""
+        for name in ("trajectory.extxyz.zst", "trajectory.extxyz"):
+            if (self.folder / name).is_file():
+                return read_trajectory(self.folder / name)
+        raise InputError(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"")
+
+    def __repr__(self) -> str:
+        return f"<shakebed.StageResults {self.folder.name}>"
+
+
+class Results:
+    """A folder of results."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.summary: dict[str, Any] = self._read("summary.json")
+        self.manifest: dict[str, Any] = self._read("manifest.json")
+        self.stages = {
+            stage["id"]: StageResults(folder / stage["id"], self.summary.get(stage["id"], {}))
+            for stage in self.manifest.get("stages", [])
+            if (folder / stage["id"]).is_dir()
+        }
+
+    def _read(self, name: str) -> dict[str, Any]:
+        path = self.folder / name
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}; is it a folder of results?") from None
+        except ValueError as error:
+            raise InputError(f"{path}: is no JSON: {error}") from None
+
+    @property
+    def answer(self) -> Optional[dict[str, Any]]:
+        """Temperature with its whole uncertainty, and the verdict; None where the recipe asks for none."""
+        return _with_quantities(self.summary.get("answer"))
+
+    @property
+    def report(self) -> Path:
+        """The page for people."""
+        return self.folder / "report.html"
+
+    def __getitem__(self, stage: str) -> StageResults:
+        if stage not in self.stages:
+            raise KeyError(f"there is no stage {stage!r} in {self.folder}; there are {', '.join(self.stages)}")
+        return self.stages[stage]
+
+    def __repr__(self) -> str:
+        return f"<shakebed.Results {self.folder}: {', '.join(self.stages)}>"
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, Any] = {"stages": ", ".join(self.stages), "report": self.report}
+        notes = []
+        if answer := self.answer:
+            rows.update({"T": answer.get("temperature"), "verdict": answer.get("verdict")})
+            notes = [answer.get("why") or ""]
+        return table_html(str(self.folder), rows, notes)
+
+
+def load(out: Union[str, "os.PathLike[str]"]) -> Results:
+    """Read a folder of results.
+
+    Returns
+    -------
+    Results
+        results["fit"]["temperature"] is a Quantity, results["bed"].table("profile")["height"] an array,
+        results["bed"].trajectory() the frames.
+    """
+    folder = Path(out)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such folder")
+    return Results(folder)
+
+
+def run(
+    recipe: Union[str, "os.PathLike[str]"],
+    out: Union[str, "os.PathLike[str]"],
+    *,
+    set: Optional[Mapping[str, Any]] = None,
+    preset: Optional[str] = None,
+    jobs: Optional[int] = None,
+    force: bool = False,
+    progress: Progress = None,
+) -> Results:
+    """Run a recipe as ``shakebed run`` does; what is up to date in `out` is kept.
+
+    Parameters
+    ----------
+    recipe : str or path
+    out : str or path
+        The folder of the results.
+    set : mapping of JSON pointer to value, optional
+        Changes, {"/stages/bed/seed": 7}.
+    preset : str, optional
+        Of the recipe, applied before `set`.
+    jobs : int, optional
+        Threads; the results do not depend on it.
+    force : bool
+        Run also what is up to date.
+    progress : callable or True, optional
+        Called with the fraction of the running stage.
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    RecipeError
+        With file, pointer and line of every mistake, before anything is run.
+    InputError, StageError
+        As the stage says.
+    CheckFailed
+        A number is not what the recipe expects; its `results` are complete.
+    KeyboardInterrupt
+        After Ctrl-C; finished stages are kept and the run can be continued by the same call.
+    """
+    recipe, out = os.fspath(recipe), os.fspath(out)
+    settings = [f"{pointer}={value if isinstance(value, str) else json.dumps(value)}"
+                for pointer, value in (set or {}).items()]
+    _core.check_recipe(recipe, settings, preset)
+    command = [program(), "run", recipe, "--out", out]
+    for setting in settings:
+        command += ["--set", setting]
+    command += ["--preset", preset] if preset else []
+    command += ["--jobs", str(jobs)] if jobs else []
+    command += ["--force"] if force else []
+    call, close = reporter(progress, "running")
+    try:
+        code, errors = _follow(command, call)
+    finally:
+        close()
+    if code == 0:
+        return load(out)
+    message = "\n".join(errors) or f"shakebed run ended with exit code {code}"
+    error = error_of_code(message, code)
+    if isinstance(error, CheckFailed):
+        error.results = load(out)
+    raise error
+
+
+def _follow(command: list[str], progress: Any) -> tuple[int, list[str]]:
+    """Runs the program to its end: its exit code and what it says of errors. Ctrl-C ends it first."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
+                               start_new_session=True)
+    errors = []
+    try:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("error: "):
+                errors.append(line[len("error: "):].rstrip("\n"))
+            elif progress is not None and (match := _percent.match(line)):
+                progress(int(match.group(2)) / 100)
+        return process.wait(), errors
+    except BaseException:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+        raise
+    finally:
+        if process.stderr is not None:
+            process.stderr.close()

@@ -1,0 +1,425 @@
+"""Beds that are simulated in memory."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any, NamedTuple, Optional, Union
+
+import numpy as np
+
+from . import _core
+from .errors import InputError, RecipeError, UsageError
+from .quantities import Progress, Quantity, reporter, table_html
+
+Scene = Union[dict, str, "os.PathLike[str]"]
+
+_stage_pointer = "/stages/0"
+
+
+class Profile(NamedTuple):
+    """A density profile.
+
+    Attributes
+    ----------
+    height : ndarray, shape (heights,)
+        In D above the mean position of the floor.
+    number_density, std_error : ndarray, shape (heights,)
+        n D^2 and its standard error, which allows for correlation in time.
+    covariance : ndarray, shape (heights, heights), or None
+        Of the mean densities.
+    covariance_samples : int
+        Independent samples behind the covariance.
+    samples : int
+        Snapshots or frames.
+    kernel : str
+        The window through which the density was measured, "gaussian:0.5" (width in D).
+    """
+
+    height: np.ndarray
+    number_density: np.ndarray
+    std_error: np.ndarray
+    covariance: Optional[np.ndarray]
+    covariance_samples: int
+    samples: int
+    kernel: str
+
+
+def profile_from(columns: dict[str, Any]) -> Profile:
+    """A Profile from the columns of the compiled module."""
+    covariance = np.asarray(columns.get("covariance", ()), dtype=float)
+    size = int(round(np.sqrt(covariance.size)))
+    return Profile(
+        columns["height"],
+        columns["number_density"],
+        columns["std_error"],
+        covariance.reshape(size, size) if size == len(columns["height"]) and size > 0 else None,
+        int(columns.get("covariance_samples", 0)),
+        int(columns["samples"]),
+        columns["kernel"],
+    )
+
+
+class Trajectory(NamedTuple):
+    """Frames of a bed. Lengths in D, times in sqrt(D/g), velocities in sqrt(g D).
+
+    Attributes
+    ----------
+    array : ndarray, shape (frames, disks, 5)
+        Columns x, z, vx, vz, spin. Not a copy, and not to be written to: copy() gives one.
+    time, phase, floor, floor_velocity : ndarray, shape (frames,)
+        Phase of the floor's cycle, 0 to 1; height of the floor.
+    """
+
+    array: np.ndarray
+    time: np.ndarray
+    phase: np.ndarray
+    floor: np.ndarray
+    floor_velocity: np.ndarray
+
+    @property
+    def positions(self) -> np.ndarray:
+        """x and z: shape (frames, disks, 2)."""
+        return self.array[:, :, 0:2]
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """vx and vz: shape (frames, disks, 2)."""
+        return self.array[:, :, 2:4]
+
+
+def read_trajectory(path: Union[str, "os.PathLike[str]"]) -> Trajectory:
+    """Read a trajectory in extended XYZ (also compressed, .zst), ours or that of another program.
+
+    Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
+    """
+    return Trajectory(*_core.read_trajectory(os.fspath(path)))
+
+
+def density_profile(
+    heights: Any, width: float, *, kernel: str = "gaussian:0.5", spacing: float = 0.25,
+    lowest: Optional[float] = None, highest: Optional[float] = None,
+) -> Profile:
+    """The density profile of disks whose centres are known.
+
+    Parameters
+    ----------
+    heights : array_like, shape (frames, disks)
+        Of the centres, in D above the floor; frames in the order of time.
+    width : float
+        Of the bed, in D.
+    kernel : str
+        The window through which the density is seen: "gaussian:0.5", "top_hat:1", "disk_chord:1" (widths in D).
+    spacing, lowest, highest : float
+        Heights of the profile, in D; lowest 0 and highest 1 D above the highest disk unless given.
+
+    Returns
+    -------
+    Profile
+        Errors and covariance allow for correlation from frame to frame.
+    """
+    z = np.ascontiguousarray(np.asarray(heights, float))
+    if z.ndim != 2 or z.size == 0:
+        raise UsageError(f"heights has shape {z.shape}; it must be (frames, disks)")
+    if not np.isfinite(z).all():
+        raise UsageError("heights holds numbers that are not finite")
+    for name, value in (("width", width), ("spacing", spacing)):
+        if not (value > 0 and np.isfinite(value)):
+            raise UsageError(f"{name} is {value}; it must be above 0")
+    low = 0.0 if lowest is None else float(lowest)
+    high = float(z.max()) + 1 if highest is None else float(highest)
+    if not high > low:
+        raise UsageError(f"highest is {high}, not above lowest, {low}")
+    points = int(np.floor((high - low) / spacing)) + 1
+    return profile_from(_core.density_profile(z, float(width), kernel, low, float(spacing), points))
+
+
+class _Document(NamedTuple):
+    text: str
+    file: str
+    directory: str
+    wrapped: bool  # the scene is one stage, not a recipe
+    has_lines: bool
+
+
+def _document(scene: Scene, seed: Optional[int]) -> _Document:
+    """The recipe of a scene: a dict, JSON text or a file, of a stage or of a whole recipe."""
+    file, directory, text = "scene", os.getcwd(), None
+    if not isinstance(scene, dict):
+        text = os.fspath(scene)
+        if not text.lstrip().startswith("{"):
+            path = Path(text)
+            try:
+                text = path.read_text(encoding="utf-8")
+            except OSError as error:
+                raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+            file, directory = str(path), str(path.resolve().parent)
+        try:
+            content = json.loads(text)
+        except ValueError:
+            return _Document(text, file, directory, False, True)  # the reader says where
+    else:
+        content = scene
+    if not isinstance(content, dict):
+        raise UsageError("a scene is an object, the options of a stage \"simulate\", or a whole recipe")
+    if "stages" in content and seed is None:
+        return _Document(text if text is not None else json.dumps(content), file, directory, False, text is not None)
+    if "stages" in content:
+        stages = [dict(s, seed=seed) if s.get("stage") == "simulate" else s for s in content["stages"]]
+        return _Document(json.dumps(dict(content, stages=stages)), file, directory, False, False)
+    stage: dict[str, Any] = {"stage": "simulate", "id": "bed", **content}
+    if seed is not None:
+        stage["seed"] = seed
+    recipe = {"name": "scene", "stages": [stage]}
+    return _Document(json.dumps(recipe), file, directory, True, False)
+
+
+def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
+    """The same mistakes at their places in what the user passed."""
+    if document.has_lines and not document.wrapped:
+        return error
+    lines = []
+    for problem in error.problems:
+        if document.wrapped and problem["pointer"].startswith(_stage_pointer):
+            problem["pointer"] = problem["pointer"][len(_stage_pointer):]
+        if not document.has_lines:
+            problem["line"] = problem["column"] = 0
+        lines.append(" ".join(p for p in (f"{problem['file']}: {problem['pointer']}: {problem['problem']}.",
+                                          problem["suggestion"]) if p))
+    from .errors import recipe_error
+
+    found = recipe_error("\n".join(lines), error.problems, error.exit_code)
+    return found  # type: ignore[return-value]
+
+
+class Bed:
+    """A bed that was simulated and measured. Reduced units: D, m, g (weightless: D, m and the initial T)."""
+
+    def __init__(self, bed: Any) -> None:
+        self._bed = bed
+
+    @property
+    def profile(self) -> Profile:
+        """Density against the height above the mean position of the floor."""
+        return profile_from(self._bed.profile(False))
+
+    @property
+    def floor_frame_profile(self) -> Profile:
+        """Density against the height above the moving floor."""
+        return profile_from(self._bed.profile(True))
+
+    @property
+    def observables(self) -> dict[str, Quantity]:
+        """Numbers of the bed as a whole, by the names of observables.json."""
+        energy = "T0" if self._bed.weightless else "m g D"
+        units = {"center_of_mass": "D", "center_of_mass_rise": "D", "compressibility_factor": "1"}
+        return {name: Quantity(*pair, units.get(name, energy)) for name, pair in self._bed.observables().items()}
+
+    def trajectory(self) -> Trajectory:
+        """The frames that the scene asks for ("frames"), without copying them."""
+        bed = self._bed
+        return Trajectory(bed.trajectory(), bed.times(), bed.phases(), bed.floor(), bed.floor_velocities())
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """Where the energy went, in m g D: kinetic + potential + dissipated - floor_work - bath_work = initial."""
+        return self._bed.energy()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Collisions and events of the whole run."""
+        return self._bed.counters()
+
+    @property
+    def largest_overlap(self) -> float:
+        """Of two disks at the end, in D."""
+        return self._bed.largest_overlap
+
+    @property
+    def length_unit(self) -> float:
+        """D in m (1 in a scene with reduced units)."""
+        return self._bed.length_unit
+
+    @property
+    def time_unit(self) -> float:
+        """sqrt(D/g) in s (1 in a scene with reduced units)."""
+        return self._bed.time_unit
+
+    @property
+    def width(self) -> float:
+        """Of the box, in D."""
+        return self._bed.width
+
+    @property
+    def column_number(self) -> float:
+        """N D/W: disks per diameter of width."""
+        return self._bed.column_number
+
+    @property
+    def gamma(self) -> float:
+        """Peak acceleration of a sinusoidal floor over g; 0 for other floors."""
+        return self._bed.gamma
+
+    @property
+    def periods(self) -> int:
+        """Periods of the floor that were measured (looks of a bed on a still floor)."""
+        return self._bed.periods
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Of each disk, in D: shape (disks,)."""
+        return self._bed.radius
+
+    def brief(self) -> str:
+        """The result in one line."""
+        return self._bed.brief()
+
+    def full(self) -> str:
+        """The result, a line a number."""
+        return self._bed.full()
+
+    def __repr__(self) -> str:
+        return f"<shakebed.Bed: {self.brief()}>"
+
+    def _repr_html_(self) -> str:
+        return table_html("simulated bed", self.observables, [self.brief()])
+
+
+def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = None) -> Bed:
+    """Simulate a bed of hard disks, event by event, and measure it.
+
+    Parameters
+    ----------
+    scene : dict, str or path
+        The options of the recipe's stage "simulate" (see ``shakebed schema``), or a whole recipe that holds one; a dict,
+        JSON text, or the file that holds it.
+    seed : int, optional
+        In place of the scene's own seed.
+    progress : callable or True, optional
+        Called with the fraction done; True: a bar, where tqdm is installed.
+
+    Returns
+    -------
+    Bed
+
+    Raises
+    ------
+    RecipeError
+        With file, pointer and line of every mistake.
+    KeyboardInterrupt
+        After Ctrl-C, within about 0.1 s.
+
+    Notes
+    -----
+    The same scene and seed give the same numbers as ``shakebed run``, to the last digit. The GIL is released.
+    """
+    document = _document(scene, seed)
+    call, close = reporter(progress, "simulating")
+    try:
+        return Bed(_core.simulate(document.text, document.file, document.directory, call))
+    except RecipeError as error:
+        raise _at_scene(error, document) from None
+    finally:
+        close()
+
+
+class Simulation:
+    """A bed that is stepped by hand.
+
+    Parameters
+    ----------
+    scene : dict, str or path
+        As for `simulate`. What it says of settling and measuring is not used.
+    seed : int, optional
+        In place of the scene's own seed.
+
+    Notes
+    -----
+    Lengths in D, times in sqrt(D/g), velocities in sqrt(g D), energies in m g D. One thread at a time may use it.
+
+    Examples
+    --------
+    >>> bed = shakebed.Simulation(scene)
+    >>> bed.step(10)
+    >>> bed.positions.shape
+    (100, 2)
+    """
+
+    def __init__(self, scene: Scene, *, seed: Optional[int] = None) -> None:
+        document = _document(scene, seed)
+        try:
+            self._stepper = _core.Stepper(document.text, document.file, document.directory)
+        except RecipeError as error:
+            raise _at_scene(error, document) from None
+
+    def advance_to(self, time: float) -> None:
+        """Run to this time since the start. Releases the GIL; stops on Ctrl-C."""
+        self._stepper.advance_to(float(time))
+
+    def step(self, duration: float) -> None:
+        """Run for this time."""
+        self.advance_to(self.time + duration)
+
+    @property
+    def time(self) -> float:
+        """Since the start, in sqrt(D/g)."""
+        return self._stepper.time
+
+    @property
+    def length_unit(self) -> float:
+        """D in m (1 in a scene with reduced units)."""
+        return self._stepper.length_unit
+
+    @property
+    def time_unit(self) -> float:
+        """sqrt(D/g) in s (1 in a scene with reduced units)."""
+        return self._stepper.time_unit
+
+    @property
+    def width(self) -> float:
+        """Of the box, in D."""
+        return self._stepper.width
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Of each disk, in D: shape (disks,)."""
+        return self._stepper.radius
+
+    def snapshot(self) -> dict[str, Any]:
+        """time, floor_position, floor_velocity, and the arrays x, z, vx, vz, spin of shape (disks,)."""
+        return self._stepper.snapshot()
+
+    @property
+    def positions(self) -> np.ndarray:
+        """x and z: shape (disks, 2)."""
+        now = self.snapshot()
+        return np.column_stack([now["x"], now["z"]])
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """vx and vz: shape (disks, 2)."""
+        now = self.snapshot()
+        return np.column_stack([now["vx"], now["vz"]])
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """Where the energy went, in m g D: kinetic + potential + dissipated - floor_work - bath_work = initial."""
+        return self._stepper.energy()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Collisions and events since the start."""
+        return self._stepper.counters()
+
+    @property
+    def largest_overlap(self) -> float:
+        """Of two disks now, in D."""
+        return self._stepper.largest_overlap()
+
+    def set_bath_temperature(self, temperature: float) -> None:
+        """Another T of the reservoir from now on, in m g D. ValueError where the scene has none."""
+        self._stepper.set_bath_temperature(float(temperature))
+
+    def __repr__(self) -> str:
+        return f"<shakebed.Simulation: {len(self.radius)} disks at time {self.time:.6g}>"

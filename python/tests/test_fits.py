@@ -1,0 +1,91 @@
+"""Fits and theory from Python are those of the command line."""
+
+import json
+
+import numpy as np
+import pytest
+
+import shakebed
+from conftest import shakebed_program
+
+
+@pytest.fixture(scope="module")
+def curve():
+    """An isothermal column of hard disks, simulated."""
+    scene = {"units": "reduced", "seed": 5, "disks": {"count": 100}, "gravity": 1,
+             "box": {"width": 12.3, "sides": "periodic"}, "floor": {"motion": "still"},
+             "bath": {"kind": "andersen", "temperature": 1.0, "rate": 0.1},
+             "settle": 50, "measure": 200}
+    return shakebed.simulate(scene).profile
+
+
+def test_temperature_of_a_bed_in_equilibrium(curve):
+    """T of the bath is 1; the answer's error is stated, four of them are allowed (chance 1 in 16,000)."""
+    answer = shakebed.find_answer(curve.height, curve.number_density, curve.std_error, kernel=curve.kernel,
+                                  column_number=100 / 12.3)
+    assert answer["status"] == "ok"
+    assert abs(answer["temperature"] - 1) < 4 * answer["std_error"] < 0.5
+
+
+def test_fit_is_that_of_the_command_line(curve, tmp_path):
+    rows = np.column_stack([curve.height, curve.number_density, curve.std_error])
+    file = tmp_path / "profile.csv"
+    file.write_text("height,number_density,std_error\n" + "".join(f"{a!r},{b!r},{c!r}\n" for a, b, c in rows.tolist()))
+    done = shakebed_program("fit-profile", file, "--kernel", curve.kernel, "--diameter", "3 mm", "--json")
+    printed = json.loads(done.stdout)
+    fit = shakebed.fit_profile(*rows.T, kernel=curve.kernel, diameter="3 mm")
+    # What the program says of the file itself comes after what the fit says.
+    said = printed.pop("warnings")
+    numbers = dict(fit.to_dict())
+    assert numbers.pop("warnings") == said[: len(fit.warnings)]
+    assert fit.ok and numbers == printed
+    assert fit.temperature_over_mg.value == pytest.approx(fit.temperature.value * 3e-3, rel=1e-12)
+    assert "temperature" in fit._repr_html_() and fit.brief() in repr(fit)
+    drawn = fit.curve()
+    assert drawn["height"].shape == drawn["smoothed_density"].shape
+
+
+def test_theory_is_that_of_the_command_line():
+    done = shakebed_program("theory", "--plateau-density", 1.10, "--diameter", "2.99 mm", "--initial-height", 10.2,
+                            "--temperature", "0.36 mm", "--json")
+    assert shakebed.theory(plateau_density=1.10, diameter="2.99 mm", initial_height=10.2,
+                           temperature="0.36 mm") == json.loads(done.stdout)
+
+
+def test_map_is_that_of_the_command_line():
+    done = shakebed_program("map", "--gamma", 4, "--frequency", "20 Hz", "--diameter", "2.99 mm", "--initial-height",
+                            10.2, "--plateau-density", 1.10, "--json")
+    assert shakebed.gamma_to_temperature(gamma=4, frequency="20 Hz", diameter="2.99 mm", initial_height=10.2,
+                                         plateau_density=1.10) == json.loads(done.stdout)
+
+
+def test_bad_data_are_a_status_and_bad_arguments_an_exception():
+    fit = shakebed.fit_profile([0, 1, 2, 3], [0, 0, 0, 0])
+    assert not fit.ok and fit.message
+    assert not shakebed.fit_profile([0, 1, np.nan], [1, 1, 1]).ok
+    with pytest.raises(ValueError, match="shape"):
+        shakebed.fit_profile([0, 1], [1])
+    with pytest.raises(ValueError, match="kernel"):
+        shakebed.fit_profile([0, 1], [1, 1], kernel="box")
+    with pytest.raises(TypeError, match="no option 'modle'"):
+        shakebed.fit_profile([0, 1], [1, 1], modle="fermi")
+    with pytest.raises(shakebed.UsageError, match="unknown unit|furlong"):
+        shakebed.theory(diameter="3 furlongs")
+    with pytest.raises(shakebed.UsageError):
+        shakebed.theory(equation_of_state="ensog")
+    with pytest.raises(shakebed.UsageError, match="one of the two"):
+        shakebed.gamma_to_temperature(frequency=20, diameter=3e-3, initial_height=10)
+
+
+def test_density_of_known_centres_adds_up(scene):
+    """The area under the profile is N D/W, whatever the kernel."""
+    z = shakebed.simulate(scene).trajectory().array[:, :, 1]
+    for kernel in ("gaussian:0.5", "top_hat:1"):
+        profile = shakebed.density_profile(z, 10.3, kernel=kernel, spacing=0.05, lowest=z.min() - 4, highest=z.max() + 4)
+        assert profile.number_density.sum() * 0.05 == pytest.approx(60 / 10.3, rel=1e-3)
+        assert profile.covariance.shape == 2 * profile.height.shape
+        assert np.allclose(np.sqrt(np.diag(profile.covariance)), profile.std_error)
+    with pytest.raises(shakebed.UsageError, match="frames, disks"):
+        shakebed.density_profile(z[0], 10.3)
+    with pytest.raises(shakebed.UsageError, match="finite"):
+        shakebed.density_profile(np.full((3, 3), np.nan), 10.3)

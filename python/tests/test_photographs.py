@@ -1,0 +1,96 @@
+"""Disks in arrays and files."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import shakebed
+from conftest import SCENE, drawn_image, shakebed_program
+
+
+def test_importing_the_package_does_not_load_opencv():
+    import subprocess
+
+    code = "import shakebed, sys; print('shakebed._images' in sys.modules, 'opencv' in open('/proc/self/maps').read())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "False"]
+
+
+def test_drawn_disks_are_found():
+    image, centres = drawn_image()
+    found = shakebed.find_disks(image)
+    assert len(found) == len(centres)
+    nearest = [np.hypot(found.x - x, found.y - y).min() for x, y in centres]
+    assert max(nearest) < 0.3 and abs(found.radius - 9) < 0.3
+    assert found.std_error.shape == (len(centres), 2) and not found.bright
+
+
+def test_types_and_strides_of_images_do_not_matter():
+    image, _ = drawn_image(seed=2)
+    wanted = shakebed.find_disks(image)
+    for other in (image.astype(np.float32), image.astype(np.float64), image.astype(np.uint16) * 257):
+        assert np.allclose(shakebed.find_disks(other).x, wanted.x, atol=1e-3)
+    wide = np.zeros((180, 400), np.uint8)
+    wide[:, 100:320] = image
+    assert np.array_equal(shakebed.find_disks(wide[:, 100:320]).x, wanted.x)  # rows that do not follow one another
+    with pytest.raises(ValueError, match="side by side"):
+        shakebed.find_disks(wide.T)
+    with pytest.raises(ValueError, match="dimensions"):
+        shakebed.find_disks(np.zeros((5, 5, 3), np.uint8))
+    with pytest.raises(ValueError, match="uint8"):
+        shakebed.find_disks(np.zeros((5, 5), np.int64))
+    with pytest.raises(ValueError, match="empty"):
+        shakebed.find_disks(np.zeros((0, 0), np.uint8))
+
+
+def test_an_image_without_beads_is_said_to_have_none():
+    noise = np.random.default_rng(1).integers(0, 255, (100, 120)).astype(np.uint8)
+    found = shakebed.find_disks(noise)
+    assert len(found) == 0 and found.message
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    """A rendered bed, and what the command line measures of its pictures."""
+    place = tmp_path_factory.mktemp("photographs")
+    bed = dict(SCENE, frames={"count": 12, "phases": 4})
+    recipe = {"name": "photographs", "stages": [
+        {"stage": "simulate", "id": "bed", **bed},
+        {"stage": "render", "id": "film", "from": "bed", "scale": "0.2 mm/px", "seed": 1}]}
+    (place / "r.json").write_text(json.dumps(recipe))
+    done = shakebed_program("run", place / "r.json", "--out", place / "out", "--quiet")
+    assert done.returncode == 0, done.stderr
+    pictures = place / "out" / "film" / "frames"
+    recipe = {"name": "extract", "stages": [
+        {"stage": "extract", "id": "seen", "images": [str(pictures)], "diameter": "3 mm"}]}
+    (place / "e.json").write_text(json.dumps(recipe))
+    done = shakebed_program("run", place / "e.json", "--out", place / "seen", "--quiet")
+    assert done.returncode == 0, done.stderr
+    return pictures, shakebed.load(place / "seen")["seen"]
+
+
+def test_a_measured_bed_is_that_of_the_command_line(frames):
+    pictures, wanted = frames
+    seen = []
+    bed = shakebed.measure_bed(pictures, "3 mm", progress=seen.append)
+    assert seen[-1] == 1
+    profile, disks = wanted.table("profile"), wanted.table("disks")
+    assert np.array_equal(bed.profile.height, profile["height"])
+    assert np.array_equal(bed.profile.number_density, profile["number_density"])
+    assert np.array_equal(bed.profile.std_error, profile["std_error"])
+    for name, digits in (("frame", 0), ("x_px", 4), ("y_px", 4), ("x", 6), ("z", 6)):  # as disks.csv is written
+        assert [f"{a:.{digits}f}" for a in bed.disks[name]] == [f"{b:.{digits}f}" for b in disks[name]], name
+    assert np.array_equal(shakebed.measure_bed(pictures, 3e-3, threads=2).profile.number_density,
+                          bed.profile.number_density)
+
+
+def test_errors_of_photographs(tmp_path):
+    with pytest.raises(shakebed.InputError) as caught:
+        shakebed.measure_bed(tmp_path / "none.png", "3 mm")
+    assert "none.png" in caught.value.file
+    with pytest.raises(shakebed.StageError, match="no beads"):
+        shakebed.measure_bed([np.full((80, 80), 100, np.uint8)], "3 mm")
+    with pytest.raises(shakebed.UsageError):
+        shakebed.measure_bed(drawn_image()[0][None], 0)

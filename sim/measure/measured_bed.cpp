@@ -1,0 +1,270 @@
+#include "sim/measure/measured_bed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+namespace shakebed::sim {
+
+namespace {
+
+// A still bed: looks a unit of time sqrt(D/g), and the fewest and the most of them, as in the stage `simulate`.
+constexpr double looks_a_time = 4, fewest_looks = 100, most_looks = 20'000;
+constexpr double most_periods = 1e12;    // more are a mistake in the units
+constexpr double longest_profile = 2e5;  // heights
+constexpr double empty_density = 1e-12;  // [1/D^2], below it a height is left out, as in the stage `simulate`
+
+std::string text_of(const char* format, ...) {
+  char buffer[256];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(buffer, sizeof buffer, format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+double floor_amplitude(const Floor& floor) {
+  double amplitude = 0;
+  if (const auto* sine = std::get_if<SinusoidalFloor>(&floor)) amplitude = sine->amplitude;
+  if (const auto* table = std::get_if<TabulatedFloor>(&floor))
+    for (const double height : table->heights) amplitude = std::max(amplitude, std::abs(height));
+  return amplitude;
+}
+
+double bath_temperature(const Bath& bath) {
+  if (const auto* b = std::get_if<LangevinBath>(&bath)) return b->temperature;
+  if (const auto* b = std::get_if<AndersenBath>(&bath)) return b->temperature;
+  if (const auto* b = std::get_if<ThermalFloor>(&bath)) return b->temperature;
+  return 0;
+}
+
+// The bed's means, the virial of each period, and the frames.
+class Observer final : public RunObserver {
+ public:
+  Observer(const Scene& scene, const MeasureOptions& options, const LookPlan& plan, MeasuredBed& out)
+      : scene_(scene), options_(options), plan_(plan), out_(out) {}
+
+  void begin(Simulation& simulation) override {
+    out_.disks = simulation.properties();
+    bed_.emplace(scene_, out_.disks, plan_.schedule.phases, profile_heights(scene_, options_), options_.kernel);
+    virial_ = simulation.counters().virial;
+  }
+  void look(Simulation& simulation, const Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
+    if (phase == 0 && bed_->periods() > 0) end_period(simulation);
+    bed_->observe(at, phase);
+    if (plan_.frames == 0 || look % plan_.frame_stride != 0 || look / plan_.frame_stride >= plan_.frames) return;
+    const double turn = plan_.shaken ? static_cast<double>(phase) / plan_.schedule.phases : 0;
+    if (options_.frame_sink) return options_.frame_sink(at, turn);
+    out_.frames.push_back(at);
+    out_.frame_phases.push_back(turn);
+  }
+  void end(Simulation& simulation) override { end_period(simulation); }
+  void save(ArchiveWriter&) override { throw std::logic_error("this run keeps no states"); }
+  void load(ArchiveReader&) override { throw std::logic_error("this run keeps no states"); }
+
+  void results() const {
+    out_.periods = bed_->periods();
+    out_.profile = bed_->density(false);
+    out_.floor_frame_profile = bed_->density(true);
+    covariance();
+    out_.temperature_x = bed_->temperature_x();
+    out_.temperature_z = bed_->temperature_z();
+    out_.spin_temperature = bed_->spin_temperature();
+    if (std::holds_alternative<UniformGravity>(scene_.gravity)) {
+      const bool hard = std::holds_alternative<HardSides>(scene_.box.sides);
+      const double ideal = ideal_centre_of_mass(scene_.count(), scene_.box.width, hard);
+      out_.centre_of_mass = bed_->centre_of_mass();
+      out_.centre_of_mass_rise = {out_.centre_of_mass.value - ideal, out_.centre_of_mass.std_error};
+    }
+    if (std::holds_alternative<PeriodicTop>(scene_.box.top)) compressibility();
+  }
+
+ private:
+  void end_period(const Simulation& simulation) {
+    const double virial = simulation.counters().virial;
+    virial_rate_.add((virial - virial_) / plan_.schedule.period);
+    virial_ = virial;
+  }
+  // P V = N T + virial rate/2, with T from the kinetic energy of the N - 1 free momenta.
+  void compressibility() const {
+    const double n = scene_.count();
+    const double kinetic = (out_.temperature_x.value + out_.temperature_z.value) * n / (2 * (n - 1));
+    out_.compressibility_factor = {1 + virial_rate_.mean() / (2 * n * kinetic),
+                                   virial_rate_.std_error() / (2 * n * kinetic)};
+  }
+  void covariance() const {
+    const FilledHeights filled = filled_heights(out_.profile);
+    if (filled.first == filled.last) return;
+    out_.covariance_first = filled.first;
+    out_.covariance_last = filled.last;
+    out_.covariance = bed_->density_covariance(out_.covariance_first, out_.covariance_last);
+    out_.covariance_samples = bed_->covariance_blocks();
+  }
+
+  const Scene& scene_;
+  const MeasureOptions& options_;
+  const LookPlan& plan_;
+  MeasuredBed& out_;
+  std::optional<BedObserver> bed_;
+  BlockedMean virial_rate_;
+  double virial_ = 0;
+};
+
+MeasuredBed bad_input(std::string message) {
+  MeasuredBed out;
+  out.message = std::move(message);
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(MeasureStatus status) {
+  switch (status) {
+    case MeasureStatus::ok:
+      return "ok";
+    case MeasureStatus::stopped:
+      return "stopped";
+    case MeasureStatus::bad_input:
+      return "bad input";
+    case MeasureStatus::precision_lost:
+      return "precision lost";
+  }
+  return "";
+}
+
+double floor_period(const Scene& scene) {
+  if (const auto* sine = std::get_if<SinusoidalFloor>(&scene.box.floor)) return 1 / sine->frequency;
+  if (const auto* table = std::get_if<TabulatedFloor>(&scene.box.floor)) return table->period;
+  return 0;
+}
+
+LookPlan plan_looks(const Scene& scene, const MeasureOptions& options) {
+  LookPlan plan;
+  MeasurementSchedule& schedule = plan.schedule;
+  schedule.settle = options.settle;
+  schedule.period = floor_period(scene);
+  plan.shaken = schedule.period > 0;
+  if (plan.shaken) {
+    schedule.phases = options.phases;
+    schedule.periods = static_cast<std::uint64_t>(options.duration / schedule.period * (1 + 1e-12));
+    schedule.settle = std::ceil(schedule.settle / schedule.period * (1 - 1e-12)) * schedule.period;  // at phase 0
+  } else {
+    schedule.phases = 1;
+    const double wanted = std::clamp(options.duration * looks_a_time, fewest_looks, most_looks);
+    schedule.periods = std::max(static_cast<std::uint64_t>(wanted), options.frames);
+    schedule.period = options.duration / static_cast<double>(schedule.periods);
+  }
+  if (options.frames > 0) {
+    plan.frames = options.frames;
+    plan.frame_stride = schedule.looks() / options.frames;
+    while (plan.frame_stride > 1 && std::gcd(plan.frame_stride, std::uint64_t{schedule.phases}) > 1)
+      --plan.frame_stride;
+  }
+  return plan;
+}
+
+HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options) {
+  HeightGrid grid;
+  grid.spacing = options.spacing;
+  const double below = floor_amplitude(scene.box.floor) + 6 * options.kernel.width + 1;
+  grid.lowest = -std::ceil(below / grid.spacing) * grid.spacing;
+  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * bath_temperature(scene.bath);
+  grid.points = static_cast<std::size_t>(std::min((loose_height - grid.lowest) / grid.spacing, longest_profile));
+  return grid;
+}
+
+std::vector<std::string> MeasureOptions::validate(const Scene& scene) const {
+  std::vector<std::string> problems;
+  if (!(settle >= 0) || !std::isfinite(settle))
+    problems.push_back(text_of("settle is %g; it must be 0 or more", settle));
+  if (!(duration > 0) || !std::isfinite(duration))
+    problems.push_back(text_of("duration is %g; it must be above 0", duration));
+  if (phases < 1) problems.push_back("phases is 0; the bed must be looked at once a period at least");
+  if (!(spacing > 0) || !std::isfinite(spacing))
+    problems.push_back(text_of("spacing is %g; it must be above 0", spacing));
+  if (!kernel_is_valid(kernel) || kernel.kind == KernelKind::none)
+    problems.push_back("kernel must have a shape and a finite width: density is measured through a window");
+  const double period = floor_period(scene);
+  if (period > 0 && duration / period * (1 + 1e-12) < 1)
+    problems.push_back(text_of("duration is %g, shorter than one period of the floor, %g", duration, period));
+  if (period > 0 && duration / period > most_periods)
+    problems.push_back(text_of("the floor would shake %g times; measure at most 1e12 periods", duration / period));
+  if (problems.empty() && frames > 0 && plan_looks(scene, *this).frame_stride == 0)
+    problems.push_back(text_of("%llu frames do not fit into %llu looks; measure longer or keep fewer",
+                               static_cast<unsigned long long>(frames),
+                               static_cast<unsigned long long>(plan_looks(scene, *this).schedule.looks())));
+  return problems;
+}
+
+FilledHeights filled_heights(const Profile& profile) {
+  FilledHeights filled{0, profile.height.size()};
+  while (filled.first < filled.last && profile.number_density[filled.first] < empty_density) ++filled.first;
+  while (filled.last > filled.first && profile.number_density[filled.last - 1] < empty_density) --filled.last;
+  return filled;
+}
+
+MeasuredBed measure(const Scene& scene, const MeasureOptions& options) {
+  if (const auto problems = check(scene); !problems.empty())
+    return bad_input(problems.front().where + ": " + problems.front().what);
+  if (const auto problems = options.validate(scene); !problems.empty()) return bad_input(problems.front());
+  MeasuredBed out;
+  const LookPlan plan = plan_looks(scene, options);
+  Observer observer(scene, options, plan, out);
+  RunControl control;
+  control.stop = options.stop;
+  control.progress = options.progress;
+  const RunResult run = measure(scene, plan.schedule, {&observer}, control);
+  if (!run.finished) {
+    out.status = MeasureStatus::stopped;
+    out.message = "the run was stopped before its end";
+    return out;
+  }
+  observer.results();
+  out.energy = run.simulation->energy();
+  out.counters = run.simulation->counters();
+  out.largest_overlap = run.simulation->largest_overlap();
+  out.message = precision_lost(*run.simulation);
+  out.status = out.message.empty() ? MeasureStatus::ok : MeasureStatus::precision_lost;
+  return out;
+}
+
+std::string MeasuredBed::brief() const {
+  if (!ok()) return std::string(to_string(status)) + ": " + message;
+  return text_of("%llu disks, %llu periods: T_x = %.4g +- %.2g, T_z = %.4g +- %.2g, centre of mass %.5g +- %.2g D",
+                 static_cast<unsigned long long>(disks.mass.size()), static_cast<unsigned long long>(periods),
+                 temperature_x.value, temperature_x.std_error, temperature_z.value, temperature_z.std_error,
+                 centre_of_mass.value, centre_of_mass.std_error);
+}
+
+std::string MeasuredBed::full() const {
+  std::string out = text_of("status                  %s\n", std::string(to_string(status)).c_str());
+  if (!message.empty()) out += "message                 " + message + "\n";
+  if (periods == 0) return out;
+  const auto line = [&](const char* name, const Measured& m, const char* unit) {
+    out += text_of("%-23s %.6g +- %.2g %s\n", name, m.value, m.std_error, unit);
+  };
+  out += text_of("disks                   %zu\n", disks.mass.size());
+  out += text_of("periods                 %llu\n", static_cast<unsigned long long>(periods));
+  const bool weight = centre_of_mass.value != 0;
+  const char* const energy_unit = weight ? "m g D" : "T0";
+  line("temperature_x", temperature_x, energy_unit);
+  line("temperature_z", temperature_z, energy_unit);
+  line("spin_temperature", spin_temperature, energy_unit);
+  if (weight) {
+    line("centre_of_mass", centre_of_mass, "D");
+    line("centre_of_mass_rise", centre_of_mass_rise, "D");
+  }
+  if (compressibility_factor.value != 0) line("compressibility_factor", compressibility_factor, "");
+  out += text_of("collisions              %llu\n", static_cast<unsigned long long>(counters.collisions()));
+  out += text_of("energy imbalance        %.2g\n", energy.imbalance());
+  out += text_of("largest overlap         %.2g D\n", largest_overlap);
+  out += text_of("frames                  %zu\n", frames.size());
+  return out;
+}
+
+}  // namespace shakebed::sim

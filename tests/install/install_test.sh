@@ -1,0 +1,99 @@
+#!/bin/sh
+# usage: install_test.sh TREE BUILD CMAKE COMPILER prefix|package|pkg_config|symbols|subproject
+# Works in BUILD/tests/install; the consumer project is copied out of the tree, so that it finds nothing of ours by chance.
+set -eu
+tree=$1 build=$2 cmake=$3 compiler=$4 case=$5
+work=$build/tests/install
+prefix=$work/prefix
+
+fail() { echo "$*" >&2; exit 1; }
+
+# Builds and runs the consumer with the further arguments of cmake.
+consumer() {
+  folder=$work/consumer-$case
+  rm -rf "$folder"
+  mkdir -p "$folder"
+  cp "$tree"/tests/install/consumer/* "$folder"
+  "$cmake" -S "$folder" -B "$folder/build" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release \
+    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror" "$@"
+  "$cmake" --build "$folder/build" --target with_sim
+  if [ "$case" = package ]; then "$cmake" --build "$folder/build"; fi
+  for program in "$folder"/build/with_*; do
+    [ -x "$program" ] && [ -f "$program" ] || continue
+    echo "== $program"
+    "$program" || fail "$program failed"
+  done
+}
+
+# No flag that changes what a user's code means or warns of.
+no_flags_leak() {
+  leaked=$(grep -E 'command' "$folder/build/compile_commands.json" | grep -E 'with_[a-z]+\.cpp' |
+    grep -oE -- '-(march|mtune|ffp-contract|fno-math-errno|Wconversion|Wshadow|Wno-psabi|fsanitize)[^ "]*' || true)
+  [ -z "$leaked" ] || fail "flags of ours reach the users: $leaked"
+}
+
+case $case in
+  prefix)
+    rm -rf "$prefix"
+      for part in program development; do
+      "$cmake" --install "$build" --prefix "$prefix" --component "$part" >/dev/null
+    done
+    for file in bin/shakebed include/shakebed/sim/scene.hpp share/shakebed/schema/pipeline.schema.json \
+      share/man/man1/shakebed.1 share/man/man1/shakebed-run.1 share/bash-completion/completions/shakebed \
+      share/zsh/site-functions/_shakebed; do
+      [ -s "$prefix/$file" ] || fail "$file was not installed"
+    done
+    for header in $(cd "$prefix/include" && find . -name '*.hpp'); do
+      if grep -nE '#include (<|")(gsl|Eigen|opencv|nlohmann|CLI|fmt)' "$prefix/include/$header"; then
+        fail "$header includes what its users may not have"
+      fi
+    done
+    if grep -rnE '#include "' "$prefix/include"; then fail "a public header includes a header of the tree"; fi
+    "$prefix/bin/shakebed" theory --json >/dev/null || fail "the installed program does not run"
+    bash -n "$prefix/share/bash-completion/completions/shakebed" || fail "the completion for bash is no shell script"
+    ;;
+  package)
+    # Moved: nothing in the package may name the place it was installed to first.
+    rm -rf "$work/moved"
+    cp -r "$prefix" "$work/moved"
+    consumer "-DCMAKE_PREFIX_PATH=$work/moved" "-DCOMPONENTS=sim;ingest;fit"
+    no_flags_leak
+    # sim alone asks for no other package.
+    case=sim_alone
+    consumer "-DCMAKE_PREFIX_PATH=$work/moved" -DCOMPONENTS=sim -DCMAKE_DISABLE_FIND_PACKAGE_OpenCV=ON \
+      -DCMAKE_DISABLE_FIND_PACKAGE_GSL=ON
+    if grep -q 'OpenCV_DIR\|GSL_' "$folder/build/CMakeCache.txt"; then fail "sim looks for OpenCV or GSL"; fi
+    # What is not there is named.
+    if "$cmake" -S "$folder" -B "$folder/bad" "-DCMAKE_PREFIX_PATH=$work/moved" -DCOMPONENTS=magnets \
+      >"$folder/bad.log" 2>&1; then fail "an unknown component was found"; fi
+    grep -q 'no component "magnets"' "$folder/bad.log" || fail "the message does not name the component"
+    ;;
+  pkg_config)
+    library=$(dirname "$(find "$prefix" -name libshakebed_sim.a)")
+    export PKG_CONFIG_PATH="$library/pkgconfig"
+    for room in sim fit; do
+      # shellcheck disable=SC2046
+      "$compiler" -std=c++20 "$tree/tests/install/consumer/with_$room.cpp" \
+        $(pkg-config --cflags --libs --static "shakebed-$room") -o "$work/pc_$room"
+      "$work/pc_$room" || fail "the program built by pkg-config failed"
+    done
+    ;;
+  symbols)
+    # Strong symbols of ours: all in namespace shakebed.
+    for library in "$build"/*/libshakebed_statistics.a "$build"/*/libshakebed_sim.a "$build"/*/libshakebed_ingest.a \
+      "$build"/*/libshakebed_fit.a; do
+      [ -f "$library" ] || continue
+      outside=$(nm --defined-only --extern-only -C "$library" 2>/dev/null | grep -E '^[0-9a-f]+ [TDBRGS] ' |
+        grep -vE '^[0-9a-f]+ [A-Z] ((typeinfo|typeinfo name|vtable|guard variable|construction vtable) for )?shakebed::' || true)
+      [ -z "$outside" ] || fail "$library has symbols outside namespace shakebed: $outside"
+      # A library does not print and does not end the program.
+      ends=$(nm --undefined-only -C "$library" 2>/dev/null | grep -E ' (exit|_exit|abort|puts|printf|std::cout|std::cerr)$' || true)
+      [ -z "$ends" ] || fail "$library prints or ends the program: $ends"
+    done
+    ;;
+  subproject)
+    consumer "-DSHAKEBED_TREE=$tree"
+    no_flags_leak
+    ;;
+  *) fail "there is no test $case" ;;
+esac
