@@ -217,7 +217,7 @@ MeasuredBed measure(const Scene& scene, const MeasureOptions& options) {
   Observer observer(scene, options, plan, out);
   RunControl control;
   control.stop = options.stop;
-  control.progress = options.progress;
+  if (options.progress) control.progress = [&](double fraction, RunPart) { options.progress(fraction); };
   const RunResult run = measure(scene, plan.schedule, {&observer}, control);
   if (!run.finished) {
     out.status = MeasureStatus::stopped;
