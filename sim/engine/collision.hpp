@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "sim/engine/lanes.hpp"
@@ -45,6 +46,7 @@ struct RoughImpulse {
 };
 inline RoughImpulse walton_impulse(double nx, double nz, double gn, double gt, double reduced_mass,
                                    const Surface& surface, double inverse_inertia_ratio) {
+  assert(gn > -1e-9 && reduced_mass > 0 && surface.restitution >= 0 && surface.restitution <= 1);
   const double e = surface.restitution;
   const double normal = -reduced_mass * (1 + e) * gn;
   double dissipated = 0.5 * reduced_mass * (1 - e * e) * gn * gn;

@@ -23,6 +23,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -57,6 +58,10 @@
 #include "sim/engine/tiles.hpp"
 
 namespace shakebed::sim {
+
+// A time or a distance that rounding alone may take from what it must be, in asserts [sqrt(D/g), D]; a thousand times
+// what hard cases show (1e-12 at speeds of 1000 sqrt(g D)).
+inline constexpr double asserted_rounding = 1e-9;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
 enum class Order { of_time, of_tiles, of_the_rest };
@@ -334,7 +339,15 @@ class Engine final : public Simulation {
 
 }  // namespace shakebed::sim
 
+// The member functions; none of these headers needs another one to come before it but for constants.
+#include "sim/engine/engine_baths.hpp"
 #include "sim/engine/engine_checks.hpp"
-#include "sim/engine/engine_impl.hpp"
+#include "sim/engine/engine_contacts.hpp"
+#include "sim/engine/engine_flight.hpp"
+#include "sim/engine/engine_loop.hpp"
+#include "sim/engine/engine_prediction.hpp"
 #include "sim/engine/engine_rest.hpp"
+#include "sim/engine/engine_shells.hpp"
+#include "sim/engine/engine_state.hpp"
+#include "sim/engine/engine_synchronise.hpp"
 #include "sim/engine/engine_tiles.hpp"

@@ -15,8 +15,6 @@
 // too quick for it until it has done so. In beds that never look calm nothing is changed, not even by rounding.
 #pragma once
 
-#include <cassert>
-
 namespace shakebed::sim {
 
 // What a bed at rest may still move with, and so what resting takes from T at most [m g D]. Soft spheres (500 disks, e
@@ -115,6 +113,7 @@ void Engine<Space, Rule, Sizes>::stop(std::uint32_t i, const FloorMotion::Motion
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::wake(std::uint32_t i) {
+  assert(is_at_rest(i) && resting_ > 0);
   rest_height_[i] = never;
   --resting_;
   woken_ = true;
@@ -210,6 +209,7 @@ void Engine<Space, Rule, Sizes>::tell_push(std::uint32_t i, double floor, double
 // The next hop of all disks at rest, of that length: their flights anew, and what comes of them.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::hop(double length, const FloorMotion::Motion& floor) {
+  assert(length > 0 && resting_ <= count_);
   const double vz = (floor_.motion(now_, length).position - floor.position) / length + 0.5 * gravity_ * length;
   for (std::uint32_t i = 0; i < count_; ++i) {
     if (!is_at_rest(i)) continue;

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -92,6 +93,7 @@ class EventQueue {
   // The event of disk a (with b; a itself when alone) now stands at `time`,
   // which both records say already.
   void push(double time, std::uint32_t a, std::uint32_t b) {
+    assert(a < count_ && b < count_ && time < never);
     const double place = time * buckets_a_time_;
     if (place < run_ends_) [[unlikely]] {
       insert_into_run({time, pair_of(a, b)});
@@ -162,6 +164,7 @@ class EventQueue {
       }
       if (time > until) [[unlikely]]
         return false;
+      assert(next_ + 1 == end_ || time <= times_[next_ + 1]);  // the run is in order
       ++next_;
       now_ = time;
       // The partner counts too: a disk may have found another one at the very

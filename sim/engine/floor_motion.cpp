@@ -1,6 +1,7 @@
 #include "sim/engine/floor_motion.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -182,6 +183,7 @@ double FloorMotion::growth(const Motion& floor, double later) const {
 }
 
 double FloorMotion::time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const {
+  assert(std::isfinite(bottom) && std::isfinite(vz) && gravity >= 0 && !std::isnan(horizon));
   if (!moves()) {
     if (bottom <= 0 && vz < 0) return 0;
     const double t = time_to_fall(std::max(bottom, 0.0), vz, gravity);

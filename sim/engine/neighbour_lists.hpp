@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -145,6 +146,7 @@ class NeighbourLists {
     return false;
   }
   void append(std::uint32_t i, std::uint32_t k) {
+    assert(i < sentinel_ && k < sentinel_ && i != k && !holds(i, k));
     const std::uint32_t place = disks_[i].neighbours++;
     if (place >= inline_neighbours && place % inline_neighbours == 0) {
       std::uint32_t* link = &overflow_[i];
@@ -177,6 +179,7 @@ class NeighbourLists {
     }
   }
   void remove(std::uint32_t i, std::uint32_t k) {
+    assert(holds(i, k));
     const std::uint32_t last = disks_[i].neighbours - 1u;
     std::uint32_t* here = nullptr;
     if (const unsigned equal = equal_words(lists_[i].disk.data(), k)) {

@@ -1,6 +1,7 @@
 #include "sim/measure/observables.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -65,6 +66,7 @@ BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::u
 }
 
 void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
+  assert(phase < phases_ && at.x.size() == masses_.size() && at.z.size() == masses_.size());
   const auto n = static_cast<double>(at.z.size());
   if (phase == 0) std::fill(period_sum_.begin(), period_sum_.end(), 0.0);
   std::vector<double> density(grid_.points);

@@ -1,6 +1,7 @@
 #include "sim/measure/statistics.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -8,6 +9,7 @@
 namespace shakebed::sim {
 
 void BlockedMean::add(std::span<const double> sample) {
+  assert(sample.size() == size_);
   std::vector<double> block(sample.begin(), sample.end());
   for (std::size_t depth = 0;; ++depth) {
     if (depth == levels_.size())
@@ -46,6 +48,7 @@ double BlockedMean::std_error(std::size_t i) const {
 
 void BlockedCovariance::add(std::span<const double> sample) {
   constexpr std::size_t most_blocks = 512;
+  assert(sample.size() == size_);
   if (in_block_ == 0) sum_.assign(size_, 0.0);
   for (std::size_t i = 0; i < size_; ++i) sum_[i] += sample[i];
   if (++in_block_ < block_length_) return;

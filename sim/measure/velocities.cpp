@@ -1,6 +1,7 @@
 #include "sim/measure/velocities.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace shakebed::sim {
@@ -58,6 +59,7 @@ VelocityObserver::VelocityObserver(const Scene& scene, const DiskProperties& dis
 }
 
 void VelocityObserver::observe(const Snapshot& at, std::uint32_t phase) {
+  assert(phase < phases_ && at.vx.size() == masses_.size());
   const double floor = floor_frame_ ? at.floor_position : 0, floor_velocity = floor_frame_ ? at.floor_velocity : 0;
   const std::size_t n = at.z.size();
   double mass = 0, momentum = 0;

@@ -190,7 +190,7 @@ TEST(StageCodeOfTheProject, HoldsEveryFileThatComputes) {
       EXPECT_FALSE(file.starts_with("fit/")) << stage << ": " << file;
   }
   EXPECT_TRUE(code.files.at("fit").contains("fit/profile_fit/fit_profile.cpp"));
-  EXPECT_TRUE(code.files.at("simulate").contains("sim/engine/engine_impl.hpp"));
+  EXPECT_TRUE(code.files.at("simulate").contains("sim/engine/engine_contacts.hpp"));
   EXPECT_TRUE(code.files.at("extract").contains("ingest/find/find_disks.cpp"));
 }
 

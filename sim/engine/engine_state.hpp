@@ -1,0 +1,114 @@
+// What can be asked of an engine: snapshots, energies, overlaps, memory. Included by engine.hpp only.
+#pragma once
+
+namespace shakebed::sim {
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
+  watcher_ = watcher;
+  if constexpr (tiles_apply) {  // a watcher is told everything in the order of time
+    if (watcher != nullptr && !tiles_.empty()) leave_tiles();
+  }
+  tell_all();
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::set_bath_temperature(double temperature) {
+  if (!(temperature > 0) || !std::isfinite(temperature))
+    throw std::invalid_argument("a bath's temperature must be positive");
+  if (auto* langevin = std::get_if<LangevinBath>(&bath_)) {
+    langevin->temperature = temperature;
+  } else if (auto* andersen = std::get_if<AndersenBath>(&bath_)) {
+    andersen->temperature = temperature;
+  } else if (auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
+    thermal->temperature = temperature;
+  } else {
+    throw std::invalid_argument("the scene has no bath that holds a temperature");
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
+  out.time = time();
+  out.floor_position = floor_.position(now_);
+  out.floor_velocity = floor_.velocity(now_);
+  out.x.resize(count_);
+  out.z.resize(count_);
+  out.vx.resize(count_);
+  out.vz.resize(count_);
+  out.spin.resize(spins_.size());
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Motion motion = motion_at(disks_[i], now_);
+    const std::uint32_t label = labels_[i];
+    out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x()) : motion.x();
+    out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
+    out.vx[label] = motion.vx();
+    out.vz[label] = motion.vz();
+    if constexpr (Rule::spins) out.spin[label] = spins_[i];
+    if constexpr (rests_apply) {
+      if (!is_at_rest(i)) continue;
+      out.vz[label] = out.floor_velocity;  // the mean over its hop
+      if (resting_ == count_) out.z[label] = out.floor_position + rest_height_[i];
+    }
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+DiskProperties Engine<Space, Rule, Sizes>::properties() const {
+  DiskProperties properties;
+  properties.radius.resize(count_);
+  properties.mass.resize(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    properties.radius[labels_[i]] = sizes_.radius(i);
+    properties.mass[labels_[i]] = sizes_.mass(i);
+  }
+  return properties;
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::kinetic_energy() const {
+  long double sum = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Motion motion = motion_at(disks_[i], now_);
+    const long double vx = motion.vx(), vz = motion.vz();
+    sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
+    if constexpr (Rule::spins) {
+      const long double surface_speed = sizes_.radius(i) * spins_[i];
+      sum += 0.5L * sizes_.mass(i) / inverse_inertia_ratio_ * surface_speed * surface_speed;
+    }
+  }
+  return static_cast<double>(sum);
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::potential_energy() const {
+  long double sum = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z();
+  return static_cast<double>(sum);
+}
+
+template <class Space, class Rule, class Sizes>
+EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
+  return {initial_energy_, kinetic_energy(), potential_energy(), dissipated_, floor_work_, bath_work_};
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::largest_overlap() const {
+  Snapshot here;
+  snapshot(here);
+  double cell = 1;
+  if constexpr (!Sizes::equal) cell = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  const DiskProperties disks = properties();
+  return sim::largest_overlap(here, cell, period_x_.length, period_z_.length,
+                              [&](std::uint32_t i, std::uint32_t k) { return disks.radius[i] + disks.radius[k]; });
+}
+
+template <class Space, class Rule, class Sizes>
+std::size_t Engine<Space, Rule, Sizes>::bytes() const {
+  return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
+         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
+         std::visit([](const auto& grid) { return grid.bytes(); }, grid_) + lists_.bytes() + queue_.bytes() +
+         log_.bytes() + (deferred_.capacity() + rest_.capacity()) * sizeof(EventEntry);
+}
+
+}  // namespace shakebed::sim

@@ -1,0 +1,216 @@
+// Synchronisation: all disks at one time, everything predicted anew, and the state from which a run goes on. Included
+// by engine.hpp only.
+#pragma once
+
+namespace shakebed::sim {
+
+inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::synchronise() {
+  ++counters_.synchronisations;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    bring_forward(i);
+    disks_[i].own_time = 0;
+  }
+  for (double& time : last_contact_) time -= now_;
+  bath_at_ -= now_;
+  rest_at_ -= now_;
+  look_at_ -= now_;
+  assert(now_ == synchronise_at_ && pending_[0].disk == nothing_pending);
+  const double elapsed = now_;
+  intervals_done_ += intervals_;
+  base_ = static_cast<double>(intervals_done_) * interval_;
+  now_ = 0;
+  tell_all();  // as a run that goes on from here will be: what the watcher sums up is then cut at the same moments
+  // Often enough for the clock's resolution, seldom enough to cost nothing: 150
+  // to 1000 events a disk apart.
+  const std::uint64_t events = counters_.events() - events_at_synchronisation_;
+  events_at_synchronisation_ = counters_.events();
+  event_rate_ = std::max(static_cast<double>(events), 1.0) / elapsed;
+  const double events_a_disk = static_cast<double>(events) / count_;
+  if (events_a_disk < 150 && elapsed * 2 <= longest_interval) intervals_ *= 2;
+  if (events_a_disk > 1000 && intervals_ > 1) intervals_ /= 2;
+  begin_interval();
+}
+
+// Numbers the disks along a space-filling curve. Sorting what is sorted changes
+// nothing, so a resumed run has the numbers of the one it continues.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::renumber() {
+  std::vector<std::uint64_t> keys(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    double x = disks_[i].x, z = disks_[i].z;
+    if constexpr (Space::wraps_x) x = period_x_.wrapped(x);
+    if constexpr (Space::wraps_z) z = period_z_.wrapped(z);
+    keys[i] = static_cast<std::uint64_t>(hilbert_place(hilbert_cell(x), hilbert_cell(z))) << 32 | i;
+  }
+  std::sort(keys.begin(), keys.end());
+  const auto permute = [&](auto& values) {
+    auto old = values;
+    for (std::uint32_t i = 0; i < count_; ++i) values[i] = old[static_cast<std::uint32_t>(keys[i])];
+  };
+  permute(disks_);
+  permute(labels_);
+  if constexpr (Rule::spins) permute(spins_);
+  if constexpr (Rule::dissipates) permute(last_contact_);
+  if constexpr (rests_apply) permute(rest_height_);
+  if constexpr (!Sizes::equal) {
+    permute(sizes_.radii);
+    permute(sizes_.masses);
+  }
+}
+
+// The density in layers across the box, mean over the disks: a bed under gravity is denser where its disks are than the
+// space that it takes up.
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::density_round_disks() const {
+  constexpr double usual_thickness = 3;  // some rows of a crystal
+  constexpr std::size_t most_layers = 4096;
+  double low = never, high = -never;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    low = std::min(low, disks_[i].z);
+    high = std::max(high, disks_[i].z);
+  }
+  const double thickness = std::max(usual_thickness, (high - low) / (most_layers - 1));
+  std::vector<double> layers(most_layers);
+  for (std::uint32_t i = 0; i < count_; ++i) layers[static_cast<std::size_t>((disks_[i].z - low) / thickness)] += 1;
+  double squares = 0;
+  for (const double disks : layers) squares += disks * disks;
+  return squares / (count_ * width_ * thickness);
+}
+
+// From positions, velocities, spins and clocks at now_ = 0 alone.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::begin_interval() {
+  renumber();
+  synchronise_at_ = static_cast<double>(intervals_) * interval_;
+  checked_at_ = -1;
+  crawls_ = 0;
+  events_to_check_ = events_between_checks();
+  if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
+  double top = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
+  const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
+  // Bounds of the shells: the radius that gives eight neighbours on the average where it is as dense as round the
+  // disks. Many a bed is denser than that for a part of its period.
+  const double neighbours = Space::falls ? 7.5 : 8.3;
+  const double density = Space::wraps_z ? count_ / (width_ * height) : density_round_disks();
+  largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
+  // Two disks that stay in their shells must not come near a second image of each other.
+  if constexpr (Space::wraps_x) {
+    if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact_) / 4);
+  }
+  if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact_) / 4);
+  largest_skin_ = std::floor(largest_skin_ / skin_unit) * skin_unit;  // as records hold it
+  // Distances of shells' centres are taken in single precision.
+  const double extent = std::max(width_, std::max(height, top));
+  shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
+  lists_.reset(disks_.data(), count_);
+  choose_tiles();
+  file_shells(height);
+  std::visit(
+      [this](auto& grid) {
+        for (std::uint32_t i = 0; i < count_; ++i) {
+          look_round<true>(grid, i);
+          choose_skin(i);
+          grid.set_reach(i, reach(i));
+        }
+        for (std::uint32_t i = 0; i < count_; ++i) {
+          mark_near_bounds(i);
+          look_round<true>(grid, i);
+          lists_.list(i, find_neighbours(i));
+        }
+      },
+      grid_);
+  predict_all();
+}
+
+// ------------------------------------------------------------------------------------------------
+// checkpoints
+
+// Calls visit(value) for everything that the future depends on besides the
+// disks, in a fixed order.
+template <class Space, class Rule, class Sizes>
+template <class Self, class Visit>
+void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
+  visit(self.intervals_);
+  visit(self.intervals_done_);
+  visit(self.event_rate_);
+  visit(self.events_at_synchronisation_);
+  visit(self.bath_at_);
+  visit(self.counters_);
+  visit(self.initial_energy_);
+  visit(self.dissipated_);
+  visit(self.floor_work_);
+  visit(self.bath_work_);
+  if constexpr (!Sizes::equal) {
+    for (std::uint32_t i = 0; i < self.count_; ++i) {
+      visit(self.sizes_.radii[i]);
+      visit(self.sizes_.masses[i]);
+    }
+  }
+  for (std::uint32_t i = 0; i < self.count_; ++i) {
+    visit(self.labels_[i]);
+    visit(self.disks_[i].x);
+    visit(self.disks_[i].z);
+    visit(self.disks_[i].vx);
+    visit(self.disks_[i].vz);
+  }
+  for (auto& spin : self.spins_) visit(spin);
+  for (auto& clock : self.last_contact_) visit(clock);
+  if constexpr (rests_apply) {
+    for (auto& height : self.rest_height_) visit(height);
+    visit(self.resting_);
+    visit(self.woken_);
+    visit(self.rest_at_);
+    visit(self.look_at_);
+    visit(self.contacts_at_look_);
+  }
+}
+
+template <class Space, class Rule, class Sizes>
+std::vector<std::uint8_t> Engine<Space, Rule, Sizes>::checkpoint() const {
+  if (now_ != 0) throw std::logic_error("a checkpoint can be taken only at a synchronisation");
+  std::vector<std::uint8_t> out;
+  checkpoint_bytes::put(out, checkpoint_bytes::magic);
+  checkpoint_bytes::put(out, count_);
+  visit_state(*this, [&](const auto& value) { checkpoint_bytes::put(out, value); });
+  checkpoint_bytes::put(out, random_.state());
+  checkpoint_bytes::put(out, checkpoint_bytes::checksum(out.data(), out.data() + out.size()));
+  return out;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes) {
+  const std::uint8_t *at = bytes.data(), *end = at + bytes.size();
+  std::uint64_t magic = 0;
+  std::uint32_t count = 0;
+  checkpoint_bytes::take(at, end, magic);
+  checkpoint_bytes::take(at, end, count);
+  if (magic != checkpoint_bytes::magic) throw std::invalid_argument("these bytes are not a checkpoint");
+  std::uint64_t written = 0;
+  end -= std::min<std::ptrdiff_t>(end - at, sizeof written);
+  std::memcpy(&written, end, static_cast<std::size_t>(bytes.data() + bytes.size() - end));
+  if (written != checkpoint_bytes::checksum(bytes.data(), end))
+    throw std::invalid_argument("the checkpoint is damaged: its checksum is another");
+  if (count != count_)
+    throw std::invalid_argument("the checkpoint is of another scene: it holds another number of disks");
+  visit_state(*this, [&](auto& value) { checkpoint_bytes::take(at, end, value); });
+  std::array<std::uint64_t, 4> random_state{};
+  checkpoint_bytes::take(at, end, random_state);
+  if (at != end)
+    throw std::invalid_argument(
+        "the checkpoint is of another scene: it holds "
+        "more than this one needs");
+  if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
+    throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
+  random_.set_state(random_state);
+  unusual_ = disk_surface_.varies() || resting_ > 0;
+  for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
+  base_ = static_cast<double>(intervals_done_) * interval_;
+  now_ = 0;
+  begin_interval();
+}
+
+}  // namespace shakebed::sim
