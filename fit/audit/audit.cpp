@@ -88,24 +88,9 @@ OtherAlpha alpha_that_gives(double mu_0) {
   return other;
 }
 
-}  // namespace
-
-std::string_view to_string(AuditStatus status) {
-  switch (status) {
-    case AuditStatus::agrees:
-      return "agrees";
-    case AuditStatus::explained:
-      return "explained";
-    case AuditStatus::open:
-      return "open";
-  }
-  return "unknown";
-}
-
-std::vector<AuditRow> audit() {
-  std::vector<AuditRow> rows;
-  const EquationOfState& eos = enskog();
-  const ExpansionConstants packed = expansion_constants(eos, close_packing_density);
+// mu_0, Lambda_1 and k, after eqs. (4) and (5).
+void audit_constants(std::vector<AuditRow>& rows) {
+  const ExpansionConstants packed = expansion_constants(enskog(), close_packing_density);
   const OtherAlpha other = alpha_that_gives(printed::mu_0);
 
   rows.push_back(numeric(
@@ -122,11 +107,17 @@ std::vector<AuditRow> audit() {
       AuditStatus::explained,
       "a small difference of large numbers: " + text_of(100.0 * (packed.lambda_1 / printed::lambda_1 - 1.0), 2) +
           " % in Lambda_1 makes it " + text_of(packed.k / k_printed, 3) + " times larger"));
+}
 
-  // The experiment.
+// The bed of the experiment, with the plateau as measured.
+Column measured_column() { return column_from_initial_height(printed::initial_height, printed::plateau_density); }
+
+// T_c, T/T_c and the height of the solid in the comparison with the experiment.
+void audit_temperatures(std::vector<AuditRow>& rows) {
+  const EquationOfState& eos = enskog();
   const double d = printed::diameter_mm;
   const Column as_packed = column_from_initial_height(printed::initial_height, close_packing_density);
-  const Column as_measured = column_from_initial_height(printed::initial_height, printed::plateau_density);
+  const Column as_measured = measured_column();
   const double critical_packed = d * critical_temperature(eos, as_packed).value;
   const double critical_measured = d * critical_temperature(eos, as_measured).value;
   rows.push_back(
@@ -146,25 +137,32 @@ std::vector<AuditRow> audit() {
   rows.push_back(numeric("zeta_F predicted", "comparison with the experiment", "D", printed::solid_height, solid,
                          to_the_digits(printed::solid_height, solid, 1e-2),
                          "mu (1 - T/T_c) with phi_0 = 1.10; a height in diameters, called layers in the paper"));
+}
+
+// Shift and area of the published fit.
+void audit_published_profile(std::vector<AuditRow>& rows) {
+  const double d = printed::diameter_mm;
   const double shift_mm = printed::shift_times_plateau / printed::plateau_density * d;
   rows.push_back(numeric("z_o", "comparison with the experiment", "mm", printed::shift_mm, shift_mm,
                          std::abs(shift_mm - printed::shift_mm) < 0.5 ? AuditStatus::explained : AuditStatus::open,
                          "zeta_0 D/phi_0; the printed formula phi_0 zeta_0/D is inverted (it gives " +
                              text_of(printed::plateau_density * printed::shift_times_plateau / d, 3) + ")"));
-  const double sum_rule = as_measured.column_number;
+  const double sum_rule = measured_column().column_number;
   const HydrostaticProfile drawn = published_profile();
   const double as_product =
-      HydrostaticProfile::tail_over_rectangle(eos, printed::temperature_mm / d, printed::shift_times_plateau,
+      HydrostaticProfile::tail_over_rectangle(enskog(), printed::temperature_mm / d, printed::shift_times_plateau,
                                               printed::plateau_density)
           .column_number();
   rows.push_back(numeric(
       "area under the published fit", "sum rule, phi_0 mu", "1/D", sum_rule, drawn.column_number(), AuditStatus::open,
       "with the shift 4.41/1.10 D the area is " + text_of(drawn.column_number(), 4) + ", with 4.41 D " +
           text_of(as_product, 4) + "; the sum rule asks " + text_of(sum_rule, 4)));
+}
 
-  // Formulas.
+// Misprints.
+void audit_formulas(std::vector<AuditRow>& rows) {
   const EnskogConstants c = enskog_constants();
-  const double f_right = eos.f(printed::plateau_density).value;
+  const double f_right = enskog().f(printed::plateau_density).value;
   const double f_misprint = f_right - c.c3 / (1.0 - c.a * printed::plateau_density) + c.c3 / (1.0 - c.a);
   rows.push_back(statement("f(phi_0), third term", "eq. (3b)", "c3/(1 - alpha_0)", "c3/(1 - alpha phi_0)",
                            AuditStatus::explained,
@@ -175,12 +173,15 @@ std::vector<AuditRow> audit() {
   rows.push_back(statement(
       "power of mu", "eq. (6)", "mu^2", "mu, from eq. (5); mu^2 if only the surface ball jumps", AuditStatus::explained,
       "two readings: Delta z = H_0 gives mu, Delta z = H_0/mu gives mu^2; the map offers both by name"));
+}
 
+// T/T_c from Gamma, and the mass of a disk.
+void audit_map(std::vector<AuditRow>& rows) {
   // Gamma = 4 and f = 20 Hz are not printed.
   ShakenBed bed;
   bed.gamma = 4.0;
-  bed.acceleration_length = acceleration_length(9.81, 20.0, 1e-3 * d);
-  bed.column = as_measured;
+  bed.acceleration_length = acceleration_length(9.81, 20.0, 1e-3 * printed::diameter_mm);
+  bed.column = measured_column();
   double nearest = 0.0;
   double with_printed = 0.0;
   for (const Reading& reading : temperatures_from_gamma(bed)) {
@@ -195,8 +196,11 @@ std::vector<AuditRow> audit() {
                   " with the printed constants. H_0, Gamma and f are not printed, so no reading is claimed"));
   rows.push_back(statement("mass of a disk", "caption of Fig. 2 and text", "1.047e-6 and 2.090e-6", "either",
                            AuditStatus::explained, "T/(m g D) does not depend on m"));
+}
 
-  // The equilibrium beds of Fig. 1.
+// The equilibrium beds of Fig. 1.
+void audit_equilibrium_beds(std::vector<AuditRow>& rows) {
+  const EquationOfState& eos = enskog();
   const double layers =
       solid_height(eos, {20.0 * close_packing_density, close_packing_density},
                    0.15 * critical_temperature(eos, {20.0 * close_packing_density, close_packing_density}).value)
@@ -208,7 +212,10 @@ std::vector<AuditRow> audit() {
                                " D with mu a height; W = 50 D with 20 rows of 50 (mu = " +
                                text_of(1000.0 / 50.0 / close_packing_density, 4) + " D)",
                            AuditStatus::open, "N D/W = phi_0 mu: both readings are offered"));
+}
 
+// The conclusion, and the list of references.
+void audit_conclusion(std::vector<AuditRow>& rows) {
   // "The breakdown should persist for any pressure."
   std::string evidence;
   for (const EquationOfState* equation : equations_of_state()) {
@@ -224,6 +231,31 @@ std::vector<AuditRow> audit() {
                 "disks have, every T is above T_c = 0"));
   rows.push_back(statement("reference [11]", "list of references", "PRE 57", "PRE 54, R9 (1996)",
                            AuditStatus::explained, "a misprint"));
+}
+
+}  // namespace
+
+std::string_view to_string(AuditStatus status) {
+  switch (status) {
+    case AuditStatus::agrees:
+      return "agrees";
+    case AuditStatus::explained:
+      return "explained";
+    case AuditStatus::open:
+      return "open";
+  }
+  return "unknown";
+}
+
+std::vector<AuditRow> audit() {
+  std::vector<AuditRow> rows;
+  audit_constants(rows);
+  audit_temperatures(rows);
+  audit_published_profile(rows);
+  audit_formulas(rows);
+  audit_map(rows);
+  audit_equilibrium_beds(rows);
+  audit_conclusion(rows);
   return rows;
 }
 

@@ -12,6 +12,13 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr double two_pi = 2.0 * pi;
 
+// Below this velocity relative to the floor [g/w] the remaining bounces take no time worth keeping: the ball is put to
+// rest where the geometric series of its bounces ends, but no later than after the next time [radians of phase].
+constexpr double rest_velocity = 1e-9;
+constexpr double longest_settle = 1e-3;
+// Phase [radians] by which a launch that rounding error has turned into a rest is stepped over.
+constexpr double step_past_rest = 1e-6;
+
 // The greatest value of a smooth periodic function: a fine scan, then golden-section search about the best point.
 template <class Function>
 double greatest_over_period(Function&& function) {
@@ -438,79 +445,121 @@ Value gamma_for_jump_height(JumpHeight kind, double height, const WaveForm& wave
   }
 }
 
-BounceStatistics bounce(double gamma, const BounceOptions& options, const WaveForm& wave) {
-  BounceStatistics statistics;
+namespace {
+
+bool is_bouncing_ball(double gamma, const BounceOptions& options, const WaveForm& wave) {
   const double e = options.restitution;
-  if (!std::isfinite(gamma) || gamma < 0.0 || !(e >= 0.0 && e <= 0.99) || options.flights < 1 ||
-      options.transient < 0 || wave.status() != ValueStatus::ok || !std::isfinite(options.initial_phase) ||
-      !(options.initial_velocity >= 0.0)) {
+  return std::isfinite(gamma) && gamma >= 0.0 && e >= 0.0 && e <= 0.99 && options.flights >= 1 &&
+         options.transient >= 0 && wave.status() == ValueStatus::ok && std::isfinite(options.initial_phase) &&
+         options.initial_velocity >= 0.0;
+}
+
+// A ball on the floor, flight after flight. Between them it stands at `phase_` with `velocity_` relative to the floor.
+class BouncingBall {
+ public:
+  BouncingBall(double gamma, const BounceOptions& options, const WaveForm& wave)
+      : gamma_(gamma),
+        options_(options),
+        wave_(wave),
+        highest_floor_(gamma * wave.highest()),
+        phase_(wrapped(options.initial_phase)),
+        velocity_(options.initial_velocity) {}
+
+  BounceStatistics run() {
+    for (int flight = -options_.transient; flight < options_.flights; ++flight) {
+      const bool counted = flight >= 0;
+      if (!rest_until_lift_off(counted)) {
+        statistics_.resting_fraction = 1.0;
+        statistics_.period = 0;
+        return std::move(statistics_);
+      }
+      fly_once(counted);
+    }
+    if (statistics_.flight_times.empty()) {
+      statistics_.status = ValueStatus::not_converged;
+      return std::move(statistics_);
+    }
+    take_means();
+    find_period();
+    return std::move(statistics_);
+  }
+
+ private:
+  // A ball too slow to bounce waits until the floor lets it go. False: it never does.
+  bool rest_until_lift_off(bool counted) {
+    const double hold = 1.0 + gamma_ * wave_.acceleration(phase_), e = options_.restitution;
+    if (!(velocity_ <= rest_velocity && hold > 0.0)) return true;
+    const double settle = std::min(e > 0.0 ? 2.0 * velocity_ / (hold * (1.0 - e)) : 0.0, longest_settle);
+    const double wait = time_to_lift_off(gamma_, wave_, phase_ + settle);
+    if (wait < 0.0) return false;
+    if (counted) resting_ += wait;
+    phase_ = wrapped(phase_ + wait + settle);
+    velocity_ = 0.0;
+    return true;
+  }
+
+  void fly_once(bool counted) {
+    const Flight flight = fly(gamma_, wave_, phase_, velocity_);
+    if (!(flight.time > 0.0)) {  // a launch that rounding error has turned into a rest: step past it
+      phase_ = wrapped(phase_ + step_past_rest);
+      velocity_ = 0.0;
+      return;
+    }
+    if (counted) count(flight);
+    phase_ = wrapped(phase_ + flight.time);
+    velocity_ = -options_.restitution * flight.impact_velocity;
+  }
+
+  void count(const Flight& flight) {
+    statistics_.launch_phases.push_back(wrapped(phase_));
+    statistics_.flight_times.push_back(flight.time);
+    flying_ += flight.time;
+    for (std::size_t i = 0; i < jump_heights.size(); ++i) {
+      const double height = height_of(jump_heights[i], flight, highest_floor_);
+      weighted_[i] += flight.time * height;
+      statistics_.greatest_height[i] =
+          statistics_.launch_phases.size() == 1 ? height : std::max(statistics_.greatest_height[i], height);
+    }
+  }
+
+  void take_means() {
+    for (std::size_t i = 0; i < jump_heights.size(); ++i) statistics_.mean_height[i] = weighted_[i] / flying_;
+    statistics_.mean_flight = flying_ / static_cast<double>(statistics_.flight_times.size()) / two_pi;
+    statistics_.resting_fraction = resting_ / (resting_ + flying_);
+  }
+
+  // The least number of flights after which the last ones repeat; 0: none up to 64.
+  void find_period() {
+    const std::size_t count = statistics_.flight_times.size();
+    const auto same = [&](std::size_t i, std::size_t j) {
+      const double turn = std::abs(std::remainder(statistics_.launch_phases[i] - statistics_.launch_phases[j], two_pi));
+      return turn < 1e-6 && std::abs(statistics_.flight_times[i] - statistics_.flight_times[j]) < 1e-6;
+    };
+    for (std::size_t period = 1; period <= 64 && 2 * period <= count && statistics_.period == 0; ++period) {
+      bool repeats = true;
+      for (std::size_t i = count - period; i < count && repeats; ++i) repeats = same(i, i - period);
+      if (repeats) statistics_.period = static_cast<int>(period);
+    }
+  }
+
+  double gamma_;
+  const BounceOptions& options_;
+  const WaveForm& wave_;
+  double highest_floor_, phase_, velocity_;
+  double flying_ = 0.0, resting_ = 0.0;
+  std::array<double, 4> weighted_{};  // jump heights by the time of their flights
+  BounceStatistics statistics_;
+};
+
+}  // namespace
+
+BounceStatistics bounce(double gamma, const BounceOptions& options, const WaveForm& wave) {
+  if (!is_bouncing_ball(gamma, options, wave)) {
+    BounceStatistics statistics;
     statistics.status = ValueStatus::invalid_argument;
     return statistics;
   }
-  // Below this relative velocity the remaining bounces take no time worth keeping: the ball is put to rest where the
-  // geometric series of its bounces ends.
-  constexpr double rest_velocity = 1e-9;
-  const double highest_floor = gamma * wave.highest();
-  double phase = wrapped(options.initial_phase);
-  double velocity = options.initial_velocity;
-  double flying = 0.0;
-  double resting = 0.0;
-  std::array<double, 4> weighted{};
-  for (int flight_index = -options.transient; flight_index < options.flights;) {
-    const bool counted = flight_index >= 0;
-    const double hold = 1.0 + gamma * wave.acceleration(phase);
-    if (velocity <= rest_velocity && hold > 0.0) {
-      const double settle = e > 0.0 ? 2.0 * velocity / (hold * (1.0 - e)) : 0.0;
-      const double wait = time_to_lift_off(gamma, wave, phase + std::min(settle, 1e-3));
-      if (wait < 0.0) {  // at rest for good
-        statistics.resting_fraction = 1.0;
-        statistics.period = 0;
-        return statistics;
-      }
-      if (counted) resting += wait;
-      phase = wrapped(phase + wait + std::min(settle, 1e-3));
-      velocity = 0.0;
-    }
-    const Flight flight = fly(gamma, wave, phase, velocity);
-    if (!(flight.time > 0.0)) {  // a launch that rounding error has turned into a rest: step past it
-      phase = wrapped(phase + 1e-6);
-      velocity = 0.0;
-      ++flight_index;
-      continue;
-    }
-    if (counted) {
-      statistics.launch_phases.push_back(wrapped(phase));
-      statistics.flight_times.push_back(flight.time);
-      flying += flight.time;
-      for (std::size_t i = 0; i < jump_heights.size(); ++i) {
-        const double height = height_of(jump_heights[i], flight, highest_floor);
-        weighted[i] += flight.time * height;
-        statistics.greatest_height[i] =
-            statistics.launch_phases.size() == 1 ? height : std::max(statistics.greatest_height[i], height);
-      }
-    }
-    phase = wrapped(phase + flight.time);
-    velocity = -e * flight.impact_velocity;
-    ++flight_index;
-  }
-  const auto count = statistics.flight_times.size();
-  if (count == 0) {
-    statistics.status = ValueStatus::not_converged;
-    return statistics;
-  }
-  for (std::size_t i = 0; i < jump_heights.size(); ++i) statistics.mean_height[i] = weighted[i] / flying;
-  statistics.mean_flight = flying / static_cast<double>(count) / two_pi;
-  statistics.resting_fraction = resting / (resting + flying);
-  const auto same = [&](std::size_t i, std::size_t j) {
-    const double turn = std::abs(std::remainder(statistics.launch_phases[i] - statistics.launch_phases[j], two_pi));
-    return turn < 1e-6 && std::abs(statistics.flight_times[i] - statistics.flight_times[j]) < 1e-6;
-  };
-  for (std::size_t period = 1; period <= 64 && 2 * period <= count && statistics.period == 0; ++period) {
-    bool repeats = true;
-    for (std::size_t i = count - period; i < count && repeats; ++i) repeats = same(i, i - period);
-    if (repeats) statistics.period = static_cast<int>(period);
-  }
-  return statistics;
+  return BouncingBall(gamma, options, wave).run();
 }
 
 ModeRange period_one_mode(int mode, double restitution) {

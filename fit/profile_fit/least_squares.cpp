@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace shakebed::fit {
 
@@ -9,6 +10,8 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
+
+constexpr double first_damping = 1e-3;  // of Fletcher's scaling, at which a fit begins
 
 // Between the solver's coordinates and the model's parameters.
 struct Coordinates {
@@ -139,12 +142,23 @@ class Solver {
     g.noalias() = jacobian_.transpose() * weight.cwiseProduct(residual_);
   }
 
-  bool descend(Solution& solution) {
-    const auto columns = static_cast<Eigen::Index>(free_.size());
-    solution.objective = objective(residual_);
-    if (columns == 0) return true;
-    const double dof = std::max(1.0, static_cast<double>(residual_.size()) - static_cast<double>(columns));
-    double signal = 0.0;  // of the weighted data: its rounding error bounds what a step can still gain
+  // A step of Levenberg and Marquardt and what it promises to lower the objective by.
+  struct Step {
+    Vector change, diagonal;  // in coordinates; the scaling of the damping
+    FitModel::Parameters trial;
+    double promise = 0.0;
+  };
+  // Normal equations, damping, and where rounding error begins.
+  struct Descent {
+    Matrix a;
+    Vector g;
+    double damping = first_damping, growth = 2.0;
+    double dof = 1.0, signal = 0.0;
+  };
+
+  // The sum of the squared weighted data: its rounding error bounds what a step can still gain.
+  [[nodiscard]] double weighted_signal() const {
+    double signal = 0.0;
     for (std::size_t i = 0; i < bins_.size(); ++i) {
       const double weighted =
           bins_.whitening.size() > 0
@@ -152,59 +166,86 @@ class Solver {
               : bins_.density[i] * bins_.inverse_error[i];
       signal += weighted * weighted;
     }
-    double damping = 1e-3;
-    double growth = 2.0;
-    Matrix a;
-    Vector g;
-    normal_equations(a, g);
+    return signal;
+  }
+
+  [[nodiscard]] FitModel::Parameters moved(const FitModel::Parameters& from, const Vector& step) const {
+    FitModel::Parameters to = from;
+    for (std::size_t i = 0; i < free_.size(); ++i)
+      to[free_[i]] = coordinates_.moved(free_[i], to[free_[i]], step[static_cast<Eigen::Index>(i)]);
+    return to;
+  }
+
+  // Fletcher's scaling; a parameter without any effect keeps a unit.
+  [[nodiscard]] Step damped_step(const Descent& descent, const FitModel::Parameters& from) const {
+    Step step;
+    step.diagonal = descent.a.diagonal();
+    const double largest = std::max(step.diagonal.maxCoeff(), 1e-300);
+    for (Eigen::Index i = 0; i < step.diagonal.size(); ++i)
+      step.diagonal[i] = std::max(step.diagonal[i], 1e-14 * largest);
+    Matrix damped = descent.a;
+    damped.diagonal() += descent.damping * step.diagonal;
+    step.change = damped.ldlt().solve(-descent.g);
+    step.trial = moved(from, step.change);
+    clamp(step.trial);
+    step.promise = -descent.g.dot(step.change);
+    return step;
+  }
+
+  void accept(const Step& step, double value, Descent& descent, Solution& solution) {
+    const double gain =
+        (solution.objective - value) /
+        std::max(step.promise + descent.damping * step.change.dot(step.diagonal.cwiseProduct(step.change)), 1e-300);
+    const double turn = 2.0 * std::clamp(gain, 0.0, 1.0) - 1.0;
+    descent.damping = std::max(1e-12, descent.damping * std::max(0.1, 1.0 - turn * turn * turn));
+    descent.growth = 2.0;
+    solution.parameters = step.trial;
+    solution.objective = value;
+    normal_equations(descent.a, descent.g);
+  }
+
+  // After a step that gained nothing: whether there is nothing to gain; without a value the search goes on, damped.
+  [[nodiscard]] static std::optional<bool> reject(const Step& step, bool has_curve, double objective,
+                                                  Descent& descent) {
+    // A step of less than 1e-4 standard errors that gains nothing: rounding error is all that is left.
+    if (has_curve && step.promise <= 1e-8 * objective / descent.dof + 1e-24 * descent.signal) return true;
+    descent.damping *= descent.growth;
+    descent.growth *= 2.0;
+    // No step, however short, lowers the sum: a minimum to rounding error.
+    if (descent.damping > 1e12)
+      return step.promise <= 1e-6 * objective / descent.dof + 1e-20 * descent.signal || descent.damping > 1e16;
+    return std::nullopt;
+  }
+
+  bool descend(Solution& solution) {
+    solution.objective = objective(residual_);
+    if (free_.empty()) return true;
+    Descent descent;
+    descent.dof = std::max(1.0, static_cast<double>(residual_.size()) - static_cast<double>(free_.size()));
+    descent.signal = weighted_signal();
+    normal_equations(descent.a, descent.g);
     for (; solution.iterations < options_.max_iterations; ++solution.iterations) {
-      // Fletcher's scaling; a parameter without any effect keeps a unit.
-      Vector diagonal = a.diagonal();
-      const double largest = std::max(diagonal.maxCoeff(), 1e-300);
-      for (Eigen::Index i = 0; i < columns; ++i) diagonal[i] = std::max(diagonal[i], 1e-14 * largest);
-      Matrix damped = a;
-      damped.diagonal() += damping * diagonal;
-      const Vector step = damped.ldlt().solve(-g);
-      FitModel::Parameters trial = solution.parameters;
-      for (Eigen::Index i = 0; i < columns; ++i) {
-        const std::size_t parameter = free_[static_cast<std::size_t>(i)];
-        trial[parameter] = coordinates_.moved(parameter, trial[parameter], step[i]);
-      }
-      clamp(trial);
-      const bool moved = trial != solution.parameters;
-      const Vector old_residual = residual_;
-      const Matrix old_jacobian = jacobian_;
-      // What this step and the undamped one promise to gain.
-      const double promise = -g.dot(step);
-      const bool worth = promise > (1e-16 / dof + 1e-18) * solution.objective + 1e-30 * signal;
-      if (!moved || !worth || !step.allFinite()) {
-        if (damping <= 1e-3 || !moved) return true;
-        damping = 1e-6;  // only the damping made the step small
-        growth = 2.0;
+      const Step step = damped_step(descent, solution.parameters);
+      const bool moves = step.trial != solution.parameters;
+      const bool worth = step.promise > (1e-16 / descent.dof + 1e-18) * solution.objective + 1e-30 * descent.signal;
+      if (!moves || !worth || !step.change.allFinite()) {
+        if (descent.damping <= first_damping || !moves) return true;
+        descent.damping = 1e-6;  // only the damping made the step small
+        descent.growth = 2.0;
         if (++shrinks_ > 20) return true;
         continue;
       }
-      const bool has_curve = evaluate(trial, residual_, jacobian_);
+      const Vector old_residual = residual_;
+      const Matrix old_jacobian = jacobian_;
+      const bool has_curve = evaluate(step.trial, residual_, jacobian_);
       const double value = has_curve ? objective(residual_) : 0.0;
       if (has_curve && value <= solution.objective) {
-        const double gain =
-            (solution.objective - value) / std::max(promise + damping * step.dot(diagonal.cwiseProduct(step)), 1e-300);
-        const double turn = 2.0 * std::clamp(gain, 0.0, 1.0) - 1.0;
-        damping = std::max(1e-12, damping * std::max(0.1, 1.0 - turn * turn * turn));
-        growth = 2.0;
-        solution.parameters = trial;
-        solution.objective = value;
-        normal_equations(a, g);
-      } else {
-        residual_ = old_residual;
-        jacobian_ = old_jacobian;
-        // A step of less than 1e-4 standard errors that gains nothing: rounding error is all that is left.
-        if (has_curve && promise <= 1e-8 * solution.objective / dof + 1e-24 * signal) return true;
-        damping *= growth;
-        growth *= 2.0;
-        // No step, however short, lowers the sum: a minimum to rounding error.
-        if (damping > 1e12) return promise <= 1e-6 * solution.objective / dof + 1e-20 * signal || damping > 1e16;
+        accept(step, value, descent, solution);
+        continue;
       }
+      residual_ = old_residual;
+      jacobian_ = old_jacobian;
+      if (const auto ended = reject(step, has_curve, solution.objective, descent)) return *ended;
     }
     return false;
   }
@@ -212,8 +253,7 @@ class Solver {
   // Near the minimum chi2 no longer tells two points apart, by rounding, where its gradient still does: Gauss-Newton
   // steps, each of which must halve what the next one promises.
   void polish(Solution& solution) {
-    const auto columns = static_cast<Eigen::Index>(free_.size());
-    if (columns == 0) return;
+    if (free_.empty()) return;
     Matrix a;
     Vector g;
     normal_equations(a, g);
@@ -221,11 +261,7 @@ class Solver {
     double promise = -g.dot(step);
     for (int i = 0; i < 3; ++i) {
       if (!step.allFinite() || !(promise > 0.0 && promise < 1e-6 * solution.objective)) return;
-      FitModel::Parameters trial = solution.parameters;
-      for (Eigen::Index c = 0; c < columns; ++c) {
-        const std::size_t parameter = free_[static_cast<std::size_t>(c)];
-        trial[parameter] = coordinates_.moved(parameter, trial[parameter], step[c]);
-      }
+      FitModel::Parameters trial = moved(solution.parameters, step);
       const FitModel::Parameters unbounded = trial;
       clamp(trial);
       if (trial != unbounded || trial == solution.parameters) return;

@@ -1,0 +1,107 @@
+// Verdicts on claims, by numbers made by hand: 1.0 with an error of 0.1 has the 95 % interval 0.804 to 1.196.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "tests/pipelines/lone_stage.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using shakebed::pipelines::find_stage;
+using shakebed::pipelines::Json;
+using testing::HasSubstr;
+
+const std::string result = R"({"t": {"value": 1.0, "std_error": 0.1, "unit": "m g D"}, "none": {"value": null},
+    "plain": 0.25, "yes": true, "no": false, "fit": {"p_value": 1e-12}})";
+
+class ClaimsVerdicts : public testing::Test {
+ protected:
+  ClaimsVerdicts() {
+    claims_.add_input("bed", *find_stage("fit"));
+    write_text(claims_.file("fit.json"), result);
+  }
+  Json one(const std::string& number, const std::string& claimed) {
+    return claims_.run(R"({"claims": [{"claim": "so it is", "number": ")" + number + "\", " + claimed +
+                       "}]}")["claims"][0];
+  }
+  std::string verdict(const std::string& number, const std::string& claimed) {
+    return one(number, claimed)["verdict"].get<std::string>();
+  }
+  LoneStage claims_{*find_stage("claims")};
+};
+
+TEST_F(ClaimsVerdicts, AValueAndItsTolerance) {
+  EXPECT_EQ(verdict("/bed/t", R"("value": 1, "tolerance": 0.2)"), "holds");
+  EXPECT_EQ(verdict("/bed/t", R"("value": 1, "tolerance": 0.19)"), "open");
+  EXPECT_EQ(verdict("/bed/t", R"("value": 1)"), "open") << "an interval is never inside a point";
+  EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.31)"), "open");
+  EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.3)"), "does not hold");
+  EXPECT_EQ(verdict("/bed/t", R"("value": 0.5, "tolerance": 0.3)"), "does not hold");
+}
+
+TEST_F(ClaimsVerdicts, Bounds) {
+  EXPECT_EQ(verdict("/bed/t", R"("least": 0.8)"), "holds");
+  EXPECT_EQ(verdict("/bed/t", R"("least": 0.81)"), "open");
+  EXPECT_EQ(verdict("/bed/t", R"("least": 1.2)"), "does not hold");
+  EXPECT_EQ(verdict("/bed/t", R"("most": 1.2)"), "holds");
+  EXPECT_EQ(verdict("/bed/t", R"("most": 1.19)"), "open");
+  EXPECT_EQ(verdict("/bed/t", R"("most": 0.8)"), "does not hold");
+  EXPECT_EQ(verdict("/bed/t", R"("least": 0.8, "most": 1.2)"), "holds");
+  EXPECT_EQ(verdict("/bed/t", R"("least": 0.9, "most": 1.1)"), "open");
+  EXPECT_EQ(verdict("/bed/t", R"("least": 2, "most": 3)"), "does not hold");
+}
+
+TEST_F(ClaimsVerdicts, NumbersWithoutErrorsAndTruths) {
+  EXPECT_EQ(verdict("/bed/plain", R"("value": 0.25)"), "holds");
+  EXPECT_EQ(verdict("/bed/plain", R"("most": 0.2)"), "does not hold");
+  EXPECT_EQ(verdict("/bed/yes", R"("value": 1)"), "holds");
+  EXPECT_EQ(verdict("/bed/no", R"("value": 1)"), "does not hold");
+}
+
+TEST_F(ClaimsVerdicts, WhatWasNotMeasured) {
+  const Json row = one("/bed/none", R"("most": 5)");
+  EXPECT_EQ(row["verdict"], "not measured");
+  EXPECT_TRUE(row["value"].is_null());
+  EXPECT_FALSE(row.contains("std_error"));
+  EXPECT_EQ(row["measured"], "–");
+}
+
+TEST_F(ClaimsVerdicts, ArePutInWords) {
+  const Json row = one("/bed/t", R"("value": 1, "tolerance": 0.2)");
+  EXPECT_EQ(row["claimed"], "1 ± 0.2");
+  EXPECT_EQ(row["measured"], "1.00 ± 0.10 m g D");
+  EXPECT_EQ(row["value"], 1.0);
+  EXPECT_EQ(row["std_error"], 0.1);
+  EXPECT_EQ(one("/bed/t", R"("least": 0.8, "most": 1.2)")["claimed"], "at least 0.8, at most 1.2");
+  EXPECT_EQ(one("/bed/plain", R"("most": 1)")["measured"], "0.25 (no error bar)");
+  EXPECT_EQ(one("/bed/fit/p_value", R"("most": 0.05)")["measured"], "below 1e-10");
+}
+
+// The same verdicts in all three files.
+TEST_F(ClaimsVerdicts, StandInTheTableAndTheText) {
+  claims_.run(R"({"claims": [{"claim": "a|b", "place": "Fig. 1", "number": "/bed/t", "value": 3},
+                             {"claim": "c", "number": "/bed/none", "value": 3, "note": "why"}]})");
+  std::map<std::string, std::string> verdicts;
+  std::vector<std::string> header;
+  shakebed::pipelines::each_csv_line(
+      read_text(claims_.output("claims.csv")), [&](const std::vector<std::string>& cells, std::size_t) {
+        if (header.empty())
+          header = cells;
+        else
+          verdicts[cells[0]] = cells[shakebed::pipelines::csv_column(header, "verdict", "claims.csv")];
+      });
+  EXPECT_EQ(verdicts, (std::map<std::string, std::string>{{"a|b", "does not hold"}, {"c", "not measured"}}));
+  const std::string text = read_text(claims_.output("claims.md"));
+  EXPECT_THAT(text, HasSubstr("| a\\|b | 3 | 1.00 ± 0.10 m g D | does not hold | Fig. 1 |\n"));
+  EXPECT_THAT(text, HasSubstr("| c | 3 | – | not measured: why |  |\n"));
+}
+
+TEST_F(ClaimsVerdicts, ANumberThatIsNotThereIsAnError) {
+  EXPECT_THROW(one("/bed/typo", R"("value": 1)"), shakebed::pipelines::InputError);
+}
+
+}  // namespace
