@@ -146,7 +146,7 @@ ReadUnit read_unit(std::string_view text, std::string_view whole) {
   }
 }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_spaces(std::string_view text) {
   const auto space = [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
   while (!text.empty() && space(text.front())) text.remove_prefix(1);
   while (!text.empty() && space(text.back())) text.remove_suffix(1);
@@ -208,7 +208,7 @@ std::string example_of(const Dimension& d) {
 }
 
 Quantity parse_quantity(std::string_view whole) {
-  const std::string_view text = trimmed(whole);
+  const std::string_view text = without_spaces(whole);
   if (text.empty()) throw std::invalid_argument("an empty string is no quantity");
   // The number: what from_chars takes, checked for words that it takes too.
   const std::size_t start = text.front() == '+' ? 1 : 0;
@@ -222,7 +222,7 @@ Quantity parse_quantity(std::string_view whole) {
     throw std::invalid_argument(fmt::format("\"{}\" is not finite", whole));
   }
   const std::string_view unit_text =
-      trimmed(std::string_view(end, static_cast<std::size_t>(text.data() + text.size() - end)));
+      without_spaces(std::string_view(end, static_cast<std::size_t>(text.data() + text.size() - end)));
   ReadUnit unit;
   if (!unit_text.empty()) unit = read_unit(unit_text, whole);
   // Shift the decimal exponent in the text, so that 2.99 mm is rounded once.
@@ -299,7 +299,7 @@ std::string likely_quantity(std::string_view number, double value, const Dimensi
   if (d == dimension::length && std::abs(value) >= largest_in_metres) unit = "mm";
   if (d == dimension::length_per_pixel && std::abs(value) >= 1e-3) unit = "mm/px";
   if (d == dimension::angle) unit = "deg";
-  return fmt::format("{} {}", trimmed(number), unit);
+  return fmt::format("{} {}", without_spaces(number), unit);
 }
 
 int edit_distance(std::string_view a, std::string_view b) {

@@ -1,5 +1,3 @@
-#include "pipelines/stages/chart.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -14,6 +12,7 @@
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "sim/measure/order.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -7,7 +7,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow check_stage();
 StagePages check_pages();  // check_report.cpp
 
 }  // namespace shakebed::pipelines

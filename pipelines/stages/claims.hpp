@@ -8,7 +8,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow claims_stage();
 StagePages claims_pages();  // claims_report.cpp
 
 }  // namespace shakebed::pipelines

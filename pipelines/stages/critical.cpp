@@ -1,5 +1,3 @@
-#include "pipelines/stages/critical.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/study_table.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -9,7 +9,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow extract_stage();
 StagePages extract_pages();  // extract_report.cpp
 
 }  // namespace shakebed::pipelines

@@ -8,7 +8,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow figure_stage();
 StagePages figure_pages();  // figure_report.cpp; of every stage that draws
 
 // A column of y against x with how it is drawn.

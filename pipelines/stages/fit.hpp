@@ -12,7 +12,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow fit_stage();
 StagePages fit_pages();  // fit_report.cpp
 
 }  // namespace shakebed::pipelines

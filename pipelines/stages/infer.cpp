@@ -1,5 +1,3 @@
-#include "pipelines/stages/infer.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "pipelines/stages/scene_options.hpp"
 #include "sim/measure/measure.hpp"
 #include "sim/measure/observables.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

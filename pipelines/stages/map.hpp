@@ -7,7 +7,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow map_stage();
 StagePages map_pages();  // map_report.cpp
 
 }  // namespace shakebed::pipelines

@@ -8,6 +8,5 @@
 
 namespace shakebed::pipelines {
 
-StageRow render_stage();
 
 }  // namespace shakebed::pipelines

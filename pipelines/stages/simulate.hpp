@@ -22,7 +22,6 @@
 
 namespace shakebed::pipelines {
 
-StageRow simulate_stage();
 StagePages simulate_pages();  // simulate_report.cpp
 
 }  // namespace shakebed::pipelines

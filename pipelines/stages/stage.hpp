@@ -2,8 +2,7 @@
 // what is above this folder (runner, report, command line) knows no stage by name.
 //
 // How to add a stage
-//   1. pipelines/stages/<name>.hpp declares one function, `StageRow <name>_stage();`.
-//   2. pipelines/stages/<name>.cpp holds the options struct with its defaults, a class derived from Stage whose
+//   1. pipelines/stages/<name>.cpp holds the options struct with its defaults, a class derived from Stage whose
 //      describe() names every option once (see config.hpp) and whose run() does the work, and the function that fills
 //      the row:
 //
@@ -37,8 +36,8 @@
 //        }
 //        }
 //
-//   3. one line in stage_table.cpp puts the row into the table; one in CMakeLists.txt compiles the file.
-//   4. what its pages and the terminal show stands in pipelines/stages/<name>_report.cpp (StagePages, below).
+//   2. one line in stage_table.cpp puts the row into the table.
+//   3. what its pages and the terminal show stands in pipelines/stages/<name>_report.cpp (StagePages, below).
 //
 // A stage is a pure function: options + the inputs' files → files in its output folder. It reads no clock, no
 // environment and no other file; its random numbers come from seed(). The same options, inputs and seed give the same

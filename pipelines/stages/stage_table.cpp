@@ -1,26 +1,20 @@
-#include "pipelines/stages/stage.hpp"
-
 #include <algorithm>
 
-#include "pipelines/stages/chart.hpp"
-#include "pipelines/stages/check.hpp"
-#include "pipelines/stages/claims.hpp"
-#include "pipelines/stages/critical.hpp"
-#include "pipelines/stages/extract.hpp"
-#include "pipelines/stages/figure.hpp"
-#include "pipelines/stages/fit.hpp"
-#include "pipelines/stages/infer.hpp"
-#include "pipelines/stages/map.hpp"
-#include "pipelines/stages/render.hpp"
-#include "pipelines/stages/simulate.hpp"
-#include "pipelines/stages/study.hpp"
+#include "pipelines/stages/stage.hpp"
+
+// The table: a stage a line, in the order of a pipeline. pipelines/stages/<name>.cpp defines StageRow <name>_stage().
+#define SHAKEBED_STAGES(row)                                                                                          \
+  row(simulate) row(infer) row(study) row(render) row(extract) row(fit) row(map) row(critical) row(figure) row(chart) \
+      row(claims) row(check)
 
 namespace shakebed::pipelines {
 
+#define SHAKEBED_DECLARE(name) StageRow name##_stage();
+SHAKEBED_STAGES(SHAKEBED_DECLARE)
+
 const std::vector<StageRow>& stage_table() {
-  static const std::vector<StageRow> table = {simulate_stage(), infer_stage(), study_stage(),  render_stage(),
-                                              extract_stage(),  fit_stage(),   map_stage(),    critical_stage(),
-                                              figure_stage(),   chart_stage(), claims_stage(), check_stage()};
+#define SHAKEBED_CALL(name) name##_stage(),
+  static const std::vector<StageRow> table = {SHAKEBED_STAGES(SHAKEBED_CALL)};
   return table;
 }
 

@@ -1,5 +1,3 @@
-#include "pipelines/stages/study.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
+#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 namespace {
