@@ -9,7 +9,6 @@
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "ingest/profile/bed_geometry.hpp"
@@ -20,6 +19,7 @@
 #include "ingest/profile/frame_rows.hpp"
 #include "ingest/profile/reduced_bed.hpp"
 #include "ingest/profile/shaking.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::ingest {
 
@@ -57,13 +57,8 @@ class OrderedFrames {
   // `take_up` receives the frames in order, from one thread at a time, and how many wait behind it.
   using TakeUp = std::function<void(FrameFindings frame, std::size_t waiting)>;
   void run(const TakeUp& take_up) {
-    if (threads_ <= 1) {
-      work(take_up);
-    } else {
-      std::vector<std::thread> threads;
-      for (unsigned k = 0; k < threads_; ++k) threads.emplace_back([&] { work(take_up); });
-      for (std::thread& thread : threads) thread.join();
-    }
+    const std::size_t threads = std::max<std::size_t>(1, threads_);
+    for_each_index(threads, static_cast<int>(threads), [&](std::size_t) { work(take_up); });
     if (failure_) std::rethrow_exception(failure_);
   }
 

@@ -16,6 +16,7 @@
 #include "pipelines/runner/shared_stages.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 #include "pipelines/runner/sweep_table.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 
@@ -137,10 +138,9 @@ class SweepRun {
     to_run_ = mine_.size() - kept_;
     console_.message(
         fmt::format("{} points, {} up to date, {} to run on {} threads", mine_.size(), kept_, to_run_, workers));
-    std::vector<std::jthread> threads;
-    for (int i = 1; i < workers && static_cast<std::size_t>(i) < to_run_; ++i) threads.emplace_back([this] { work(); });
-    work();
-    threads.clear();
+    const std::size_t threads =
+        std::min<std::size_t>(static_cast<std::size_t>(workers), std::max<std::size_t>(1, to_run_));
+    for_each_index(threads, workers, [this](std::size_t) { work(); });
     console_.end_progress();
   }
 

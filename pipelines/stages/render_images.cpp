@@ -5,17 +5,16 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
 #include <fstream>
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -142,23 +141,16 @@ class FrameDrawer {
   void draw_on_all_threads() {
     const ingest::FrameRenderer renderer(camera_);
     TrajectoryReader reader(trajectory_);
-    std::exception_ptr failure;
-    std::mutex failing;
-    const auto work = [&] {
+    const auto threads = static_cast<std::size_t>(std::max(1, context_.jobs()));
+    for_each_index(threads, context_.jobs(), [&](std::size_t) {
       try {
         draw_frames(reader, renderer);
       } catch (...) {
-        const std::lock_guard lock(failing);
-        if (!failure) failure = std::current_exception();
         stop_ = true;
+        throw;
       }
-    };
-    std::vector<std::thread> threads;
-    for (int i = 1; i < context_.jobs(); ++i) threads.emplace_back(work);
-    work();
-    for (std::thread& thread : threads) thread.join();
+    });
     context_.check_interrupted();
-    if (failure) std::rethrow_exception(failure);
   }
 
   void draw_frames(TrajectoryReader& reader, const ingest::FrameRenderer& renderer) {

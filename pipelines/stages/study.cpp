@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
 #include <map>
-#include <mutex>
-#include <thread>
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -452,34 +450,17 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
 std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& all) const {
   std::vector<Json> kept(all.size());
   const fs::path scratch = context.scratch();
-  std::atomic<std::size_t> next{0}, done{0};
-  std::mutex guard;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < all.size(); i = next++) {
-      try {
-        context.check_interrupted();
-        const fs::path file = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
-        if (!fs::exists(file)) {
-          write_file_atomically(file, dump(run_once(context, all[i], folder)));
-          fs::remove_all(folder);
-        }
-        kept[i] = read_json(file);
-      } catch (...) {
-        const std::lock_guard lock(guard);
-        if (!failure) failure = std::current_exception();
-        next = all.size();
-      }
-      context.progress(static_cast<double>(++done) / static_cast<double>(all.size()),
-                       fmt::format("{} runs", all.size()));
+  std::atomic<std::size_t> done{0};
+  for_each_index(all.size(), context.jobs(), [&](std::size_t i) {
+    context.check_interrupted();
+    const fs::path file = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
+    if (!fs::exists(file)) {
+      write_file_atomically(file, dump(run_once(context, all[i], folder)));
+      fs::remove_all(folder);
     }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (int k = 1; k < context.jobs(); ++k) helpers.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
+    kept[i] = read_json(file);
+    context.progress(static_cast<double>(++done) / static_cast<double>(all.size()), fmt::format("{} runs", all.size()));
+  });
   return kept;
 }
 

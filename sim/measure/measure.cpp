@@ -1,12 +1,10 @@
 #include "sim/measure/measure.hpp"
+#include "statistics/parallel.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <stdexcept>
-#include <thread>
 
 namespace shakebed::sim {
 
@@ -136,26 +134,10 @@ RunResult measure(const Scene& scene, const MeasurementSchedule& schedule, const
 }
 
 bool each_replica(std::uint32_t replicas, int threads, const std::function<bool(std::uint32_t)>& run) {
-  std::atomic<std::uint32_t> next{0};
   std::atomic<bool> ends{false};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::uint32_t k = next++; k < replicas && !ends; k = next++) {
-      try {
-        if (!run(k)) ends = true;
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        if (!failure) failure = std::current_exception();
-        ends = true;
-      }
-    }
-  };
-  std::vector<std::thread> others;
-  for (int t = 1; t < threads && t < static_cast<int>(replicas); ++t) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  for_each_index(replicas, threads, [&](std::size_t k) {
+    if (!ends && !run(static_cast<std::uint32_t>(k))) ends = true;
+  });
   return !ends;
 }
 
