@@ -20,14 +20,14 @@ struct Claim {
 };
 
 // The interval of 95 % against what is claimed. A claim of a number to some tolerance is an interval too.
-enum class Verdict { holds, open, fails, missing };
-std::string_view name_of(Verdict verdict) {
+enum class ClaimVerdict { holds, open, fails, missing };
+std::string_view name_of(ClaimVerdict verdict) {
   switch (verdict) {
-    case Verdict::holds:
+    case ClaimVerdict::holds:
       return "holds";
-    case Verdict::open:
+    case ClaimVerdict::open:
       return "open";
-    case Verdict::fails:
+    case ClaimVerdict::fails:
       return "does not hold";
     default:
       return "not measured";
@@ -63,14 +63,14 @@ Measured read_number(const Claim& claim, const std::vector<Input>& inputs) {
   return measured;
 }
 
-Verdict verdict_of(const Claim& claim, const Measured& measured) {
-  if (!std::isfinite(measured.value)) return Verdict::missing;
+ClaimVerdict verdict_of(const Claim& claim, const Measured& measured) {
+  if (!std::isfinite(measured.value)) return ClaimVerdict::missing;
   const double low = claim.value ? *claim.value - claim.tolerance : claim.least.value_or(-INFINITY),
                high = claim.value ? *claim.value + claim.tolerance : claim.most.value_or(INFINITY);
   const double least = measured.value - interval_95 * measured.error,
                most = measured.value + interval_95 * measured.error;
-  if (least >= low && most <= high) return Verdict::holds;
-  return most < low || least > high ? Verdict::fails : Verdict::open;
+  if (least >= low && most <= high) return ClaimVerdict::holds;
+  return most < low || least > high ? ClaimVerdict::fails : ClaimVerdict::open;
 }
 
 std::string claimed_text(const Claim& claim) {
@@ -99,7 +99,7 @@ std::string measured_text(const Claim& claim, const Measured& measured) {
 
 struct Judged {
   std::string claimed, measured;
-  Verdict verdict;
+  ClaimVerdict verdict;
 };
 
 Json claim_json(const Claim& c, const Measured& number, const Judged& judged) {
