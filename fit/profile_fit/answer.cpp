@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/profile_fit/measured_profile.hpp"
 #include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 
@@ -32,12 +33,6 @@ constexpr double widest_interval = 3.0;
 constexpr int bias_steps = 4;
 // The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
 constexpr double tail_density = 0.6;
-
-std::string number(double value, int digits = 3) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 std::string per_cent(double part) { return number(100.0 * part, 2) + " %"; }
 

@@ -9,7 +9,6 @@ namespace shakebed::pipelines {
 Json FrameGeometry::to_json() const {
   Json out;
   out["scale"] = quantity_json(scale, "m/px");
-  out["diameter"] = quantity_json(diameter, "m");
   out["floor"] = quantity_json(floor, "px");
   out["left_wall"] = quantity_json(left_wall, "px");
   out["right_wall"] = quantity_json(right_wall, "px");
@@ -28,7 +27,6 @@ FrameGeometry FrameGeometry::read(const std::filesystem::path& path) {
     return found->get<double>();
   };
   return {.scale = value("scale"),
-          .diameter = value("diameter"),
           .floor = value("floor"),
           .left_wall = value("left_wall"),
           .right_wall = value("right_wall"),

@@ -10,7 +10,6 @@ namespace shakebed::pipelines {
 // geometry.json beside rendered frames: where things are in them.
 struct FrameGeometry {
   double scale = 0;                      // [m/px]
-  double diameter = 0;                   // [m]
   double floor = 0;                      // row of the floor's mean position [px]
   double left_wall = 0, right_wall = 0;  // columns [px]
   double lowest = 0;                     // of any disk's centre [D]

@@ -262,12 +262,22 @@ class Reader {
 
 }  // namespace
 
+std::vector<StatedColumn> profile_columns(const std::string& origin) {
+  return {{"height", "D", "height above " + origin},
+          {"number_density", "1/D^2", "disks per area, in units of 1/D^2"},
+          {"std_error", "1/D^2", "standard error of number_density"},
+          {"area_fraction", "1", "fraction of the area covered by disks"},
+          {"samples", "1", "disk positions seen at this height"}};
+}
+
+std::vector<StatedColumn> covariance_columns() {
+  return {{"height_i", "D", "first height"},
+          {"height_j", "D", "second height, not below the first"},
+          {"covariance", "1/D^4", "covariance of the densities at the two heights"}};
+}
+
 void write_profile_csv(const std::filesystem::path& path, const ProfileTable& profile) {
-  Table table(profile.description, {{"height", "D", "height above " + profile.origin},
-                                    {"number_density", "1/D^2", "disks per area, in units of 1/D^2"},
-                                    {"std_error", "1/D^2", "standard error of number_density"},
-                                    {"area_fraction", "1", "fraction of the area covered by disks"},
-                                    {"samples", "1", "disk positions seen at this height"}});
+  Table table(profile.description, profile_columns(profile.origin));
   table.note("origin", profile.origin);
   if (profile.kernel)
     table.note("kernel", Json{{"kind", to_string(profile.kernel->kind)}, {"width", profile.kernel->width}});
@@ -313,10 +323,7 @@ ProfileCovariance read_covariance_csv(const std::filesystem::path& path, const P
 
 void write_covariance_csv(const std::filesystem::path& path, const std::vector<double>& heights,
                           const std::vector<double>& covariance, std::size_t independent_samples) {
-  Table table("covariance of number_density in profile.csv; pairs that are not listed: 0",
-              {{"height_i", "D", "first height"},
-               {"height_j", "D", "second height, not below the first"},
-               {"covariance", "1/D^4", "covariance of the densities at the two heights"}});
+  Table table("covariance of number_density in profile.csv; pairs that are not listed: 0", covariance_columns());
   table.note("independent_samples", independent_samples);
   const std::size_t n = heights.size();
   for (std::size_t i = 0; i < n; ++i)

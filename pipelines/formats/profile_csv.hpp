@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipelines/formats/results.hpp"
 #include "statistics/kernel.hpp"
 
 namespace shakebed::pipelines {
@@ -50,5 +51,9 @@ ProfileCovariance read_covariance_csv(const std::filesystem::path& path, const P
 // The covariance of rows first, first + 1, ... of `heights`, n x n, row by row.
 void write_covariance_csv(const std::filesystem::path& path, const std::vector<double>& heights,
                           const std::vector<double>& covariance, std::size_t independent_samples);
+
+// The columns of a density profile above `origin`, and those of a covariance between its heights.
+std::vector<StatedColumn> profile_columns(const std::string& origin = "the floor's mean position");
+std::vector<StatedColumn> covariance_columns();
 
 }  // namespace shakebed::pipelines

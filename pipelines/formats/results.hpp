@@ -39,7 +39,9 @@ struct StatedResult {
   bool may_be_null = false;
 };
 struct StatedColumn {
-  std::string name, unit, meaning;
+  std::string name;     // of letters, digits and '_'; ends in the unit where that is not D, m, g reduced or 1
+  std::string unit;     // "D", "1/D^2", "m g D", "px", "1" for a plain number, "" for words
+  std::string meaning;  // a noun phrase
   std::vector<std::string> values{};  // where only these texts stand in it
 };
 struct StatedTable {

@@ -36,22 +36,22 @@ void Table::add(std::vector<Cell> cells) {
 
 std::string Table::csv() const {
   std::string header;
-  for (const Column& column : columns_) header += (header.empty() ? "" : ",") + quoted_where_needed(column.name);
+  for (const StatedColumn& column : columns_) header += (header.empty() ? "" : ",") + quoted_where_needed(column.name);
   return header + '\n' + body_;
 }
 
 Json Table::metadata(std::string_view file_name) const {
   Json columns = Json::array();
-  for (const Column& column : columns_) {
+  for (const StatedColumn& column : columns_) {
     Json entry{{"name", column.name}, {"titles", column.name}};
-    if (!column.description.empty()) entry["dc:description"] = column.description;
+    if (!column.meaning.empty()) entry["dc:description"] = column.meaning;
     entry["datatype"] = column.unit.empty() ? "string" : "number";
     if (!column.unit.empty()) entry["schema:unitText"] = column.unit;
     columns.push_back(std::move(entry));
   }
   Json out{{"@context", "http://www.w3.org/ns/csvw"},
            {"url", file_name},
-           {"dc:description", description_},
+           {"dc:description", meaning_},
            {"tableSchema", Json{{"columns", std::move(columns)}}}};
   if (!notes_.empty()) out["notes"] = Json::array({notes_});
   return out;

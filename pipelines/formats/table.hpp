@@ -12,14 +12,9 @@
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/results.hpp"
 
 namespace shakebed::pipelines {
-
-struct Column {
-  std::string name;         // of letters, digits and '_'; ends in the unit where that is not D, m, g reduced or 1
-  std::string unit = "1";   // "D", "1/D^2", "m g D", "px", "" for words
-  std::string description;  // a noun phrase
-};
 
 // A number, a count or words, as text. A number that is not finite is an empty cell.
 class Cell {
@@ -37,8 +32,9 @@ class Cell {
 
 class Table {
  public:
-  Table(std::string description, std::vector<Column> columns)
-      : description_(std::move(description)), columns_(std::move(columns)) {}
+  Table(std::string meaning, std::vector<StatedColumn> columns)
+      : meaning_(std::move(meaning)), columns_(std::move(columns)) {}
+  explicit Table(const StatedTable& stated) : Table(stated.meaning, stated.columns) {}
 
   // What holds for the whole table: note("kernel", {{"kind", "gaussian"}, {"width", 0.5}}).
   void note(std::string_view key, Json value) { notes_[std::string(key)] = std::move(value); }
@@ -54,8 +50,8 @@ class Table {
   void write_atomically(const std::filesystem::path& path) const;
 
  private:
-  std::string description_;
-  std::vector<Column> columns_;
+  std::string meaning_;
+  std::vector<StatedColumn> columns_;
   Json notes_ = Json::object();
   std::string body_;
   std::size_t rows_ = 0;

@@ -101,6 +101,7 @@ class StageRun : public RunContext {
 
   const std::vector<Input>& inputs() const override { return inputs_; }
   std::uint64_t seed() const override { return stage_.seed; }
+  const ResultList& stated() const override { return *stage_.results; }
   int jobs() const override { return jobs_; }
   const fs::path& output_directory() const override { return directory_; }
   const fs::path& scratch() override {

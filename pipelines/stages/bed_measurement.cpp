@@ -50,53 +50,26 @@ void write_covariance(RunContext& context, const sim::Profile& profile, const st
   write_covariance_csv(context.output("covariance.csv"), heights, covariance, independent_blocks);
 }
 
-const Column layer_height{"height", "D", "middle of the layer above the floor's mean position"};
-
-Table layers_table(const sim::BedObserver& observer) {
-  Table table("layers of 1 D above the floor's mean position, lab frame, all phases together",
-              {layer_height,
-               {"temperature_x", "m g D", "m <v_x^2>"},
-               {"temperature_z", "m g D", "m <(v_z - mean of v_z)^2>, the mean of the phase taken off"},
-               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
-               {"share", "1", "fraction of all disks in the layer"},
-               {"spin_temperature", "m g D", "I <spin^2>"}});
+Table layers_table(Table table, const sim::BedObserver& observer) {
   for (const sim::BedObserver::Layer& layer : observer.layers())
     table.add({layer.height, layer.temperature_x, layer.temperature_z, layer.mean_velocity_z, layer.share,
                layer.spin_temperature});
   return table;
 }
 
-Table order_table(const sim::OrderObserver& order) {
-  Table table("order in layers of 1 D; neighbours are disks closer than (1 + sqrt 3)/2 contact distances",
-              {layer_height,
-               {"psi6", "1", "mean of |psi_6| of the layer's disks"},
-               {"neighbours", "1", "mean number of neighbours"},
-               {"share", "1", "fraction of all disks in the layer"}});
+Table order_table(Table table, const sim::OrderObserver& order) {
   for (const sim::OrderObserver::Layer& layer : order.layers())
     table.add({layer.height, layer.psi6_local, layer.neighbours, layer.share});
   return table;
 }
 
-Table rows_table(const sim::OrderObserver& order) {
-  Table table("rows of disks from the floor up, without the surface", {{"row", "1", "number of the row, from 1"},
-                                                                       {"height", "D", "mean height above the floor"},
-                                                                       {"disks", "1", "mean number of disks"}});
+Table rows_table(Table table, const sim::OrderObserver& order) {
   std::int64_t number = 0;
   for (const sim::OrderObserver::Row& row : order.rows()) table.add({++number, row.height, row.disks});
   return table;
 }
 
-Table velocities_table(const sim::VelocityObserver& velocities) {
-  Table table("layers of 1 D above the floor's mean position, lab frame, all phases together",
-              {layer_height,
-               {"number_density", "1/D^2", "disks per area"},
-               {"mean_velocity_x", "sqrt(g D)", "mean horizontal velocity"},
-               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
-               {"temperature_x", "m g D", "without the layer's mean velocity"},
-               {"temperature_z", "m g D", "without the layer's mean velocity"},
-               {"spin_temperature", "m g D", "I <spin^2>"},
-               {"a2", "1", "fourth cumulant of the velocities, 0 for a Maxwellian"},
-               {"samples", "1", "disks seen in the layer"}});
+Table velocities_table(Table table, const sim::VelocityObserver& velocities) {
   for (std::size_t k = 0; k < velocities.grid().count; ++k) {
     const sim::VelocityMoments layer = velocities.layer(k);
     if (layer.count == 0) continue;
@@ -107,12 +80,7 @@ Table velocities_table(const sim::VelocityObserver& velocities) {
   return table;
 }
 
-Table histogram_table(const sim::VelocityObserver& velocities) {
-  Table table("distribution of the velocities in units of sqrt(T/m); the outermost classes hold what lies beyond",
-              {{"velocity", "sqrt(T/m)", "middle of the class"},
-               {"density_x", "1/sqrt(T/m)", "probability density of v_x"},
-               {"density_z", "1/sqrt(T/m)", "probability density of v_z without the bed's mean"},
-               {"maxwellian", "1/sqrt(T/m)", "standard normal density"}});
+Table histogram_table(Table table, const sim::VelocityObserver& velocities) {
   table.note("temperature", velocities.histogram_unit() * velocities.histogram_unit());
   for (int bin = 0; bin < sim::VelocityObserver::histogram_bins; ++bin) {
     const double u = velocities.histogram_place(bin);
@@ -122,18 +90,7 @@ Table histogram_table(const sim::VelocityObserver& velocities) {
   return table;
 }
 
-Table phases_table(const sim::VelocityObserver& velocities, bool floor_frame) {
-  const char* frame = floor_frame ? "above the moving floor; velocities relative to the floor"
-                                  : "above the floor's mean position; velocities in the lab frame";
-  Table table(std::string("layers of 1 D by phase of the shaking, ") + frame,
-              {{"phase", "1", "phase in periods, 0 where the floor rises through its mean"},
-               {"height", "D", std::string("middle of the layer ") + frame},
-               {"number_density", "1/D^2", "disks per area"},
-               {"mean_velocity_x", "sqrt(g D)", "mean horizontal velocity"},
-               {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity"},
-               {"temperature_x", "m g D", "without the mean velocity of the layer at the phase"},
-               {"temperature_z", "m g D", "without the mean velocity of the layer at the phase"},
-               {"samples", "1", "disks seen in the layer at the phase"}});
+Table phases_table(Table table, const sim::VelocityObserver& velocities) {
   for (std::uint32_t phase = 0; phase < velocities.phases(); ++phase) {
     for (std::size_t k = 0; k < velocities.grid().count; ++k) {
       const sim::VelocityMoments& cell = velocities.cell(phase, k);
@@ -146,46 +103,21 @@ Table phases_table(const sim::VelocityObserver& velocities, bool floor_frame) {
   return table;
 }
 
-Table displacement_table(const sim::DisplacementObserver& displacement, double look) {
-  Table table("mean square displacements against the time between two looks",
-              {{"lag", "sqrt(D/g)", "time between the two looks"},
-               {"msd_x", "D^2", "mean square displacement in x"},
-               {"std_error_x", "D^2", "standard error of msd_x"},
-               {"msd_z", "D^2", "mean square displacement in z"},
-               {"std_error_z", "D^2", "standard error of msd_z"},
-               {"origins", "1", "pairs of looks"}});
+Table displacement_table(Table table, const sim::DisplacementObserver& displacement, double look) {
   for (const auto& lag : displacement.lags())
     table.add({static_cast<double>(lag.looks) * look, lag.x.value, lag.x.std_error, lag.z.value, lag.z.std_error,
                count_cell(lag.origins)});
   return table;
 }
 
-Table pressure_table(const sim::FlightObserver& flights) {
-  struct Quantity {
-    const char *name, *unit, *description;
-    sim::Measured sim::FlightObserver::Layer::*value;
-  };
-  using Layer = sim::FlightObserver::Layer;
-  const Quantity quantities[] = {
-      {"number_density", "1/D^2", "disks per area", &Layer::number_density},
-      {"temperature_x", "m g D", "m <v_x^2>", &Layer::temperature_x},
-      {"temperature_z", "m g D", "m <v_z^2> without the mean", &Layer::temperature_z},
-      {"mean_velocity_z", "sqrt(g D)", "mean vertical velocity", &Layer::mean_velocity_z},
-      {"pressure_zz", "m g/D", "vertical momentum flux, kinetic and by contacts", &Layer::pressure_zz},
-      {"pressure_xx", "m g/D", "horizontal momentum flux, kinetic and by contacts", &Layer::pressure_xx},
-      {"weight_above", "m g/D", "weight of the disks above, per width", &Layer::weight_above},
-      {"collision_rate", "sqrt(g/D)/D^2", "contacts between disks per area and time", &Layer::collision_rate}};
-  std::vector<Column> columns{layer_height};
-  for (const Quantity& q : quantities) {
-    columns.push_back({q.name, q.unit, q.description});
-    columns.push_back({std::string(q.name) + "_error", q.unit, std::string("standard error of ") + q.name});
-  }
-  Table table("exact averages over time along the trajectories, lab frame", columns);
+Table pressure_table(Table table, const sim::FlightObserver& flights) {
   for (const auto& layer : flights.layers()) {
     std::vector<Cell> cells{layer.height};
-    for (const Quantity& q : quantities) {
-      cells.emplace_back((layer.*q.value).value);
-      cells.emplace_back((layer.*q.value).std_error);
+    for (const sim::Measured& one :
+         {layer.number_density, layer.temperature_x, layer.temperature_z, layer.mean_velocity_z, layer.pressure_zz,
+          layer.pressure_xx, layer.weight_above, layer.collision_rate}) {
+      cells.emplace_back(one.value);
+      cells.emplace_back(one.std_error);
     }
     table.add(std::move(cells));
   }
@@ -337,22 +269,24 @@ void BedMeasurement::write(RunContext& context, bool frames) const {
   if (frames)
     write_profile(context, "profile_frames.csv", frames_.density(false),
                   "the floor's mean position, at the moments of the frames only");
-  layers_table(bed_).write(context.output("layers.csv"));
+  const auto write = [&](const char* file, const auto& fill, const auto&... from) {
+    fill(context.table(file), from...).write(context.output(file));
+  };
+  write("layers.csv", layers_table, bed_);
   if (order_) {
-    order_table(*order_).write(context.output("order.csv"));
-    rows_table(*order_).write(context.output("rows.csv"));
+    write("order.csv", order_table, *order_);
+    write("rows.csv", rows_table, *order_);
   }
   if (plan_.observe.velocities) {
-    velocities_table(*lab_).write(context.output("velocities.csv"));
-    histogram_table(*lab_).write(context.output("velocity_histogram.csv"));
+    write("velocities.csv", velocities_table, *lab_);
+    write("velocity_histogram.csv", histogram_table, *lab_);
   }
   if (plan_.observe.phases) {
-    phases_table(*lab_, false).write(context.output("phases.csv"));
-    if (floor_) phases_table(*floor_, true).write(context.output("phases_floor_frame.csv"));
+    write("phases.csv", phases_table, *lab_);
+    if (floor_) write("phases_floor_frame.csv", phases_table, *floor_);
   }
-  if (displacement_)
-    displacement_table(*displacement_, plan_.period / plan_.phases).write(context.output("displacement.csv"));
-  if (flights_) pressure_table(*flights_).write(context.output("pressure.csv"));
+  if (displacement_) write("displacement.csv", displacement_table, *displacement_, plan_.period / plan_.phases);
+  if (flights_) write("pressure.csv", pressure_table, *flights_);
 }
 
 }  // namespace shakebed::pipelines

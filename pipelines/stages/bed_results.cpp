@@ -14,6 +14,10 @@ class BedStatement {
         bed_(bed),
         heavy_(given_if(!bed.weightless, "the bed has gravity")),
         energy_(bed.weightless ? "T0" : "m g D"),
+        velocity_(bed.weightless ? "sqrt(T0/m)" : "sqrt(g D)"),
+        time_(bed.weightless ? "D sqrt(m/T0)" : "sqrt(D/g)"),
+        rate_(bed.weightless ? "sqrt(T0/m)/D" : "sqrt(g/D)"),
+        pressure_(bed.weightless ? "T0/D^2" : "m g/D"),
         length_(bed.reduced ? "D" : "m") {}
 
   void state() {
@@ -38,8 +42,7 @@ class BedStatement {
     temperature("temperature_z", "kinetic temperature upwards, without the mean velocity of the phase");
     temperature("temperature_z_local", "kinetic temperature upwards, without the mean velocity of layer and phase");
     temperature("spin_temperature", "temperature of the rotation");
-    list_.quantity("/collision_rate", bed_.weightless ? "sqrt(T0/m)/D" : "sqrt(g/D)",
-                   "contacts of a disk with others in a unit of time");
+    list_.quantity("/collision_rate", rate_, "contacts of a disk with others in a unit of time");
   }
 
   void heights() {
@@ -100,104 +103,116 @@ class BedStatement {
 
   void profiles() {
     list_.table({"profile.csv", "density profile above the floor's mean position", profile_columns()});
-    list_.table({"profile_floor_frame.csv", "density profile above the moving floor", profile_columns()});
+    list_.table(
+        {"profile_floor_frame.csv", "density profile above the moving floor", profile_columns("the moving floor")});
     list_.table({"profile_frames.csv", "density profile at the moments of the frames only", profile_columns(),
                  given_if(bed_.frames, "\"frames\" asks for some")});
     list_.table({"covariance.csv", "covariance of the densities of profile.csv", covariance_columns()});
   }
 
   void tables() {
-    const StatedColumn height{"height", "D", "middle of the layer"};
     list_.table({"layers.csv",
-                 "temperatures by layers of 1 D",
-                 {height,
-                  {"temperature_x", energy_, "kinetic temperature across"},
-                  {"temperature_z", energy_, "kinetic temperature upwards"},
-                  {"mean_velocity_z", "sqrt(g D)", "mean velocity upwards"},
-                  {"share", "1", "share of the disks"},
-                  {"spin_temperature", energy_, "temperature of the rotation"}}});
-    order_tables(height);
-    velocity_tables(height);
+                 "layers of 1 D above the floor's mean position, lab frame, all phases together",
+                 {layer_height_,
+                  {"temperature_x", energy_, "m <v_x^2>"},
+                  {"temperature_z", energy_, "m <(v_z - mean of v_z)^2>, the mean of the phase taken off"},
+                  {"mean_velocity_z", velocity_, "mean vertical velocity"},
+                  {"share", "1", "fraction of all disks in the layer"},
+                  {"spin_temperature", energy_, "I <spin^2>"}}});
+    order_tables();
+    velocity_tables();
     list_.table({"displacement.csv",
-                 "mean square displacements",
-                 {{"lag", "sqrt(D/g)", "time between two looks"},
-                  {"msd_x", "D^2", "mean square displacement across"},
-                  {"std_error_x", "D^2", "its standard error"},
-                  {"msd_z", "D^2", "mean square displacement upwards"},
-                  {"std_error_z", "D^2", "its standard error"},
+                 "mean square displacements against the time between two looks",
+                 {{"lag", time_, "time between the two looks"},
+                  {"msd_x", "D^2", "mean square displacement in x"},
+                  {"std_error_x", "D^2", "standard error of msd_x"},
+                  {"msd_z", "D^2", "mean square displacement in z"},
+                  {"std_error_z", "D^2", "standard error of msd_z"},
                   {"origins", "1", "pairs of looks"}},
                  observed(bed_.observe.displacement, "displacement")});
-    pressure_table(height);
+    pressure_table();
     list_.table({"schedule.csv",
-                 "means over the second half of each hold of the annealing",
-                 {{"step", "1", "number of the step"},
-                  {"bath_temperature", "m g D", "temperature of the bath"},
-                  {"temperature", "m g D", "kinetic temperature"},
-                  {"temperature_error", "m g D", "its standard error"},
+                 "annealing: means over the second half of each hold",
+                 {{"step", "1", "number of the step, from 0"},
+                  {"bath_temperature", energy_, "temperature of the reservoir"},
+                  {"temperature", energy_, "kinetic temperature of the disks"},
+                  {"temperature_error", energy_, "standard error of temperature"},
                   {"center_of_mass", "D", "height of the centre of mass"},
-                  {"center_of_mass_error", "D", "its standard error"}},
+                  {"center_of_mass_error", "D", "standard error of center_of_mass"}},
                  given_if(bed_.annealed, "there is a \"schedule\"")});
   }
 
-  void order_tables(const StatedColumn& height) {
+  void order_tables() {
     const Given order = observed(bed_.observe.order, "order");
     list_.table({"order.csv",
-                 "bond order by layers of 1 D",
-                 {height,
-                  {"psi6", "1", "mean of |psi_6|"},
-                  {"neighbours", "1", "neighbours of a disk"},
-                  {"share", "1", "share of the disks"}},
+                 "order in layers of 1 D; neighbours are disks closer than (1 + sqrt 3)/2 contact distances",
+                 {layer_height_,
+                  {"psi6", "1", "mean of |psi_6| of the layer's disks"},
+                  {"neighbours", "1", "mean number of neighbours"},
+                  {"share", "1", "fraction of all disks in the layer"}},
                  order});
     list_.table({"rows.csv",
-                 "rows of disks from the floor up",
-                 {{"row", "1", "number of the row"}, {"height", "D", "its height"}, {"disks", "1", "its disks"}},
+                 "rows of disks from the floor up, without the surface",
+                 {{"row", "1", "number of the row, from 1"},
+                  {"height", "D", "mean height above the floor"},
+                  {"disks", "1", "mean number of disks"}},
                  order});
   }
 
-  void velocity_tables(const StatedColumn& height) {
-    const Given velocities = observed(bed_.observe.velocities, "velocities");
-    const std::vector<StatedColumn> common{{"number_density", "1/D^2", "number density"},
-                                           {"mean_velocity_x", "sqrt(g D)", "mean velocity across"},
-                                           {"mean_velocity_z", "sqrt(g D)", "mean velocity upwards"},
-                                           {"temperature_x", energy_, "kinetic temperature across"},
-                                           {"temperature_z", energy_, "kinetic temperature upwards"}};
-    std::vector<StatedColumn> layers{height};
-    layers.insert(layers.end(), common.begin(), common.end());
-    std::vector<StatedColumn> phases = layers;
-    phases.insert(phases.begin(), {"phase", "1", "phase of the floor, 0 to 1"});
-    phases.push_back({"samples", "1", "disks seen"});
-    layers.push_back({"spin_temperature", energy_, "temperature of the rotation"});
-    layers.push_back({"a2", "1", "fourth cumulant of the velocities"});
-    layers.push_back({"samples", "1", "disks seen"});
-    list_.table({"velocities.csv", "velocities by layers of 1 D", layers, velocities});
-    list_.table({"velocity_histogram.csv",
-                 "histogram of the velocities",
-                 {{"velocity", "sqrt(T/m)", "middle of the bin"},
-                  {"density_x", "1/sqrt(T/m)", "probability density across"},
-                  {"density_z", "1/sqrt(T/m)", "probability density upwards"},
-                  {"maxwellian", "1/sqrt(T/m)", "that of a Maxwellian"}},
-                 velocities});
-    const Given by_phase = observed(bed_.observe.phases, "phases");
-    list_.table({"phases.csv", "velocities by phase and layer", phases, by_phase});
-    list_.table({"phases_floor_frame.csv", "velocities by phase and layer above the moving floor", phases,
-                 both(by_phase, given_if(bed_.shaken, "the floor moves"))});
+  // Moments of the velocities in cells of height, or of height and phase.
+  std::vector<StatedColumn> moments(const std::string& without) const {
+    return {{"number_density", "1/D^2", "disks per area"},
+            {"mean_velocity_x", velocity_, "mean horizontal velocity"},
+            {"mean_velocity_z", velocity_, "mean vertical velocity"},
+            {"temperature_x", energy_, "horizontal temperature without the mean velocity of " + without},
+            {"temperature_z", energy_, "vertical temperature without the mean velocity of " + without}};
   }
 
-  void pressure_table(const StatedColumn& height) {
-    std::vector<StatedColumn> columns{height};
-    const StatedColumn rows[] = {{"number_density", "1/D^2", "number density"},
-                                 {"temperature_x", energy_, "kinetic temperature across"},
-                                 {"temperature_z", energy_, "kinetic temperature upwards"},
-                                 {"mean_velocity_z", "sqrt(g D)", "mean velocity upwards"},
-                                 {"pressure_zz", "m g/D", "pressure upwards"},
-                                 {"pressure_xx", "m g/D", "pressure across"},
-                                 {"weight_above", "m g/D", "weight of what lies above"},
-                                 {"collision_rate", "sqrt(g/D)/D^2", "contacts in an area and unit of time"}};
-    for (const StatedColumn& row : rows) {
+  void velocity_tables() {
+    const Given velocities = observed(bed_.observe.velocities, "velocities");
+    std::vector<StatedColumn> layers = moments("the layer");
+    layers.insert(layers.begin(), layer_height_);
+    layers.push_back({"spin_temperature", energy_, "I <spin^2>"});
+    layers.push_back({"a2", "1", "fourth cumulant of the velocities, 0 for a Maxwellian"});
+    layers.push_back({"samples", "1", "disks seen in the layer"});
+    list_.table({"velocities.csv", "layers of 1 D above the floor's mean position, lab frame, all phases together",
+                 layers, velocities});
+    list_.table({"velocity_histogram.csv",
+                 "distribution of the velocities in units of sqrt(T/m); the outermost classes hold what lies beyond",
+                 {{"velocity", "sqrt(T/m)", "middle of the class"},
+                  {"density_x", "1/sqrt(T/m)", "probability density of v_x"},
+                  {"density_z", "1/sqrt(T/m)", "probability density of v_z without the bed's mean"},
+                  {"maxwellian", "1/sqrt(T/m)", "standard normal density"}},
+                 velocities});
+    const Given by_phase = observed(bed_.observe.phases, "phases");
+    phase_table("phases.csv", "above the floor's mean position; velocities in the lab frame", by_phase);
+    phase_table("phases_floor_frame.csv", "above the moving floor; velocities relative to the floor",
+                both(by_phase, given_if(bed_.shaken, "the floor moves")));
+  }
+
+  void phase_table(const std::string& file, const std::string& frame, const Given& given) {
+    std::vector<StatedColumn> columns = moments("the layer at the phase");
+    columns.insert(columns.begin(), {{"phase", "1", "phase in periods, 0 where the floor rises through its mean"},
+                                     {"height", "D", "middle of the layer " + frame}});
+    columns.push_back({"samples", "1", "disks seen in the layer at the phase"});
+    list_.table({file, "layers of 1 D by phase of the shaking, " + frame, columns, given});
+  }
+
+  void pressure_table() {
+    std::vector<StatedColumn> columns{layer_height_};
+    for (const StatedColumn& row : std::initializer_list<StatedColumn>{
+             {"number_density", "1/D^2", "disks per area"},
+             {"temperature_x", energy_, "m <v_x^2>"},
+             {"temperature_z", energy_, "m <v_z^2> without the mean"},
+             {"mean_velocity_z", velocity_, "mean vertical velocity"},
+             {"pressure_zz", pressure_, "vertical momentum flux, kinetic and by contacts"},
+             {"pressure_xx", pressure_, "horizontal momentum flux, kinetic and by contacts"},
+             {"weight_above", pressure_, "weight of the disks above, per width"},
+             {"collision_rate", rate_ + "/D^2", "contacts between disks per area and time"}}) {
       columns.push_back(row);
-      columns.push_back({row.name + "_error", row.unit, "its standard error"});
+      columns.push_back({row.name + "_error", row.unit, "standard error of " + row.name});
     }
-    list_.table({"pressure.csv", "pressure by height, exact averages over time", columns,
+    list_.table({"pressure.csv", "exact averages over time along the trajectories, lab frame", columns,
                  observed(bed_.observe.pressure, "pressure")});
   }
 
@@ -215,22 +230,11 @@ class BedStatement {
   ResultList& list_;
   const BedOutput& bed_;
   Given heavy_;
-  std::string energy_, length_;
+  std::string energy_, velocity_, time_, rate_, pressure_, length_;
+  StatedColumn layer_height_{"height", "D", "middle of the layer above the floor's mean position"};
 };
 
 }  // namespace
-
-std::vector<StatedColumn> profile_columns() {
-  return {{"height", "D", "height"},
-          {"number_density", "1/D^2", "number density n D^2"},
-          {"std_error", "1/D^2", "its standard error"},
-          {"area_fraction", "1", "covered share of the area"},
-          {"samples", "1", "disks counted"}};
-}
-
-std::vector<StatedColumn> covariance_columns() {
-  return {{"height_i", "D", "one height"}, {"height_j", "D", "another"}, {"covariance", "1/D^4", "of their densities"}};
-}
 
 void state_bed_results(ResultList& list, const BedOutput& bed) { BedStatement(list, bed).state(); }
 

@@ -16,9 +16,4 @@ struct BedOutput {
 };
 void state_bed_results(ResultList& list, const BedOutput& bed);
 
-// The columns of a density profile.
-std::vector<StatedColumn> profile_columns();
-// Those of a covariance between its heights.
-std::vector<StatedColumn> covariance_columns();
-
 }  // namespace shakebed::pipelines

@@ -73,16 +73,16 @@ class Claims : public Stage {
                 {{"claim", "", "what is claimed"},
                  {"measured_as", "", "what the number is"},
                  {"claimed", "", "the claim as a number or an interval"},
-                 {"measured", "", "the measured number, in its own unit"},
-                 {"std_error", "", "its standard error"},
+                 {"measured", "1", "the measured number, in its own unit"},
+                 {"std_error", "1", "its standard error, in that unit"},
                  {"verdict", "", "holds, open, does not hold, or not measured"},
                  {"place", "", "where the claim stands"}}});
   }
 
   void run(RunContext& context) const override {
     Json rows = Json::array();
-    std::string csv = "claim,measured_as,claimed,measured,std_error,verdict,place\n",
-                table = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
+    Table verdicts = context.table("claims.csv");
+    std::string table = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
     const auto cell = [](const std::string& text) {
       std::string out;
       for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
@@ -143,13 +143,7 @@ class Claims : public Stage {
       if (!c.note.empty()) row["note"] = c.note;
       row["number"] = c.pointer;
       rows.push_back(std::move(row));
-      const auto quoted = [](std::string text) {
-        for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
-        return "\"" + text + "\"";
-      };
-      csv += fmt::format("{},{},{},{},{},{},{}\n", quoted(c.claim), quoted(c.measured_as), quoted(claimed),
-                         std::isfinite(value) ? number_text(value) : "", error > 0 ? number_text(error) : "",
-                         name_of(verdict), quoted(c.place));
+      verdicts.add({c.claim, c.measured_as, claimed, value, error > 0 ? error : no_number, name_of(verdict), c.place});
       table += fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
                            c.measured_as.empty() ? "" : " (" + cell(c.measured_as) + ")", claimed, cell(measured),
                            name_of(verdict), c.note.empty() ? "" : ": " + cell(c.note), cell(c.place));
@@ -159,7 +153,7 @@ class Claims : public Stage {
                           "the interval of 95 % of the measured number (1.96 standard errors) lies within "
                           "what is claimed (holds), outside of it (does not hold), or in both (open)"},
                          {"claims", std::move(rows)}}));
-    write_file(context.output("claims.csv"), csv);
+    verdicts.write(context.output("claims.csv"));
     write_file(context.output("claims.md"), table);
   }
 

@@ -50,14 +50,15 @@ class Critical : public Stage {
     };
     state("T_c", density_, "temperature at which the bottom falls below the threshold");
     state("T_c_prime", order_, "temperature at which the bond order falls below the threshold");
-    list.table({"critical.csv",
-                "the temperatures",
-                {{"series", "", "series of the study"},
-                 {"quantity", "", "T_c or T_c_prime", {"T_c", "T_c_prime"}},
-                 {"threshold", "1", "threshold of the column"},
-                 {"temperature", unit_, "where it is crossed"},
-                 {"std_error", unit_, "its standard error"},
-                 {"status", "", "whether it is crossed"}}});
+    list.table(
+        {"critical.csv",
+         "temperatures at which a quantity crosses thresholds",
+         {{"series", "", "series of the study"},
+          {"quantity", "", "T_c: by the density of the bottom row; T_c_prime: by the order", {"T_c", "T_c_prime"}},
+          {"threshold", "1", "threshold of the quantity"},
+          {"temperature", unit_, "temperature of the crossing"},
+          {"std_error", unit_, "standard error of the temperature"},
+          {"status", "", "ok, or why there is no crossing"}}});
   }
 
   void run(RunContext& context) const override {
@@ -67,13 +68,7 @@ class Critical : public Stage {
       const std::string name = table.series(r);
       if (std::find(series.begin(), series.end(), name) == series.end()) series.push_back(name);
     }
-    Table crossings("temperatures at which a quantity crosses thresholds",
-                    {{"series", "", "series of the study"},
-                     {"quantity", "", "T_c: by the density of the bottom row; T_c_prime: by the order"},
-                     {"threshold", "1", "threshold of the quantity"},
-                     {"temperature", unit_, "temperature of the crossing"},
-                     {"std_error", unit_, "standard error of the temperature"},
-                     {"status", "", "ok, or why there is no crossing"}});
+    Table crossings = context.table("critical.csv");
     Json out;
     std::size_t found = 0, asked = 0;
     const auto look = [&](const char* name, const std::string& column, const std::vector<double>& thresholds) {

@@ -118,7 +118,7 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
   list.table({"frames.csv",
               "the frames read",
               {frame,
-               {"file", "", "file"},
+               {"image", "", "file that holds the frame"},
                {"page", "1", "page of the file"},
                {"status", "", "whether it was used"},
                {"disks", "1", "disks found"},

@@ -326,29 +326,15 @@ Json bootstrap_json(const fit::BootstrapResult& result, std::uint32_t resamples)
 
 // curve.csv (the model), residuals.csv (every height of the profile), windows.csv (temperature against window).
 void write_tables(RunContext& context, const fit::FitResult& result) {
-  const Column height{"height", "D", "height above the floor's mean position"};
-  Table curve("the fitted model " + result.model,
-              {height,
-               {"number_density", "1/D^2", "density of the model"},
-               {"smoothed_density", "1/D^2", "density of the model through the kernel of the measurement"}});
+  Table curve = context.table("curve.csv");
+  curve.note("model", result.model);
   for (const fit::CurvePoint& point : result.curve) curve.add({point.height, point.density, point.smoothed_density});
   curve.write(context.output("curve.csv"));
-  Table residuals("measured and fitted densities", {height,
-                                                    {"number_density", "1/D^2", "measured density"},
-                                                    {"std_error", "1/D^2", "standard error of the measured density"},
-                                                    {"model", "1/D^2", "fitted density through the kernel"},
-                                                    {"used", "1", "1 inside the window of the fit, else 0"}});
+  Table residuals = context.table("residuals.csv");
   for (const fit::Residual& r : result.residuals)
     residuals.add({r.height, r.density, r.std_error, r.model, count_cell(r.used ? 1 : 0)});
   residuals.write(context.output("residuals.csv"));
-  Table windows("fits in other windows", {{"low", "D", "lower end of the window"},
-                                          {"high", "D", "upper end of the window"},
-                                          {"bins", "1", "heights in the window"},
-                                          {"temperature", "m g D", "fitted temperature T"},
-                                          {"std_error", "m g D", "standard error of T"},
-                                          {"shift", "D", "fitted shift of the profile"},
-                                          {"chi2_per_dof", "1", "chi-square per degree of freedom"},
-                                          {"status", "", "ok, or why there is no fit"}});
+  Table windows = context.table("windows.csv");
   for (const fit::WindowFit& w : result.window_sweep)
     windows.add({w.low, w.high, count_cell(w.bins), w.temperature.value, w.temperature.std_error, w.shift.value,
                  w.chi2_per_dof, std::string(fit::to_string(w.status))});

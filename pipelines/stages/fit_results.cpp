@@ -158,29 +158,29 @@ class FitStatement {
   }
 
   void tables() {
-    const StatedColumn height{"height", "D", "height"};
+    const StatedColumn height{"height", "D", "height above the floor's mean position"};
     list_.table({"curve.csv",
-                 "the fitted curve",
+                 "the fitted model",
                  {height,
                   {"number_density", "1/D^2", "density of the model"},
-                  {"smoothed_density", "1/D^2", "the same through the kernel of the measurement"}}});
+                  {"smoothed_density", "1/D^2", "density of the model through the kernel of the measurement"}}});
     list_.table({"residuals.csv",
                  "measured and fitted densities",
                  {height,
                   {"number_density", "1/D^2", "measured density"},
-                  {"std_error", "1/D^2", "its standard error"},
-                  {"model", "1/D^2", "fitted density"},
-                  {"used", "1", "1 inside the window", {"0", "1"}}}});
+                  {"std_error", "1/D^2", "standard error of the measured density"},
+                  {"model", "1/D^2", "fitted density through the kernel"},
+                  {"used", "1", "1 inside the window of the fit, else 0", {"0", "1"}}}});
     list_.table({"windows.csv",
-                 "the temperature against the window",
-                 {{"low", "D", "lowest height"},
-                  {"high", "D", "highest height"},
-                  {"bins", "1", "heights used"},
-                  {"temperature", "m g D", "fitted temperature"},
-                  {"std_error", "m g D", "its standard error"},
-                  {"shift", "D", "fitted shift"},
-                  {"chi2_per_dof", "1", "chi2 over the degrees of freedom"},
-                  {"status", "", "whether the fit succeeded"}}});
+                 "fits in other windows",
+                 {{"low", "D", "lower end of the window"},
+                  {"high", "D", "upper end of the window"},
+                  {"bins", "1", "heights in the window"},
+                  {"temperature", "m g D", "fitted temperature T"},
+                  {"std_error", "m g D", "standard error of T"},
+                  {"shift", "D", "fitted shift of the profile"},
+                  {"chi2_per_dof", "1", "chi-square per degree of freedom"},
+                  {"status", "", "ok, or why there is no fit"}}});
   }
 
   ResultList& list_;

@@ -89,7 +89,7 @@ void render_frames(const RenderOptions& options, RunContext& context) {
   camera.gradient_x = options.gradient_x, camera.gradient_y = options.gradient_y, camera.vignette = options.vignette;
   camera.seed = context.seed();
   const ingest::FrameRenderer renderer(camera);
-  FrameGeometry geometry{.scale = options.scale, .diameter = bed.diameter};
+  FrameGeometry geometry{.scale = options.scale};
   geometry.left_wall = options.margin - 0.5;
   geometry.right_wall = geometry.left_wall + width * pixels_per_diameter;
   geometry.floor = camera.height - 0.5 - floor_depth;
@@ -208,10 +208,10 @@ ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::
 
 // The columns of disks.csv and disk_details.csv, whose rows are written frame by frame.
 void describe_tables(RunContext& context) {
-  const std::vector<Column> place{{"frame", "1", "number of the frame, from 0"},
-                                  {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
-                                  {"y_px", "px", "centre, from the centre of the top-left pixel downwards"}};
-  std::vector<Column> disks = place, details = place;
+  const std::vector<StatedColumn> place{{"frame", "1", "number of the frame, from 0"},
+                                        {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
+                                        {"y_px", "px", "centre, from the centre of the top-left pixel downwards"}};
+  std::vector<StatedColumn> disks = place, details = place;
   disks.insert(disks.end(), {{"radius_px", "px", "radius"},
                              {"x", "D", "centre, from the left wall"},
                              {"z", "D", "height of the centre above the floor's mean position"},
@@ -427,7 +427,7 @@ Table bead_table(const ingest::FinderCalibration& finder) {
 Table frames_table(const std::vector<ingest::FrameReport>& frames) {
   Table table("what was found in each frame",
               {{"frame", "1", "number of the frame, from 0"},
-               {"file", "", "file that holds it"},
+               {"image", "", "file that holds the frame"},
                {"page", "1", "page of the file or frame of the film, from 0"},
                {"status", "", "good, nothing_found, unreadable or size_changed"},
                {"disks", "1", "disks found"},

@@ -75,7 +75,8 @@ class Infer : public Stage {
   // Those that are no farther from the target than the nearest, as far as the errors allow to tell.
   std::vector<const Point*> as_near(const std::vector<Point>& points, const Point& nearest) const;
   Json results_of(const std::vector<Point>& points) const;
-  Table points_table(const std::vector<Point>& points) const;
+  // infer.csv, row by row into the empty table.
+  Table points_table(Table table, const std::vector<Point>& points) const;
 
   SceneOptions bed_;
   double settle_ = 0, measure_ = 0;
@@ -323,28 +324,11 @@ void Infer::run(RunContext& context) const {
   if (failure) std::rethrow_exception(failure);
   for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
 
-  points_table(all).write(context.output("infer.csv"));
+  points_table(context.table("infer.csv"), all).write(context.output("infer.csv"));
   write_file(context.output("infer.json"), dump(results_of(all)));
 }
 
-Table Infer::points_table(const std::vector<Point>& points) const {
-  Table table("grid points: means over the beds of a point, with standard errors from the spread between them",
-              {{"restitution", "1", "of the beads"},
-               {"friction", "1", "of the beads"},
-               {"side_friction", "1", "of the sides"},
-               {"status", "", "of the fit"},
-               {"temperature", "m g D", "fitted temperature"},
-               {"temperature_error", "m g D", "standard error of temperature"},
-               {"solid_height", "D", "height of the solid"},
-               {"density", "1/D^2", "greatest density of the profile"},
-               {"density_error", "1/D^2", "standard error of density"},
-               {"temperature_x", "m g D", "kinetic temperature, horizontal"},
-               {"temperature_z", "m g D", "kinetic temperature, vertical"},
-               {"temperature_z_local", "m g D", "the same without the mean velocity of the layer"},
-               {"rise", "D", "rise of the centre of mass"},
-               {"distance", "1", "distance from the target"},
-               {"collisions", "1", "collisions of all beds of the point"},
-               {"distance_error", "1", "standard error of distance"}});
+Table Infer::points_table(Table table, const std::vector<Point>& points) const {
   table.note("beds_per_point", replicas_);
   for (const Point& p : points) {
     const bool near = std::isfinite(p.distance);
@@ -384,15 +368,24 @@ void Infer::results(ResultList& list) const {
   }
   for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error"})
     list.number(std::string("/as_near/#/") + key, "1", "a point that is as near as the nearest", found, true);
-  std::vector<StatedColumn> columns;
-  for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error", "collisions"})
-    columns.push_back({key, "1", "as in infer.json"});
-  columns.push_back({"status", "", "whether the fits succeeded"});
-  for (const char* key : {"temperature", "temperature_error", "temperature_x", "temperature_z", "temperature_z_local"})
-    columns.push_back({key, "m g D", "as in infer.json"});
-  for (const char* key : {"solid_height", "rise"}) columns.push_back({key, "D", "as in infer.json"});
-  for (const char* key : {"density", "density_error"}) columns.push_back({key, "1/D^2", "as in infer.json"});
-  list.table({"infer.csv", "the beds of every point", columns});
+  list.table({"infer.csv",
+              "grid points: means over the beds of a point, with standard errors from the spread between them",
+              {{"restitution", "1", "of the beads"},
+               {"friction", "1", "of the beads"},
+               {"side_friction", "1", "of the sides"},
+               {"status", "", "of the fit"},
+               {"temperature", "m g D", "fitted temperature"},
+               {"temperature_error", "m g D", "standard error of temperature"},
+               {"solid_height", "D", "height of the solid"},
+               {"density", "1/D^2", "greatest density of the profile"},
+               {"density_error", "1/D^2", "standard error of density"},
+               {"temperature_x", "m g D", "kinetic temperature, horizontal"},
+               {"temperature_z", "m g D", "kinetic temperature, vertical"},
+               {"temperature_z_local", "m g D", "the same without the mean velocity of the layer"},
+               {"rise", "D", "rise of the centre of mass"},
+               {"distance", "1", "distance from the target"},
+               {"collisions", "1", "collisions of all beds of the point"},
+               {"distance_error", "1", "standard error of distance"}}});
 }
 
 Json Infer::results_of(const std::vector<Point>& points) const {

@@ -138,15 +138,7 @@ class Map : public Stage {
       json["simulated"] = simulated(context, table, question, bead_restitution, bead_friction, json);
     }
     write_file(context.output("map.json"), dump(json));
-    Table readings("formulas that predict T/T_c from Gamma",
-                   {{"name", "", "name of the formula"},
-                    {"jump_height", "", "definition of the jump height of a single ball"},
-                    {"expansion", "", "relation between the rise of the bed and T"},
-                    {"constants", "", "constants of the theory that it uses"},
-                    {"jump", "D", "jump height of a single ball"},
-                    {"rise", "D", "rise of the centre of mass"},
-                    {"reduced_temperature", "1", "T/T_c"},
-                    {"in_range", "1", "1 where the formula applies at this Gamma, else 0"}});
+    Table readings = context.table("map.csv");
     std::size_t in_range = 0;
     for (const Json& row : json["readings"]) {
       const auto value = [&](const char* key) {
@@ -182,15 +174,15 @@ class Map : public Stage {
     list.quantity(row + "gamma_of_measured_temperature", "1", "Gamma that the fitted temperature asks for", measured,
                   true);
     list.table({"map.csv",
-                "Gamma to T/T_c by every reading",
-                {{"name", "", "name of the reading"},
-                 {"jump_height", "", "how the jump height follows from Gamma"},
-                 {"expansion", "", "how the expansion follows from T"},
-                 {"constants", "", "whose constants"},
+                "formulas that predict T/T_c from Gamma",
+                {{"name", "", "name of the formula"},
+                 {"jump_height", "", "definition of the jump height of a single ball"},
+                 {"expansion", "", "relation between the rise of the bed and T"},
+                 {"constants", "", "constants of the theory that it uses"},
                  {"jump", "D", "jump height of a single ball"},
                  {"rise", "D", "rise of the centre of mass"},
                  {"reduced_temperature", "1", "T/T_c"},
-                 {"in_range", "1", "1 where its formula applies at this Gamma, else 0", {"0", "1"}}}});
+                 {"in_range", "1", "1 where the formula applies at this Gamma, else 0", {"0", "1"}}}});
   }
 
   void state_simulated(ResultList& list) const {

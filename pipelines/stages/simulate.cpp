@@ -599,13 +599,7 @@ class Simulate::Run {
   }
 
   Table schedule_table() const {
-    Table table("annealing: means over the second half of each hold",
-                {{"step", "1", "number of the step, from 0"},
-                 {"bath_temperature", "m g D", "temperature of the reservoir"},
-                 {"temperature", "m g D", "kinetic temperature of the disks"},
-                 {"temperature_error", "m g D", "standard error of temperature"},
-                 {"center_of_mass", "D", "height of the centre of mass"},
-                 {"center_of_mass_error", "D", "standard error of center_of_mass"}});
+    Table table = context_.table("schedule.csv");
     for (std::size_t k = 0; k < step_means_.size(); ++k) {
       const sim::BlockedMean& means = step_means_[k];
       const bool seen = means.samples() > 0;
@@ -681,7 +675,7 @@ Json joined(const std::vector<Json>& results) {
 }
 
 Table replicas_table(const std::vector<Json>& results) {
-  std::vector<Column> columns{{"replica", "1", "number of the replica, from 0"}};
+  std::vector<StatedColumn> columns{{"replica", "1", "number of the replica, from 0"}};
   for (const auto& [key, value] : results.front().items())
     if (value.is_object() && value.contains("std_error"))
       columns.push_back({key, value.value("unit", std::string("1")), key + " of the replica"});

@@ -22,6 +22,12 @@ bool Input::has(std::string_view name) const {
 
 Json Input::result() const { return read_json(file(result_name)); }
 
+Table RunContext::table(std::string_view file) const {
+  const StatedTable* found = stated().find_table(file);
+  if (found == nullptr) throw std::logic_error(fmt::format("results() does not state {}", file));
+  return Table(*found);
+}
+
 const Input* RunContext::find_input(std::string_view kind) const {
   const auto found = inputs_of(kind);
   return found.empty() ? nullptr : found.front();

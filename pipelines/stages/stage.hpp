@@ -72,6 +72,8 @@
 #include "pipelines/formats/config.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/results.hpp"
+#include "pipelines/formats/table.hpp"
 
 namespace shakebed::pipelines {
 
@@ -97,7 +99,8 @@ class RunContext {
   // --- what goes in
   virtual const std::vector<Input>& inputs() const = 0;  // in the order of "from"
   virtual std::uint64_t seed() const = 0;
-  virtual int jobs() const = 0;  // threads it may use; the result must not depend on it
+  virtual const ResultList& stated() const = 0;  // what results() stated of this stage
+  virtual int jobs() const = 0;                  // threads it may use; the result must not depend on it
   // The only input of one of these kinds. Throws InputError if there is none or more than one.
   const Input& input(std::string_view kind) const;
   const Input* find_input(std::string_view kind) const;  // nullptr if none
@@ -106,6 +109,8 @@ class RunContext {
   // --- what comes out
   virtual const std::filesystem::path& output_directory() const = 0;
   std::filesystem::path output(std::string_view name) const { return output_directory() / name; }
+  // An empty table with the columns that results() states for this file.
+  Table table(std::string_view file) const;
   // A folder for what must outlive a kill -9, Ctrl-C or an error: checkpoints. The same work (code, options, seed,
   // inputs' bytes) started again under the same OUT finds the same folder with what was left in it;
   // other work never does. It is made on the first call, may be read from any thread, and is removed when the stage has

@@ -242,9 +242,13 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
 }
 
 void Study::results(ResultList& list) const {
+  bool scaled_values = parameter_.times != 1;  // then they are in a unit of the user's own
+  for (const auto& [name, change] : series_) scaled_values |= change.times.value_or(1) != 1;
+  const std::string unit_of_values = scaled_values || parameter_.unit.empty() ? "1" : parameter_.unit;
   std::vector<std::string> names;
   for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) names.push_back(series_name(k));
-  std::vector<StatedColumn> columns{{"series", "", "kind of bed", names}, {parameter_.name, "", "what is varied"}};
+  std::vector<StatedColumn> columns{{"series", "", "kind of bed", names},
+                                    {parameter_.name, unit_of_values, "what is varied"}};
   std::vector<StatedColumn> runs = columns;
   runs.push_back({"replica", "1", "number of the run"});
   list.number("/replicas", "1", "runs at every point");
@@ -256,7 +260,7 @@ void Study::results(ResultList& list) const {
         stage == nullptr ? nullptr
                          : stage->results->find(collected.at.substr(1 + escape_pointer_token(tokens.front()).size()));
     const bool scaled = collected.times != 1 || collected.plus != 0;
-    const std::string unit = number == nullptr || scaled ? "" : number->unit;
+    const std::string unit = number == nullptr || scaled ? "1" : number->unit;  // scaled: in a unit of its own
     const std::string meaning = number == nullptr ? "" : number->meaning;
     columns.push_back({name, unit, meaning});
     columns.push_back({name + "_error", unit, "its standard error"});
@@ -265,7 +269,7 @@ void Study::results(ResultList& list) const {
       list.quantity(pointer_join(pointer_join("/series", one) + "/#", name), unit, meaning, {}, true);
   }
   for (const std::string& one : names)
-    list.number(pointer_join(pointer_join("/series", one) + "/#", parameter_.name), "", "what is varied");
+    list.number(pointer_join(pointer_join("/series", one) + "/#", parameter_.name), unit_of_values, "what is varied");
   list.table({"table.csv", "means over the runs of each point", columns});
   list.table({"replicas.csv", "the numbers of each run", runs});
   for (const auto& [name, table] : tables_) {
@@ -380,13 +384,7 @@ Json Study::run_once(RunContext& context, const Point& point, const fs::path& fo
 
 // A table with the meaning and unit of its columns beside it, as results() states them.
 void Study::write_described(RunContext& context, const std::string& file, const std::string& csv) const {
-  ResultList stated;
-  results(stated);
-  std::vector<Column> columns;
-  for (const StatedColumn& column : stated.find_table(file)->columns)
-    columns.push_back(
-        {column.name, column.unit.empty() && column.name != "series" ? "1" : column.unit, column.meaning});
-  Table described(stated.find_table(file)->meaning, columns);
+  Table described = context.table(file);
   described.note("runs_per_point", replicas_);
   write_file(context.output(file), csv);
   write_file(metadata_path(context.output(file)), dump(described.metadata(file)));

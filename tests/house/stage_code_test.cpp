@@ -19,12 +19,8 @@
 namespace {
 
 namespace fs = std::filesystem;
+using shakebed::tests::text_of;
 using testing::IsEmpty;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream stream(path);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 // stage_code.cmake, run on a tree: stage → fingerprint, stage → files.
 struct StageCode {

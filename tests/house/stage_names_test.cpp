@@ -9,14 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "tests/house/temporary_folder.hpp"
+
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream stream(path);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
+using shakebed::tests::text_of;
 
 // Of every pipelines/stages/<name>.cpp with a row.
 std::vector<std::string> stage_names(const fs::path& root) {

@@ -27,7 +27,7 @@ Camera camera_of(int width, int height) {
   return camera;
 }
 
-std::vector<RenderedDisk> bed_of(double radius, int width, int height, int rows, int gas) {
+std::vector<RenderedDisk> rows_and_gas(double radius, int width, int height, int rows, int gas) {
   SyntheticBed bed;
   bed.left_wall_px = 6;
   bed.right_wall_px = width - 6.5;
@@ -104,7 +104,7 @@ TEST(HardCases, DisksOfThreeHundredPixels) {
 }
 
 TEST(HardCases, SaturatedUnderExposedAndFaint) {
-  const auto truth = bed_of(10, 360, 360, 6, 50);
+  const auto truth = rows_and_gas(10, 360, 360, 6, 50);
   for (const auto& [background, bead] : {std::pair{330.0, 90.0}, {26.0, 4.0}, {140.0, 126.0}}) {
     Camera camera = camera_of(360, 360);
     camera.background_level = background;
@@ -117,7 +117,7 @@ TEST(HardCases, SaturatedUnderExposedAndFaint) {
 }
 
 TEST(HardCases, LightFallingByFourFifths) {
-  const auto truth = bed_of(10, 500, 400, 7, 80);
+  const auto truth = rows_and_gas(10, 500, 400, 7, 80);
   Camera camera = camera_of(500, 400);
   camera.gradient_x = 0.8;
   camera.vignette = 0.3;
@@ -127,7 +127,7 @@ TEST(HardCases, LightFallingByFourFifths) {
 }
 
 TEST(HardCases, StreaksOfHalfADiameter) {
-  auto truth = bed_of(10, 400, 400, 0, 90);
+  auto truth = rows_and_gas(10, 400, 400, 0, 90);
   RandomStream random(5);
   for (RenderedDisk& disk : truth) {
     const double angle = 2 * std::numbers::pi * random.uniform();
@@ -142,7 +142,7 @@ TEST(HardCases, StreaksOfHalfADiameter) {
 }
 
 TEST(HardCases, DustOnTheGlass) {
-  const auto truth = bed_of(10, 400, 400, 6, 60);
+  const auto truth = rows_and_gas(10, 400, 400, 6, 60);
   Camera camera = camera_of(400, 400);
   camera.dust_fraction = 0.05;
   const test::Score score = found_in(truth, camera);
@@ -151,7 +151,7 @@ TEST(HardCases, DustOnTheGlass) {
 }
 
 TEST(HardCases, JpegArtefacts) {
-  const auto truth = bed_of(10, 400, 400, 6, 60);
+  const auto truth = rows_and_gas(10, 400, 400, 6, 60);
   Camera camera = camera_of(400, 400);
   camera.jpeg_quality = 60;
   const test::Score score = found_in(truth, camera);
@@ -210,7 +210,7 @@ TEST(HardCases, AFrameAroundTheBedHidesNoBeadAndIsNone) {
 // Spheres lit from the upper left, the far side at a third of the light; what the eye takes for the middle of a bead is
 // a sixth of a radius off.
 TEST(HardCases, BeadsLitFromOneSideAreWhereTheirOutlineIs) {
-  const std::vector<RenderedDisk> truth = bed_of(10, 400, 400, 6, 60);
+  const std::vector<RenderedDisk> truth = rows_and_gas(10, 400, 400, 6, 60);
   GrayFrame frame;
   frame.width = frame.height = 400;
   RandomStream random(5);
@@ -238,7 +238,7 @@ TEST(HardCases, BeadsLitFromOneSideAreWhereTheirOutlineIs) {
 }
 
 TEST(HardCases, BedTurnedByThreeDegreesGivesItsTilt) {
-  auto truth = bed_of(10, 500, 400, 7, 60);
+  auto truth = rows_and_gas(10, 500, 400, 7, 60);
   const double angle = 3 * std::numbers::pi / 180;
   for (RenderedDisk& disk : truth) {
     const double x = disk.x_px - 250, y = disk.y_px - 230;
@@ -301,7 +301,7 @@ TEST(HardCases, MalformedFrameIsAnError) {
 }
 
 TEST(HardCases, AFilmWhoseSizeChangesIsReported) {
-  const auto truth = bed_of(10, 300, 300, 5, 20);
+  const auto truth = rows_and_gas(10, 300, 300, 5, 20);
   const GrayFrame large = render_frame(truth, camera_of(300, 300)), other = render_frame(truth, camera_of(310, 300));
   FrameSource source = FrameSource::from_frames({large, other, large});
   MeasureOptions options;

@@ -43,6 +43,10 @@ const Refused refused[] = {
     {"study-of-a-misspelled-number", 14, "/stages/0/collect/T/at", "Did you mean \"/bed/temperature_x\"?"},
     {"chart-of-a-series-that-is-not-there", 18, "/stages/1/charts/0/points/0/where/series", "Did you mean \"e09\"?"},
     {"gamma-and-amplitude", 8, "/stages/0/floor/gamma", "both \"amplitude\" and \"gamma\" are given"},
+    {"extract-with-another-diameter", 11, "/stages/2/diameter", "is 0.0029 m here, but 0.003 m in stage \"bed\""},
+    {"fit-with-another-diameter", 12, "/stages/3/diameter", "is 0.0031 m here, but 0.003 m in stage \"bed\""},
+    {"map-with-another-frequency", 13, "/stages/4/frequency", "is 21 Hz here, but 20 Hz in stage \"bed\""},
+    {"kernel-with-a-hyphen", 11, "/stages/2/kernel/kind", "Did you mean \"top_hat\"?"},
     {"gamma-without-frequency", 7, "/stages/0/floor/frequency", "\"frequency\" is missing"},
 };
 

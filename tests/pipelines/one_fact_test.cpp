@@ -40,27 +40,13 @@ class OneFact : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(OneFact, AnotherDiameterThanTheBedsIsRefusedWithBothPlacesNamed) {
-  for (const std::string command : {"validate", "run"}) {
-    const ProgramResult refused = run(photographed_bed(R"(, "diameter": "2.9 mm")"), {command, "r.json"});
-    EXPECT_EQ(refused.exit_code, 3) << command;
-    EXPECT_THAT(refused.err, HasSubstr("r.json:6:")) << "the line of the later statement";
-    EXPECT_THAT(refused.err,
-                HasSubstr("/stages/2/diameter: is 0.0029 m here, but 0.003 m in stage \"bed\" (/stages/0)"));
-    EXPECT_FALSE(fs::exists(folder_ / "results"));
-  }
-}
-
-TEST_F(OneFact, AFitAndAMapMayNotContradictTheBedEither) {
+// Other contradictions: consistency_test.cpp.
+TEST_F(OneFact, AMapMayNotContradictTheBedsGammaOrGravity) {
   const auto error_of = [&](const std::string& fit, const std::string& more) {
     const ProgramResult refused = run(photographed_bed("", fit, more), {"validate", "r.json"});
     EXPECT_EQ(refused.exit_code, 3) << fit << more;
     return refused.err;
   };
-  EXPECT_THAT(error_of(R"(, "diameter": "3.1 mm")", ""),
-              HasSubstr("/stages/3/diameter: is 0.0031 m here, but 0.003 m in"));
-  EXPECT_THAT(error_of("", R"(, { "stage": "map", "from": "fit", "frequency": "21 Hz" })"),
-              HasSubstr("/stages/4/frequency: is 21 Hz here, but 20 Hz in stage \"bed\" (/stages/0)"));
   EXPECT_THAT(error_of("", R"(, { "stage": "map", "from": "fit", "gamma": 4 })"), HasSubstr("/stages/4/gamma: is 4"));
   EXPECT_THAT(error_of("", R"(, { "stage": "map", "from": "fit", "gravity": "1.62 m/s^2" })"),
               HasSubstr("but 9.81 m/s^2 in"));

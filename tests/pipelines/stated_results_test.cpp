@@ -8,6 +8,7 @@
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/runner/plan.hpp"
 #include "tests/pipelines/program.hpp"
 
@@ -102,9 +103,22 @@ class Comparison {
     each_csv_line(read_file(path), [&](const std::vector<std::string>& cells, std::size_t) {
       if (header.empty()) header = cells;
     });
-    for (const std::string& column : header)
-      if (misfit_of_column(*table, column))
-        fail("writes " + path.string() + " with the column " + column + ", which it does not state");
+    const Json metadata = read_json(metadata_path(path));
+    for (std::size_t i = 0; i < header.size(); ++i)
+      compare_column(*table, header[i], metadata["tableSchema"]["columns"][i], path.filename().string());
+  }
+
+  // The unit beside the table is the one stated, and so is the one at the end of a column's name.
+  void compare_column(const StatedTable& table, const std::string& name, const Json& described,
+                      const std::string& file) {
+    if (misfit_of_column(table, name)) return fail("writes " + file + " with the column " + name + ", unstated");
+    for (const StatedColumn& column : table.columns) {
+      if (column.name != name) continue;
+      const std::string unit = described.value("schema:unitText", "");
+      if (unit != column.unit)
+        fail("writes " + name + " of " + file + " in \"" + unit + "\", it states \"" + column.unit + "\"");
+      if (column.meaning.empty()) fail("says nothing of " + name + " of " + file);
+    }
   }
 
   const PlannedStage& stage_;
@@ -131,6 +145,33 @@ std::string quick(const std::string& text) {
   JsonNode document = *parse_json(text, "r.json", problems);
   apply_preset(document, "r.json", "quick");
   return dump(document.to_json());
+}
+
+// `shakebed reference`: a page for every stage, with every option of the schema and every number and column stated.
+TEST(Reference, HasAPageForEveryStage) {
+  ScratchFolder folder;
+  const std::string index = run_shakebed({"reference"}, folder.path()).out;
+  for (const StageRow& row : stage_table()) {
+    EXPECT_NE(index.find("| `" + std::string(row.name) + "` |"), std::string::npos) << row.name;
+    const ProgramResult page = run_shakebed({"reference", std::string(row.name)}, folder.path());
+    ASSERT_EQ(page.exit_code, 0) << row.name << page.err;
+    Json schema;
+    Fields fields = Fields::schema(schema);
+    row.make()->describe(fields);
+    for (const auto& [option, unused] : schema["properties"].items())
+      EXPECT_NE(page.out.find("| `" + option + "` |"), std::string::npos) << row.name << " " << option;
+    ResultList results;
+    row.make()->results(results);
+    for (const StatedResult& one : results.all())
+      EXPECT_NE(page.out.find("| `" + one.pointer + "` |"), std::string::npos) << row.name << one.pointer;
+    for (const StatedTable& table : results.tables())
+      for (const StatedColumn& column : table.columns)
+        EXPECT_NE(page.out.find("| `" + column.name + "` |", page.out.find("### " + table.file)), std::string::npos)
+            << row.name << " " << table.file << " " << column.name;
+  }
+  const ProgramResult mistyped = run_shakebed({"reference", "simulte"}, folder.path());
+  EXPECT_EQ(mistyped.exit_code, 2);
+  EXPECT_NE(mistyped.err.find("did you mean \"simulate\"?"), std::string::npos) << mistyped.err;
 }
 
 TEST(StatedResults, OfTheStarterRecipe) { compare(quick(shipped("starter.json"))); }

@@ -1,3 +1,4 @@
+// implements: pipelines/cli/commands.hpp
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -6,12 +7,17 @@
 #include <filesystem>
 
 #include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/program.hpp"
 #include "pipelines/formats/errors.hpp"
 
 namespace shakebed::pipelines {
 
-int command_bench(const Arguments& arguments) {
-  namespace fs = std::filesystem;
+namespace fs = std::filesystem;
+
+namespace {
+
+// Becomes the program shakebed-bench, with what stands behind "bench" on the command line.
+int bench(const Call& call) {
   std::error_code error;
   const fs::path here = fs::read_symlink("/proc/self/exe", error).parent_path();
   for (const fs::path& place : {here / SHAKEBED_BENCH_FROM_PROGRAM, fs::path(SHAKEBED_BENCH_IN_BUILD)}) {
@@ -19,8 +25,8 @@ int command_bench(const Arguments& arguments) {
     std::vector<char*> words;
     std::string name = "shakebed bench";
     words.push_back(name.data());
-    for (std::size_t i = 2; i < arguments.command_line.size(); ++i)
-      words.push_back(const_cast<char*>(arguments.command_line[i].c_str()));
+    for (std::size_t i = 2; i < call.command_line.size(); ++i)
+      words.push_back(const_cast<char*>(call.command_line[i].c_str()));
     words.push_back(nullptr);
     ::execv(place.c_str(), words.data());
     throw StageError(fmt::format("{}: cannot be started: {}", place.string(), std::strerror(errno)));
@@ -28,6 +34,12 @@ int command_bench(const Arguments& arguments) {
   throw StageError(
       "the program shakebed-bench is not installed; build it with: cmake --build --preset release --target "
       "shakebed_bench");
+}
+
+}  // namespace
+
+void add_bench(Program& program) {
+  program.add_prefix({"bench", "speed against error, stage by stage, on this machine", ""}, bench);
 }
 
 }  // namespace shakebed::pipelines

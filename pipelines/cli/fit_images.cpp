@@ -1,0 +1,190 @@
+// implements: pipelines/cli/commands.hpp
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <numbers>
+
+#include "pipelines/cli/arguments.hpp"
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/run_plan.hpp"
+#include "pipelines/stages/images_module.hpp"
+#include "statistics/kernel.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* default_gravity = "9.81 m/s^2";
+const std::vector<std::string> polarities{"automatic", "dark", "bright"};
+const std::vector<std::string> channels{"automatic",          "red", "green", "blue", "grey", "saturation",
+                                        "background_distance"};
+
+struct ImageArguments {
+  RunArguments run;
+  std::vector<std::string> files;
+  std::string diameter;
+  std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity,
+      second_diameter, kernel, channel;
+  std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens, radius;
+  bool preview = false;
+  std::optional<std::uint64_t> bead_number;
+  std::vector<double> roi;
+};
+
+template <class Enum>
+Enum choice_of(const std::optional<std::string>& text, const std::vector<std::string>& names) {
+  return text ? static_cast<Enum>(std::find(names.begin(), names.end(), *text) - names.begin()) : Enum{};
+}
+
+int preview_images(const Call& call, const ImageArguments& image) {
+  PreviewRequest request{.files = image.files, .diameter = image.diameter, .options = {}, .folder = {}};
+  request.options.roi = image.roi;
+  request.options.radius = image.radius;
+  request.options.polarity = choice_of<BeadPolarity>(image.polarity, polarities);
+  request.options.channel = choice_of<BeadChannel>(image.channel, channels);
+  const fs::path folder = call.out.value_or("shakebed-preview");
+  fs::create_directories(folder);
+  request.folder = folder.string();
+  print(fmt::format("{}\nsee {}\n", images_module().preview(request), (folder / "preview.html").string()));
+  return exit_ok;
+}
+
+Json kernel_json(const std::string& text) {
+  const auto kernel = kernel_from(text);
+  if (!kernel || kernel->kind == KernelKind::none)
+    throw UsageError(
+        fmt::format("--kernel: expected gaussian:WIDTH, top_hat:WIDTH or disk_chord:WIDTH (in D), got \"{}\"", text));
+  return Json{{"kind", to_string(kernel->kind)}, {"width", kernel->width}};
+}
+
+Json extract_stage(const ImageArguments& image) {
+  Json stage{{"stage", "extract"},
+             {"id", "extract"},
+             {"images", Json::array()},
+             {"diameter", image.diameter},
+             {"overlays", 2}};
+  for (const std::string& file : image.files) stage["images"].push_back(fs::absolute(file).string());
+  const auto give = [&](const char* key, const auto& value) {
+    if (value) stage[key] = *value;
+  };
+  give("scale", image.scale), give("floor", image.floor);
+  give("left_wall", image.left_wall), give("right_wall", image.right_wall);
+  if (!image.roi.empty()) stage["roi"] = image.roi;
+  give("polarity", image.polarity), give("channel", image.channel), give("radius", image.radius);
+  give("second_diameter", image.second_diameter), give("gravity", image.gravity);
+  give("pixel_aspect", image.pixel_aspect), give("lens", image.lens), give("bead_number", image.bead_number);
+  if (image.kernel) stage["kernel"] = kernel_json(*image.kernel);
+  give("frame_rate", image.frame_rate);
+  if (image.frame_rate) give("frequency", image.frequency);
+  return stage;
+}
+
+// Gamma → T of the floor that was named.
+Json map_stage(const ImageArguments& image) {
+  const double frequency = quantity_argument("--frequency", *image.frequency, dimension::frequency);
+  const double amplitude = quantity_argument("--amplitude", *image.amplitude, dimension::length);
+  const double gravity =
+      quantity_argument("--gravity", image.gravity.value_or(default_gravity), dimension::acceleration);
+  require_positive("--frequency", frequency), require_positive("--amplitude", amplitude),
+      require_positive("--gravity", gravity);
+  const double omega = 2 * std::numbers::pi * frequency;
+  Json stage{{"stage", "map"},
+             {"from", Json::array({"fit", "extract"})},
+             {"gamma", amplitude * omega * omega / gravity},
+             {"frequency", *image.frequency}};
+  if (image.initial_height) {
+    const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
+    const double height = diameters_argument("--initial-height", *image.initial_height, diameter);
+    require_positive("--initial-height", height);
+    stage["initial_height"] = height;
+  }
+  return stage;
+}
+
+// The recipe that the options stand for.
+Json recipe_of(const ImageArguments& image) {
+  Json fit{{"stage", "fit"}, {"from", "extract"}, {"plateau_density", plateau_argument(image.plateau_density)}};
+  if (image.model) fit["model"] = *image.model;
+  Json recipe;
+  recipe["name"] = "fit-images";
+  recipe["stages"] = Json::array({extract_stage(image), fit});
+  recipe["stages"].push_back(Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}});
+  if (image.frequency && image.amplitude)
+    recipe["stages"].push_back(map_stage(image));
+  else if (image.amplitude)
+    throw UsageError("--amplitude: Gamma also needs --frequency");
+  recipe["report"] = Json{{"title", "A bed in photographs"},
+                          {"text",
+                           "Disks were found in the frames given, the scale follows from the bead's diameter, the "
+                           "profile is that of the disks' centres above the floor."}};
+  return recipe;
+}
+
+int fit_images(const Call& call, const ImageArguments& image) {
+  require_positive("--diameter", quantity_argument("--diameter", image.diameter, dimension::length));
+  if (image.preview) return preview_images(call, image);
+  return run_plan_command(
+      call, image.run,
+      read_recipe_text(dump(recipe_of(image)), "(command line)", fs::current_path(), changes_of(image.run)));
+}
+
+// What is in the picture.
+void add_picture_options(CLI::App& command, ImageArguments& image) {
+  command.add_option("files", image.files, "images, films, or folders of them")->required()->type_name("FILES");
+  command.add_option("--diameter", image.diameter, "diameter of a bead, with its unit: \"2.99 mm\"")->required();
+  command.add_option("--scale", image.scale, "length of a pixel: \"0.2 mm/px\" (default: found from the diameter)");
+  command.add_option("--floor", image.floor, "row of the floor in pixels from the top (default: found)");
+  command.add_option("--left-wall", image.left_wall, "column of the left wall in pixels (default: found)");
+  command.add_option("--right-wall", image.right_wall, "column of the right wall in pixels (default: found)");
+  command.add_option("--roi", image.roi, "region of interest in pixels: LEFT,TOP,WIDTH,HEIGHT")
+      ->delimiter(',')
+      ->expected(4);
+  command.add_option("--polarity", image.polarity, "automatic, dark or bright beads")->check(CLI::IsMember(polarities));
+  command.add_option("--radius", image.radius, "radius of a bead in pixels, good to a quarter (default: found)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--channel", image.channel, "part of a colour picture that is used (default: found)")
+      ->check(CLI::IsMember(channels));
+  command.add_flag("--preview", image.preview,
+                   "draw what would be found in the first frame, with the command for each alternative, and stop");
+  command.add_option("--second-diameter", image.second_diameter, "of beads of another size, to be found too");
+  command.add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
+  command.add_option("--lens", image.lens,
+                     "how far the lens moves the corners, in half diagonals, a barrel positive (default: found)");
+  command.add_option("--bead-number", image.bead_number, "how many beads there are in view, to be checked");
+}
+
+// What is known of the bed, and how it is measured.
+void add_bed_options(CLI::App& command, ImageArguments& image) {
+  command.add_option("--plateau-density", image.plateau_density, plateau_help);
+  command.add_option("--model", image.model, "model of the fit (default enskog-rectangle)");
+  command.add_option("--frequency", image.frequency,
+                     "of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
+  command.add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
+  command.add_option("--frame-rate", image.frame_rate,
+                     "of a film: \"500 Hz\": velocities; and profiles by phase if the bed shakes");
+  command.add_option("--kernel", image.kernel,
+                     "density is measured through: gaussian:0.5 (default), top_hat:1, disk_chord:1");
+  command.add_option("--initial-height", image.initial_height,
+                     "height mu of the bed at rest, in D or a length (default: from the beads counted between the "
+                     "walls)");
+  command.add_option("--gravity", image.gravity, "default \"9.81 m/s^2\"");
+}
+
+}  // namespace
+
+void add_fit_images(Program& program) {
+  const auto given = std::make_shared<ImageArguments>();
+  CLI::App& command =
+      program.add({"fit-images", "photographs or a film of your own → profile, temperature, report; no JSON needed",
+                   "  shakebed fit-images photos/*.tif --diameter \"6 mm\" --out o\n"
+                   "  shakebed fit-images film.mp4 --diameter \"2.99 mm\" --plateau-density 1.10"},
+                  [given](const Call& call) { return fit_images(call, *given); });
+  add_picture_options(command, *given);
+  add_bed_options(command, *given);
+  add_run_options(command, given->run);
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,83 @@
+// implements: pipelines/cli/commands.hpp
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "pipelines/cli/arguments.hpp"
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/program.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/stages/measured_profile.hpp"
+#include "pipelines/stages/theory.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+struct ProfileArguments {
+  std::string file;
+  std::optional<std::string> model, diameter, kernel;
+  std::optional<double> plateau_density, column_number;
+  bool plateau_density_free = false;
+  std::vector<double> window;
+};
+
+Kernel kernel_argument(const std::string& text) {
+  const auto kernel = kernel_from(text);
+  if (!kernel)
+    throw UsageError(fmt::format(
+        "--kernel: there is no kernel \"{}\"; write none, gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)",
+        text));
+  return *kernel;
+}
+
+fit::FitOptions options_of(const ProfileArguments& given, const MeasuredProfile& measured) {
+  fit::FitOptions options;
+  if (given.model) options.model = *given.model;
+  options.plateau_density = plateau_argument(given.plateau_density);
+  options.plateau_density_free = given.plateau_density_free;
+  options.column_number = given.column_number ? given.column_number : measured.column_number;
+  if (!given.window.empty()) options.window.low = given.window[0], options.window.high = given.window[1];
+  options.kernel = given.kernel ? kernel_argument(*given.kernel) : measured.kernel.value_or(Kernel{});
+  return options;
+}
+
+int fit_profile(const Call& call, const ProfileArguments& given) {
+  const MeasuredProfile measured = read_measured_profile(given.file);
+  const fit::FitOptions options = options_of(given, measured);
+  std::optional<double> diameter;
+  if (given.diameter) diameter = diameter_argument(*given.diameter);
+  const fit::FitResult result = fit::fit_profile(measured.profile, options);
+  if (result.status == fit::FitStatus::bad_input) throw InputError(fmt::format("{}: {}", given.file, result.message));
+  Json json = fit_json(result, diameter);
+  for (const std::string& warning : measured.warnings) json["warnings"].push_back(warning);
+  if (call.out) {
+    std::filesystem::create_directories(*call.out);
+    write_file_atomically(std::filesystem::path(*call.out) / "fit.json", dump(json));
+  }
+  print(call.json ? dump(json) : fit_text(json));
+  return result.ok() ? exit_ok : exit_stage_failed;
+}
+
+}  // namespace
+
+void add_fit_profile(Program& program) {
+  const auto given = std::make_shared<ProfileArguments>();
+  CLI::App& command = program.add({"fit-profile", "a density profile from anywhere → fit",
+                                   "  shakebed fit-profile profile.csv --plateau-density 1.10 --diameter \"2.99 mm\"\n"
+                                   "  shakebed fit-profile profile.csv --model hydrostatic:best-of --json"},
+                                  [given](const Call& call) { return fit_profile(call, *given); });
+  command.add_option("file", given->file, "CSV with height (in D) and number_density (n D^2); std_error if known")
+      ->required()
+      ->type_name("FILE.csv");
+  command.add_option("--model", given->model, "enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle");
+  command.add_option("--plateau-density", given->plateau_density, plateau_help);
+  command.add_flag("--plateau-density-free", given->plateau_density_free, "fit it too");
+  command.add_option("--diameter", given->diameter, "D, for T/(m g) as a length");
+  command.add_option("--column-number", given->column_number, "N D/W, for T_c");
+  command.add_option("--kernel", given->kernel,
+                     "what it was measured through: none, gaussian:0.5, top_hat:1, disk_chord:1 (default: as the file "
+                     "says)");
+  command.add_option("--window", given->window, "LOW,HIGH in D (default: found)")->delimiter(',')->expected(2);
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,73 @@
+// implements: pipelines/cli/commands.hpp
+#include <numbers>
+
+#include "pipelines/cli/arguments.hpp"
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/program.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/stages/theory.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+struct MapArguments {
+  std::optional<double> gamma, plateau_density;
+  double restitution = 0;
+  std::string frequency, diameter, initial_height, equation = "enskog";
+  std::optional<std::string> amplitude, gravity, temperature;
+};
+
+MapQuestion question_of(const MapArguments& given) {
+  MapQuestion question;
+  question.equation = given.equation;
+  question.plateau_density = plateau_argument(given.plateau_density);
+  question.frequency = quantity_argument("--frequency", given.frequency, dimension::frequency);
+  question.diameter = diameter_argument(given.diameter);
+  question.gravity = quantity_argument("--gravity", given.gravity.value_or("9.81 m/s^2"), dimension::acceleration);
+  require_positive("--frequency", question.frequency), require_positive("--gravity", question.gravity);
+  question.initial_height = diameters_argument("--initial-height", given.initial_height, question.diameter);
+  require_positive("--initial-height", question.initial_height);
+  if (given.restitution < 0 || given.restitution > 0.99) throw UsageError("--restitution: must be from 0 to 0.99");
+  question.restitution = given.restitution;
+  if (given.gamma.has_value() == given.amplitude.has_value())
+    throw UsageError("give --gamma or --amplitude, one of the two");
+  if (given.gamma) {
+    question.gamma = *given.gamma;
+  } else {
+    const double omega = 2 * std::numbers::pi * question.frequency;
+    question.gamma =
+        quantity_argument("--amplitude", *given.amplitude, dimension::length) * omega * omega / question.gravity;
+  }
+  require_positive("--gamma", question.gamma);
+  if (given.temperature)
+    question.measured_temperature = diameters_argument("--temperature", *given.temperature, question.diameter);
+  return question;
+}
+
+}  // namespace
+
+void add_map(Program& program) {
+  const auto given = std::make_shared<MapArguments>();
+  CLI::App& command =
+      program.add({"map", "Gamma → temperature, by every named reading",
+                   "  shakebed map --gamma 4 --frequency \"20 Hz\" --diameter \"2.99 mm\" --initial-height 10.2 "
+                   "--plateau-density 1.10"},
+                  [given](const Call& call) {
+                    const Json json = map_json(question_of(*given));
+                    print(call.json ? dump(json) : map_text(json));
+                    return exit_ok;
+                  });
+  command.add_option("--gamma", given->gamma, "peak acceleration in g");
+  command.add_option("--amplitude", given->amplitude, "of the floor, instead of --gamma");
+  command.add_option("--frequency", given->frequency, "of the floor")->required();
+  command.add_option("--diameter", given->diameter, "D")->required();
+  command.add_option("--initial-height", given->initial_height, initial_height_help)->required();
+  command.add_option("--plateau-density", given->plateau_density, plateau_help);
+  command.add_option("--gravity", given->gravity, "default \"9.81 m/s^2\"");
+  command.add_option("--restitution", given->restitution, "of the single ball (default 0: one flight of a dead ball)");
+  command.add_option("--eos", given->equation, "equation of state (default enskog)");
+  command.add_option("--temperature", given->temperature,
+                     "a measured T, mapped back to Gamma: T/(m g) as a length, or T in m g D");
+}
+
+}  // namespace shakebed::pipelines

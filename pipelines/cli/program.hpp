@@ -1,0 +1,45 @@
+// The program: its commands, and the options that all of them have. Each command is in a file of its own, which adds it
+// with its options, examples and work; shakebed.cpp lists them.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace shakebed::pipelines {
+
+// How a command was called.
+struct Call {
+  std::vector<std::string> command_line;  // all of it, "shakebed" first
+  std::optional<std::string> out;         // --out
+  bool json = false, quiet = false, verbose = false;
+};
+
+struct CommandText {
+  const char *name, *help, *examples;
+};
+
+class Program {
+ public:
+  Program(int argc, char** argv);
+  // A command below the program or below `parent`. `work` is called when it is chosen; it gives the exit code.
+  CLI::App& add(const CommandText& text, std::function<int(const Call&)> work, CLI::App* parent = nullptr);
+  // The same for a command that reads the rest of the command line itself.
+  CLI::App& add_prefix(const CommandText& text, std::function<int(const Call&)> work);
+  CLI::App& add_group(const char* name, const char* help);
+  // Reads the command line and does what it says. Throws Error.
+  int run();
+  CLI::App& app() { return app_; }
+
+ private:
+  void refuse_unknown_command() const;
+  int argc_;
+  char** argv_;
+  CLI::App app_;
+  Call call_;
+  std::function<int(const Call&)> chosen_;
+};
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,38 @@
+// implements: pipelines/cli/commands.hpp
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/run_plan.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+struct RecipeArguments {
+  std::string recipe;
+  RunArguments run;
+};
+
+void add(Program& program, const CommandText& text, bool dry) {
+  const auto given = std::make_shared<RecipeArguments>();
+  CLI::App& command = program.add(text, [given, dry](const Call& call) {
+    given->run.dry_run = given->run.dry_run || dry;
+    return run_plan_command(call, given->run, read_recipe(given->recipe, changes_of(given->run)));
+  });
+  command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
+  add_preset(command, given->run);
+  add_run_options(command, given->run);
+}
+
+}  // namespace
+
+void add_run(Program& program) {
+  add(program,
+      {"run", "run a pipeline",
+       "  shakebed run bed.json\n  shakebed run bed.json --set /stages/bed/floor/amplitude=\"3 mm\" --out o\n"
+       "  shakebed run bed.json --dry-run\n  shakebed run sweep.json --jobs 8 --shard 2/4"},
+      false);
+}
+
+void add_explain(Program& program) {
+  add(program, {"explain", "what a run would do, a sentence a stage", "  shakebed explain bed.json --out o"}, true);
+}
+
+}  // namespace shakebed::pipelines

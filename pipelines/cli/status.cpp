@@ -1,0 +1,111 @@
+// implements: pipelines/cli/commands.hpp
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipelines/cli/arguments.hpp"
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/program.hpp"
+#include "pipelines/formats/errors.hpp"
+#include "pipelines/runner/cache.hpp"
+#include "pipelines/runner/console.hpp"
+#include "pipelines/runner/folder_lock.hpp"
+#include "pipelines/runner/sweep.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+bool is_running(const fs::path& out) {
+  std::error_code error;
+  if (!fs::exists(out / ".lock", error)) return false;
+  try {
+    const FolderLock lock(out);
+    return false;
+  } catch (const StageError&) {
+    return true;
+  }
+}
+
+// Folder and what is known of the stage in it, by name.
+std::vector<std::pair<std::string, StageRecord>> records_in(const fs::path& out) {
+  std::vector<std::pair<std::string, StageRecord>> records;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out, error)) {
+    if (!entry.is_directory(error) || entry.is_symlink(error)) continue;
+    if (auto record = read_record(entry.path()))
+      records.emplace_back(entry.path().filename().string(), std::move(*record));
+  }
+  std::sort(records.begin(), records.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return records;
+}
+
+// Of one stage: for --json and for people.
+std::pair<Json, std::string> stage_status(const fs::path& out, const std::string& id, const StageRecord& record) {
+  std::uint64_t bytes = 0;
+  std::vector<std::string> damaged;
+  std::error_code error;
+  for (const Fingerprint& file : record.outputs) {
+    bytes += file.bytes;
+    if (fs::file_size(out / id / file.file, error) != file.bytes || error) damaged.push_back(file.file);
+  }
+  const std::optional<StageCost> cost = read_cost(out / id);
+  Json json{{"id", id},
+            {"stage", record.stage},
+            {"code", record.code},
+            {"wall_seconds", cost ? Json(cost->wall_seconds) : Json()},
+            {"files", record.outputs.size()},
+            {"bytes", bytes},
+            {"damaged", damaged}};
+  return {std::move(json), fmt::format("  {:<16} {:<10} {:>5} files {:>12} bytes  {:>10}{}\n", id, record.stage,
+                                       record.outputs.size(), bytes, cost ? duration_text(cost->wall_seconds) : "",
+                                       damaged.empty() ? "" : fmt::format("  damaged: {}", fmt::join(damaged, ", ")))};
+}
+
+int status(const Call& call, const fs::path& out) {
+  std::error_code error;
+  if (!fs::is_directory(out, error)) throw InputError(fmt::format("{}: there is no such folder", out.string()));
+  Json json;
+  json["folder"] = out.string();
+  json["running"] = is_running(out);
+  if (fs::is_regular_file(out / "manifest.json", error)) {
+    const Json manifest = read_json(out / "manifest.json");
+    for (const char* key : {"pipeline", "finished", "exit_code", "error", "wall_seconds"})
+      if (manifest.contains(key)) json[key] = manifest[key];
+  }
+  std::string text = fmt::format(
+      "{}: {}\n", out.string(),
+      json["running"].get<bool>() ? "running now"
+      : json.contains("exit_code")
+          ? fmt::format("finished {} with exit code {}", json.value("finished", ""), json.value("exit_code", 0))
+          : "no finished run");
+  json["stages"] = Json::array();
+  for (const auto& [id, record] : records_in(out)) {
+    auto [row, line] = stage_status(out, id, record);
+    json["stages"].push_back(std::move(row));
+    text += line;
+  }
+  if (json["stages"].empty()) text += "  no finished stage\n";
+  if (const Json sweep = sweep_status(out); !sweep.is_null()) {
+    json["sweep"] = sweep;
+    text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
+                        sweep["points"].get<std::uint64_t>(), sweep["failed"].get<std::uint64_t>());
+  }
+  print(call.json ? dump(json) : text);
+  return exit_ok;
+}
+
+}  // namespace
+
+void add_status(Program& program) {
+  const auto folder = std::make_shared<std::string>();
+  CLI::App& command = program.add({"status", "what a results folder holds", "  shakebed status results/bed"},
+                                  [folder](const Call& call) { return status(call, *folder); });
+  command.add_option("folder", *folder, "the results folder")->required()->type_name("DIR");
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,49 @@
+// implements: pipelines/cli/commands.hpp
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/run_plan.hpp"
+#include "pipelines/runner/slurm.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+struct SubmitArguments {
+  std::string recipe;
+  RunArguments run;
+  int shards = 1;
+  std::vector<std::string> options;
+};
+
+int submit(const Call& call, const SubmitArguments& given) {
+  const Plan plan = read_recipe(given.recipe, changes_of(given.run));
+  Console console(level_of(call));
+  SlurmOptions options;
+  options.shards = given.shards;
+  options.sbatch = given.options;
+  options.preset = given.run.preset;
+  options.settings = given.run.settings;
+  options.dry_run = given.run.dry_run;
+  options.json = call.json;
+  options.out = out_of(call, plan.name);
+  return submit_slurm(plan, options, console);
+}
+
+}  // namespace
+
+void add_submit(Program& program) {
+  CLI::App& group = program.add_group("submit", "hand a sweep to a cluster");
+  const auto given = std::make_shared<SubmitArguments>();
+  CLI::App& slurm = program.add(
+      {"slurm", "a Slurm job array over the points of a sweep, and a job that gathers",
+       "  shakebed submit slurm sweep.json --shards 100 --out o\n  shakebed submit slurm sweep.json "
+       "--shards 100 --sbatch=--partition=short --dry-run"},
+      [given](const Call& call) { return submit(call, *given); }, &group);
+  slurm.add_option("recipe", given->recipe, "a recipe with a sweep")->required()->type_name("FILE.json");
+  slurm.add_option("--shards", given->shards, "tasks of the array")->check(CLI::PositiveNumber);
+  slurm.add_option("--sbatch", given->options, "more options for sbatch, one each: --sbatch=--time=1:00:00")
+      ->type_name("OPTION");
+  add_preset(slurm, given->run);
+  slurm.add_option("--set", given->run.settings, "change the recipe")->type_name("POINTER=VALUE");
+  slurm.add_flag("--dry-run", given->run.dry_run, "write the scripts, submit nothing");
+}
+
+}  // namespace shakebed::pipelines
