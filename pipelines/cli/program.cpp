@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "pipelines/cli/command_pages.hpp"
 #include "pipelines/formats/errors.hpp"
@@ -68,7 +69,8 @@ void Program::refuse_unknown_command() const {
 }
 
 int Program::run() {
-  if (argc_ == 3 && std::string_view(argv_[1]) == "--write-command-pages") {  // for the install rules
+  // For the install rules: manual pages and completions.
+  if (argc_ == 3 && std::string_view(argv_[1]) == "--write-command-pages") {
     write_command_pages(app_, argv_[2]);
     return exit_ok;
   }
