@@ -276,11 +276,6 @@ std::vector<double> values_of(const std::optional<Doubles>& array) {
   return {array->data(), array->data() + array->size()};
 }
 
-struct FitRequest {
-  fit::Profile profile;
-  fit::FitOptions options;
-};
-
 fit::FitOptions fit_options(const py::dict& wanted) {
   fit::FitOptions out;
   const auto take = [&](const char* name, auto& value) {

@@ -1,5 +1,8 @@
 // The compiled half of the Python module that touches images: it alone loads OpenCV, when it is first used.
-#include <cmath>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <future>
 #include <optional>
 #include <stdexcept>
 
@@ -9,6 +12,8 @@
 namespace shakebed::python {
 
 namespace {
+
+constexpr std::chrono::milliseconds time_between_questions{50};
 
 ingest::Polarity polarity_named(const std::string& name) {
   if (name == "automatic") return ingest::Polarity::automatic;
@@ -135,23 +140,37 @@ py::dict table_of(const std::vector<ingest::MeasuredDisk>& disks) {
   return out;
 }
 
-// Runs `work` without the GIL; Ctrl-C and exceptions of the caller's progress function end it between frames.
+// Runs `work` on a thread of its own while this one waits: signals and the caller's progress function belong to the
+// thread that called. Ctrl-C and exceptions of that function end the work after the frame it is at.
 struct Stopped : std::exception {};
 ingest::BedFound measured(const std::function<ingest::BedFound(const ingest::MeasureOptions&)>& work,
                           const py::dict& wanted, py::object progress, std::size_t frames) {
   ingest::MeasureOptions options = measure_options(wanted);
-  Caller caller(std::move(progress));
+  std::atomic<std::size_t> frames_done{0};
+  std::atomic<bool> stop{false};
   options.progress = [&](std::size_t done) {
+    frames_done = done;
+    if (stop) throw Stopped();
+  };
+  Caller caller(std::move(progress));
+  const auto show = [&](std::size_t done) {
     if (frames > 0) caller.progress(static_cast<double>(done) / static_cast<double>(frames));
-    if (caller.stop()) throw Stopped();
   };
   ingest::BedFound found;
-  try {
+  {
     const py::gil_scoped_release release;
-    found = work(options);
-  } catch (const Stopped&) {
-    caller.raise_if_stopped();
+    std::future<ingest::BedFound> future = std::async(std::launch::async, [&] { return work(options); });
+    std::size_t shown = 0;
+    while (future.wait_for(time_between_questions) != std::future_status::ready) {
+      if (const std::size_t done = frames_done; done != shown) show(shown = done);
+      if (caller.stop()) stop = true;
+    }
+    try {
+      found = future.get();
+      show(frames_done);
+    } catch (const Stopped&) {}
   }
+  caller.raise_if_stopped();
   return found;
 }
 

@@ -101,16 +101,19 @@ BedFound refused(FindStatus status, std::string message) {
   return out;
 }
 
-std::string bad_options(const MeasureOptions& options) {
-  if (!(options.bead_diameter_m > 0) || !std::isfinite(options.bead_diameter_m))
-    return text_of("bead_diameter_m is %g; the diameter of a bead is needed, in m", options.bead_diameter_m);
-  if (!(options.bin_width > 0)) return text_of("bin_width is %g; it must be above 0", options.bin_width);
-  if (!kernel_is_valid(options.kernel) || options.kernel.kind == KernelKind::none)
-    return "the kernel must have a shape and a finite width: density is measured through a window";
-  return "";
-}
-
 }  // namespace
+
+std::vector<std::string> validate(const MeasureOptions& options) {
+  std::vector<std::string> problems;
+  if (!(options.bead_diameter_m > 0) || !std::isfinite(options.bead_diameter_m))
+    problems.push_back(
+        text_of("bead_diameter_m is %g; the diameter of a bead is needed, in m", options.bead_diameter_m));
+  if (!(options.bin_width > 0) || !std::isfinite(options.bin_width))
+    problems.push_back(text_of("bin_width is %g; it must be above 0", options.bin_width));
+  if (!kernel_is_valid(options.kernel) || options.kernel.kind == KernelKind::none)
+    problems.push_back("the kernel must have a shape and a finite width: density is measured through a window");
+  return problems;
+}
 
 GrayFrame frame_of(const ImageView& image) {
   if (image.width <= 0 || image.height <= 0 || image.pixels == nullptr)
@@ -207,8 +210,8 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
 
 BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions& options,
                      const FrameSourceOptions& source_options) {
-  if (const std::string problem = bad_options(options); !problem.empty())
-    return refused(FindStatus::bad_input, problem);
+  if (const auto problems = validate(options); !problems.empty())
+    return refused(FindStatus::bad_input, problems.front());
   MeasureOptions measure = options;
   FrameSourceOptions source = source_options;
   FrameSource names = FrameSource::open(paths, source);
@@ -235,8 +238,8 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
 
 BedFound measure_bed(std::vector<GrayFrame> frames, const MeasureOptions& options) {
   if (frames.empty()) return refused(FindStatus::bad_input, "there are no frames");
-  if (const std::string problem = bad_options(options); !problem.empty())
-    return refused(FindStatus::bad_input, problem);
+  if (const auto problems = validate(options); !problems.empty())
+    return refused(FindStatus::bad_input, problems.front());
   const FirstSurvey survey = survey_first(as_channels(frames.front()), options.find);
   if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
   MeasureOptions measure = options;

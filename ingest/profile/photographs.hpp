@@ -62,6 +62,9 @@ struct FirstSurvey {
 };
 FirstSurvey survey_first(const ChannelFrames& first, const FindOptions& options);
 
+// Why nothing can be measured with these options, one sentence each; empty when it can.
+std::vector<std::string> validate(const MeasureOptions& options);
+
 struct BedFound {
   FindStatus status = FindStatus::bad_input;
   std::string message;  // one sentence, unless ok

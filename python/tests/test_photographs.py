@@ -1,7 +1,12 @@
 """Disks in arrays and files."""
 
 import json
+import os
+import pathlib
+import signal
+import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -11,8 +16,6 @@ from conftest import SCENE, drawn_image, shakebed_program
 
 
 def test_importing_the_package_does_not_load_opencv():
-    import subprocess
-
     code = "import shakebed, sys; print('shakebed._images' in sys.modules, 'opencv' in open('/proc/self/maps').read())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.split() == ["False", "False"]
@@ -94,3 +97,28 @@ def test_errors_of_photographs(tmp_path):
         shakebed.measure_bed([np.full((80, 80), 100, np.uint8)], "3 mm")
     with pytest.raises(shakebed.UsageError):
         shakebed.measure_bed(drawn_image()[0][None], 0)
+
+
+def test_control_c_ends_a_measurement_on_several_threads():
+    code = (
+        "import sys, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
+        "frames = [drawn_image()[0]] * 1000\n"
+        "print('ready', flush=True)\n"
+        "try:\n    shakebed.measure_bed(frames, '3 mm', threads=2)\n"
+        "except KeyboardInterrupt:\n    sys.exit(42)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"ready\n"
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=30) == 42
+    process.stdout.close()
+
+
+def test_twelve_lines_go_from_photographs_to_a_plot(frames, tmp_path):
+    pytest.importorskip("matplotlib")
+    script = pathlib.Path(__file__).resolve().parents[2] / "examples" / "python" / "photographs_to_plot.py"
+    assert len([line for line in script.read_text().splitlines() if line.strip()]) <= 12
+    done = subprocess.run([sys.executable, script, frames[0], "3 mm"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "profile.png").read_bytes().startswith(b"\x89PNG")

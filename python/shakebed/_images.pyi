@@ -1,0 +1,39 @@
+# The compiled half that touches images. Users call shakebed/photographs.py.
+from typing import Any, Callable, Optional
+
+import numpy as np
+
+class Disks:
+    status: str
+    ok: bool
+    message: str
+    radius: float
+    radius_std_error: float
+    bright: bool
+    expected_wrong: float
+    warnings: list[str]
+    def columns(self) -> dict[str, np.ndarray]: ...
+    def brief(self) -> str: ...
+    def full(self) -> str: ...
+
+class Bed:
+    status: str
+    ok: bool
+    message: str
+    width: float
+    scale: float
+    radius: float
+    floor: float
+    frames: int
+    disks_a_frame: float
+    warnings: list[str]
+    def profile(self) -> dict[str, Any]: ...
+    def disks(self) -> dict[str, np.ndarray]: ...
+    def brief(self) -> str: ...
+    def full(self) -> str: ...
+
+def find_disks(image: np.ndarray, options: dict[str, Any]) -> Disks: ...
+def measure_arrays(
+    images: list[np.ndarray], options: dict[str, Any], progress: Optional[Callable[[float], None]]
+) -> Bed: ...
+def measure_files(paths: list[str], options: dict[str, Any], progress: Optional[Callable[[float], None]]) -> Bed: ...
