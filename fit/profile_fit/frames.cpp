@@ -88,94 +88,132 @@ FrameAverage average_frames(const ProfileFrames& frames) {
   return average;
 }
 
-BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& options,
-                              const BootstrapOptions& bootstrap) {
-  BootstrapResult result;
-  if (shape_is_good(frames, result.message)) {
-    if (frames.frames() < 2)
-      result.message = "there is one frame only";
-    else if (bootstrap.resamples < 10 || !(bootstrap.confidence > 0.0 && bootstrap.confidence < 1.0))
-      result.message = "at least 10 resamples and a confidence between 0 and 1 are needed";
-  }
-  if (!result.message.empty()) {
-    result.status = FitStatus::bad_input;
-    return result;
-  }
-  const Samples samples = samples_of(frames);
-  const std::size_t bins = frames.height.size(), count = frames.frames(), window = samples.windows.length;
-  result.window = static_cast<int>(window);
-  // Weighed by the scatter of single frames, which is well known. By errors from a few windows, what these happen to
-  // show little of would weigh much, and scatter little by the same windows.
+namespace {
+
+std::string why_no_bootstrap(const ProfileFrames& frames, const BootstrapOptions& bootstrap) {
+  std::string why;
+  if (!shape_is_good(frames, why)) return why;
+  if (frames.frames() < 2) return "there is one frame only";
+  if (bootstrap.resamples < 10 || !(bootstrap.confidence > 0.0 && bootstrap.confidence < 1.0))
+    return "at least 10 resamples and a confidence between 0 and 1 are needed";
+  return "";
+}
+
+// Weighed by the scatter of single frames, which is well known. By errors from a few windows, what these happen to
+// show little of would weigh much, and scatter little by the same windows.
+Profile weighed_profile(const ProfileFrames& frames, const Samples& samples) {
   Profile profile;
   profile.height = frames.height;
   profile.number_density = samples.mean;
-  const statistics::Windows single{1, 1, count};
-  for (std::size_t i = 0; i < bins; ++i)
+  const statistics::Windows single{1, 1, frames.frames()};
+  for (std::size_t i = 0; i < frames.height.size(); ++i)
     profile.std_error.push_back(std::sqrt(statistics::covariance_by_windows(samples.frames, i, i + 1, single).front()));
+  return profile;
+}
+
+// Mean densities of a resample: the mean of the frames, and each window's deviation times a normal variate.
+class Resampler {
+ public:
+  Resampler(const Samples& samples, std::uint64_t seed)
+      : samples_(samples),
+        generator_(seed),
+        // Of the sum over a window, so that the resamples' covariance is that by windows.
+        share_(std::sqrt(samples.windows.correction /
+                         statistics::window_divisor(samples.frames.size(), samples.windows.length))) {}
+
+  std::vector<double> densities() {
+    const std::size_t count = samples_.frames.size(), window = samples_.windows.length;
+    std::vector<double> before{0.0};  // the sum of the variates of the windows that begin before each frame
+    for (std::size_t w = 0; w < count; ++w)
+      before.push_back(before.back() + (w + window <= count ? share_ * normal(generator_) : 0.0));
+    std::vector<double> density = samples_.mean;
+    for (std::size_t f = 0; f < count; ++f) {
+      // Of all windows that the frame is in.
+      const double weight = before[f + 1] - before[f + 1 < window ? 0 : f + 1 - window];
+      for (std::size_t i = 0; i < density.size(); ++i)
+        density[i] += weight * (samples_.frames[f][i] - samples_.mean[i]);
+    }
+    return density;
+  }
+
+ private:
+  const Samples& samples_;
+  std::mt19937_64 generator_;
+  double share_;
+};
+
+// Between the sorted values.
+double quantile_of(const std::vector<double>& sorted, double fraction) {
+  const double position = fraction * static_cast<double>(sorted.size() - 1);
+  const auto i = static_cast<std::size_t>(position);
+  const double part = position - static_cast<double>(i);
+  return i + 1 < sorted.size() ? (1.0 - part) * sorted[i] + part * sorted[i + 1] : sorted.back();
+}
+
+double spread_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  const double mean = sum / static_cast<double>(values.size());
+  double variance = 0.0;
+  for (const double value : values) variance += (value - mean) * (value - mean);
+  return std::sqrt(variance / static_cast<double>(values.size() - 1));
+}
+
+// Percentiles about the centre, moved apart as Student's are from the normal ones: the windows are few.
+Interval interval_of(const std::vector<double>& sorted, double centre, double confidence, double degrees) {
+  const double upper = 0.5 * (1.0 + confidence);
+  const double apart = gsl_cdf_tdist_Pinv(upper, degrees) / gsl_cdf_ugaussian_Pinv(upper);
+  Interval interval;
+  interval.status = FitStatus::ok;
+  interval.confidence = confidence;
+  interval.low = centre + apart * (quantile_of(sorted, 1.0 - upper) - centre);
+  interval.high = centre + apart * (quantile_of(sorted, upper) - centre);
+  return interval;
+}
+
+}  // namespace
+
+BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& options,
+                              const BootstrapOptions& bootstrap) {
+  BootstrapResult result;
+  const auto refused = [&](FitStatus status, std::string why) {
+    result.status = status;
+    result.message = std::move(why);
+    return result;
+  };
+  if (std::string why = why_no_bootstrap(frames, bootstrap); !why.empty())
+    return refused(FitStatus::bad_input, std::move(why));
+  const Samples samples = samples_of(frames);
+  result.window = static_cast<int>(samples.windows.length);
+  Profile profile = weighed_profile(frames, samples);
   FitOptions plain = options;
   plain.interval = plain.sweep = plain.compare = false;
   plain.curve_points = 0;
   const FitResult whole = fit_profile(profile, plain);
-  if (!whole.ok()) {
-    result.status = whole.status;
-    result.message = whole.message;
-    return result;
-  }
+  if (!whole.ok()) return refused(whole.status, whole.message);
   // Every resample is fitted on the window of the whole sample.
   plain.window.low = whole.window_low;
   plain.window.high = whole.window_high;
-  std::mt19937_64 generator(bootstrap.seed);
-  std::vector<double> temperatures;
-  std::vector<double> shifts;
-  // Of the sum over a window, so that the resamples' covariance is that by windows.
-  const double share = std::sqrt(samples.windows.correction / statistics::window_divisor(count, window));
+  Resampler resampler(samples, bootstrap.seed);
+  std::vector<double> temperatures, shifts;
   for (int resample = 0; resample < bootstrap.resamples; ++resample) {
-    std::vector<double> before{0.0};  // the sum of the variates of the windows that begin before each frame
-    for (std::size_t w = 0; w < count; ++w)
-      before.push_back(before.back() + (w + window <= count ? share * normal(generator) : 0.0));
-    profile.number_density = samples.mean;
-    for (std::size_t f = 0; f < count; ++f) {
-      // Of all windows that the frame is in.
-      const double weight = before[f + 1] - before[f + 1 < window ? 0 : f + 1 - window];
-      for (std::size_t i = 0; i < bins; ++i)
-        profile.number_density[i] += weight * (samples.frames[f][i] - samples.mean[i]);
-    }
+    profile.number_density = resampler.densities();
     const FitResult fit = fit_profile(profile, plain);
     if (!fit.ok()) continue;
     temperatures.push_back(fit.temperature.value);
     shifts.push_back(fit.shift.value);
   }
   result.succeeded = static_cast<int>(temperatures.size());
-  if (result.succeeded < bootstrap.resamples / 2) {
-    result.status = FitStatus::not_converged;
-    result.message = "only " + std::to_string(result.succeeded) + " of the resamples could be fitted";
-    return result;
-  }
+  if (result.succeeded < bootstrap.resamples / 2)
+    return refused(FitStatus::not_converged,
+                   "only " + std::to_string(result.succeeded) + " of the resamples could be fitted");
+  std::sort(temperatures.begin(), temperatures.end());
+  std::sort(shifts.begin(), shifts.end());
   const double degrees = std::max(1.0, static_cast<double>(samples.windows.independent) - 1.0);
-  const auto summarise = [&](std::vector<double>& values, double centre, Estimate& estimate, Interval& interval) {
-    std::sort(values.begin(), values.end());
-    double sum = 0.0;
-    for (const double value : values) sum += value;
-    const double mean = sum / static_cast<double>(values.size());
-    double variance = 0.0;
-    for (const double value : values) variance += (value - mean) * (value - mean);
-    estimate = {centre, std::sqrt(variance / static_cast<double>(values.size() - 1)), false};
-    const auto quantile = [&](double fraction) {
-      const double position = fraction * static_cast<double>(values.size() - 1);
-      const auto i = static_cast<std::size_t>(position);
-      const double part = position - static_cast<double>(i);
-      return i + 1 < values.size() ? (1.0 - part) * values[i] + part * values[i + 1] : values.back();
-    };
-    interval.status = FitStatus::ok;
-    interval.confidence = bootstrap.confidence;
-    // Percentiles, moved apart as Student's are from the normal ones: the windows are few.
-    const double upper = 0.5 * (1.0 + bootstrap.confidence);
-    const double apart = gsl_cdf_tdist_Pinv(upper, degrees) / gsl_cdf_ugaussian_Pinv(upper);
-    interval.low = centre + apart * (quantile(1.0 - upper) - centre);
-    interval.high = centre + apart * (quantile(upper) - centre);
-  };
-  summarise(temperatures, whole.temperature.value, result.temperature, result.temperature_interval);
-  summarise(shifts, whole.shift.value, result.shift, result.shift_interval);
+  result.temperature = {whole.temperature.value, spread_of(temperatures), false};
+  result.temperature_interval = interval_of(temperatures, whole.temperature.value, bootstrap.confidence, degrees);
+  result.shift = {whole.shift.value, spread_of(shifts), false};
+  result.shift_interval = interval_of(shifts, whole.shift.value, bootstrap.confidence, degrees);
   result.temperatures = std::move(temperatures);
   return result;
 }

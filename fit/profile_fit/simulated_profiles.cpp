@@ -10,6 +10,9 @@ namespace shakebed::fit {
 
 namespace {
 
+constexpr double least_error = 1e-4;  // of a bin, relative to the greatest density
+constexpr double poor_chance = 1e-3;  // of so large a chi2: below, the match is poor
+
 // A temperature of the library: the mean of its runs on the measurement's bins.
 struct Node {
   double log_temperature = 0.0;
@@ -212,63 +215,68 @@ double best_log_temperature(const Target& target, const std::vector<Node>& nodes
   return 0.5 * (a + b);
 }
 
-}  // namespace
-
-MatchResult match_simulated(const Profile& measured, const std::vector<SimulatedProfile>& library,
-                            const MatchOptions& options) {
-  MatchResult result;
-  const auto bad = [&](std::string why) {
-    result.status = FitStatus::bad_input;
-    result.message = std::move(why);
-    return result;
-  };
-  if (!is_good(measured)) return bad("the measured profile is empty, not finite or not in ascending heights");
+// Why neither can be used; "": they can.
+std::string why_bad(const Profile& measured, const std::vector<SimulatedProfile>& library) {
+  if (!is_good(measured)) return "the measured profile is empty, not finite or not in ascending heights";
   for (const SimulatedProfile& run : library) {
-    if (!(std::isfinite(run.temperature) && run.temperature > 0.0)) return bad("a library temperature is not positive");
-    if (!is_good(run.profile)) return bad("a library profile is empty, not finite or not in ascending heights");
+    if (!(std::isfinite(run.temperature) && run.temperature > 0.0)) return "a library temperature is not positive";
+    if (!is_good(run.profile)) return "a library profile is empty, not finite or not in ascending heights";
   }
-  Target target;
+  return "";
+}
+
+double greatest_density(const Profile& profile) {
   double greatest = 0.0;
-  for (const double density : measured.number_density) greatest = std::max(greatest, density);
-  if (!(greatest > 0.0)) {
-    result.status = FitStatus::no_signal;
-    result.message = "no bin has a positive density";
-    return result;
-  }
+  for (const double density : profile.number_density) greatest = std::max(greatest, density);
+  return greatest;
+}
+
+// The bins in the window. A bin empty in both profiles, without an error, is no evidence of infinite weight: a floor
+// for every variance.
+Target target_of(const Profile& measured, const MatchOptions& options) {
+  const double least_variance = std::pow(least_error * greatest_density(measured), 2);
+  Target target;
   for (std::size_t i = 0; i < measured.height.size(); ++i) {
     if (measured.height[i] < options.low || measured.height[i] > options.high) continue;
+    const double error = measured.std_error.empty() ? 0.0 : measured.std_error[i];
     target.height.push_back(measured.height[i]);
     target.density.push_back(measured.number_density[i]);
-    target.variance.push_back(measured.std_error.empty() ? 0.0 : measured.std_error[i] * measured.std_error[i]);
+    target.variance.push_back(std::max(error * error, least_variance));
   }
-  result.bins = static_cast<int>(target.height.size());
-  result.dof = result.bins - 1;
-  if (result.bins < 3) {
-    result.status = FitStatus::too_few_bins;
-    result.message = "fewer than three bins in the window";
-    return result;
-  }
-  const std::vector<Node> nodes = nodes_of(library, target.height);
-  if (nodes.size() < 2) return bad("the library needs at least two temperatures");
-  // A bin empty in both, without an error, is no evidence of infinite weight: a floor for every variance.
-  const double least_variance = std::pow(1e-4 * greatest, 2);
-  for (double& variance : target.variance) variance = std::max(variance, least_variance);
+  return target;
+}
 
-  const double x = best_log_temperature(target, nodes, options.order);
-  const double least = misfit(target, nodes, x, options.order, &result.chi2);
-  result.chi2_per_dof = result.chi2 / result.dof;
-  result.temperature.value = std::exp(x);
-  const double low = nodes.front().log_temperature;
-  const double high = nodes.back().log_temperature;
+// The best temperature, its errors, and the profile there.
+class Matcher {
+ public:
+  Matcher(const Target& target, const std::vector<Node>& nodes, const MatchOptions& options, MatchResult& result)
+      : target_(target), nodes_(nodes), options_(options), result_(result) {}
+
+  void run() {
+    best_ = best_log_temperature(target_, nodes_, options_.order);
+    least_ = misfit(target_, nodes_, best_, options_.order, &result_.chi2);
+    result_.chi2_per_dof = result_.chi2 / result_.dof;
+    result_.temperature.value = std::exp(best_);
+    find_errors();
+    take_profile();
+    find_status();
+  }
+
+ private:
+  [[nodiscard]] double low() const { return nodes_.front().log_temperature; }
+  [[nodiscard]] double high() const { return nodes_.back().log_temperature; }
+  // A poor match has larger errors than it states.
+  [[nodiscard]] bool is_poor() const { return gsl_cdf_chisq_Q(result_.chi2, result_.dof) < poor_chance; }
+
   // Where the misfit has risen by `rise`, on either side.
-  const auto crossing = [&](int side, double rise, bool& open) {
-    const double end = side < 0 ? low : high;
-    double inside = x;
-    double outside = x;
-    double step = 1e-4 * (high - low);
+  [[nodiscard]] double crossing(int side, double rise, bool& open) const {
+    const double end = side < 0 ? low() : high();
+    double inside = best_;
+    double outside = best_;
+    double step = 1e-4 * (high() - low());
     while (true) {
       outside = side < 0 ? std::max(end, outside - step) : std::min(end, outside + step);
-      if (misfit(target, nodes, outside, options.order) - least >= rise) break;
+      if (misfit(target_, nodes_, outside, options_.order) - least_ >= rise) break;
       inside = outside;
       if (outside == end) {
         open = true;
@@ -278,57 +286,91 @@ MatchResult match_simulated(const Profile& measured, const std::vector<Simulated
     }
     for (int i = 0; i < 60; ++i) {
       const double middle = 0.5 * (inside + outside);
-      (misfit(target, nodes, middle, options.order) - least < rise ? inside : outside) = middle;
+      (misfit(target_, nodes_, middle, options_.order) - least_ < rise ? inside : outside) = middle;
     }
     return inside;
-  };
-  // A poor match has larger errors than it states.
-  const double scale = std::max(1.0, result.chi2_per_dof);
-  const bool poor = gsl_cdf_chisq_Q(result.chi2, result.dof) < 1e-3;
-  const double unit = poor ? scale : 1.0;
-  bool low_open = false;
-  bool high_open = false;
-  const double down = crossing(-1, unit, low_open);
-  const double up = crossing(+1, unit, high_open);
-  result.interpolation_error = std::abs(std::exp(best_log_temperature(target, nodes, std::max(2, options.order - 1))) -
-                                        result.temperature.value);
-  result.temperature.std_error =
-      std::hypot(0.5 * (std::exp(up) - std::exp(down)), nodes.size() > 2 ? 0.1 * result.interpolation_error : 0.0);
-  const double quantile = unit * gsl_cdf_chisq_Pinv(options.confidence, 1.0);
-  result.interval.confidence = options.confidence;
-  result.interval.low = std::exp(crossing(-1, quantile, result.interval.low_open));
-  result.interval.high = std::exp(crossing(+1, quantile, result.interval.high_open));
-  result.interval.status = FitStatus::ok;
-  const auto solid_at = [&](double at) {
-    const Stencil stencil = stencil_at(nodes, at, options.order);
+  }
+
+  [[nodiscard]] double solid_at(double at) const {
+    const Stencil stencil = stencil_at(nodes_, at, options_.order);
     double height = 0.0;
     for (std::size_t i = 0; i < stencil.weight.size(); ++i)
-      height += stencil.weight[i] * nodes[stencil.first + i].solid_height;
+      height += stencil.weight[i] * nodes_[stencil.first + i].solid_height;
     return height;
+  }
+
+  void find_errors() {
+    const double unit = is_poor() ? std::max(1.0, result_.chi2_per_dof) : 1.0;
+    bool ignored = false;
+    const double down = crossing(-1, unit, ignored);
+    const double up = crossing(+1, unit, ignored);
+    const double coarser = std::exp(best_log_temperature(target_, nodes_, std::max(2, options_.order - 1)));
+    result_.interpolation_error = std::abs(coarser - result_.temperature.value);
+    result_.temperature.std_error =
+        std::hypot(0.5 * (std::exp(up) - std::exp(down)), nodes_.size() > 2 ? 0.1 * result_.interpolation_error : 0.0);
+    const double quantile = unit * gsl_cdf_chisq_Pinv(options_.confidence, 1.0);
+    result_.interval.confidence = options_.confidence;
+    result_.interval.low = std::exp(crossing(-1, quantile, result_.interval.low_open));
+    result_.interval.high = std::exp(crossing(+1, quantile, result_.interval.high_open));
+    result_.interval.status = FitStatus::ok;
+    result_.solid_height = {solid_at(best_), 0.5 * std::abs(solid_at(up) - solid_at(down)), false};
+  }
+
+  void take_profile() {
+    const Model model = model_at(nodes_, best_, options_.order);
+    result_.height = target_.height;
+    result_.density = model.density;
+    for (std::size_t b = 0; b < model.variance.size(); ++b) {
+      double variance = model.variance[b];
+      for (const std::vector<double>& mode : model.modes) variance += mode[b] * mode[b];
+      result_.library_error.push_back(std::sqrt(variance));
+    }
+  }
+
+  void find_status() {
+    result_.status = FitStatus::ok;
+    const double range = high() - low();
+    if (best_ - low() < 1e-9 * range || high() - best_ < 1e-9 * range) {
+      result_.status = FitStatus::unresolved_temperature;
+      result_.message = "the best temperature is an end of the library: its range does not hold the measurement";
+    }
+    if (is_poor()) {
+      result_.warnings.emplace_back(
+          "no bed of the library describes the data; the errors were enlarged by the square root of "
+          "chi2/dof");
+    }
+    if (result_.interpolation_error > result_.temperature.std_error && nodes_.size() > 2) {
+      result_.warnings.emplace_back(
+          "the library is coarse: its interpolation moves the temperature by more than its error");
+    }
+  }
+
+  const Target& target_;
+  const std::vector<Node>& nodes_;
+  const MatchOptions& options_;
+  MatchResult& result_;
+  double best_ = 0.0, least_ = 0.0;  // ln T; the misfit there
+};
+
+}  // namespace
+
+MatchResult match_simulated(const Profile& measured, const std::vector<SimulatedProfile>& library,
+                            const MatchOptions& options) {
+  MatchResult result;
+  const auto refused = [&](FitStatus status, std::string why) {
+    result.status = status;
+    result.message = std::move(why);
+    return result;
   };
-  result.solid_height = {solid_at(x), 0.5 * std::abs(solid_at(up) - solid_at(down)), false};
-  const Model model = model_at(nodes, x, options.order);
-  result.height = target.height;
-  result.density = model.density;
-  for (std::size_t b = 0; b < model.variance.size(); ++b) {
-    double variance = model.variance[b];
-    for (const std::vector<double>& mode : model.modes) variance += mode[b] * mode[b];
-    result.library_error.push_back(std::sqrt(variance));
-  }
-  result.status = FitStatus::ok;
-  if (x - low < 1e-9 * (high - low) || high - x < 1e-9 * (high - low)) {
-    result.status = FitStatus::unresolved_temperature;
-    result.message = "the best temperature is an end of the library: its range does not hold the measurement";
-  }
-  if (poor) {
-    result.warnings.emplace_back(
-        "no bed of the library describes the data; the errors were enlarged by the square root of "
-        "chi2/dof");
-  }
-  if (result.interpolation_error > result.temperature.std_error && nodes.size() > 2) {
-    result.warnings.emplace_back(
-        "the library is coarse: its interpolation moves the temperature by more than its error");
-  }
+  if (std::string why = why_bad(measured, library); !why.empty()) return refused(FitStatus::bad_input, std::move(why));
+  if (!(greatest_density(measured) > 0.0)) return refused(FitStatus::no_signal, "no bin has a positive density");
+  const Target target = target_of(measured, options);
+  result.bins = static_cast<int>(target.height.size());
+  result.dof = result.bins - 1;
+  if (result.bins < 3) return refused(FitStatus::too_few_bins, "fewer than three bins in the window");
+  const std::vector<Node> nodes = nodes_of(library, target.height);
+  if (nodes.size() < 2) return refused(FitStatus::bad_input, "the library needs at least two temperatures");
+  Matcher(target, nodes, options, result).run();
   return result;
 }
 

@@ -1,11 +1,10 @@
-// The figures of Quinn and Hong (2000): what the quick recipes find with other random numbers is what the full ones
-// found, whose numbers are committed.
+// The figures of Quinn and Hong (2000): what their quick recipes find against laws that hold whatever the paper says.
 #include <gtest/gtest.h>
 
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -17,8 +16,6 @@
 
 namespace shakebed::tests {
 namespace {
-
-const std::string source = SHAKEBED_SOURCE_DIR;
 
 // A table of a study: (series, value of the parameter) → column → number.
 using Table = std::map<std::pair<std::string, std::string>, std::map<std::string, double>>;
@@ -39,19 +36,15 @@ Table read_table(const std::filesystem::path& path) {
   return table;
 }
 
-// Few replicas do not determine an error: that of a series is the root mean square over its points, as a part of the
-// number itself where `relative`.
-double pooled_error(const Table& table, const std::string& series, const std::string& column, bool relative) {
+// Few replicas do not determine an error: that of a series, relative to the number itself, is the root mean square over
+// its points.
+double pooled_error(const Table& table, const std::string& series, const std::string& column) {
   double squares = 0, n = 0;
   for (const auto& [key, row] : table) {
     if (key.first != series || !row.contains(column + "_error")) continue;
-    squares += std::pow(row.at(column + "_error") / (relative ? row.at(column) : 1), 2), n += 1;
+    squares += std::pow(row.at(column + "_error") / row.at(column), 2), n += 1;
   }
   return n > 0 ? std::sqrt(squares / n) : 0;
-}
-
-std::filesystem::path measured(const std::string& file) {
-  return source + "/reference-data/quinn-hong-2000/measured/" + file;
 }
 
 // One study of a recipe's quick preset with seeds of its own and the values given, run alone.
@@ -65,124 +58,61 @@ Table run_quick(const std::string& recipe, const std::string& study, const std::
   return result.exit_code == 0 ? read_table(folder / ("out/" + study + "/table.csv")) : Table{};
 }
 
-// Every found number of the series within `reach` errors of the committed one, plus `allowance`.
-void compare(const Table& found, const Table& committed, const std::string& series, const std::string& column,
-             double reach, double allowance = 0, bool relative = false) {
-  const double error =
-      std::hypot(pooled_error(found, series, column, relative), pooled_error(committed, series, column, relative));
-  ASSERT_GT(error, 0) << series << " " << column;
-  int compared = 0;
-  for (const auto& [key, row] : found) {
-    if (key.first != series) continue;
-    ASSERT_TRUE(committed.contains(key)) << key.first << " at " << key.second;
-    const double expected = committed.at(key).at(column);
-    EXPECT_NEAR(row.at(column), expected, reach * error * (relative ? expected : 1) + allowance)
-        << column << " of " << key.first << " at " << key.second << ", error " << error;
-    ++compared;
-  }
-  EXPECT_GT(compared, 0) << series;
+// Replicas were two at each of `points` parameters: a pooled error has one degree of freedom a point. How many errors
+// may the largest of `comparisons` differences have, if one test in a thousand may fail?
+double allowed_errors(int points, int comparisons) {
+  return boost::math::quantile(boost::math::complement(boost::math::students_t(points), 1e-3 / 2 / comparisons));
 }
 
-// The committed numbers are those of the full presets: more replicas, slower cooling, longer measurement. Of the quick
-// ones two replicas at four temperatures give the errors four degrees of freedom: a difference of 7 errors has a chance
-// of 2e-3 (Student's t), and there are 24 comparisons here: one false alarm in about 20 choices of seeds. They are
-// fixed.
-//
-// Rough disks are not annealed in the quick preset: at 0.2 T_c their tail was found 0.008 above the slowly cooled one
-// (elastic ones: 0.0007). That is a difference of the beds, not of the measurement, and is allowed for by 0.01.
-TEST(QuinnHongFigure2, QuickIsWhatTheFullPresetFound) {
-  const Table committed = read_table(measured("fig2-beds.csv"));
+// Equipartition: elastic disks in a reservoir have its temperature. Disks that lose energy in collisions are colder.
+TEST(QuinnHongFigure2, BathsSetTheTemperatureOfElasticBeds) {
   const Table found = run_quick("quinn-hong-fig2", "beds", "[0.2,0.5,0.8,1.1]");
   ASSERT_EQ(found.size(), 12u);
-  for (const char* column : {"T", "solid_by_shift", "fitted_T", "psi6"})
-    compare(found, committed, "elastic", column, 7);
-  for (const char* series : {"langevin", "andersen"}) {
-    compare(found, committed, series, "T", 7);
-    compare(found, committed, series, "solid_by_shift", 7, 0.01);
+  const double error = pooled_error(found, "elastic", "T");
+  ASSERT_GT(error, 0);
+  ASSERT_LT(error, 0.01) << "a comparison that tells nothing";
+  for (const auto& [key, row] : found) {
+    const double bath = std::stod(key.second);
+    if (key.first == "elastic")
+      EXPECT_NEAR(row.at("T"), bath, allowed_errors(4, 4) * error * bath) << "at " << key.second;
+    else
+      EXPECT_LT(row.at("T"), bath) << key.first << " at " << key.second;
   }
 }
 
-// Crystal and expansion on the way to the fluid. Three temperatures: errors of three degrees of freedom; 9 errors have
-// a chance of 3e-3, six comparisons.
-TEST(QuinnHongFigure2, QuickMeltsWhereTheFullPresetDoes) {
-  const Table committed = read_table(measured("fig2-melting.csv"));
+// Hard disks freeze at the pressure 9.185 T/D^2 [Bernard2011]. The pressure at the floor is N m g/W = 23.09 m g/D: the
+// last crystal goes at T = 2.514 m g D, which is 12.12 T_c; below, it fills 1 - T/(12.12 T_c) of the disks. A tenth is
+// allowed: the interface is about two of the twenty rows wide.
+TEST(QuinnHongFigure2, CrystalMeltsAtThePressureAtWhichHardDisksFreeze) {
+  constexpr double column = 1000 / 43.30127019, critical = 0.2074723010161296;
+  constexpr double melting = column / 9.185 / critical;
   const Table found = run_quick("quinn-hong-fig2", "melting", "[6,10,14]");
   ASSERT_EQ(found.size(), 3u);
-  for (const char* column : {"psi6", "rise"}) compare(found, committed, "elastic", column, 9);
-}
-
-// What the page says must be in the committed numbers.
-TEST(QuinnHongFigure2, CommittedNumbersSayWhatThePageSays) {
-  const Table beds = read_table(measured("fig2-beds.csv"));
-  ASSERT_EQ(beds.size(), 36u);  // three series, twelve temperatures
-  for (const auto& [key, row] : beds) {
-    const double t = row.at("T");
-    EXPECT_NEAR(row.at("solid_by_shift"), 1 - t, 0.035) << key.first << " at " << key.second;
-    EXPECT_GT(row.at("crystal_80"), 0.75) << key.first << " at " << key.second;
-  }
-  // Between periodic sides the offset from the line is gone.
-  const Table bottom = read_table(measured("fig2-bottom.csv"));
-  int compared = 0;
-  for (const auto& [key, row] : bottom) {
-    const double t = row.at("T");
-    if (key.first != "periodic" || t > 1.1) continue;
-    EXPECT_NEAR(row.at("solid_by_shift"), 1 - t, 0.012) << key.second;
-    ++compared;
-  }
-  EXPECT_EQ(compared, 6);
-  // The crystal goes with 1 - T/(12.1 T_c), the prediction of freezing.
-  for (const auto& [key, row] : read_table(measured("fig2-melting.csv"))) {
-    const double t = row.at("T");
-    if (t < 10.5) {
-      EXPECT_NEAR(row.at("crystal_70"), 1 - t / 12.12, 0.06) << key.second;
-    } else if (t > 15) {
-      EXPECT_LT(row.at("crystal_80"), 0.01) << key.second;
-    }
+  for (const auto& [key, row] : found) {
+    const double t = std::stod(key.second);
+    EXPECT_NEAR(row.at("crystal_70"), std::max(0.0, 1 - t / melting), 0.1) << "at " << key.second;
   }
 }
 
-// Eight kinds of shaken beds, measured for a sixth of the time: relative errors of T, three degrees of freedom, 9
-// errors, 24 comparisons: one false alarm in about 14 choices of seeds.
-TEST(QuinnHongEquation6, QuickIsWhatTheFullPresetFound) {
-  const Table committed = read_table(measured("eq6-shaken.csv"));
-  const Table found = run_quick("quinn-hong-eq6", "shaken", "[2,3,5]");
-  ASSERT_EQ(found.size(), 24u);
-  std::set<std::string> series;
-  for (const auto& [key, row] : found) series.insert(key.first);
-  for (const std::string& name : series) compare(found, committed, name, "T", 9, 0, true);
-}
-
-// No reading of eq. (6) is within a tenth of T_c of the beds, nor within 40 % of their temperature.
-TEST(QuinnHongEquation6, CommittedNumbersSayWhatThePageSays) {
-  const Table committed = read_table(measured("eq6-shaken.csv"));
-  ASSERT_EQ(committed.size(), 72u);  // eight series, nine Gamma from 1.2 to 8
-  for (const std::string reading : {"eq5", "eq5_printed", "eq6", "eq6_printed", "fermi"}) {
-    for (const std::string jump : {"relative_max", "above_launch", "above_mean_floor", "above_highest_floor"}) {
-      double squares = 0, logarithms = 0, n = 0;
-      for (const auto& [key, row] : committed) {
-        const std::string column = reading + "_" + jump;
-        if (row.at(column + "_in_range") != 1) continue;
-        squares += std::pow(row.at("T") - row.at(column), 2);
-        logarithms += std::pow(std::log(row.at("T") / row.at(column)), 2);
-        n += 1;
-      }
-      ASSERT_GE(n, 7) << reading << " " << jump;
-      EXPECT_GT(std::sqrt(squares / n), 0.3) << reading << " " << jump;
-      EXPECT_GT(std::sqrt(logarithms / n), std::log(1.4)) << reading << " " << jump;
-    }
-  }
-}
-
-// Five restitutions in the bath; smooth disks, with the same allowance for the short annealing as rough ones.
-TEST(QuinnHongBeyond, QuickIsWhatTheFullPresetFound) {
-  const Table committed = read_table(measured("beyond-dissipation.csv"));
+// Five restitutions in one bath: elastic disks have its temperature, and the more energy a collision loses, the colder
+// the bed. The paper's profile describes them better than a Fermi function.
+TEST(QuinnHongBeyond, DissipationCoolsABedInABath) {
   const Table found = run_quick("quinn-hong-beyond", "dissipation", "[0.2,0.6,1]");
   ASSERT_EQ(found.size(), 15u);
-  for (const char* e : {"1", "0.99", "0.95", "0.9", "0.8"}) {
-    compare(found, committed, e, "T", 9);
-    compare(found, committed, e, "solid", 9, 0.01);
+  const double error = pooled_error(found, "1", "T");
+  ASSERT_GT(error, 0);
+  ASSERT_LT(error, 0.01) << "a comparison that tells nothing";
+  for (const std::string bath : {"0.2", "0.6", "1"}) {
+    const double expected = std::stod(bath);
+    EXPECT_NEAR(found.at({"1", bath}).at("T"), expected, allowed_errors(3, 3) * error * expected) << "at " << bath;
+    double warmer = found.at({"1", bath}).at("T");
+    for (const std::string e : {"0.99", "0.95", "0.9", "0.8"}) {
+      const double t = found.at({e, bath}).at("T");
+      EXPECT_LT(t, warmer) << "restitution " << e << " at " << bath;
+      warmer = t;
+    }
   }
-  for (const auto& [key, row] : committed)
+  for (const auto& [key, row] : found)
     EXPECT_GT(row.at("misfit_fermi"), row.at("misfit_enskog")) << key.first << " at " << key.second;
 }
 

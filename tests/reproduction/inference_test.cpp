@@ -90,21 +90,5 @@ TEST(Inference, FindsOnACoarseGridThePairOfTheFullOne) {
   EXPECT_NEAR(ratios / 12, 1, 0.015);
 }
 
-// The paper's bed itself: what the recipe's material gives is what the search says of it.
-TEST(Inference, IsWhatTheFigureUses) {
-  const pipelines::Json recipe = pipelines::read_json(source + "/pipelines/recipes/clement-rajchenbach/figure.json");
-  Row nearest;
-  for (const Row& row : full_search()) {
-    if (row.distance < nearest.distance) nearest = row;
-  }
-  const pipelines::Json& bed = recipe["stages"][0];
-  EXPECT_EQ(bed["disks"]["restitution"], nearest.restitution);
-  EXPECT_EQ(bed["disks"]["friction"], nearest.friction);
-  EXPECT_EQ(bed["floor"]["restitution"], nearest.restitution);
-  EXPECT_EQ(bed["floor"]["friction"], nearest.friction);
-  EXPECT_EQ(bed["box"]["sides"]["restitution"], nearest.restitution);
-  EXPECT_EQ(bed["box"]["sides"]["friction"], nearest.side_friction);
-}
-
 }  // namespace
 }  // namespace shakebed::tests

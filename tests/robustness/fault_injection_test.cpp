@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -351,6 +352,54 @@ TEST_F(Faults, SignalsAtAnyMoment) {
     if (i % 6 == 5 || code == 0) fs::remove_all(folder_ / "o");  // else the next one would find all of it done
   }
   EXPECT_GT(stopped, 6) << "the signals came too late";
+}
+
+// A picture is overwritten while it is read, and its time of writing put back: as many bytes, as old as before. The
+// clock is ahead, for files touched within the last two seconds are read twice in any case.
+TEST(ExternalFiles, AFrameThatChangesWhileItIsReadIsNoticed) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "camera", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 3, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
+      "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "0.2 s", "measure": "0.5 s", "frames": { "count": 6, "phases": 3 } },
+    { "stage": "render", "from": "bed", "scale": "0.25 mm/px" } ] })");
+  const ProgramResult photographed = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(photographed.exit_code, 0) << photographed.err;
+  fs::copy(folder / "o/render/frames", folder / "frames");
+  const fs::path frame = folder / "frames/000003.png";
+  const std::string whole = read_text(frame);
+  const auto written = fs::last_write_time(frame);
+  std::atomic<bool> over{false};
+  const auto is_read = [&] {
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder / "mine", error)) {
+      if (entry.path().filename().string().starts_with(".partial-extract")) return true;
+    }
+    return false;
+  };
+  std::thread other([&] {
+    while (!over && !is_read()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::string changed = whole;
+    changed.back() = static_cast<char>(changed.back() ^ 1);
+    write_text(frame, changed);
+    fs::last_write_time(frame, written);
+  });
+  const std::vector<std::string> measure{"fit-images", "frames", "--diameter", "3 mm", "--out", "mine"};
+  ProgramResult disturbed;
+  {
+    const Shim shim;
+    const Variable ahead("SHAKEBED_FAULT_CLOCK_AHEAD", "10");
+    disturbed = run_shakebed(measure, folder.path());
+  }
+  over = true;
+  other.join();
+  EXPECT_EQ(disturbed.exit_code, 5) << disturbed.err;
+  EXPECT_NE(disturbed.err.find("000003.png: changed while it was read"), std::string::npos) << disturbed.err;
+  EXPECT_FALSE(fs::exists(folder / "mine/extract"));
+  write_text(frame, whole);
+  const ProgramResult again = run_shakebed(measure, folder.path());
+  EXPECT_EQ(again.exit_code, 0) << again.err;
 }
 
 }  // namespace

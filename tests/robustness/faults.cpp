@@ -4,6 +4,7 @@
 //   SHAKEBED_FAULT_SHORT=1       every write of more than one byte to a file writes only about half
 //   SHAKEBED_FAULT_EINTR=N       every N-th read and write is interrupted before it does anything (EINTR)
 //   SHAKEBED_FAULT_CLOCK=1       the wall clock jumps by hours, forwards and backwards
+//   SHAKEBED_FAULT_CLOCK_AHEAD=S the wall clock is S seconds ahead: files that were just written look older
 // Only calls that go through the dynamic linker are seen: those of the C library's own stdio are not, so disk-full is
 // also tested with a real small disk.
 #include <dlfcn.h>
@@ -168,8 +169,11 @@ ssize_t read(int descriptor, void* data, size_t size) {
 int clock_gettime(clockid_t clock, struct timespec* now) {
   static auto* const real = next<int(clockid_t, struct timespec*)>("clock_gettime");
   static const bool jump = setting("SHAKEBED_FAULT_CLOCK") != 0;
+  static const long ahead = setting("SHAKEBED_FAULT_CLOCK_AHEAD");
   const int result = real(clock, now);
-  if (jump && result == 0 && clock == CLOCK_REALTIME) now->tv_sec += (++looks % 2 == 0 ? 7200 : -7200);
+  if (result != 0 || clock != CLOCK_REALTIME) return result;
+  now->tv_sec += ahead;
+  if (jump) now->tv_sec += (++looks % 2 == 0 ? 7200 : -7200);
   return result;
 }
 

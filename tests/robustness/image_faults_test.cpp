@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -211,40 +210,6 @@ TEST_F(ImageFaults, FramesVanishWhileTheyAreRead) {
     EXPECT_EQ(run("o").exit_code, 0);
     expect_goes_on();
   }
-}
-
-// A picture is overwritten while it is read, and its time of writing put back: as many bytes, as old as before.
-TEST_F(ImageFaults, AFrameThatChangesWhileItIsReadIsNoticed) {
-  const fs::path frame = folder_ / "frames/000003.png";
-  fs::copy(folder_ / "expected/render/frames", folder_ / "frames");
-  const std::string whole = read_text(frame);
-  std::this_thread::sleep_for(std::chrono::seconds(4));  // files touched just now are always read twice
-  const auto written = fs::last_write_time(frame);
-  std::atomic<bool> over{false};
-  const auto is_read = [&] {
-    std::error_code error;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "mine", error)) {
-      if (entry.path().filename().string().starts_with(".partial-extract")) return true;
-    }
-    return false;
-  };
-  std::thread other([&] {
-    while (!over && !is_read()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    std::string changed = whole;
-    changed.back() = static_cast<char>(changed.back() ^ 1);
-    write_text(frame, changed);
-    fs::last_write_time(frame, written);
-  });
-  const std::vector<std::string> measure{"fit-images", "frames", "--diameter", "3 mm", "--out", "mine"};
-  const ProgramResult disturbed = run_shakebed(measure, folder_.path());
-  over = true;
-  other.join();
-  EXPECT_EQ(disturbed.exit_code, 5) << disturbed.err;
-  EXPECT_NE(disturbed.err.find("000003.png: changed while it was read"), std::string::npos) << disturbed.err;
-  EXPECT_FALSE(fs::exists(folder_ / "mine/extract"));
-  write_text(frame, whole);
-  const ProgramResult again = run_shakebed(measure, folder_.path());
-  EXPECT_EQ(again.exit_code, 0) << again.err;
 }
 
 TEST_F(ImageFaults, MemoryIsShort) {

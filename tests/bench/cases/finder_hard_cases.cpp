@@ -100,7 +100,11 @@ class HardCases {
       : folder_(std::move(folder)), progress_(progress) {}
 
   std::vector<HardCaseRow> run() {
-    disks();
+    pairs_and_borders();
+    RandomStream random(1);
+    sizes(random);
+    beds(random);
+    floors();
     light();
     nothing();
     files();
@@ -165,7 +169,7 @@ class HardCases {
     return (folder_ / name).string();
   }
 
-  void disks() {
+  void pairs_and_borders() {
     add("touching pair, 12 angles", 1000, [](HardCaseRow& row) {
       Comparison comparison;
       for (int k = 0; k < 12; ++k) {
@@ -188,8 +192,10 @@ class HardCases {
           row.note = "a cut disk is not flagged, or a whole one is";
         }
     });
+  }
+
+  void sizes(RandomStream& random) {
     Disks small;
-    RandomStream random(1);
     for (int k = 0; k < 400; ++k)
       small.push_back({12 + 10 * (k % 20) + random.uniform(), 12 + 10 * (k / 20) + random.uniform(), 1.5, 0, 0});
     Camera camera = camera_of(224, 224);
@@ -206,6 +212,9 @@ class HardCases {
              {350, 600, 150, 0, 0},
              {760, 580, 150, 0, 0}},
             camera_of(1000, 800), 0.05, 1, 5000);
+  }
+
+  void beds(RandomStream& random) {
     picture("a packed bed, hardly any gas", bed_of(10, 420, 420, 18, 5), camera_of(420, 420), 0.02, 1);
     Disks flying = bed_of(10, 400, 400, 0, 90);
     for (RenderedDisk& disk : flying) {
@@ -213,7 +222,7 @@ class HardCases {
       disk.velocity_x_px_per_s = 1e4 * std::cos(angle);
       disk.velocity_y_px_per_s = 1e4 * std::sin(angle);
     }
-    camera = camera_of(400, 400);
+    Camera camera = camera_of(400, 400);
     camera.exposure_s = 1e-3;
     picture("streaks of half a diameter", flying, camera, 0.5, 0.97);
     camera = camera_of(400, 400);
@@ -222,6 +231,9 @@ class HardCases {
     camera = camera_of(400, 400);
     camera.jpeg_quality = 60;
     picture("JPEG of quality 60", bed_of(10, 400, 400, 6, 60), camera, 0.1);
+  }
+
+  void floors() {
     add("a dark floor in view", 1000, [](HardCaseRow& row) {
       SyntheticBed bed;
       bed.left_wall_px = 6, bed.right_wall_px = 393.5, bed.floor_px = 385.7;

@@ -169,81 +169,98 @@ std::string logarithmic_axis(std::string_view axis, double low, double high) {
   return fmt::format("set {0}range [{1}:{2}]\nset {0}tics ({3})\n", axis, low, high, text);
 }
 
-void draw(const Figure& figure, const fs::path& directory) {
-  // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
-  constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
-                                 "#56B4E9", "#7A5C00", "#6A3D9A", "#000000"};
-  constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8, 3};
-  std::string data, plot;
-  int index = 0;
-  constexpr double largest = std::numeric_limits<double>::max();
-  double cheapest = largest, dearest = 0, best = largest, worst = 0;  // what is drawn lies between them
-  const auto block = [&](const std::string& label, const auto& each) {
-    data += "# " + label + "\n";
-    each();
-    data += "\n\n";
-    plot += plot.empty() ? "plot " : ", \\\n     ";
-    plot += fmt::format("{} index {} using 1:2 ", gnuplot_text(figure.name + ".dat"), index++);
-  };
-  if (figure.pareto) {
-    const auto front = pareto_front(figure);
-    if (front.size() >= 2) {
-      block("Pareto front", [&] {
-        // As a staircase: what is to be had for at most this cost.
-        for (std::size_t i = 0; i < front.size(); ++i) {
-          if (i > 0) data += fmt::format("{} {}\n", front[i].cost, front[i - 1].error);
-          data += fmt::format("{} {}\n", front[i].cost, front[i].error);
-        }
-      });
-      plot += "with lines lw 7 lc rgb '#e3e3e3' title 'Pareto front'";
-    }
+// The data and the plot command of a figure, block by block, and the range of what is drawn.
+class Drawing {
+ public:
+  explicit Drawing(const Figure& figure) : figure_(figure) {
+    if (figure.pareto) add_front();
+    for (const Curve& curve : figure.curves) add_curve(curve);
+    for (const Curve& curve : figure.curves) mark_default(curve);
+    if (blocks_ == 0) throw StageError(fmt::format("there is nothing to draw in {}.svg", figure.name));
   }
-  std::size_t method = 0;
-  for (const Curve& curve : figure.curves) {
+  const std::string& data() const { return data_; }
+  std::string script() const {
+    const double margin = std::max(1.6, std::pow(worst_ / best_, 0.05));  // markers whole, over many decades too
+    // The label's empty second line keeps it off the key.
+    return "set encoding utf8\nset terminal svg size 860,620 noenhanced font 'Helvetica,16' background '#ffffff' "
+           "linewidth 1.4\n" +
+           fmt::format("set output {}\nset xlabel {}.\"\\n\" offset 0,0.6\nset ylabel {}\nset title {} font ',15'\n",
+                       gnuplot_text(figure_.name + ".svg"), gnuplot_text(figure_.cost_label),
+                       gnuplot_text(figure_.error_label), gnuplot_text(figure_.title)) +
+           "set logscale xy\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
+           "'#dddddd' "
+           "lt 1 lw 0.6\nset key below horizontal Left reverse maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
+           logarithmic_axis("x", cheapest_ / 1.3, dearest_ * 1.3) +
+           logarithmic_axis("y", best_ / margin, worst_ * margin) + plot_ + "\n";
+  }
+
+ private:
+  void begin_block(const std::string& label) {
+    data_ += "# " + label + "\n";
+    plot_ += plot_.empty() ? "plot " : ", \\\n     ";
+    plot_ += fmt::format("{} index {} using 1:2 ", gnuplot_text(figure_.name + ".dat"), blocks_++);
+  }
+
+  // As a staircase: what is to be had for at most this cost.
+  void add_front() {
+    const auto front = pareto_front(figure_);
+    if (front.size() < 2) return;
+    begin_block("Pareto front");
+    for (std::size_t i = 0; i < front.size(); ++i) {
+      if (i > 0) data_ += fmt::format("{} {}\n", front[i].cost, front[i - 1].error);
+      data_ += fmt::format("{} {}\n", front[i].cost, front[i].error);
+    }
+    data_ += "\n\n";
+    plot_ += "with lines lw 7 lc rgb '#e3e3e3' title 'Pareto front'";
+  }
+
+  void add_curve(const Curve& curve) {
+    // Colours that stay apart for every kind of colour vision [Okabe and Ito 2008].
+    constexpr std::array colors = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
+                                   "#56B4E9", "#7A5C00", "#6A3D9A", "#000000"};
+    constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8, 3};
     std::size_t shown = 0;
     for (std::size_t i = 0; i < curve.cost.size(); ++i) shown += drawable(curve.cost[i], curve.error[i]);
-    if (shown == 0) continue;
-    block(curve.label, [&] {
-      for (std::size_t i = 0; i < curve.cost.size(); ++i) {
-        if (!drawable(curve.cost[i], curve.error[i])) continue;
-        data += fmt::format("{} {}\n", curve.cost[i], curve.error[i]);
-        cheapest = std::min(cheapest, curve.cost[i]), dearest = std::max(dearest, curve.cost[i]);
-        best = std::min(best, curve.error[i]), worst = std::max(worst, curve.error[i]);
-      }
-    });
-    if (curve.limit) {
-      plot += fmt::format("with lines lw 2 dashtype 2 lc rgb '#404040' title {}", gnuplot_text(curve.label));
-      continue;
+    if (shown == 0) return;
+    begin_block(curve.label);
+    for (std::size_t i = 0; i < curve.cost.size(); ++i) {
+      if (!drawable(curve.cost[i], curve.error[i])) continue;
+      data_ += fmt::format("{} {}\n", curve.cost[i], curve.error[i]);
+      cheapest_ = std::min(cheapest_, curve.cost[i]), dearest_ = std::max(dearest_, curve.cost[i]);
+      best_ = std::min(best_, curve.error[i]), worst_ = std::max(worst_, curve.error[i]);
     }
-    plot += fmt::format("with {} lw 2 pt {} ps 0.8 lc rgb '{}' title {}", curve.line ? "linespoints" : "points",
-                        points[method % points.size()], colors[method % colors.size()], gnuplot_text(curve.label));
-    ++method;
+    data_ += "\n\n";
+    if (curve.limit) {
+      plot_ += fmt::format("with lines lw 2 dashtype 2 lc rgb '#404040' title {}", gnuplot_text(curve.label));
+      return;
+    }
+    plot_ += fmt::format("with {} lw 2 pt {} ps 0.8 lc rgb '{}' title {}", curve.line ? "linespoints" : "points",
+                         points[methods_ % points.size()], colors[methods_ % colors.size()], gnuplot_text(curve.label));
+    ++methods_;
   }
-  bool first_standard = true;
-  for (const Curve& curve : figure.curves) {
-    if (!curve.standard || !drawable(curve.cost[*curve.standard], curve.error[*curve.standard])) continue;
-    block("default",
-          [&] { data += fmt::format("{} {}\n", curve.cost[*curve.standard], curve.error[*curve.standard]); });
-    plot += fmt::format("with points pt 6 ps 2.2 lw 2.5 lc rgb '#000000' {}",
-                        first_standard ? "title 'default'" : "notitle");
-    first_standard = false;
+
+  void mark_default(const Curve& curve) {
+    if (!curve.standard || !drawable(curve.cost[*curve.standard], curve.error[*curve.standard])) return;
+    begin_block("default");
+    data_ += fmt::format("{} {}\n\n\n", curve.cost[*curve.standard], curve.error[*curve.standard]);
+    plot_ +=
+        fmt::format("with points pt 6 ps 2.2 lw 2.5 lc rgb '#000000' {}", has_default_ ? "notitle" : "title 'default'");
+    has_default_ = true;
   }
-  if (index == 0) throw StageError(fmt::format("there is nothing to draw in {}.svg", figure.name));
-  write_file(directory / (figure.name + ".dat"), data);
-  const double margin = std::max(1.6, std::pow(worst / best, 0.05));  // markers whole, over many decades too
-  // The label's empty second line keeps it off the key.
-  const std::string script =
-      "set encoding utf8\nset terminal svg size 860,620 noenhanced font 'Helvetica,16' background '#ffffff' linewidth "
-      "1.4\n" +
-      fmt::format("set output {}\nset xlabel {}.\"\\n\" offset 0,0.6\nset ylabel {}\nset title {} font ',15'\n",
-                  gnuplot_text(figure.name + ".svg"), gnuplot_text(figure.cost_label), gnuplot_text(figure.error_label),
-                  gnuplot_text(figure.title)) +
-      "set logscale xy\nset border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb "
-      "'#dddddd' "
-      "lt 1 lw 0.6\nset key below horizontal Left reverse maxcols 3 spacing 1.2 samplen 2 font ',12'\n" +
-      logarithmic_axis("x", cheapest / 1.3, dearest * 1.3) + logarithmic_axis("y", best / margin, worst * margin) +
-      plot + "\n";
-  write_file(directory / (figure.name + ".gp"), script);
+
+  const Figure& figure_;
+  std::string data_, plot_;
+  int blocks_ = 0;
+  std::size_t methods_ = 0;
+  bool has_default_ = false;
+  double cheapest_ = std::numeric_limits<double>::max(), dearest_ = 0;
+  double best_ = std::numeric_limits<double>::max(), worst_ = 0;
+};
+
+void draw(const Figure& figure, const fs::path& directory) {
+  const Drawing drawing(figure);
+  write_file(directory / (figure.name + ".dat"), drawing.data());
+  write_file(directory / (figure.name + ".gp"), drawing.script());
   ProcessResult result;
   try {
     result = run_process({"gnuplot", figure.name + ".gp"}, directory);
@@ -276,6 +293,16 @@ Json machine_json() {
               {"version", program_version()},
               {"revision", source_revision()},
               {"compiler", compiler_text()}};
+}
+
+std::vector<std::string> failed_cases(const Document& document) {
+  std::vector<std::string> failed;
+  for (const StageResult& stage : document.stages) {
+    for (const HardCase& one : stage.hard_cases) {
+      if (!one.pass) failed.push_back(fmt::format("hard case failed: {}: {}: {}", stage.name, one.name, one.note));
+    }
+  }
+  return failed;
 }
 
 std::vector<FrontPoint> pareto_front(const Figure& figure) {

@@ -29,6 +29,9 @@ std::string document_text(const Document& document);
 // gnuplot is missing or fails.
 std::string document_html(const Document& document, const std::filesystem::path& directory);
 
+// A sentence for each hard case that failed. The program then ends with exit code 6.
+std::vector<std::string> failed_cases(const Document& document);
+
 // The points of a figure that no other point beats in both cost and error, by rising cost; limits are no points.
 struct FrontPoint {
   double cost = 0, error = 0;

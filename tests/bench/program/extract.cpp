@@ -19,6 +19,39 @@ std::string look_of(const ingest::FinderBenchmarkRow& row) {
                      row.blur_px, row.noise);
 }
 
+// The limits of error and time that the finder is held to.
+HardCase limits_case(const ingest::FinderBenchmarkRow& row) {
+  HardCase one;
+  one.name = "the finder as users get it: " + look_of(row), one.status = "found", one.unit = "px rms";
+  one.error = row.rms_px, one.limit = row.rms_limit_px, one.seconds = 1e-3 * row.cpu_ms,
+  one.time_limit = 1e-3 * row.cpu_limit_ms;
+  one.pass = row.within_limits, one.note = row.beyond;
+  return one;
+}
+
+// Of a look; its curves are the bound, ours and HoughCircles.
+Figure centres_figure(const ingest::FinderBenchmarkRow& row) {
+  Figure figure;
+  figure.name = fmt::format("extract-{}-blur-{:g}-noise-{:g}",
+                            row.shading == ingest::BeadShading::flat ? "flat" : "shaded", row.blur_px, row.noise);
+  figure.title = "Centres of disks, " + look_of(row);
+  figure.cost_label = "CPU seconds a frame", figure.error_label = "error of a centre [px], rms per axis";
+  Curve bound{"Cramer-Rao bound", {}, {}};
+  bound.limit = true;
+  figure.curves = {std::move(bound), {"shakebed (map, 1, 2, 3 sweeps, joint fit)", {}, {}}, {"HoughCircles", {}, {}}};
+  return figure;
+}
+
+void add_to_figure(const ingest::FinderBenchmarkRow& row, Figure& figure) {
+  Curve& curve = figure.curves[row.method == "hough" ? 2 : 1];
+  curve.cost.push_back(1e-3 * row.cpu_ms), curve.error.push_back(row.rms_px);
+  if (row.method == "joint fit") curve.standard = curve.cost.size() - 1;
+  if (row.bound_px > 0) {
+    Curve& bound = figure.curves[0];
+    bound.cost.push_back(1e-3 * row.cpu_ms), bound.error.push_back(row.bound_px);
+  }
+}
+
 void finder(const Effort& effort, StageResult& result) {
   ingest::FinderBenchmarkOptions options;
   options.frames = 20;  // the limit of the time a frame holds for so many: the calibration is shared by them
@@ -46,33 +79,9 @@ void finder(const Effort& effort, StageResult& result) {
          row.cpu_ms, row.has_limits ? Json(row.within_limits ? "pass" : "FAIL") : Json()});
     if (row.method == "joint fit")
       result.metrics.push_back({"joint fit, " + look, "s/frame", 1e-3 * row.cpu_ms, false});
-    if (row.has_limits) {
-      HardCase one;
-      one.name = "the finder as users get it: " + look, one.status = "found", one.unit = "px rms";
-      one.error = row.rms_px, one.limit = row.rms_limit_px, one.seconds = 1e-3 * row.cpu_ms,
-      one.time_limit = 1e-3 * row.cpu_limit_ms;
-      one.pass = row.within_limits, one.note = row.beyond;
-      result.hard_cases.push_back(std::move(one));
-    }
+    if (row.has_limits) result.hard_cases.push_back(limits_case(row));
     if (!(row.noise > 0)) continue;
-    Figure& figure = figures[look];
-    if (figure.name.empty()) {
-      figure.name = fmt::format("extract-{}-blur-{:g}-noise-{:g}",
-                                row.shading == ingest::BeadShading::flat ? "flat" : "shaded", row.blur_px, row.noise);
-      figure.title = "Centres of disks, " + look;
-      figure.cost_label = "CPU seconds a frame", figure.error_label = "error of a centre [px], rms per axis";
-      Curve bound{"Cramer-Rao bound", {}, {}};
-      bound.limit = true;
-      figure.curves = {
-          std::move(bound), {"shakebed (map, 1, 2, 3 sweeps, joint fit)", {}, {}}, {"HoughCircles", {}, {}}};
-    }
-    Curve& curve = figure.curves[row.method == "hough" ? 2 : 1];
-    curve.cost.push_back(1e-3 * row.cpu_ms), curve.error.push_back(row.rms_px);
-    if (row.method == "joint fit") curve.standard = curve.cost.size() - 1;
-    if (row.bound_px > 0) {
-      Curve& bound = figure.curves[0];
-      bound.cost.push_back(1e-3 * row.cpu_ms), bound.error.push_back(row.bound_px);
-    }
+    add_to_figure(row, figures.try_emplace(look, centres_figure(row)).first->second);
   }
   for (auto& [look, figure] : figures) {
     std::sort(figure.curves[0].cost.begin(), figure.curves[0].cost.end());  // a level line

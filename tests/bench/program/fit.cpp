@@ -39,58 +39,57 @@ fit::FitOptions plain_options(const Kernel& kernel) {
   return options;
 }
 
-void room_benchmark(const Effort& effort, StageResult& result) {
-  effort.step("fit: inverse, constants, fits without noise");
-  const auto rows = fit::benchmark_fit(effort.quick ? 0.3 : 3);
-  Table table{"The kernels of the fit, without noise",
-              "error: relative, against the truth the input was made from; cost a value (inverse, constants) or a fit",
-              {"what", "setting", "values or bins", "us", "error"},
-              {}};
-  Figure inverse{"fit-inverse",
-                 "Density from f: error against cost, by equation of state",
-                 "CPU seconds a value",
-                 "relative error, worst",
-                 {}};
-  Figure fits{"fit-kernel",
-              "A fit without noise: error of T against cost, by kernel",
-              "CPU seconds a fit",
-              "relative error of T",
-              {}};
-  std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> growth;
-  const auto curve_of = [](Figure& figure, const std::string& label) -> Curve& {
-    for (Curve& curve : figure.curves) {
-      if (curve.label == label) return curve;
-    }
-    figure.curves.push_back({label, {}, {}});
-    return figure.curves.back();
-  };
+Curve& curve_of(Figure& figure, const std::string& label) {
+  for (Curve& curve : figure.curves) {
+    if (curve.label == label) return curve;
+  }
+  figure.curves.push_back({label, {}, {}});
+  return figure.curves.back();
+}
+
+// Density from f, with the least error that a double can have.
+Figure inverse_figure(const std::vector<fit::FitBenchmarkRow>& rows) {
+  Figure figure{"fit-inverse",
+                "Density from f: error against cost, by equation of state",
+                "CPU seconds a value",
+                "relative error, worst",
+                {}};
   double fastest = 1, slowest = 0;
   for (const fit::FitBenchmarkRow& row : rows) {
-    table.rows.push_back({row.what, row.setting, row.size, 1e-3 * row.nanoseconds, row.error});
-    const double seconds = 1e-9 * row.nanoseconds, error = std::max(row.error, 1e-17);
-    result.metrics.push_back({fmt::format("{}, {}, {}", row.what, row.setting, row.size), "s", seconds, false});
-    if (row.what == "inverse") {
-      Curve& curve = curve_of(inverse, row.setting);
-      curve.cost.push_back(seconds), curve.error.push_back(error);
-      if (row.setting.starts_with("enskog, batch")) curve.standard = curve.cost.size() - 1;
-      fastest = std::min(fastest, seconds), slowest = std::max(slowest, seconds);
-    } else if (row.what == "fit") {
-      Curve& curve = curve_of(fits, row.setting);
-      curve.cost.push_back(seconds), curve.error.push_back(error);
-      growth[row.setting].first.push_back(row.size), growth[row.setting].second.push_back(seconds);
-    }
+    if (row.what != "inverse") continue;
+    const double seconds = 1e-9 * row.nanoseconds;
+    Curve& curve = curve_of(figure, row.setting);
+    curve.cost.push_back(seconds), curve.error.push_back(std::max(row.error, 1e-17));
+    if (row.setting.starts_with("enskog, batch")) curve.standard = curve.cost.size() - 1;
+    fastest = std::min(fastest, seconds), slowest = std::max(slowest, seconds);
   }
-  if (!inverse.curves.empty()) {
-    Curve epsilon{"half a unit in the last place",
-                  {fastest / 1.5, slowest * 1.5},
-                  {std::numeric_limits<double>::epsilon() / 2, std::numeric_limits<double>::epsilon() / 2}};
-    epsilon.limit = true;
-    inverse.curves.push_back(std::move(epsilon));
-    result.figures.push_back(std::move(inverse));
+  if (figure.curves.empty()) return figure;
+  constexpr double half_unit = std::numeric_limits<double>::epsilon() / 2;
+  Curve epsilon{"half a unit in the last place", {fastest / 1.5, slowest * 1.5}, {half_unit, half_unit}};
+  epsilon.limit = true;
+  figure.curves.push_back(std::move(epsilon));
+  return figure;
+}
+
+Figure kernel_figure(const std::vector<fit::FitBenchmarkRow>& rows) {
+  Figure figure{"fit-kernel",
+                "A fit without noise: error of T against cost, by kernel (30 to 10,000 bins, left to right)",
+                "CPU seconds a fit",
+                "relative error of T",
+                {}};
+  for (const fit::FitBenchmarkRow& row : rows) {
+    if (row.what != "fit") continue;
+    Curve& curve = curve_of(figure, row.setting);
+    curve.cost.push_back(1e-9 * row.nanoseconds), curve.error.push_back(std::max(row.error, 1e-17));
   }
-  if (!fits.curves.empty()) {
-    fits.title += " (30 to 10,000 bins, left to right)";
-    result.figures.push_back(std::move(fits));
+  return figure;
+}
+
+Table growth_table(const std::vector<fit::FitBenchmarkRow>& rows) {
+  std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> growth;  // setting → bins, seconds
+  for (const fit::FitBenchmarkRow& row : rows) {
+    if (row.what != "fit") continue;
+    growth[row.setting].first.push_back(row.size), growth[row.setting].second.push_back(1e-9 * row.nanoseconds);
   }
   Table exponents{"Growth of a fit with the number of bins",
                   "cost ~ bins^p, by least squares in the logarithms",
@@ -102,8 +101,26 @@ void room_benchmark(const Effort& effort, StageResult& result) {
       exponents.rows.push_back({setting, *low, *high, *p});
     }
   }
+  return exponents;
+}
+
+void room_benchmark(const Effort& effort, StageResult& result) {
+  effort.step("fit: inverse, constants, fits without noise");
+  const auto rows = fit::benchmark_fit(effort.quick ? 0.3 : 3);
+  Table table{"The kernels of the fit, without noise",
+              "error: relative, against the truth the input was made from; cost a value (inverse, constants) or a fit",
+              {"what", "setting", "values or bins", "us", "error"},
+              {}};
+  for (const fit::FitBenchmarkRow& row : rows) {
+    table.rows.push_back({row.what, row.setting, row.size, 1e-3 * row.nanoseconds, row.error});
+    result.metrics.push_back(
+        {fmt::format("{}, {}, {}", row.what, row.setting, row.size), "s", 1e-9 * row.nanoseconds, false});
+  }
+  for (Figure figure : {inverse_figure(rows), kernel_figure(rows)}) {
+    if (!figure.curves.empty()) result.figures.push_back(std::move(figure));
+  }
   result.tables.push_back(std::move(table));
-  if (!exponents.rows.empty()) result.tables.push_back(std::move(exponents));
+  if (Table exponents = growth_table(rows); !exponents.rows.empty()) result.tables.push_back(std::move(exponents));
 }
 
 // What a fit keeps, by its bins.
@@ -260,98 +277,122 @@ void refusal_case(HardCase& one, const fit::Profile& data, const fit::FitOptions
              !std::isnan(found.temperature.std_error);
 }
 
-void hard_cases(const Effort& effort, StageResult& result) {
-  effort.step("fit: hard cases");
-  const auto add = [&](const std::string& name, const std::string& unit, double limit,
-                       const std::function<void(HardCase&)>& work) {
-    effort.check_interrupted();
-    result.hard_cases.push_back(run_hard_case(name, unit, limit, 2, work));
-  };
-  const Kernel none{}, gaussian{KernelKind::gaussian, 0.5};
-  for (const double phi : {1e-300, 1e-8, 0.5, fit::close_packing_density}) {
-    add(fmt::format("f and back at phi = {:.4g}", phi), "relative", 2e-14, [&](HardCase& one) {
-      const fit::Value f = fit::enskog().f(phi), back = fit::enskog().density_from_f(f.value);
-      // One rounding of f moves phi by |f| eps/kappa: that part is the input's.
-      const double input = 1.2e-16 * std::abs(f.value) / fit::enskog().stiffness(phi).value;
-      one.error = std::max(0.0, std::abs(back.value / phi - 1) - input);
-      one.note = fmt::format("f = {:.6g}", f.value);
-    });
+class HardCases {
+ public:
+  HardCases(const Effort& effort, StageResult& result) : effort_(effort), result_(result) {}
+
+  void run() {
+    effort_.step("fit: hard cases");
+    equations_of_state();
+    fits();
+    refusals();
   }
-  add("k at phi_0 = 1e-8, where the printed formula cancels", "relative", 1e-12, [&](HardCase& one) {
-    // k = integral of (Z/Z_0)^2: 1 - (pi/2) phi_0 to first order.
-    const double phi = 1e-8, k = fit::expansion_constants(fit::enskog(), phi).k;
-    one.error = std::abs(k / (1 - std::numbers::pi / 2 * phi) - 1);
-  });
-  for (const auto& equation : fit::equations_of_state()) {
-    if (!equation->has_pole()) continue;
-    add(fmt::format("{}: T_c at close packing, where it has a pole", equation->name()), "", 0, [&](HardCase& one) {
-      const fit::Value value = fit::critical_temperature(*equation, {column, fit::close_packing_density});
-      one.status = value.status == fit::ValueStatus::ok ? "a number" : "refused";
-      one.pass = value.status != fit::ValueStatus::ok && !std::isnan(value.value);
-    });
+
+ private:
+  void add(const std::string& name, const std::string& unit, double limit, const std::function<void(HardCase&)>& work) {
+    effort_.check_interrupted();
+    result_.hard_cases.push_back(run_hard_case(name, unit, limit, 2, work));
   }
-  add("four bins", "relative", 1e-3, [&](HardCase& one) {
-    fit::Profile data;
-    const fit::Profile whole = exact_profile(130, none);
-    for (std::size_t i : {105U, 107U, 109U, 111U})
-      data.height.push_back(whole.height[i]), data.number_density.push_back(whole.number_density[i]),
-          data.std_error.push_back(1e-3);
-    fit::FitOptions options = plain_options(none);
-    options.window.low = data.height.front(), options.window.high = data.height.back();
-    fit_case(one, data, options, true_temperature);
-  });
-  add("T = 1e-4 m g D: the tail is far sharper than a bin", "", 0, [&](HardCase& one) {
-    const auto truth = fit::HydrostaticProfile::of_column(fit::enskog(), 1e-4, {column, plateau});
-    fit::Profile data = exact_profile(52, gaussian);
-    truth.sample(data.height, gaussian, data.number_density);
-    refusal_case(one, data, plain_options(gaussian));
-  });
-  add("wide kernel (2 D) over a tail of 0.12 D", "relative", 1e-3, [&](HardCase& one) {
-    const Kernel wide{KernelKind::gaussian, 2};
-    fit_case(one, exact_profile(100, wide, 20), plain_options(wide), true_temperature);
-  });
-  add("errors over nine decades", "relative", 1e-3, [&](HardCase& one) {
-    fit::Profile data = exact_profile(100, gaussian);
-    for (std::size_t i = 0; i < data.std_error.size(); ++i)
-      data.std_error[i] = 1e-10 * std::pow(10, 9.0 * static_cast<double>(i) / 99);
-    fit_case(one, data, plain_options(gaussian), true_temperature);
-  });
-  add("heights shifted by 1e6 D", "relative", 1e-3, [&](HardCase& one) {
-    fit::Profile data = exact_profile(100, gaussian);
-    for (double& height : data.height) height += 1e6;
-    fit::FitOptions options = plain_options(gaussian);
-    options.base = 1e6;
-    fit_case(one, data, options, true_temperature);
-  });
-  add("bins in random order", "relative", 1e-4, [&](HardCase& one) {
-    fit::Profile data = exact_profile(100, gaussian);
-    sim::Random random(3);
-    for (std::size_t i = data.height.size() - 1; i > 0; --i) {
-      const auto j = random.below(static_cast<std::uint32_t>(i + 1));
-      std::swap(data.height[i], data.height[j]), std::swap(data.number_density[i], data.number_density[j]);
+
+  void equations_of_state() {
+    for (const double phi : {1e-300, 1e-8, 0.5, fit::close_packing_density}) {
+      add(fmt::format("f and back at phi = {:.4g}", phi), "relative", 2e-14, [&](HardCase& one) {
+        const fit::Value f = fit::enskog().f(phi), back = fit::enskog().density_from_f(f.value);
+        // One rounding of f moves phi by |f| eps/kappa: that part is the input's.
+        const double input = 1.2e-16 * std::abs(f.value) / fit::enskog().stiffness(phi).value;
+        one.error = std::max(0.0, std::abs(back.value / phi - 1) - input);
+        one.note = fmt::format("f = {:.6g}", f.value);
+      });
     }
-    fit_case(one, data, plain_options(gaussian), true_temperature);
-  });
-  const auto spoil = [&](const std::function<void(fit::Profile&)>& how) {
-    fit::Profile data = exact_profile(52, gaussian);
-    how(data);
-    return data;
-  };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::pair<const char*, fit::Profile> refused[] = {
-      {"no bins", {}},
-      {"a NaN among the densities", spoil([&](fit::Profile& d) { d.number_density[7] = nan; })},
-      {"an infinite height", spoil([&](fit::Profile& d) { d.height[7] = 1 / 0.0; })},
-      {"a negative error", spoil([&](fit::Profile& d) { d.std_error[7] = -1; })},
-      {"densities all 0", spoil([&](fit::Profile& d) { d.number_density.assign(d.height.size(), 0); })},
-      {"a profile that does not fall", spoil([&](fit::Profile& d) { d.number_density.assign(d.height.size(), 0.5); })},
-      {"lengths that differ", spoil([&](fit::Profile& d) { d.number_density.pop_back(); })},
-      {"a covariance that is not positive",
-       spoil([&](fit::Profile& d) { d.covariance.assign(d.height.size() * d.height.size(), -1); })},
-  };
-  for (const auto& [name, data] : refused)
-    add(name, "", 0, [&, &profile = data](HardCase& one) { refusal_case(one, profile, plain_options(gaussian)); });
-}
+    add("k at phi_0 = 1e-8, where the printed formula cancels", "relative", 1e-12, [&](HardCase& one) {
+      // k = integral of (Z/Z_0)^2: 1 - (pi/2) phi_0 to first order.
+      const double phi = 1e-8, k = fit::expansion_constants(fit::enskog(), phi).k;
+      one.error = std::abs(k / (1 - std::numbers::pi / 2 * phi) - 1);
+    });
+    for (const auto& equation : fit::equations_of_state()) {
+      if (!equation->has_pole()) continue;
+      add(fmt::format("{}: T_c at close packing, where it has a pole", equation->name()), "", 0, [&](HardCase& one) {
+        const fit::Value value = fit::critical_temperature(*equation, {column, fit::close_packing_density});
+        one.status = value.status == fit::ValueStatus::ok ? "a number" : "refused";
+        one.pass = value.status != fit::ValueStatus::ok && !std::isnan(value.value);
+      });
+    }
+  }
+
+  void fits() {
+    const Kernel none{}, gaussian{KernelKind::gaussian, 0.5};
+    add("four bins", "relative", 1e-3, [&](HardCase& one) {
+      fit::Profile data;
+      const fit::Profile whole = exact_profile(130, none);
+      for (std::size_t i : {105U, 107U, 109U, 111U})
+        data.height.push_back(whole.height[i]), data.number_density.push_back(whole.number_density[i]),
+            data.std_error.push_back(1e-3);
+      fit::FitOptions options = plain_options(none);
+      options.window.low = data.height.front(), options.window.high = data.height.back();
+      fit_case(one, data, options, true_temperature);
+    });
+    add("T = 1e-4 m g D: the tail is far sharper than a bin", "", 0, [&](HardCase& one) {
+      const auto truth = fit::HydrostaticProfile::of_column(fit::enskog(), 1e-4, {column, plateau});
+      fit::Profile data = exact_profile(52, gaussian);
+      truth.sample(data.height, gaussian, data.number_density);
+      refusal_case(one, data, plain_options(gaussian));
+    });
+    add("wide kernel (2 D) over a tail of 0.12 D", "relative", 1e-3, [&](HardCase& one) {
+      const Kernel wide{KernelKind::gaussian, 2};
+      fit_case(one, exact_profile(100, wide, 20), plain_options(wide), true_temperature);
+    });
+    add("errors over nine decades", "relative", 1e-3, [&](HardCase& one) {
+      fit::Profile data = exact_profile(100, gaussian);
+      for (std::size_t i = 0; i < data.std_error.size(); ++i)
+        data.std_error[i] = 1e-10 * std::pow(10, 9.0 * static_cast<double>(i) / 99);
+      fit_case(one, data, plain_options(gaussian), true_temperature);
+    });
+    add("heights shifted by 1e6 D", "relative", 1e-3, [&](HardCase& one) {
+      fit::Profile data = exact_profile(100, gaussian);
+      for (double& height : data.height) height += 1e6;
+      fit::FitOptions options = plain_options(gaussian);
+      options.base = 1e6;
+      fit_case(one, data, options, true_temperature);
+    });
+    add("bins in random order", "relative", 1e-4, [&](HardCase& one) {
+      fit::Profile data = exact_profile(100, gaussian);
+      sim::Random random(3);
+      for (std::size_t i = data.height.size() - 1; i > 0; --i) {
+        const auto j = random.below(static_cast<std::uint32_t>(i + 1));
+        std::swap(data.height[i], data.height[j]), std::swap(data.number_density[i], data.number_density[j]);
+      }
+      fit_case(one, data, plain_options(gaussian), true_temperature);
+    });
+  }
+
+  // Input without an answer.
+  void refusals() {
+    const Kernel gaussian{KernelKind::gaussian, 0.5};
+    const auto spoil = [&](const std::function<void(fit::Profile&)>& how) {
+      fit::Profile data = exact_profile(52, gaussian);
+      how(data);
+      return data;
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::pair<const char*, fit::Profile> refused[] = {
+        {"no bins", {}},
+        {"a NaN among the densities", spoil([&](fit::Profile& d) { d.number_density[7] = nan; })},
+        {"an infinite height", spoil([&](fit::Profile& d) { d.height[7] = 1 / 0.0; })},
+        {"a negative error", spoil([&](fit::Profile& d) { d.std_error[7] = -1; })},
+        {"densities all 0", spoil([&](fit::Profile& d) { d.number_density.assign(d.height.size(), 0); })},
+        {"a profile that does not fall",
+         spoil([&](fit::Profile& d) { d.number_density.assign(d.height.size(), 0.5); })},
+        {"lengths that differ", spoil([&](fit::Profile& d) { d.number_density.pop_back(); })},
+        {"a covariance that is not positive",
+         spoil([&](fit::Profile& d) { d.covariance.assign(d.height.size() * d.height.size(), -1); })},
+    };
+    for (const auto& [name, data] : refused)
+      add(name, "", 0, [&, &profile = data](HardCase& one) { refusal_case(one, profile, plain_options(gaussian)); });
+  }
+
+  const Effort& effort_;
+  StageResult& result_;
+};
 
 }  // namespace
 
@@ -363,7 +404,7 @@ StageResult bench_fit(const Effort& effort) {
     memory_growth(effort, result);
     trade_offs(effort, result);
     statistics(effort, result);
-    hard_cases(effort, result);
+    HardCases(effort, result).run();
   });
   return result;
 }

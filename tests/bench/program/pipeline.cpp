@@ -204,71 +204,91 @@ Json percent_or_null(double value) { return number_or_null(100 * value); }
 
 // What an accuracy costs. Of so many settings some did well by luck: the cheapest that did well are measured again,
 // with beds that no choice has seen, and the first that keeps the goal by these is named.
-void settings_for_goals(const std::vector<Trial>& trials, const Effort& effort, StageResult& result, Curve& again) {
-  ChoiceRules rules;
-  if (effort.quick) rules.budget = 12;
-  // Cheap settings are measured with more beds.
-  const auto beds_for = [&](double cost) {
-    return effort.quick ? std::clamp(static_cast<int>(10 / cost), 12, 30)
-                        : std::clamp(static_cast<int>(150 / cost), 20, 40);
-  };
-  Table table{"Settings for an accuracy of T, measured again",
-              fmt::format("settings that did well at first, the cheapest first, each measured again with beds of new "
-                          "seeds; with the confidence given their rms lies below the bound. All tries for a goal "
-                          "together name a setting that does not keep it with a chance of {:g} % at most",
-                          100 * rules.chance),
-              {"goal %", "px/D", "frames", "disks", "bed s", "fit", "CPU s", "first rms %", "beds", "rms %", "bias %",
-               "bound %", "confidence %", "verdict"},
-              {}};
-  std::vector<Measured> known;
-  for (const Trial& trial : trials) known.push_back(trial.measured(trial.best_way()));
-  std::map<std::size_t, Trial> measured_again;
-  for (const double goal : {0.05, 0.02, 0.01}) {
-    if (effort.quick && goal < 0.02) {
-      result.sentences.push_back(
-          fmt::format("For {:g} % in T: what keeps it takes longer than a quick run; `shakebed bench pipeline` tells.",
-                      100 * goal));
-      continue;
-    }
-    const auto measure_again = [&](std::size_t setting) {
-      auto found = measured_again.find(setting);
-      if (found == measured_again.end()) {
-        const Settings& s = trials[setting].settings;
-        effort.step(fmt::format("pipeline: for {:g} %: {}, measured again", 100 * goal, settings_text(s)));
-        found = measured_again
-                    .emplace(setting, try_settings(s, 1000 * (setting + 1), beds_for(known[setting].cost), effort))
-                    .first;
-        again.cost.push_back(found->second.cost.all());
-        again.error.push_back(found->second.error[trials[setting].best_way()].rms());
+class GoalSearch {
+ public:
+  GoalSearch(const std::vector<Trial>& trials, const Effort& effort, StageResult& result)
+      : trials_(trials), effort_(effort), result_(result) {
+    if (effort.quick) rules_.budget = 12;
+    for (const Trial& trial : trials) known_.push_back(trial.measured(trial.best_way()));
+    table_.title = "Settings for an accuracy of T, measured again";
+    table_.note = fmt::format(
+        "settings that did well at first, the cheapest first, each measured again with beds of new "
+        "seeds; with the confidence given their rms lies below the bound. All tries for a goal "
+        "together name a setting that does not keep it with a chance of {:g} % at most",
+        100 * rules_.chance);
+    table_.header = {"goal %",      "px/D", "frames", "disks",  "bed s",   "fit",          "CPU s",
+                     "first rms %", "beds", "rms %",  "bias %", "bound %", "confidence %", "verdict"};
+    again_.line = false;
+  }
+
+  // The points that were measured again, as a curve.
+  Curve run() {
+    for (const double goal : {0.05, 0.02, 0.01}) {
+      if (effort_.quick && goal < 0.02) {
+        result_.sentences.push_back(fmt::format(
+            "For {:g} % in T: what keeps it takes longer than a quick run; `shakebed bench pipeline` tells.",
+            100 * goal));
+        continue;
       }
-      return found->second.measured(trials[setting].best_way());
-    };
-    const Choice choice = choose_setting(known, goal, measure_again, rules);
-    for (const Confirmation& one : choice.tried) {
-      const Trial& trial = trials[one.setting];
-      const std::size_t way = trial.best_way();
-      const Spread& fresh = measured_again.at(one.setting).error[way];
-      std::vector<Json> row = settings_cells(trial.settings);
-      row.insert(row.begin(), 100 * goal);
-      for (Json cell :
-           {Json(ways[way].brief), Json(one.again.cost), percent_or_null(trial.error[way].rms()), Json(fresh.count),
-            percent_or_null(fresh.rms()), percent_or_null(fresh.mean()), percent_or_null(one.bound),
-            Json(100 * (1 - one.level)), Json(one.holds ? "keeps it" : "not shown to")})
-        row.push_back(std::move(cell));
-      table.rows.push_back(std::move(row));
+      const Choice choice = choose_setting(
+          known_, goal, [&](std::size_t setting) { return measure_again(setting, goal); }, rules_);
+      for (const Confirmation& one : choice.tried) table_.rows.push_back(row_of(one, goal));
+      if (choice.setting)
+        name_setting(*choice.setting, choice.tried.back(), goal);
+      else
+        result_.sentences.push_back(nothing_found(choice, goal));
     }
-    if (choice.setting) {
-      const Confirmation& one = choice.tried.back();
-      const Trial& trial = trials[*choice.setting];
-      const std::size_t way = trial.best_way();
-      result.sentences.push_back(fmt::format(
-          "For {:g} % in T use {}, fitted with {}: {:.2g} CPU seconds (measured again with {} new beds: {:.2g} % rms, "
-          "below {:.2g} % with {:.3g} % confidence).",
-          100 * goal, settings_text(trial.settings), ways[way].name, one.again.cost, one.again.count,
-          100 * measured_again.at(*choice.setting).error[way].rms(), 100 * one.bound, 100 * (1 - one.level)));
-      result.metrics.push_back({fmt::format("{:g} % in T, CPU a bed", 100 * goal), "s", one.again.cost, false});
-      continue;
+    if (!table_.rows.empty()) result_.tables.push_back(std::move(table_));
+    return std::move(again_);
+  }
+
+ private:
+  // Cheap settings are measured with more beds.
+  int beds_for(double cost) const {
+    return effort_.quick ? std::clamp(static_cast<int>(10 / cost), 12, 30)
+                         : std::clamp(static_cast<int>(150 / cost), 20, 40);
+  }
+
+  Measured measure_again(std::size_t setting, double goal) {
+    auto found = measured_again_.find(setting);
+    if (found == measured_again_.end()) {
+      const Settings& s = trials_[setting].settings;
+      effort_.step(fmt::format("pipeline: for {:g} %: {}, measured again", 100 * goal, settings_text(s)));
+      found = measured_again_
+                  .emplace(setting, try_settings(s, 1000 * (setting + 1), beds_for(known_[setting].cost), effort_))
+                  .first;
+      again_.cost.push_back(found->second.cost.all());
+      again_.error.push_back(found->second.error[trials_[setting].best_way()].rms());
     }
+    return found->second.measured(trials_[setting].best_way());
+  }
+
+  std::vector<Json> row_of(const Confirmation& one, double goal) const {
+    const Trial& trial = trials_[one.setting];
+    const std::size_t way = trial.best_way();
+    const Spread& fresh = measured_again_.at(one.setting).error[way];
+    std::vector<Json> row = settings_cells(trial.settings);
+    row.insert(row.begin(), 100 * goal);
+    for (Json cell :
+         {Json(ways[way].brief), Json(one.again.cost), percent_or_null(trial.error[way].rms()), Json(fresh.count),
+          percent_or_null(fresh.rms()), percent_or_null(fresh.mean()), percent_or_null(one.bound),
+          Json(100 * (1 - one.level)), Json(one.holds ? "keeps it" : "not shown to")})
+      row.push_back(std::move(cell));
+    return row;
+  }
+
+  void name_setting(std::size_t setting, const Confirmation& one, double goal) {
+    const Trial& trial = trials_[setting];
+    const std::size_t way = trial.best_way();
+    result_.sentences.push_back(fmt::format(
+        "For {:g} % in T use {}, fitted with {}: {:.2g} CPU seconds (measured again with {} new beds: {:.2g} % rms, "
+        "below {:.2g} % with {:.3g} % confidence).",
+        100 * goal, settings_text(trial.settings), ways[way].name, one.again.cost, one.again.count,
+        100 * measured_again_.at(setting).error[way].rms(), 100 * one.bound, 100 * (1 - one.level)));
+    result_.metrics.push_back({fmt::format("{:g} % in T, CPU a bed", 100 * goal), "s", one.again.cost, false});
+  }
+
+  std::string nothing_found(const Choice& choice, double goal) const {
     std::string sentence = fmt::format("For {:g} % in T: no setting is shown to keep it", 100 * goal);
     if (std::any_of(choice.tried.begin(), choice.tried.end(),
                     [](const auto& one) { return std::isfinite(one.bound); })) {
@@ -278,89 +298,154 @@ void settings_for_goals(const std::vector<Trial>& trials, const Effort& effort, 
       sentence += fmt::format(" ({} did well at first and {} measured again{}; nearest come {}: {:.2g} CPU seconds, ",
                               choice.tried.size(), choice.tried.size() == 1 ? "was" : "were",
                               choice.out_of_budget ? ", others were left for want of time" : "",
-                              settings_text(trials[nearest->setting].settings), nearest->again.cost);
+                              settings_text(trials_[nearest->setting].settings), nearest->again.cost);
       sentence += fmt::format("{:.2g} % rms, below {:.2g} % with {:.3g} % confidence)",
                               100 * std::sqrt(nearest->again.squares / nearest->again.count), 100 * nearest->bound,
                               100 * (1 - nearest->level));
     }
-    sentence += effort.quick ? ". A quick run measures short beds and few: `shakebed bench pipeline` tells more." : ".";
-    result.sentences.push_back(std::move(sentence));
+    return sentence +
+           (effort_.quick ? ". A quick run measures short beds and few: `shakebed bench pipeline` tells more." : ".");
   }
-  if (!table.rows.empty()) result.tables.push_back(std::move(table));
-}
 
-void errors_by_dial(const Effort& effort, StageResult& result) {
-  const int seeds = effort.quick ? 4 : 8;
-  Table costs{"What a temperature costs",
-              "CPU seconds of one bed, from the simulation to one fit",
-              {"dial", "px/D", "frames", "disks", "bed s", "CPU s", "simulate", "render", "extract", "fit"},
-              {}};
-  Table errors{
+  const std::vector<Trial>& trials_;
+  const Effort& effort_;
+  StageResult& result_;
+  ChoiceRules rules_;
+  std::vector<Measured> known_;
+  std::map<std::size_t, Trial> measured_again_;
+  Table table_;
+  Curve again_{"measured again with new beds", {}, {}};
+};
+
+// Costs and errors of T, dial by dial.
+class Dials {
+ public:
+  Dials(const Effort& effort, StageResult& result) : effort_(effort), result_(result) {
+    for (const Way& way : ways)
+      errors_.header.push_back(fmt::format("{}: rms", way.brief)), errors_.header.push_back("bias");
+    errors_.header.push_back("no fit");
+    for (std::size_t k = 0; k < way_count; ++k) by_way_[k].label = ways[k].name, by_way_[k].line = false;
+  }
+
+  void run() {
+    for (const Dial& dial : all_dials(effort_.quick)) turn(dial);
+    for (std::size_t k = 0; k < way_count; ++k) {
+      if (k != dial_way) figure_.curves.push_back(std::move(by_way_[k]));
+    }
+    result_.metrics.push_back({"usual settings, CPU", "s", usual_trial_->cost.all(), false});
+    result_.metrics.push_back(
+        {"usual settings, error of T by the default fit", "relative", usual_trial_->error[default_way].rms(), false});
+    figure_.curves.push_back(GoalSearch(trials_, effort_, result_).run());
+    result_.figures.push_back(std::move(figure_));
+    result_.tables.push_back(std::move(errors_));
+    result_.tables.push_back(std::move(costs_));
+  }
+
+ private:
+  void turn(const Dial& dial) {
+    Curve curve{fmt::format("{} (from {:g} D up)", dial.name, ways[dial_way].low), {}, {}};
+    for (const Settings& s : dial.values) {
+      const bool is_usual = s == Settings{};
+      if (!is_usual || !usual_trial_) {
+        effort_.step(fmt::format("pipeline: {}: {}", dial.name, settings_text(s)));
+        trials_.push_back(try_settings(s, 1, seeds_, effort_));
+        if (is_usual) usual_trial_ = trials_.back();
+      }
+      const Trial& trial = is_usual ? *usual_trial_ : trials_.back();
+      add_rows(dial, trial);
+      curve.cost.push_back(trial.cost.all()), curve.error.push_back(trial.error[dial_way].rms());
+      if (is_usual) by_way_[default_way].standard = by_way_[default_way].cost.size();
+      for (std::size_t k = 0; k < way_count; ++k)
+        by_way_[k].cost.push_back(trial.cost.all()), by_way_[k].error.push_back(trial.error[k].rms());
+    }
+    figure_.curves.push_back(std::move(curve));
+  }
+
+  void add_rows(const Dial& dial, const Trial& trial) {
+    std::vector<Json> cells = settings_cells(trial.settings);
+    cells.insert(cells.begin(), dial.name);
+    std::vector<Json> cost = cells;
+    for (const double seconds :
+         {trial.cost.all(), trial.cost.simulate, trial.cost.render, trial.cost.extract, trial.cost.fit})
+      cost.emplace_back(seconds);
+    costs_.rows.push_back(std::move(cost));
+    int failed = 0;
+    for (const Spread& spread : trial.error) {
+      cells.push_back(percent_or_null(spread.rms())), cells.push_back(percent_or_null(spread.mean()));
+      failed += spread.failed;
+    }
+    cells.emplace_back(failed);
+    errors_.rows.push_back(std::move(cells));
+  }
+
+  const Effort& effort_;
+  StageResult& result_;
+  int seeds_ = effort_.quick ? 4 : 8;
+  Table costs_{"What a temperature costs",
+               "CPU seconds of one bed, from the simulation to one fit",
+               {"dial", "px/D", "frames", "disks", "bed s", "CPU s", "simulate", "render", "extract", "fit"},
+               {}};
+  Table errors_{
       "Error of T by what can be dialled",
       fmt::format("{} beds a row, each with a seed of its own; T is held at m g D by the reservoir; rms and "
                   "bias of T/T_true - 1 in %, an rms being uncertain by {:.0f} % of itself. {}: {}; {}: {}; {}: "
                   "{}; {}: {}",
-                  seeds, 100 / std::sqrt(2.0 * seeds), ways[0].brief, ways[0].name, ways[1].brief, ways[1].name,
+                  seeds_, 100 / std::sqrt(2.0 * seeds_), ways[0].brief, ways[0].name, ways[1].brief, ways[1].name,
                   ways[2].brief, ways[2].name, ways[3].brief, ways[3].name),
       {"dial", "px/D", "frames", "disks", "bed s"},
       {}};
-  for (const Way& way : ways)
-    errors.header.push_back(fmt::format("{}: rms", way.brief)), errors.header.push_back("bias");
-  errors.header.push_back("no fit");
-  Figure figure{"pipeline-error",
-                "From bed to temperature: error of T against the CPU time of the whole",
-                "CPU seconds",
-                fmt::format("relative error of T, rms of {} beds", seeds),
-                {}};
-  std::array<Curve, way_count> by_way;
-  for (std::size_t k = 0; k < way_count; ++k) by_way[k].label = ways[k].name, by_way[k].line = false;
-  std::vector<Trial> trials;
-  const Settings usual;
-  std::optional<Trial> usual_trial;
-  for (const Dial& dial : all_dials(effort.quick)) {
-    Curve curve{fmt::format("{} (from {:g} D up)", dial.name, ways[dial_way].low), {}, {}};
-    for (const Settings& s : dial.values) {
-      const bool is_usual = s == usual;
-      if (!is_usual || !usual_trial) {
-        effort.step(fmt::format("pipeline: {}: {}", dial.name, settings_text(s)));
-        trials.push_back(try_settings(s, 1, seeds, effort));
-        if (is_usual) usual_trial = trials.back();
-      }
-      const Trial& trial = is_usual ? *usual_trial : trials.back();
-      std::vector<Json> cells = settings_cells(s);
-      cells.insert(cells.begin(), dial.name);
-      std::vector<Json> cost = cells;
-      for (const double seconds :
-           {trial.cost.all(), trial.cost.simulate, trial.cost.render, trial.cost.extract, trial.cost.fit})
-        cost.emplace_back(seconds);
-      costs.rows.push_back(std::move(cost));
-      int failed = 0;
-      for (const Spread& spread : trial.error) {
-        cells.push_back(percent_or_null(spread.rms())), cells.push_back(percent_or_null(spread.mean()));
-        failed += spread.failed;
-      }
-      cells.emplace_back(failed);
-      errors.rows.push_back(std::move(cells));
-      curve.cost.push_back(trial.cost.all()), curve.error.push_back(trial.error[dial_way].rms());
-      if (is_usual) by_way[default_way].standard = by_way[default_way].cost.size();
-      for (std::size_t k = 0; k < way_count; ++k)
-        by_way[k].cost.push_back(trial.cost.all()), by_way[k].error.push_back(trial.error[k].rms());
-    }
-    figure.curves.push_back(std::move(curve));
+  Figure figure_{"pipeline-error",
+                 "From bed to temperature: error of T against the CPU time of the whole",
+                 "CPU seconds",
+                 fmt::format("relative error of T, rms of {} beds", seeds_),
+                 {}};
+  std::array<Curve, way_count> by_way_;
+  std::vector<Trial> trials_;
+  std::optional<Trial> usual_trial_;
+};
+
+// One long bed without a camera: its kinetic temperature, and what each fit makes of its profile.
+struct LongBed {
+  double kinetic = 0, kinetic_error = 0;
+  Temperatures fitted{}, fit_error{};
+};
+LongBed measure_long_bed(const Settings& settings, double seconds, const fs::path& folder) {
+  Json stages = Json::array({simulate_json(settings, 99, seconds, 0)});
+  for (const Way& way : ways) stages.push_back(fit_json_of(way, "bed"));
+  const RecipeRun run = run_recipe(Json{{"name", "bench"}, {"stages", stages}}, folder);
+  const auto observed = [&](const char* axis, const char* what) {
+    return run.number("bed", "observables.json", fmt::format("/temperature_{}/{}", axis, what));
+  };
+  LongBed bed;
+  bed.kinetic = (observed("x", "value") + observed("z", "value")) / 2;
+  bed.kinetic_error = std::hypot(observed("x", "std_error"), observed("z", "std_error")) / 2;
+  bed.fitted = temperatures_of(run);
+  for (std::size_t k = 0; k < way_count; ++k)
+    bed.fit_error[k] = run.number(ways[k].id, "fit.json", "/temperature/std_error");
+  return bed;
+}
+
+// One bed by pictures with the faults of a camera, by perfect ones, and by its true positions.
+struct SameBed {
+  Temperatures from_noisy, from_clean, from_positions;
+};
+SameBed measure_three_times(const Settings& usual, std::uint64_t seed, const fs::path& scratch) {
+  SameBed bed;
+  bed.from_noisy = temperatures_of(run_recipe(recipe_of(usual, seed), scratch / "run"));
+  Settings perfect = usual;
+  perfect.camera_faults = false;
+  const RecipeRun clean = run_recipe(recipe_of(perfect, seed), scratch / "run");
+  bed.from_clean = temperatures_of(clean);
+  Json stages = Json::array();
+  for (const Way& way : ways) {
+    Json fit = fit_json_of(way, "bed");
+    fit.erase("from");
+    fit["profile"] = fs::absolute(clean.out / "bed" / "profile_frames.csv").string();
+    stages.push_back(std::move(fit));
   }
-  for (std::size_t k = 0; k < way_count; ++k) {
-    if (k != dial_way) figure.curves.push_back(std::move(by_way[k]));
-  }
-  result.metrics.push_back({"usual settings, CPU", "s", usual_trial->cost.all(), false});
-  result.metrics.push_back(
-      {"usual settings, error of T by the default fit", "relative", usual_trial->error[default_way].rms(), false});
-  Curve again{"measured again with new beds", {}, {}};
-  again.line = false;
-  settings_for_goals(trials, effort, result, again);
-  figure.curves.push_back(std::move(again));
-  result.figures.push_back(std::move(figure));
-  result.tables.push_back(std::move(errors));
-  result.tables.push_back(std::move(costs));
+  bed.from_positions =
+      temperatures_of(run_recipe(Json{{"name", "bench"}, {"stages", std::move(stages)}}, scratch / "positions"));
+  return bed;
 }
 
 // Where the error comes from, at the usual settings.
@@ -370,37 +455,15 @@ void error_budget(const Effort& effort, StageResult& result) {
   const int seeds = effort.quick ? 4 : 8;
   const double seconds = effort.quick ? 200 : 2000;
   const Settings usual;
-  // One long bed without a camera.
-  Json long_stages = Json::array({simulate_json(usual, 99, seconds, 0)});
-  for (const Way& way : ways) long_stages.push_back(fit_json_of(way, "bed"));
-  const RecipeRun truth = run_recipe(Json{{"name", "bench"}, {"stages", long_stages}}, scratch / "truth");
-  const auto observed = [&](const char* axis, const char* what) {
-    return truth.number("bed", "observables.json", fmt::format("/temperature_{}/{}", axis, what));
-  };
-  const double kinetic = (observed("x", "value") + observed("z", "value")) / 2,
-               kinetic_error = std::hypot(observed("x", "std_error"), observed("z", "std_error")) / 2;
-  const Temperatures fitted = temperatures_of(truth);
+  const LongBed truth = measure_long_bed(usual, seconds, scratch / "truth");
   std::array<Spread, way_count> statistics, extraction, image, whole;
   for (int seed = 1; seed <= seeds; ++seed) {
     effort.check_interrupted();
-    const RecipeRun noisy = run_recipe(recipe_of(usual, static_cast<std::uint64_t>(seed)), scratch / "run");
-    const Temperatures from_noisy = temperatures_of(noisy);
-    Settings perfect = usual;
-    perfect.camera_faults = false;
-    const RecipeRun clean = run_recipe(recipe_of(perfect, static_cast<std::uint64_t>(seed)), scratch / "run");
-    const Temperatures from_clean = temperatures_of(clean);
-    Json stages = Json::array();
-    for (const Way& way : ways) {
-      Json fit = fit_json_of(way, "bed");
-      fit.erase("from");
-      fit["profile"] = fs::absolute(clean.out / "bed" / "profile_frames.csv").string();
-      stages.push_back(std::move(fit));
-    }
-    const Temperatures from_positions =
-        temperatures_of(run_recipe(Json{{"name", "bench"}, {"stages", std::move(stages)}}, scratch / "positions"));
+    const SameBed bed = measure_three_times(usual, static_cast<std::uint64_t>(seed), scratch);
     for (std::size_t k = 0; k < way_count; ++k) {
-      statistics[k].add(from_positions[k], fitted[k]), extraction[k].add(from_clean[k], from_positions[k]);
-      image[k].add(from_noisy[k], from_clean[k]), whole[k].add(from_noisy[k], temperature);
+      statistics[k].add(bed.from_positions[k], truth.fitted[k]);
+      extraction[k].add(bed.from_clean[k], bed.from_positions[k]);
+      image[k].add(bed.from_noisy[k], bed.from_clean[k]), whole[k].add(bed.from_noisy[k], temperature);
     }
   }
   for (std::size_t k = 0; k < way_count; ++k) {
@@ -413,11 +476,13 @@ void error_budget(const Effort& effort, StageResult& result) {
                     settings_text(usual), seconds),
         {"part", "rms", "mean", "+-"},
         {}};
-    const double fit_error = truth.number(ways[k].id, "fit.json", "/temperature/std_error");
-    table.rows.push_back({"simulation: kinetic T against the reservoir's", std::abs(kinetic / temperature - 1),
-                          kinetic / temperature - 1, kinetic_error / temperature});
-    table.rows.push_back({"model: fit to the long bed against its kinetic T", std::abs(fitted[k] / kinetic - 1),
-                          fitted[k] / kinetic - 1, fit_error / kinetic});
+    const auto add = [&](const char* part, double change, double error) {
+      table.rows.push_back({part, std::abs(change), change, error});
+    };
+    add("simulation: kinetic T against the reservoir's", truth.kinetic / temperature - 1,
+        truth.kinetic_error / temperature);
+    add("model: fit to the long bed against its kinetic T", truth.fitted[k] / truth.kinetic - 1,
+        truth.fit_error[k] / truth.kinetic);
     for (const auto& [name, spread] :
          {std::pair<const char*, const Spread*>{"statistics: so few frames", &statistics[k]},
           {"extraction: finding the disks", &extraction[k]},
@@ -436,6 +501,36 @@ double children_cpu() {
          1e-6 * static_cast<double>(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
 }
 
+// The program shakebed: beside this one, where both are installed, or in the build.
+std::string shakebed_program() {
+  const fs::path here = fs::read_symlink("/proc/self/exe").parent_path();
+  for (const char* place : {"shakebed", "../../bin/shakebed", "../../../pipelines/shakebed"}) {
+    std::error_code error;
+    if (fs::is_regular_file(here / place, error)) return (here / place).lexically_normal().string();
+  }
+  throw StageError(fmt::format("the program shakebed is not to be found from {}", here.string()));
+}
+
+// A small bed and its fit at each of `points` restitutions.
+Json sweep_recipe(int points) {
+  Json recipe{
+      {"name", "bench"},
+      {"stages",
+       Json::array(
+           {Json{{"stage", "simulate"},
+                 {"id", "bed"},
+                 {"disks", {{"count", 40}, {"diameter", 3e-3}, {"restitution", 0.9}}},
+                 {"gravity", 9.81},
+                 {"box", {{"width", 30e-3}, {"sides", "periodic"}}},
+                 {"floor", {{"motion", "sinusoidal"}, {"amplitude", 1.5e-3}, {"frequency", 20}, {"restitution", 0.9}}},
+                 {"settle", 0.1},
+                 {"measure", 0.1}},
+            fit_json_of(ways[default_way], "bed")})}};
+  recipe["sweep"] =
+      Json{{"over", {{"/stages/bed/disks/restitution", {{"from", 0.5}, {"to", 0.95}, {"count", points}}}}}};
+  return recipe;
+}
+
 // Cost and memory of a sweep against its points: the program itself is run, as a user would.
 void sweep_growth(const Effort& effort, StageResult& result) {
   Table table{"Growth of a sweep with its points",
@@ -448,27 +543,12 @@ void sweep_growth(const Effort& effort, StageResult& result) {
     const fs::path folder = fs::path(effort.scratch) / "sweep";
     fs::remove_all(folder);
     fs::create_directories(folder);
-    Json recipe{
-        {"name", "bench"},
-        {"stages",
-         Json::array({Json{{"stage", "simulate"},
-                           {"id", "bed"},
-                           {"disks", {{"count", 40}, {"diameter", 3e-3}, {"restitution", 0.9}}},
-                           {"gravity", 9.81},
-                           {"box", {{"width", 30e-3}, {"sides", "periodic"}}},
-                           {"floor",
-                            {{"motion", "sinusoidal"}, {"amplitude", 1.5e-3}, {"frequency", 20}, {"restitution", 0.9}}},
-                           {"settle", 0.1},
-                           {"measure", 0.1}},
-                      fit_json_of(ways[default_way], "bed")})}};
-    recipe["sweep"] =
-        Json{{"over", {{"/stages/bed/disks/restitution", {{"from", 0.5}, {"to", 0.95}, {"count", count}}}}}};
-    write_file(folder / "sweep.json", dump(recipe));
+    write_file(folder / "sweep.json", dump(sweep_recipe(count)));
     double peak = 0;
     const auto run = [&] {
       const double start = children_cpu();
-      const ProcessResult done = run_process(
-          {fs::read_symlink("/proc/self/exe").string(), "run", "sweep.json", "--out", "o", "--quiet"}, folder);
+      const ProcessResult done =
+          run_process({shakebed_program(), "run", "sweep.json", "--out", "o", "--quiet"}, folder);
       // A point whose little bed cannot be fitted is an honest end of that point.
       if (done.exit_code != exit_ok && done.exit_code != exit_stage_failed && done.exit_code != exit_check_failed)
         throw StageError(
@@ -501,7 +581,7 @@ StageResult bench_pipeline(const Effort& effort) {
   StageResult result;
   result.name = "pipeline", result.title = "pipeline: from a bed to its temperature";
   result.cpu_seconds = cpu_seconds_of([&] {
-    errors_by_dial(effort, result);
+    Dials(effort, result).run();
     error_budget(effort, result);
     sweep_growth(effort, result);
   });

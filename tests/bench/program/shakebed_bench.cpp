@@ -25,50 +25,43 @@ struct Arguments {
   bool quick = false, json = false, quiet = false, verbose = false;
 };
 
-int run_bench(const Arguments& arguments) {
-  struct Row {
-    std::string_view name;
-    bench::StageResult (*measure)(const bench::Effort&);
-  };
-  constexpr Row rows[] = {{"simulate", bench::bench_simulate},
-                          {"extract", bench::bench_extract},
-                          {"fit", bench::bench_fit},
-                          {"map", bench::bench_map},
-                          {"pipeline", bench::bench_pipeline}};
-  const std::string& wanted = arguments.stage;
+struct Row {
+  std::string_view name;
+  bench::StageResult (*measure)(const bench::Effort&);
+};
+constexpr Row rows[] = {{"simulate", bench::bench_simulate},
+                        {"extract", bench::bench_extract},
+                        {"fit", bench::bench_fit},
+                        {"map", bench::bench_map},
+                        {"pipeline", bench::bench_pipeline}};
+
+// A folder that is removed at the end.
+struct Scratch {
+  explicit Scratch(fs::path where) : path(std::move(where)) { fs::create_directories(path); }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  ~Scratch() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  fs::path path;
+};
+
+// Nothing is measured yet; the mistakes of an earlier run are found now rather than after the work.
+bench::Document empty_document(const Arguments& arguments) {
   bench::Document document;
   document.quick = arguments.quick;
   if (arguments.against) {
     document.against = read_json(*arguments.against), document.against_name = *arguments.against;
-    bench::comparison({}, document.against, document.against_name);  // its mistakes now rather than after the work
+    bench::comparison({}, document.against, document.against_name);
   }
   document.digits = Json::parse(bench::digits_kept);
-  const fs::path out = arguments.out ? fs::path(*arguments.out) : fs::path("results") / "bench";
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (error) throw StageError(fmt::format("--out {}: cannot be made: {}", out.string(), error.message()));
-  const FolderLock lock(out);
-  install_interrupt_handler();
-  Console console(arguments.quiet     ? Console::Level::quiet
-                  : arguments.verbose ? Console::Level::verbose
-                                      : Console::Level::normal);
-  bench::Effort effort{.quick = document.quick, .scratch = (out / "scratch").string(), .console = &console};
-  struct Scratch {
-    fs::path path;
-    ~Scratch() {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);
-    }
-  } const scratch{effort.scratch};
-  fs::create_directories(scratch.path);
   document.machine = bench::machine_json();
   document.when = utc_now();
-  for (const Row& row : rows) {
-    if (wanted != "all" && wanted != row.name) continue;
-    document.stages.push_back(row.measure(effort));
-    // After each stage, so that what took an hour is not lost by what comes after it.
-    write_file_atomically(out / "bench.json", dump(bench::document_json(document)));
-  }
+  return document;
+}
+
+void write_results(const Arguments& arguments, const bench::Document& document, const fs::path& out) {
   const std::string page = bench::document_html(document, out);
   const Json json = bench::document_json(document);
   write_file_atomically(out / "bench.html", page);
@@ -78,15 +71,31 @@ int run_bench(const Arguments& arguments) {
                                                                                          (out / "bench.html").string());
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
     throw StageError("stdout cannot be written");
-  int failed = 0;
-  for (const bench::StageResult& stage : document.stages) {
-    for (const bench::HardCase& one : stage.hard_cases) {
-      if (one.pass) continue;
-      ++failed;
-      console.error(fmt::format("hard case failed: {}: {}: {}", stage.name, one.name, one.note));
-    }
+}
+
+int run_bench(const Arguments& arguments) {
+  bench::Document document = empty_document(arguments);
+  const fs::path out = arguments.out ? fs::path(*arguments.out) : fs::path("results") / "bench";
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) throw StageError(fmt::format("--out {}: cannot be made: {}", out.string(), error.message()));
+  const FolderLock lock(out);
+  install_interrupt_handler();
+  Console console(arguments.quiet     ? Console::Level::quiet
+                  : arguments.verbose ? Console::Level::verbose
+                                      : Console::Level::normal);
+  const Scratch scratch(out / "scratch");
+  const bench::Effort effort{.quick = document.quick, .scratch = scratch.path.string(), .console = &console};
+  for (const Row& row : rows) {
+    if (arguments.stage != "all" && arguments.stage != row.name) continue;
+    document.stages.push_back(row.measure(effort));
+    // After each stage, so that what took an hour is not lost by what comes after it.
+    write_file_atomically(out / "bench.json", dump(bench::document_json(document)));
   }
-  return failed == 0 ? exit_ok : exit_check_failed;
+  write_results(arguments, document, out);
+  const std::vector<std::string> failed = bench::failed_cases(document);
+  for (const std::string& sentence : failed) console.error(sentence);
+  return failed.empty() ? exit_ok : exit_check_failed;
 }
 
 int run_program(int argc, char** argv) {

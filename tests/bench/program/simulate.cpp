@@ -172,6 +172,59 @@ void speed_and_growth(const Effort& effort, StageResult& result) {
                             false});
 }
 
+// A stretch of a run: its collisions, what they add to the virial, its time.
+struct Stretch {
+  double collisions = 0, virial = 0, time = 0;
+};
+
+struct LongRun {
+  std::vector<Stretch> stretches;
+  double disks = 0, temperature = 0, collisions = 0, cpu = 0;
+};
+
+LongRun run_fluid(std::uint32_t rows, double density, const Effort& effort) {
+  const auto simulation = sim::simulate(fluid(rows, std::numbers::pi / 4 * density, 7 + rows));
+  equilibrate(*simulation, 200, effort);
+  LongRun run;
+  run.disks = static_cast<double>(rows) * rows, run.temperature = simulation->energy().kinetic / (run.disks - 1);
+  const double total = effort.quick ? 1.2e7 : 2e8, step = 1000 / (4 * run.disks);
+  sim::Counters before = simulation->counters();
+  double then = simulation->time();
+  run.cpu = cpu_seconds_of([&] {
+    while (run.collisions < total) {
+      effort.check_interrupted();
+      simulation->advance_to(simulation->time() + step);
+      const sim::Counters now = simulation->counters();
+      run.stretches.push_back({static_cast<double>(now.disk_collisions - before.disk_collisions),
+                               now.virial - before.virial, simulation->time() - then});
+      run.collisions += run.stretches.back().collisions;
+      before = now, then = simulation->time();
+    }
+  });
+  return run;
+}
+
+std::vector<Stretch> joined_by_four(const std::vector<Stretch>& stretches) {
+  std::vector<Stretch> joined;
+  for (std::size_t i = 0; i + 3 < stretches.size(); i += 4) {
+    Stretch sum;
+    for (std::size_t k = i; k < i + 4; ++k)
+      sum.collisions += stretches[k].collisions, sum.virial += stretches[k].virial, sum.time += stretches[k].time;
+    joined.push_back(sum);
+  }
+  return joined;
+}
+
+// Of Z, relative, of a stretch.
+double rms_error(const LongRun& run, const std::vector<Stretch>& stretches, double reference) {
+  double squares = 0;
+  for (const Stretch& s : stretches) {
+    const double z = 1 + s.virial / s.time / (2 * run.disks * run.temperature);
+    squares += (z / reference - 1) * (z / reference - 1);
+  }
+  return std::sqrt(squares / static_cast<double>(stretches.size()));
+}
+
 // Error of Z in stretches of C collisions, over the many stretches of one long run, against the simulated value of
 // Kolafa and Rottner [KolafaRottner2006].
 void error_against_collisions(const Effort& effort, StageResult& result) {
@@ -190,48 +243,16 @@ void error_against_collisions(const Effort& effort, StageResult& result) {
   double rate_best = 0;
   for (const std::uint32_t rows : {16U, 32U, 64U}) {
     effort.step(fmt::format("simulate: error of Z, {} disks", rows * rows));
-    const auto simulation = sim::simulate(fluid(rows, std::numbers::pi / 4 * density, 7 + rows));
-    equilibrate(*simulation, 200, effort);
-    const double n = static_cast<double>(rows) * rows, temperature = simulation->energy().kinetic / (n - 1);
-    struct Stretch {
-      double collisions, virial, time;
-    };
-    std::vector<Stretch> stretches;
-    const double total = effort.quick ? 1.2e7 : 2e8, step = 1000 / (4 * n);
-    sim::Counters before = simulation->counters();
-    double then = simulation->time(), done = 0;
-    const double cpu = cpu_seconds_of([&] {
-      while (done < total) {
-        effort.check_interrupted();
-        simulation->advance_to(simulation->time() + step);
-        const sim::Counters now = simulation->counters();
-        stretches.push_back({static_cast<double>(now.disk_collisions - before.disk_collisions),
-                             now.virial - before.virial, simulation->time() - then});
-        done += stretches.back().collisions;
-        before = now, then = simulation->time();
-      }
-    });
-    rate_best = std::max(rate_best, done / cpu);
+    const LongRun run = run_fluid(rows, density, effort);
+    rate_best = std::max(rate_best, run.collisions / run.cpu);
     Curve curve{fmt::format("{} disks", rows * rows), {}, {}};
-    while (stretches.size() >= 4) {
-      double squares = 0, collisions = 0;
-      for (const Stretch& s : stretches) {
-        const double z = 1 + s.virial / s.time / (2 * n * temperature);
-        squares += (z / reference - 1) * (z / reference - 1), collisions += s.collisions;
-      }
-      const auto blocks = static_cast<double>(stretches.size());
-      collisions /= blocks;
-      curve.cost.push_back(cpu * collisions / done), curve.error.push_back(std::sqrt(squares / blocks));
+    for (std::vector<Stretch> stretches = run.stretches; stretches.size() >= 4; stretches = joined_by_four(stretches)) {
+      double collisions = 0;
+      for (const Stretch& s : stretches) collisions += s.collisions / static_cast<double>(stretches.size());
+      curve.cost.push_back(run.cpu * collisions / run.collisions);
+      curve.error.push_back(rms_error(run, stretches, reference));
       table.rows.push_back({rows * rows, std::round(collisions), curve.cost.back(), curve.error.back(),
                             limit / std::sqrt(collisions), stretches.size()});
-      std::vector<Stretch> joined;
-      for (std::size_t i = 0; i + 3 < stretches.size(); i += 4) {
-        Stretch sum{0, 0, 0};
-        for (std::size_t k = i; k < i + 4; ++k)
-          sum.collisions += stretches[k].collisions, sum.virial += stretches[k].virial, sum.time += stretches[k].time;
-        joined.push_back(sum);
-      }
-      stretches = std::move(joined);
     }
     figure.curves.push_back(std::move(curve));
   }
@@ -329,193 +350,237 @@ void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effor
   if (!(overlap <= 1e-9)) one.pass = false;
 }
 
+sim::Scene pile(std::uint32_t count, double width, double restitution, double contact_duration) {
+  sim::Scene scene;
+  scene.gravity = sim::UniformGravity{};
+  scene.disks.species = {{count, 1, 1}};
+  scene.disks.contact = {restitution, 0, 0};
+  scene.disks.contact_duration = contact_duration;
+  scene.box.width = width;
+  scene.box.sides = sim::HardSides{{restitution, 0, 0}};
+  scene.box.floor_surface = {restitution, 0, 0};
+  scene.start_temperature = 1;
+  return scene;
+}
+
+// Of any disk's place.
+double largest_difference(const sim::Simulation& one, const sim::Simulation& other) {
+  sim::Snapshot a, b;
+  one.snapshot(a), other.snapshot(b);
+  double difference = 0;
+  for (std::size_t i = 0; i < a.x.size(); ++i)
+    difference = std::max({difference, std::abs(a.x[i] - b.x[i]), std::abs(a.z[i] - b.z[i])});
+  return difference;
+}
+
 // A disk that rests has a contact each contact duration: that, not a time step, is what piles cost here.
-void hard_cases(const Effort& effort, StageResult& result) {
-  effort.step("simulate: hard cases");
-  const auto add = [&](const std::string& name, double limit, double time_limit,
-                       const std::function<void(HardCase&)>& work) {
-    effort.check_interrupted();
-    if (effort.console != nullptr) effort.console->detail("bench: simulate: " + name);
-    result.hard_cases.push_back(run_hard_case(name, "energy", limit, time_limit, work));
-  };
-  const auto pile = [](std::uint32_t count, double width, double restitution, double contact_duration) {
-    sim::Scene scene;
-    scene.gravity = sim::UniformGravity{};
-    scene.disks.species = {{count, 1, 1}};
-    scene.disks.contact = {restitution, 0, 0};
-    scene.disks.contact_duration = contact_duration;
-    scene.box.width = width;
-    scene.box.sides = sim::HardSides{{restitution, 0, 0}};
-    scene.box.floor_surface = {restitution, 0, 0};
-    scene.start_temperature = 1;
-    return scene;
-  };
-  add("inelastic collapse: pile comes to rest, contact clock", 1e-10, 10,
-      [&](HardCase& one) { run_scene(one, pile(200, 15, 0.5, 1e-3), 30, effort); });
-  // Infinitely many contacts in a finite time, which no run can follow: it must stop and say why.
-  add("inelastic collapse: the same without a contact clock", 0, 10, [&](HardCase& one) {
-    try {
-      run_scene(one, pile(200, 15, 0.5, 0), 5, effort);
-      one.pass = false, one.status = "ran on";
-    } catch (const std::runtime_error& stopped) {
-      one.note = stopped.what();
-      one.pass = one.note.find("inelastic collapse") != std::string::npos;
-      one.status = one.pass ? "refused" : "failed";
-    }
-  });
-  add("restitution 0", 1e-10, 10, [&](HardCase& one) { run_scene(one, pile(100, 15, 0, 1e-3), 20, effort); });
-  add("a column of 300 disks, one wide", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(300, 1.2, 0.95, 1e-3);
-    run_scene(one, scene, 10, effort);
-  });
-  add("crystal at area fraction 0.9065 (0.9069 is close packing)", 1e-10, 10,
-      [&](HardCase& one) { run_scene(one, fluid(32, 0.9065), 0.2, effort); });
-  for (const double offset : {-1e-12, 1e-12}) {
-    add(fmt::format("one disk on a floor at Gamma = 1 {} 1e-12", offset < 0 ? "-" : "+"), 1e-9, 10, [&](HardCase& one) {
-      // At rest for half of every period: a contact each contact duration.
-      sim::Scene scene = pile(1, 5, 0.5, 0.01);
-      const double frequency = 0.5, w = 2 * std::numbers::pi * frequency;
-      scene.box.floor = sim::SinusoidalFloor{(1 + offset) / (w * w), frequency};
-      scene.start_temperature = 1e-4;
-      run_scene(one, scene, 200, effort);
+class HardCases {
+ public:
+  HardCases(const Effort& effort, StageResult& result) : effort_(effort), result_(result) {}
+
+  void run() {
+    effort_.step("simulate: hard cases");
+    beds_at_rest();
+    shaken_disks();
+    lattices();
+    contacts_at_one_instant();
+    two_species();
+    few_disks();
+    late_clock();
+    checkpoint();
+  }
+
+ private:
+  void add(const std::string& name, double limit, double time_limit, const std::function<void(HardCase&)>& work) {
+    effort_.check_interrupted();
+    if (effort_.console != nullptr) effort_.console->detail("bench: simulate: " + name);
+    result_.hard_cases.push_back(run_hard_case(name, "energy", limit, time_limit, work));
+  }
+
+  void beds_at_rest() {
+    add("inelastic collapse: pile comes to rest, contact clock", 1e-10, 10,
+        [&](HardCase& one) { run_scene(one, pile(200, 15, 0.5, 1e-3), 30, effort_); });
+    // Infinitely many contacts in a finite time, which no run can follow: it must stop and say why.
+    add("inelastic collapse: the same without a contact clock", 0, 10, [&](HardCase& one) {
+      try {
+        run_scene(one, pile(200, 15, 0.5, 0), 5, effort_);
+        one.pass = false, one.status = "ran on";
+      } catch (const std::runtime_error& stopped) {
+        one.note = stopped.what();
+        one.pass = one.note.find("inelastic collapse") != std::string::npos;
+        one.status = one.pass ? "refused" : "failed";
+      }
+    });
+    add("restitution 0", 1e-10, 10, [&](HardCase& one) { run_scene(one, pile(100, 15, 0, 1e-3), 20, effort_); });
+    add("a column of 300 disks, one wide", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(300, 1.2, 0.95, 1e-3);
+      run_scene(one, scene, 10, effort_);
     });
   }
-  add("a disk between walls 1 + 1e-6 D apart", 1e-9, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(1, 1 + 1e-6, 1, 0);
-    run_scene(one, scene, 1, effort);
-  });
-  add("Gamma = 1000", 1e-9, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(50, 10, 0.9, 1e-6);
-    const double frequency = 1, w = 2 * std::numbers::pi * frequency;
-    scene.box.floor = sim::SinusoidalFloor{1000 / (w * w), frequency};
-    run_scene(one, scene, 100, effort);
-  });
-  // 1.75e8 contacts when not quick.
-  add("1e6 periods of a floor with one disk", 1e-9, effort.quick ? 20 : 180, [&](HardCase& one) {
-    // Gamma below the first bouncing mode: the disk rests for a part of every period, with a contact each contact
-    // duration.
-    sim::Scene scene = pile(1, 5, 0.5, 0.02);
-    const double frequency = 1, w = 2 * std::numbers::pi * frequency;
-    scene.box.floor = sim::SinusoidalFloor{1.02 / (w * w), frequency};
-    run_scene(one, scene, effort.quick ? 1e4 : 1e6, effort);
-    if (effort.quick) one.note += "; quick: 1e4";
-  });
-  add("two sizes 1:0.2, masses 1:1e-3", 1e-9, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(60, 20, 1, 0);
-    scene.disks.species.push_back({300, 0.2, 1e-3});
-    scene.start = sim::RandomStart{0};
-    run_scene(one, scene, 20, effort);
-  });
-  add("close-packed start, phi = (1 - 1e-10) 2/sqrt 3", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene;
-    scene.gravity = sim::Weightless{};
-    scene.disks.species = {{900, 1, 1}};
-    const double spacing = std::sqrt(1 / (1 - 1e-10));
-    scene.box.width = 30 * spacing;
-    scene.box.sides = sim::PeriodicSides{};
-    scene.box.top = sim::PeriodicTop{30 * spacing * std::numbers::sqrt3 / 2};
-    scene.start = sim::HexagonalStart{30, 0};
-    run_scene(one, scene, 1e-9, effort);
-  });
-  add("two disks hit a third at one instant, again and again", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(3, 12, 1, 0);
-    constexpr double c = std::numbers::sqrt3 / 2;
-    scene.start = sim::PlacedStart{
-        {{6, 5, 0, 0, 0, 0}, {6 - 2, 5 + 4 * c, 1, -2 * c, 0, 0}, {6 + 2, 5 + 4 * c, -1, -2 * c, 0, 0}}};
-    run_scene(one, scene, 50, effort);
-  });
-  add("a lattice hit by its lowest row: triple contacts everywhere", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(80, 10.5, 0.6, 1e-3);
-    scene.box.sides = sim::PeriodicSides{};
-    sim::PlacedStart start;
-    for (int k = 0; k < 80; ++k) {
-      const int row = k / 10;
-      start.disks.push_back({k % 10 + 0.25 + 0.5 * (row % 2), 0.51 + row * (std::numbers::sqrt3 / 2 + 0.01), 0,
-                             row == 0 ? 2.0 : 0.0, 0, 0});
+
+  void shaken_disks() {
+    for (const double offset : {-1e-12, 1e-12}) {
+      add(fmt::format("one disk on a floor at Gamma = 1 {} 1e-12", offset < 0 ? "-" : "+"), 1e-9, 10,
+          [&](HardCase& one) {
+            // At rest for half of every period: a contact each contact duration.
+            sim::Scene scene = pile(1, 5, 0.5, 0.01);
+            const double frequency = 0.5, w = 2 * std::numbers::pi * frequency;
+            scene.box.floor = sim::SinusoidalFloor{(1 + offset) / (w * w), frequency};
+            scene.start_temperature = 1e-4;
+            run_scene(one, scene, 200, effort_);
+          });
     }
-    scene.start = start;
-    run_scene(one, scene, 20, effort);
-  });
-  for (const double duration : {0.0, 1e-4}) {
-    add(fmt::format("a row of touching disks that fills the width, {} contact clock", duration > 0 ? "with" : "no"),
-        1e-10, 10, [&](HardCase& one) {
-          sim::Scene scene = pile(12, 12, 0.9, duration);
-          sim::PlacedStart start;
-          for (int k = 0; k < 12; ++k) start.disks.push_back({0.5 + k, 0.5, k == 3 ? 1.0 : 0.0, 1, 0, 0});
-          scene.start = start;
-          run_scene(one, scene, 20, effort);
-        });
+    add("a disk between walls 1 + 1e-6 D apart", 1e-9, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(1, 1 + 1e-6, 1, 0);
+      run_scene(one, scene, 1, effort_);
+    });
+    add("Gamma = 1000", 1e-9, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(50, 10, 0.9, 1e-6);
+      const double frequency = 1, w = 2 * std::numbers::pi * frequency;
+      scene.box.floor = sim::SinusoidalFloor{1000 / (w * w), frequency};
+      run_scene(one, scene, 100, effort_);
+    });
+    // 1.75e8 contacts when not quick.
+    add("1e6 periods of a floor with one disk", 1e-9, effort_.quick ? 20 : 180, [&](HardCase& one) {
+      // Gamma below the first bouncing mode: the disk rests for a part of every period, with a contact each contact
+      // duration.
+      sim::Scene scene = pile(1, 5, 0.5, 0.02);
+      const double frequency = 1, w = 2 * std::numbers::pi * frequency;
+      scene.box.floor = sim::SinusoidalFloor{1.02 / (w * w), frequency};
+      run_scene(one, scene, effort_.quick ? 1e4 : 1e6, effort_);
+      if (effort_.quick) one.note += "; quick: 1e4";
+    });
   }
-  add("masses 1:1e6", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(0, 10, 1, 0);
-    scene.disks.species = {{30, 1, 1}, {30, 1, 1e6}};
-    run_scene(one, scene, 3, effort);
-  });
-  add("radii 1:5", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(0, 30, 0.9, 1e-3);
-    scene.disks.species = {{200, 1, 1}, {10, 5, 25}};
-    scene.start = sim::RandomStart{};
-    run_scene(one, scene, 50, effort);
-  });
-  add("T = 1e-12 m g D", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(100, 12, 1, 0);
-    scene.start_temperature = 1e-12;
-    run_scene(one, scene, 1e-3, effort);
-  });
-  add("a disk at rest on the floor", 1e-10, 10, [&](HardCase& one) {
-    sim::Scene scene = pile(1, 4, 0.5, 0);
-    scene.start = sim::PlacedStart{{{2, 0.5, 0, 0, 0, 0}}};
-    run_scene(one, scene, 10, effort);
-  });
-  add("an empty scene", 0, 10, [&](HardCase& one) {
-    const auto simulation = sim::simulate(pile(0, 4, 0.9, 0));
-    simulation->advance_to(100);
-    one.pass = simulation->time() == 100 && simulation->counters().collisions() == 0;
-    one.note = fmt::format("{} contacts", simulation->counters().collisions());
-  });
-  add("one disk, elastic, for 1000 time units", 1e-10, 10,
-      [&](HardCase& one) { run_scene(one, pile(1, 4, 1, 0), 1000, effort); });
-  // Time is counted from the last synchronisation: the same state put 2^33 intervals later, where a run would have had
-  // more than 1e10 contacts, must go on to the same places.
-  result.hard_cases.push_back(
-      run_hard_case("the clock after 1e10 contacts", "D, largest difference", 0, 10, [&](HardCase& one) {
-        const sim::Scene scene = Bed::scene(1e-6);
-        const auto early = sim::simulate(scene), late = sim::simulate(scene);
-        for (int k = 0; k < 5; ++k) early->advance_to(early->next_synchronisation());
-        late->restore(sim::checkpoint_bytes::put_later(early->checkpoint(), std::uint64_t{1} << 33U));
-        for (int k = 0; k < 20; ++k) {
-          early->advance_to(early->next_synchronisation());
-          late->advance_to(late->next_synchronisation());
-        }
-        sim::Snapshot a, b;
-        early->snapshot(a), late->snapshot(b);
-        double difference = 0;
-        for (std::size_t i = 0; i < a.x.size(); ++i)
-          difference = std::max({difference, std::abs(a.x[i] - b.x[i]), std::abs(a.z[i] - b.z[i])});
-        one.error = difference;
-        const double contacts = static_cast<double>(early->counters().collisions()) / early->time() * late->time();
-        one.pass = contacts > 1e10;
-        one.note = fmt::format("at time {:.4g}, {:.3g} contacts", late->time(), contacts);
-      }));
-  result.hard_cases.push_back(
-      run_hard_case("stopped at a checkpoint and gone on", "D, largest difference", 0, 10, [&](HardCase& one) {
-        const sim::Scene scene = Bed::scene(1e-6);
-        const auto whole = sim::simulate(scene);
-        const auto first = sim::simulate(scene);
-        for (int k = 0; k < 20; ++k) first->advance_to(first->next_synchronisation());
-        const auto second = sim::simulate(scene);
-        second->restore(first->checkpoint());
-        const double until = first->time() + 20;
-        whole->advance_to(until), second->advance_to(until);
-        sim::Snapshot a, b;
-        whole->snapshot(a), second->snapshot(b);
-        double difference = 0;
-        for (std::size_t i = 0; i < a.x.size(); ++i)
-          difference = std::max({difference, std::abs(a.x[i] - b.x[i]), std::abs(a.z[i] - b.z[i])});
-        one.error = difference;
-        one.note = fmt::format("after {} contacts", whole->counters().collisions());
-      }));
-}
+
+  void lattices() {
+    add("crystal at area fraction 0.9065 (0.9069 is close packing)", 1e-10, 10,
+        [&](HardCase& one) { run_scene(one, fluid(32, 0.9065), 0.2, effort_); });
+    add("close-packed start, phi = (1 - 1e-10) 2/sqrt 3", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene;
+      scene.gravity = sim::Weightless{};
+      scene.disks.species = {{900, 1, 1}};
+      const double spacing = std::sqrt(1 / (1 - 1e-10));
+      scene.box.width = 30 * spacing;
+      scene.box.sides = sim::PeriodicSides{};
+      scene.box.top = sim::PeriodicTop{30 * spacing * std::numbers::sqrt3 / 2};
+      scene.start = sim::HexagonalStart{30, 0};
+      run_scene(one, scene, 1e-9, effort_);
+    });
+  }
+
+  void contacts_at_one_instant() {
+    add("two disks hit a third at one instant, again and again", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(3, 12, 1, 0);
+      constexpr double c = std::numbers::sqrt3 / 2;
+      scene.start = sim::PlacedStart{
+          {{6, 5, 0, 0, 0, 0}, {6 - 2, 5 + 4 * c, 1, -2 * c, 0, 0}, {6 + 2, 5 + 4 * c, -1, -2 * c, 0, 0}}};
+      run_scene(one, scene, 50, effort_);
+    });
+    add("a lattice hit by its lowest row: triple contacts everywhere", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(80, 10.5, 0.6, 1e-3);
+      scene.box.sides = sim::PeriodicSides{};
+      sim::PlacedStart start;
+      for (int k = 0; k < 80; ++k) {
+        const int row = k / 10;
+        start.disks.push_back({k % 10 + 0.25 + 0.5 * (row % 2), 0.51 + row * (std::numbers::sqrt3 / 2 + 0.01), 0,
+                               row == 0 ? 2.0 : 0.0, 0, 0});
+      }
+      scene.start = start;
+      run_scene(one, scene, 20, effort_);
+    });
+    for (const double duration : {0.0, 1e-4}) {
+      add(fmt::format("a row of touching disks that fills the width, {} contact clock", duration > 0 ? "with" : "no"),
+          1e-10, 10, [&](HardCase& one) {
+            sim::Scene scene = pile(12, 12, 0.9, duration);
+            sim::PlacedStart start;
+            for (int k = 0; k < 12; ++k) start.disks.push_back({0.5 + k, 0.5, k == 3 ? 1.0 : 0.0, 1, 0, 0});
+            scene.start = start;
+            run_scene(one, scene, 20, effort_);
+          });
+    }
+  }
+
+  void two_species() {
+    add("two sizes 1:0.2, masses 1:1e-3", 1e-9, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(60, 20, 1, 0);
+      scene.disks.species.push_back({300, 0.2, 1e-3});
+      scene.start = sim::RandomStart{0};
+      run_scene(one, scene, 20, effort_);
+    });
+    add("masses 1:1e6", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(0, 10, 1, 0);
+      scene.disks.species = {{30, 1, 1}, {30, 1, 1e6}};
+      run_scene(one, scene, 3, effort_);
+    });
+    add("radii 1:5", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(0, 30, 0.9, 1e-3);
+      scene.disks.species = {{200, 1, 1}, {10, 5, 25}};
+      scene.start = sim::RandomStart{};
+      run_scene(one, scene, 50, effort_);
+    });
+  }
+
+  // Cold, resting, one or none.
+  void few_disks() {
+    add("T = 1e-12 m g D", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(100, 12, 1, 0);
+      scene.start_temperature = 1e-12;
+      run_scene(one, scene, 1e-3, effort_);
+    });
+    add("a disk at rest on the floor", 1e-10, 10, [&](HardCase& one) {
+      sim::Scene scene = pile(1, 4, 0.5, 0);
+      scene.start = sim::PlacedStart{{{2, 0.5, 0, 0, 0, 0}}};
+      run_scene(one, scene, 10, effort_);
+    });
+    add("an empty scene", 0, 10, [&](HardCase& one) {
+      const auto simulation = sim::simulate(pile(0, 4, 0.9, 0));
+      simulation->advance_to(100);
+      one.pass = simulation->time() == 100 && simulation->counters().collisions() == 0;
+      one.note = fmt::format("{} contacts", simulation->counters().collisions());
+    });
+    add("one disk, elastic, for 1000 time units", 1e-10, 10,
+        [&](HardCase& one) { run_scene(one, pile(1, 4, 1, 0), 1000, effort_); });
+  }
+
+  void late_clock() {
+    // Time is counted from the last synchronisation: the same state put 2^33 intervals later, where a run would have
+    // had more than 1e10 contacts, must go on to the same places.
+    result_.hard_cases.push_back(
+        run_hard_case("the clock after 1e10 contacts", "D, largest difference", 0, 10, [&](HardCase& one) {
+          const sim::Scene scene = Bed::scene(1e-6);
+          const auto early = sim::simulate(scene), late = sim::simulate(scene);
+          for (int k = 0; k < 5; ++k) early->advance_to(early->next_synchronisation());
+          late->restore(sim::checkpoint_bytes::put_later(early->checkpoint(), std::uint64_t{1} << 33U));
+          for (int k = 0; k < 20; ++k) {
+            early->advance_to(early->next_synchronisation());
+            late->advance_to(late->next_synchronisation());
+          }
+          one.error = largest_difference(*early, *late);
+          const double contacts = static_cast<double>(early->counters().collisions()) / early->time() * late->time();
+          one.pass = contacts > 1e10;
+          one.note = fmt::format("at time {:.4g}, {:.3g} contacts", late->time(), contacts);
+        }));
+  }
+
+  void checkpoint() {
+    result_.hard_cases.push_back(
+        run_hard_case("stopped at a checkpoint and gone on", "D, largest difference", 0, 10, [&](HardCase& one) {
+          const sim::Scene scene = Bed::scene(1e-6);
+          const auto whole = sim::simulate(scene);
+          const auto first = sim::simulate(scene);
+          for (int k = 0; k < 20; ++k) first->advance_to(first->next_synchronisation());
+          const auto second = sim::simulate(scene);
+          second->restore(first->checkpoint());
+          const double until = first->time() + 20;
+          whole->advance_to(until), second->advance_to(until);
+          one.error = largest_difference(*whole, *second);
+          one.note = fmt::format("after {} contacts", whole->counters().collisions());
+        }));
+  }
+
+  const Effort& effort_;
+  StageResult& result_;
+};
 
 }  // namespace
 
@@ -526,7 +591,7 @@ StageResult bench_simulate(const Effort& effort) {
     error_against_collisions(effort, result);
     contact_clock(effort, result);
     speed_and_growth(effort, result);
-    hard_cases(effort, result);
+    HardCases(effort, result).run();
   });
   return result;
 }
