@@ -245,9 +245,11 @@ class FrameFinder {
     found.radius_px = calibration_.radius_px;
     const double determinant = disk.hessian_xx * disk.hessian_yy - disk.hessian_xy * disk.hessian_xy;
     if (determinant > 0) {
-      found.variance_x = noise_ * noise_ * disk.hessian_yy / determinant;
-      found.variance_y = noise_ * noise_ * disk.hessian_xx / determinant;
-      found.covariance_xy = -noise_ * noise_ * disk.hessian_xy / determinant;
+      // Noise is as wide as a pixel of the camera.
+      const double variance = noise_ * noise_ * frame_.enlargement * frame_.enlargement;
+      found.variance_x = variance * disk.hessian_yy / determinant;
+      found.variance_y = variance * disk.hessian_xx / determinant;
+      found.covariance_xy = -variance * disk.hessian_xy / determinant;
     }
     const double share = disk.explained / typical_;
     found.quality = std::clamp(share, 0.0, 1.0);

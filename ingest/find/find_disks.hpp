@@ -5,6 +5,7 @@
 // bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,8 +60,8 @@ struct FinderCalibration {
   double edge_width_px = 0;         // sigma of the blurred edge, the pixel's own 0.29 px included
   double noise_level = 0;           // sigma of the residuals in grey levels, away from edges
   double contrast_level = 0;        // bead minus background, grey levels, at the middle of the frame
-  bool radius_of_all_rims = false;  // told from the profile below, the rims of all beads, not from open ones alone
-  double tone_exponent = 1;         // recorded level = light^exponent, told from the rims; 1 for a linear camera
+  bool radius_of_all_rims = false;  // from the profile below, the rims of all beads, not of open ones alone
+  double tone_exponent = 1;         // recorded level = light^exponent, from the rims; 1 for a linear camera
   bool solid_borders = false;       // floor, walls or lid are in view; each frame is searched without them
   int width = 0, height = 0;        // of the frames it was learned from
   BeadProfile profile;
@@ -73,6 +74,8 @@ struct FinderCalibration {
   std::optional<RimModel> rims;
   bool by_rims = false;             // beads are found by rims alone: light and profile are empty
   bool rims_to_be_checked = false;  // faces without a rim occur, and are dropped
+  // Where faces fit, but none has a rim, as in surroundings as bright as the beads: 1 for each pixel that is left out.
+  std::shared_ptr<const std::vector<std::uint8_t>> left_out;
 };
 
 struct FindResult {

@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "ingest/find/nearby.hpp"
 
@@ -15,6 +20,10 @@ constexpr double surely_a_bead = 0.9;  // probability of a rim from which the fa
 constexpr double most_missed = 0.06;   // share of these that faces may miss
 constexpr double no_rim = 0.2;         // support below which a face has no rim at all
 constexpr double most_rimless = 0.35;  // share of the faces without a rim beyond which they are something else
+// Radii: pixels so near to a face without a rim, and to none with one, are left out. A jammed tiling leaves voids of up
+// to half a radius between its disks.
+constexpr double left_out_reach = 1.5;
+constexpr int most_left_out_rounds = 3;
 // A face's radius over that of the rims, which hidden parts make smaller: black beads in a packed bed 1.05,
 // photoelastic disks 1.04 to 1.06. A face smaller than the rims is a part of the bead.
 constexpr double least_ratio = 0.97, most_ratio = 1.15;
@@ -50,12 +59,13 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
   std::vector<FoundDisk> kept;
   for (std::size_t k = 0; k < circles.size(); ++k) {
     FoundDisk disk = found.disks[k];
-    // A cut bead shows half its rim at most: its support is of that half.
+    // A cut bead may show too little of its rim: it is doubtful, and stays where beads are.
     if (circles[k].support < no_rim && !disk.cut) {
       ++found.rejected;
       continue;
     }
-    disk.probability = std::max(rims.probability_of(circles[k].support), disk.quality >= whole_quality ? 0.95 : 0.5);
+    const bool whole = disk.quality >= whole_quality && circles[k].support >= no_rim;
+    disk.probability = std::max(rims.probability_of(circles[k].support), whole ? 0.95 : 0.5);
     kept.push_back(disk);
   }
   found.disks = std::move(kept);
@@ -64,8 +74,10 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
 }
 
 struct Agreement {
-  double missed = 0;   // share of the sure rims that no face has
-  double rimless = 0;  // share of the faces
+  double missed = 0;                  // share of the sure rims that no face has
+  double rimless = 0;                 // share of the faces
+  std::vector<Circle> faces, no_rim;  // whole faces with a rim, and without
+  [[nodiscard]] bool good() const { return missed <= most_missed && rimless <= most_rimless; }
 };
 Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
   Agreement agreement;
@@ -82,10 +94,79 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   std::vector<Circle> places;
   for (const FoundDisk& disk : faces.disks)
     if (!disk.cut) places.push_back(place_of(disk));
-  for (const Circle& circle : rims_at(frame, rims.model, places))
-    agreement.rimless += (circle.support < no_rim) / static_cast<double>(places.size());
+  const std::vector<Circle> circles = rims_at(frame, rims.model, places);
+  for (std::size_t k = 0; k < places.size(); ++k)
+    (circles[k].support < no_rim ? agreement.no_rim : agreement.faces).push_back(places[k]);
+  if (!places.empty())
+    agreement.rimless = static_cast<double>(agreement.no_rim.size()) / static_cast<double>(places.size());
   return agreement;
 }
+
+void paint(std::vector<std::uint8_t>& pixels, const GrayFrame& frame, const Circle& circle, std::uint8_t value) {
+  const double reach = left_out_reach * circle.radius;
+  const int top = std::max(0, static_cast<int>(std::ceil(circle.y - reach)));
+  const int bottom = std::min(frame.height - 1, static_cast<int>(std::floor(circle.y + reach)));
+  for (int row = top; row <= bottom; ++row) {
+    const double half = std::sqrt(std::max(0.0, reach * reach - (row - circle.y) * (row - circle.y)));
+    const int left = std::max(0, static_cast<int>(std::ceil(circle.x - half)));
+    const int right = std::min(frame.width - 1, static_cast<int>(std::floor(circle.x + half)));
+    const auto line = pixels.begin() + static_cast<std::ptrdiff_t>(row) * frame.width;
+    if (left <= right) std::fill(line + left, line + right + 1, value);
+  }
+}
+
+// Faces without rims where none with a rim is near: surroundings as bright as the beads, which faces tile. Beads, light
+// and profile are learned again without them.
+class FacesAndRims {
+ public:
+  FacesAndRims(const std::vector<const GrayFrame*>& frames, const FindOptions& asked, const LearnedRims& rims)
+      : frames_(frames), asked_(asked), rims_(rims) {}
+
+  // The calibration by faces, if faces and rims agree.
+  std::optional<CalibrationResult> learn() {
+    CalibrationResult faces = learn_finder(frames_, asked_);
+    for (int round = 0;; ++round) {
+      faces.calibration.left_out = left_out_;
+      const double ratio = faces.found ? faces.calibration.radius_px / rims_.model.radius_px : 0;
+      if (!(ratio > least_ratio && ratio < most_ratio)) return std::nullopt;
+      const GrayFrame& frame = *frames_.back();
+      const Agreement agreement = compare(frame, rims_, find_disks(frame, faces.calibration, asked_));
+      if (agreement.good()) {
+        faces.calibration.rims = rims_.model;
+        faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
+        return faces;
+      }
+      if (round == most_left_out_rounds || agreement.rimless <= most_rimless) return std::nullopt;
+      leave_out(agreement);
+      faces = learn_without();
+    }
+  }
+
+ private:
+  void leave_out(const Agreement& agreement) {
+    const GrayFrame& frame = *frames_.back();
+    std::vector<std::uint8_t> pixels = left_out_ ? *left_out_ : std::vector<std::uint8_t>(frame.pixels.size(), 0);
+    for (const Circle& circle : agreement.no_rim) paint(pixels, frame, circle, 1);
+    for (const Circle& circle : agreement.faces) paint(pixels, frame, circle, 0);
+    left_out_ = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels));
+  }
+
+  CalibrationResult learn_without() {
+    FinderCalibration parts;
+    parts.left_out = left_out_;
+    std::vector<GrayFrame> seen;
+    for (const GrayFrame* frame : frames_)
+      if (frame->pixels.size() == left_out_->size()) seen.push_back(seen_part(*frame, parts));
+    std::vector<const GrayFrame*> pointers;
+    for (const GrayFrame& frame : seen) pointers.push_back(&frame);
+    return learn_finder(pointers, asked_);
+  }
+
+  const std::vector<const GrayFrame*>& frames_;
+  const FindOptions& asked_;
+  const LearnedRims& rims_;
+  std::shared_ptr<const std::vector<std::uint8_t>> left_out_;
+};
 
 CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims) {
   CalibrationResult result;
@@ -160,16 +241,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
-  CalibrationResult faces = learn_finder(frames, asked);
-  const double ratio = faces.found ? faces.calibration.radius_px / rims.model.radius_px : 0;
-  if (ratio > least_ratio && ratio < most_ratio) {
-    const Agreement agreement = compare(frame, rims, find_disks(frame, faces.calibration, asked));
-    if (agreement.missed <= most_missed && agreement.rimless <= most_rimless) {
-      faces.calibration.rims = rims.model;
-      faces.calibration.rims_to_be_checked = agreement.rimless > 0;
-      return faces;
-    }
-  }
+  if (auto faces = FacesAndRims(frames, asked, rims).learn()) return std::move(*faces);
   return calibration_by_rims(frame, rims);
 }
 

@@ -504,7 +504,11 @@ void require_consistent(const GrayFrame& frame) {
     throw std::invalid_argument("find_disks: the frame's pixel count is not width x height");
 }
 
-GrayFrame seen_part(const GrayFrame& frame, const FinderCalibration& calibration) {
+GrayFrame seen_part(const GrayFrame& recorded, const FinderCalibration& calibration) {
+  GrayFrame frame = recorded;
+  if (calibration.left_out)
+    for (std::size_t k = 0; k < frame.pixels.size(); ++k)
+      if ((*calibration.left_out)[k] != 0) frame.pixels[k] = unseen_level;
   if (!calibration.solid_borders) return frame;
   std::vector<SolidBorder> borders = find_solid_borders(frame);
   std::erase_if(borders, [&](const SolidBorder& border) { return is_background(border, calibration.light, frame); });

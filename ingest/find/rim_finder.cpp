@@ -19,7 +19,10 @@ constexpr double support_width = 0.055;    // over which circles are counted, ei
 // Before any is seen: circles that chance makes up in a class of support, fewer the better the support.
 constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
 constexpr double least_probability = 0.8;  // of a disk that is reported: more than one circle alone in its class has
-constexpr double well_supported = 0.9;     // probability from which a circle tells the radius
+constexpr double well_supported = 0.9;     // probability from which a circle counts for the radius
+// Where blurred beads touch, their steepest edges lie farther out than a lone one's: in a photograph of beads of 2.5 px
+// at 1.4 times its radius. A circle so much smaller than the others must show most of its rim.
+constexpr double lone_share = 0.75, lone_support = 0.6;
 const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07};
 
 std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity polarity) {
@@ -197,6 +200,12 @@ std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const
     start.y = at.from_frame_y(place.y);
     start.radius = model.radius_px / at.scale;
     Circle fitted = fit_circle(edges, start, model.polarity);
+    if (fitted.support < faintest_support) {
+      Circle smaller = start;
+      smaller.radius *= lone_share;
+      smaller = fit_circle(edges, smaller, model.polarity);
+      if (smaller.support >= lone_support) fitted = smaller;
+    }
     fitted.x = at.to_frame_x(fitted.x);
     fitted.y = at.to_frame_y(fitted.y);
     fitted.radius *= at.scale;

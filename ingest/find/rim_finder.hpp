@@ -3,8 +3,8 @@
 //
 // The frame is reduced until a bead is 8 to 16 px in radius, circles of the beads' radius are searched in its edges,
 // and each is given the probability that it is a bead. That probability follows from the share of the rim that is seen:
-// the same search on copies of the frame stretched along one axis, where no bead is round any more, tells how many
-// circles so well supported chance makes up (target and decoy [EliasGygi]).
+// the same search on copies of the frame stretched along one axis, where no bead is round any more, shows how
+// many circles so well supported chance makes up (target and decoy [EliasGygi]).
 
 #include <vector>
 

@@ -20,6 +20,9 @@ struct GrayFrame {
   int width = 0;
   int height = 0;
   std::vector<float> pixels;
+  // Pixels of this frame to one that the camera took, along a side: more than 1 where the picture was enlarged by
+  // repeating pixels. Its noise is then as much wider.
+  double enlargement = 1;
 
   [[nodiscard]] bool empty() const { return pixels.empty(); }
   [[nodiscard]] float at(int column, int row) const {
@@ -101,7 +104,7 @@ class FrameSource {
   void rewind();
   // Frames in the stream if known without decoding films; TIFF files are counted by page.
   [[nodiscard]] std::optional<std::size_t> count_if_known() const;
-  // Frames a second of the stream as the film itself tells them; nothing unless the stream is one film that does.
+  // Frames a second of the stream as stated in the film; nothing unless the stream is one film that does.
   [[nodiscard]] std::optional<double> film_rate_hz() const;
 
  private:

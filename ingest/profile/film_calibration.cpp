@@ -67,6 +67,14 @@ class FilmLearner {
     if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
     calibrated_.beads.reset();
     if (film_.options.second_diameter_m) learn_second();
+    if (enlargement_ > 1) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "The pictures were enlarged %.2f times by repeating pixels; they were smoothed, and the errors of "
+                    "the centres are those of the smaller picture.",
+                    enlargement_);
+      film_.warnings.emplace_back(text);
+    }
     film_.lens = lens_;
     if (!lens_.plain()) use_lens();
     film_.finder = std::move(calibrated_.calibration);
@@ -113,6 +121,7 @@ class FilmLearner {
 
   // With the frames before it once beads are known. Whether it shows beads.
   bool learns_from(GrayFrame frame, std::string& first_reason) {
+    enlargement_ = std::max(enlargement_, frame.enlargement);
     straight_.push_back(straightened(frame));
     recorded_.push_back(std::move(frame));
     CalibrationResult attempt = learn_beads(
@@ -280,6 +289,7 @@ class FilmLearner {
   FilmCalibration film_;
   std::vector<GrayFrame> recorded_, straight_;  // frames learned from, as recorded and true
   CalibrationResult calibrated_;
+  double enlargement_ = 1;  // of the pictures
 };
 
 }  // namespace
