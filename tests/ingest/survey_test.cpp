@@ -17,6 +17,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/profile/measure_bed.hpp"
+#include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -237,6 +238,114 @@ TEST(Survey, ReducedFramesGiveThePlacesOfTheRecordedOnes) {
     double nearest = 1e9;
     for (const Place& place : truth) nearest = std::min(nearest, std::hypot(disk.x_px - place.x, disk.y_px - place.y));
     EXPECT_LT(nearest, 0.15);
+  }
+}
+
+// A frame with every pixel repeated `factor` times along both sides, as programs enlarge that take the nearest pixel.
+GrayFrame repeated(const GrayFrame& frame, double factor) {
+  GrayFrame large;
+  large.width = static_cast<int>(frame.width * factor);
+  large.height = static_cast<int>(frame.height * factor);
+  for (int row = 0; row < large.height; ++row)
+    for (int column = 0; column < large.width; ++column)
+      large.pixels.push_back(frame.at(std::min(frame.width - 1, static_cast<int>(column / factor)),
+                                      std::min(frame.height - 1, static_cast<int>(row / factor))));
+  return large;
+}
+
+Measurement measured_as_found(const std::string& path) {
+  const Survey survey = take_survey(read_channels(path));
+  if (!survey.found) return {};
+  MeasureOptions options;
+  options.bead_diameter_m = 0.006;
+  options.find.seen = BeadsSeen{survey.candidates.front().rims.polarity, survey.candidates.front().rims.radius_px};
+  FrameSource source = FrameSource::open({path});
+  return measure_bed(source, options);
+}
+
+TEST(Survey, FindsBeadsInPicturesEnlargedByRepeatingPixels) {
+  const test::ScratchFolder folder;
+  std::mt19937 random(41);
+  std::size_t beads = 0, hits = 0, found = 0;
+  constexpr int pictures = 8;
+  for (unsigned k = 0; k < pictures; ++k) {
+    const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    const double radius = 2.6 + 3 * part(), factor = 2 + 2 * part();
+    const std::vector<Place> places = scattered(60, 2.15 * radius, 180, 160, 100 + k);
+    const bool bright = k % 2 == 0;
+    const GrayFrame frame = painted(
+        180, 160,
+        [&](double x, double y) {
+          const double level = bead_at(places, radius, x, y) != nullptr ? 60.0 : 190.0;
+          return bright ? 250 - level : level;
+        },
+        200 + k);
+    const std::string path = folder / ("enlarged_" + std::to_string(k) + ".png");
+    write_png(path, repeated(frame, factor));
+    EXPECT_NEAR(read_frame(path).enlargement, factor, 0.01 * factor) << k;
+    std::vector<Place> truth;
+    for (const Place& place : places) truth.push_back({factor * (place.x + 0.5) - 0.5, factor * (place.y + 0.5) - 0.5});
+    const Score score_here = score(measured_as_found(path).disks, truth, factor * radius, [](const MeasuredDisk& d) {
+      return Place{d.x_px, d.y_px};
+    });
+    beads += truth.size(), hits += score_here.hits, found += score_here.found;
+  }
+  EXPECT_GE(static_cast<double>(hits), 0.98 * static_cast<double>(beads));
+  EXPECT_LE(static_cast<double>(found - hits), 0.02 * static_cast<double>(beads));
+}
+
+TEST(Survey, PicturesThatWereNotEnlargedStayAsTheyAre) {
+  const test::ScratchFolder folder;
+  const std::vector<std::pair<std::string, Paint>> pictures = {
+      {"smooth", [](double x, double y) { return 60 + 0.2 * x + 0.1 * y + 20 * std::sin(x / 9); }},
+      {"a plot",
+       [](double x, double y) {
+         const bool curve = std::abs(y - 150 - 80 * std::sin(x / 40)) < 1.5;
+         const bool grid = std::fmod(x + 20, 60) < 1 || std::fmod(y + 20, 50) < 1;
+         return curve ? 20.0 : grid ? 200.0 : 250.0;
+       }},
+      {"beads",
+       [](double x, double y) { return std::hypot(std::fmod(x, 24) - 12, std::fmod(y, 24) - 12) < 9 ? 60. : 200.; }}};
+  for (const auto& [name, paint] : pictures) {
+    GrayFrame frame = painted(300, 260, paint);
+    for (float& level : frame.pixels) level = std::min(255.0F, std::round(level));
+    const std::string path = folder / (name + ".png");
+    write_png(path, frame);
+    const GrayFrame read = read_frame(path);
+    EXPECT_EQ(read.enlargement, 1) << name;
+    EXPECT_EQ(read.pixels, frame.pixels) << name;
+  }
+}
+
+// White beads in a black pan on a table as bright as they are: faces tile the table, which has no rims.
+TEST(Survey, SurroundingsAsBrightAsTheBeadsHoldNoBeads) {
+  for (const unsigned seed : {51U, 52U}) {
+    std::mt19937 random(seed);
+    const double radius = 6 + static_cast<double>(random() % 300) / 100, pan = 200, middle = 240;
+    std::vector<Place> truth;
+    // A crystal in the middle of the pan, lone beads around it.
+    for (int row = -5; row <= 5; ++row)
+      for (int column = -5; column <= 5; ++column)
+        truth.push_back({middle + 2.05 * radius * (column + 0.5 * (row & 1)), middle + 1.78 * radius * row});
+    const double crystal = 13 * radius;
+    for (const Place& place : scattered(400, 2.6 * radius, 480, 480, seed)) {
+      const double away = std::hypot(place.x - middle, place.y - middle);
+      if (away > crystal + 2 * radius && away < pan - 2 * radius) truth.push_back(place);
+    }
+    const GrayFrame frame = painted(
+        480, 480,
+        [&](double x, double y) {
+          if (std::hypot(x - middle, y - middle) > pan) return 205.0 + 6 * std::sin(x / 31) + 6 * std::cos(y / 23);
+          return bead_at(truth, radius, x, y) != nullptr ? 215.0 : 50.0;
+        },
+        seed);
+    const test::ScratchFolder folder;
+    write_png(folder / "pan.png", frame);
+    const Score found = score(measured_as_found(folder / "pan.png").disks, truth, radius, [](const MeasuredDisk& d) {
+      return Place{d.x_px, d.y_px};
+    });
+    EXPECT_GE(static_cast<double>(found.hits), 0.98 * static_cast<double>(truth.size())) << seed;
+    EXPECT_LE(static_cast<double>(found.found - found.hits), 0.02 * static_cast<double>(truth.size())) << seed;
   }
 }
 
