@@ -14,13 +14,13 @@
 namespace shakebed::ingest {
 namespace {
 
-constexpr double radius = 10, edge = 1.04, knot = 0.4, noise = 0.035, beads = 1000;
+constexpr double rim_radius = 10, edge = 1.04, knot = 0.4, rim_noise = 0.035, rim_beads = 1000;
 
 BeadProfile profile_of(const RadialContrast& contrast) {
   BeadProfile profile;
   profile.step_px = 0.05;
   for (int k = 0; k <= 280; ++k)
-    profile.level.push_back(static_cast<float>(blurred_disk_contrast(radius, edge, contrast, 0.05 * k)));
+    profile.level.push_back(static_cast<float>(blurred_disk_contrast(rim_radius, edge, contrast, 0.05 * k)));
   return profile;
 }
 
@@ -63,14 +63,14 @@ TEST_P(Shadings, RadiusIsToldWithinItsErrorAndHundredthsOfAPixel) {
       const double r = 0.05 * static_cast<double>(k), place = r / knot;
       const auto cell = static_cast<std::size_t>(place);
       const double error = errors[cell] + (place - static_cast<double>(cell)) * (errors[cell + 1] - errors[cell]);
-      profile.level[k] += static_cast<float>(error * noise / std::sqrt(beads * 2 * 3.14159265 * r * knot));
+      profile.level[k] += static_cast<float>(error * rim_noise / std::sqrt(rim_beads * 2 * 3.14159265 * r * knot));
     }
-    const RimChoice choice = choose_rim(profile, {radius + 0.08, edge + 0.1, knot, noise, beads, 200, 60});
+    const RimChoice choice = choose_rim(profile, {rim_radius + 0.08, edge + 0.1, knot, rim_noise, rim_beads, 200, 60});
     ASSERT_TRUE(choice.rim.good) << GetParam().name;
     EXPECT_EQ(choice.exponent, 1);
-    EXPECT_NEAR(choice.rim.radius_px, radius, 0.02);
+    EXPECT_NEAR(choice.rim.radius_px, rim_radius, 0.02);
     // Five trials of five shadings: beyond 4 standard errors (and what learning is good to) by chance once in 600 runs.
-    EXPECT_NEAR(choice.rim.radius_px, radius, 4 * choice.rim.std_error_px + 0.002);
+    EXPECT_NEAR(choice.rim.radius_px, rim_radius, 4 * choice.rim.std_error_px + 0.002);
   }
 }
 INSTANTIATE_TEST_SUITE_P(Rim, Shadings,
@@ -89,10 +89,10 @@ TEST(Rim, AToneCurveIsSeenAndUndone) {
   const double background = encoded(200), bead = encoded(60);
   for (float& level : profile.level)
     level = static_cast<float>((encoded(200 - 140 * static_cast<double>(level)) - background) / (bead - background));
-  const RimChoice choice = choose_rim(profile, {radius, edge, knot, noise, beads, background, bead});
+  const RimChoice choice = choose_rim(profile, {rim_radius, edge, knot, rim_noise, rim_beads, background, bead});
   EXPECT_TRUE(choice.rim.good);
   EXPECT_EQ(choice.exponent, 0.45);
-  EXPECT_NEAR(choice.rim.radius_px, radius, 0.01);
+  EXPECT_NEAR(choice.rim.radius_px, rim_radius, 0.01);
 }
 
 // A packed bed and a gas, as a linear camera and as one that encodes for display records them, and with blacks clipped:

@@ -15,14 +15,14 @@ using shakebed::pipelines::find_stage;
 using shakebed::pipelines::Json;
 using testing::HasSubstr;
 
-const std::string result = R"({"t": {"value": 1.0, "std_error": 0.1, "unit": "m g D"}, "none": {"value": null},
+const std::string numbers = R"({"t": {"value": 1.0, "std_error": 0.1, "unit": "m g D"}, "none": {"value": null},
     "plain": 0.25, "yes": true, "no": false, "fit": {"p_value": 1e-12}})";
 
 class ClaimsVerdicts : public testing::Test {
  protected:
   ClaimsVerdicts() {
     claims_.add_input("bed", *find_stage("fit"));
-    write_text(claims_.file("fit.json"), result);
+    write_text(claims_.file("fit.json"), numbers);
   }
   Json one(const std::string& number, const std::string& claimed) {
     return claims_.run(R"({"claims": [{"claim": "so it is", "number": ")" + number + "\", " + claimed +

@@ -22,7 +22,7 @@ struct Refused {
   friend void PrintTo(const Refused& r, std::ostream* out) { *out << r.name; }
 };
 
-const Refused refused[] = {
+const Refused refused_recipes[] = {
     {"preset-with-a-wrong-value", 14, "/presets/full/~1stages~1bed~1measure", "is a frequency"},
     {"sweep-over-a-pointer-that-is-not-there", 12, "/sweep/over/~1stages~1bed~1floor~1amplitde",
      "Did you mean \"amplitude\"?"},
@@ -67,7 +67,7 @@ TEST_P(WrongRecipe, IsRefusedBeforeAnythingRuns) {
   }
   EXPECT_FALSE(fs::exists(folder / "o")) << "nothing may be made of a recipe that is wrong";
 }
-INSTANTIATE_TEST_SUITE_P(All, WrongRecipe, testing::ValuesIn(refused),
+INSTANTIATE_TEST_SUITE_P(All, WrongRecipe, testing::ValuesIn(refused_recipes),
                          [](const testing::TestParamInfo<Refused>& given) {
                            std::string name = given.param.name;
                            std::erase(name, '-');

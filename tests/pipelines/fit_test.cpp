@@ -23,7 +23,7 @@ std::string bed(const std::string& id, double reduced, int seed, const std::stri
              "bath": { "kind": "andersen", "temperature": )" +
          t + R"(, "rate": 0.3 }, "start_temperature": )" + t + R"(, "settle": 60, "measure": 150)" + more + " },\n";
 }
-const std::string frames = R"(, "frames": { "count": 150 })";
+const std::string with_frames = R"(, "frames": { "count": 150 })";
 
 class FitStage : public testing::Test {
  protected:
@@ -149,7 +149,7 @@ TEST_F(FitStage, ResamplesFrames) {
   std::string stages;
   for (int k = 0; k < beds; ++k) {
     const std::string id = std::to_string(k);
-    stages += bed("bed" + id, 20, k + 1, frames) + fit_stage("fit" + id, "bed" + id) + (k + 1 < beds ? "," : "");
+    stages += bed("bed" + id, 20, k + 1, with_frames) + fit_stage("fit" + id, "bed" + id) + (k + 1 < beds ? "," : "");
   }
   const ProgramResult ran = run(stages);
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
