@@ -34,7 +34,7 @@ struct WindowChoice {
   double lowest_significance = fit::WindowOptions{}.lowest_significance;
 };
 
-const std::string simulation = "simulation";
+const std::string simulation_model = "simulation";
 
 // The tail of a bed: densities below this one, in 1/D^2, about half that of the solid.
 constexpr double tail_density = 0.6;
@@ -84,9 +84,9 @@ class Fit : public Stage {
   }
 
   void results(ResultList& list) const override {
-    state_fit_results(list, {.matched = options_.model == simulation,
+    state_fit_results(list, {.matched = options_.model == simulation_model,
                              .bootstrap = bootstrap_ > 0,
-                             .answer = answer_ && options_.model != simulation});
+                             .answer = answer_ && options_.model != simulation_model});
   }
   void run(RunContext& context) const override;
 
@@ -165,14 +165,14 @@ class Fit : public Stage {
   void check_bootstrap(Fields& fields) const {
     fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
                    "there are no frames to resample: no extract or simulate stage in \"from\"");
-    fields.require(bootstrap_ == 0 || options_.model != simulation, "bootstrap",
+    fields.require(bootstrap_ == 0 || options_.model != simulation_model, "bootstrap",
                    "the model simulation has its own errors, from the library's repeats");
   }
 
   void check_inputs(Fields& fields) const {
-    fields.require(options_.model != simulation || fields.has_upstream("simulate"), "model",
+    fields.require(options_.model != simulation_model || fields.has_upstream("simulate"), "model",
                    "the model simulation needs simulate stages in \"from\" as its library");
-    fields.require(options_.model == simulation || fields.upstream().size() <= 2, "from",
+    fields.require(options_.model == simulation_model || fields.upstream().size() <= 2, "from",
                    "only the model simulation reads more than two stages");
     const bool upstream = !fields.upstream().empty();
     fields.require(!temperature_measured_ || fields.has_upstream("simulate"), "temperature_measured",
@@ -187,8 +187,8 @@ class Fit : public Stage {
 
   void check_model(Fields& fields) const {
     const std::string& model = options_.model;
-    bool known = model == "enskog-rectangle" || model == "fermi" || model == "rectangle" || model == simulation;
-    std::vector<std::string> names{"enskog-rectangle", "fermi", "rectangle", simulation};
+    bool known = model == "enskog-rectangle" || model == "fermi" || model == "rectangle" || model == simulation_model;
+    std::vector<std::string> names{"enskog-rectangle", "fermi", "rectangle", simulation_model};
     for (const fit::EquationOfState* row : fit::equations_of_state()) {
       names.push_back("hydrostatic:" + std::string(row->name()));
       known = known || names.back() == model;
@@ -300,7 +300,7 @@ Matched match(const FitTask& task, const std::vector<LibraryBed>& beds, const Wi
   if (window.high) how.high = *window.high;
   const fit::MatchResult found = fit::match_simulated(measured, library, how);
   fit::FitResult& fit = out.fit;
-  fit.status = found.status, fit.message = found.message, fit.model = simulation;
+  fit.status = found.status, fit.message = found.message, fit.model = simulation_model;
   fit.kernel = task.options.kernel;
   fit.temperature = found.temperature, fit.temperature_interval = found.interval;
   fit.warnings = found.warnings;
@@ -420,7 +420,7 @@ FitTask Fit::read_profile(RunContext& context) const {
   const bool has_covariance = task.source != nullptr && profile_.empty() && task.source->has("covariance.csv");
   if (errors_ == ErrorSource::covariance && !has_covariance)
     throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
-  const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options_.model != simulation;
+  const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options_.model != simulation_model;
   task.measured = read_measured_profile(
       task.path, use_covariance ? std::optional(task.source->file("covariance.csv")) : std::nullopt);
   for (const std::string& warning : task.measured.warnings) context.warning(warning);
@@ -484,7 +484,7 @@ void Fit::run(RunContext& context) const {
   take_bed_facts(context, task);
   set_options(task);
   context.progress(0.1, "fitting");
-  const bool matching = options_.model == simulation;
+  const bool matching = options_.model == simulation_model;
   const Matched matched = matching ? match(task, read_library(context, task), window_) : Matched{};
   const fit::FitResult result = matching ? matched.fit : fit::fit_profile(task.measured.profile, task.options);
   if (result.status == fit::FitStatus::bad_input)

@@ -32,7 +32,8 @@
 //        }  // namespace
 //        StageRow shake_stage() {
 //          return {.name = "shake", .summary = "shakes the bed", .accepts = {"simulate"}, .fewest_inputs = 1,
-//                  .most_inputs = 1, .result = "shake.json", .make = [] { return std::make_unique<Shake>(); }};
+//                  .most_inputs = 1, .result = "shake.json",
+//                  .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Shake>(); }};
 //        }
 //        }
 //

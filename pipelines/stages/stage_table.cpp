@@ -3,9 +3,21 @@
 #include "pipelines/stages/stage.hpp"
 
 // The table: a stage a line, in the order of a pipeline. pipelines/stages/<name>.cpp defines StageRow <name>_stage().
-#define SHAKEBED_STAGES(row)                                                                                          \
-  row(simulate) row(infer) row(study) row(render) row(extract) row(fit) row(map) row(critical) row(figure) row(chart) \
-      row(claims) row(check)
+// clang-format off
+#define SHAKEBED_STAGES(row) \
+  row(simulate) \
+  row(infer) \
+  row(study) \
+  row(render) \
+  row(extract) \
+  row(fit) \
+  row(map) \
+  row(critical) \
+  row(figure) \
+  row(chart) \
+  row(claims) \
+  row(check)
+// clang-format on
 
 namespace shakebed::pipelines {
 

@@ -14,16 +14,16 @@
 namespace shakebed::fit {
 namespace {
 
-const Kernel kernel{KernelKind::gaussian, 0.5};
+const Kernel usual_kernel{KernelKind::gaussian, 0.5};
 
 // A column of the accurate equation of state, of 20 D, with noise: what a bed would be without layers.
 AnswerInput column(double temperature, double noise = 0.003, std::uint64_t seed = 5) {
   const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {20.0, close_packing_density});
   AnswerInput input;
-  input.kernel = kernel;
+  input.kernel = usual_kernel;
   input.base = 0.0;
   const int bins = static_cast<int>(4.0 * synthetic::top_of(truth));
-  input.profile = synthetic::profile_of(truth, kernel, bins, synthetic::top_of(truth), noise, seed);
+  input.profile = synthetic::profile_of(truth, usual_kernel, bins, synthetic::top_of(truth), noise, seed);
   return input;
 }
 
@@ -36,7 +36,7 @@ TEST(Answer, OfABedInEquilibriumIsItsTemperature) {
     run.spacing = 0.25, run.frames = 150, run.interval = 2, run.seed = 8;
     run.kernel = {KernelKind::gaussian, 0.5};
     AnswerInput input;
-    input.kernel = kernel;
+    input.kernel = usual_kernel;
     input.profile = average_frames(simulated::profiles_of(run)).profile;
     input.column_number = run.bed.column().column_number;
     const Answer answer = find_answer(input);
