@@ -51,16 +51,19 @@ endif()
 # What is compiled often and run briefly: a third less time to compile. No result depends on it.
 set(SHAKEBED_QUICK_COMPILE $<$<CONFIG:Release>:-O1>)
 
-# shakebed_test(NAME sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds])
-# One GoogleTest program; each of its tests becomes a ctest case with the labels given.
+# shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [OPTIMIZED])
+# One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
+# compute long.
 function(shakebed_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LABELS;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED" "TIMEOUT" "SOURCES;LABELS;LIBRARIES" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} shakebed_options GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_options(${name} PRIVATE ${SHAKEBED_QUICK_COMPILE})
+  if(NOT ARG_OPTIMIZED)
+    target_compile_options(${name} PRIVATE ${SHAKEBED_QUICK_COMPILE})
+  endif()
   target_compile_definitions(${name} PRIVATE "SHAKEBED_SOURCE_DIR=\"${PROJECT_SOURCE_DIR}\"")
   # With PRE_TEST discovery a list of labels loses all but its first on the way to ctest: the properties are set by a
   # script that ctest reads after it has discovered the tests.
