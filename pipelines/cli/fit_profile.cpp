@@ -37,12 +37,14 @@ fit::FitOptions options_of(const ProfileArguments& given, const MeasuredProfile&
   options.plateau_density_free = given.plateau_density_free;
   options.column_number = given.column_number ? given.column_number : measured.column_number;
   if (!given.window.empty()) options.window.low = given.window[0], options.window.high = given.window[1];
-  options.kernel = given.kernel ? kernel_argument(*given.kernel) : measured.kernel.value_or(Kernel{});
+  options.kernel = measured.kernel;
   return options;
 }
 
 int fit_profile(const Call& call, const ProfileArguments& given) {
-  const MeasuredProfile measured = read_measured_profile(given.file);
+  std::optional<Kernel> kernel;
+  if (given.kernel) kernel = kernel_argument(*given.kernel);
+  const MeasuredProfile measured = read_measured_profile(given.file, std::nullopt, kernel);
   const fit::FitOptions options = options_of(given, measured);
   std::optional<double> diameter;
   if (given.diameter) diameter = diameter_argument(*given.diameter);

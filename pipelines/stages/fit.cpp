@@ -218,7 +218,7 @@ class Fit : public Stage {
 
 LibraryBed library_bed(const Input& input) {
   const MeasuredProfile measured = read_measured_profile(input.file("profile.csv"));
-  LibraryBed bed{input.id, {0, measured.profile, 0}, measured.kernel.value_or(Kernel{})};
+  LibraryBed bed{input.id, {0, measured.profile, 0}, measured.kernel};
   bed.profile.temperature = BedDescription::read(input.file("bed.json")).bath_temperature;
   if (!(bed.profile.temperature > 0)) {
     const Json observed = input.result();
@@ -422,7 +422,7 @@ FitTask Fit::read_profile(RunContext& context) const {
     throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
   const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options_.model != simulation_model;
   task.measured = read_measured_profile(
-      task.path, use_covariance ? std::optional(task.source->file("covariance.csv")) : std::nullopt);
+      task.path, use_covariance ? std::optional(task.source->file("covariance.csv")) : std::nullopt, kernel_);
   for (const std::string& warning : task.measured.warnings) context.warning(warning);
   return task;
 }
@@ -447,7 +447,7 @@ void Fit::take_bed_facts(const RunContext& context, FitTask& task) const {
 }
 
 void Fit::set_options(FitTask& task) const {
-  task.options.kernel = kernel_ ? *kernel_ : task.measured.kernel.value_or(Kernel{});
+  task.options.kernel = task.measured.kernel;
   fit::WindowOptions& window = task.options.window;
   window.low = window_.low, window.high = window_.high;
   window.floor_exclusion = window_.floor_exclusion, window.plateau_fraction = window_.plateau_fraction;

@@ -5,7 +5,8 @@
 namespace shakebed::pipelines {
 
 MeasuredProfile read_measured_profile(const std::filesystem::path& profile,
-                                      const std::optional<std::filesystem::path>& covariance) {
+                                      const std::optional<std::filesystem::path>& covariance,
+                                      const std::optional<Kernel>& stated) {
   ProfileTable table = read_profile_csv(profile);
   MeasuredProfile out;
   if (covariance) {
@@ -14,13 +15,15 @@ MeasuredProfile read_measured_profile(const std::filesystem::path& profile,
   }
   out.profile.height = std::move(table.height), out.profile.number_density = std::move(table.number_density);
   out.profile.std_error = std::move(table.std_error);
-  out.kernel = table.kernel, out.column_number = table.column_number;
+  out.column_number = table.column_number;
   out.warnings = std::move(table.notes);
   if (out.profile.std_error.empty())
     out.warnings.push_back(profile.string() +
                            ": has no standard errors. The errors of the fit come from the scatter of the points about "
                            "it.");
-  if (!out.kernel)
+  const std::optional<Kernel> kernel = stated ? stated : table.kernel;
+  out.kernel = kernel.value_or(Kernel{});
+  if (!kernel)
     out.warnings.push_back(profile.string() +
                            ": does not say through which kernel it was measured. It is taken as densities at points; "
                            "name the kernel if it has one.");

@@ -13,13 +13,15 @@ namespace shakebed::pipelines {
 
 struct MeasuredProfile {
   fit::Profile profile;
-  std::optional<Kernel> kernel;         // what it was measured through; nothing where the file does not say
+  Kernel kernel;                        // what it was measured through; none where nobody says
   std::optional<double> column_number;  // N D/W
   std::vector<std::string> warnings;    // how the file was read, a sentence each
 };
 
-// With the covariance of that file, where one is given. Throws InputError.
+// With the covariance of that file, where one is given. `stated`: the kernel that an option names, before what the file
+// says. Throws InputError.
 MeasuredProfile read_measured_profile(const std::filesystem::path& profile,
-                                      const std::optional<std::filesystem::path>& covariance = std::nullopt);
+                                      const std::optional<std::filesystem::path>& covariance = std::nullopt,
+                                      const std::optional<Kernel>& stated = std::nullopt);
 
 }  // namespace shakebed::pipelines

@@ -35,7 +35,9 @@ class Random {
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }                 // [0, 1)
   double uniform_positive() { return (static_cast<double>(bits() >> 11) + 1) * 0x1p-53; }  // (0, 1]
   std::uint32_t below(std::uint32_t n) {
-    return static_cast<std::uint32_t>((static_cast<unsigned __int128>(bits()) * n) >> 64);
+    // The upper half of the product of 64 and 32 bits.
+    const std::uint64_t b = bits(), upper = (b >> 32) * n, lower = (b & 0xffffffff) * n;
+    return static_cast<std::uint32_t>((upper + (lower >> 32)) >> 32);
   }
   struct Pair {
     double first, second;

@@ -121,6 +121,25 @@ TEST_F(OneFact, OneRowWithoutAnErrorIsTreatedAlikeByFitAndFitProfile) {
   EXPECT_EQ(written["temperature"].dump(), first);
 }
 
+TEST_F(OneFact, AKernelThatAnOptionNamesNeedNotBeInTheFile) {
+  std::string text = profile_with_one_zero_error("0.01");
+  text.erase(0, text.find('\n') + 1);  // the line that names it
+  write_text(folder_ / "p.csv", text);
+  const std::string asks = "does not say through which kernel";
+  const Json silent = Json::parse(run_shakebed({"fit-profile", "p.csv", "--json"}, folder_.path()).out);
+  EXPECT_THAT(silent["warnings"].dump(), HasSubstr(asks));
+  EXPECT_EQ(silent["kernel"]["kind"], "none");
+  const Json named =
+      Json::parse(run_shakebed({"fit-profile", "p.csv", "--kernel", "gaussian:0.5", "--json"}, folder_.path()).out);
+  EXPECT_THAT(named["warnings"].dump(), testing::Not(HasSubstr(asks)));
+  EXPECT_EQ(named["kernel"]["kind"], "gaussian");
+  const ProgramResult staged = run(R"({ "name": "t", "stages": [
+    { "stage": "fit", "profile": "p.csv", "kernel": { "kind": "gaussian", "width": 0.5 } } ] })");
+  ASSERT_EQ(staged.exit_code, 0) << staged.err;
+  EXPECT_THAT(staged.err, testing::Not(HasSubstr(asks)));
+  EXPECT_EQ(result("o/fit/fit.json")["temperature"].dump(), named["temperature"].dump());
+}
+
 TEST_F(OneFact, AKernelHasOneSpellingInOptionsAndFiles) {
   for (const std::string kind : {"gaussian", "top_hat", "disk_chord"}) {
     std::string recipe = photographed_bed(R"(, "kernel": { "kind": ")" + kind + R"(", "width": 0.8 })");
