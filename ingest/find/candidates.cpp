@@ -11,7 +11,7 @@ namespace shakebed::ingest {
 namespace {
 
 // The frame the map is made of: reduced, and smoothed where noise asks for it and disks are wide enough to bear it.
-// (Smoothing blurs the rims by which a bead is told from the darkness around it.)
+// (Smoothing blurs the rims that separate a bead from the darkness around it.)
 GrayFrame map_frame(const GrayFrame& flat, double radius, double noise) {
   const int factor = map_reduction(radius);
   constexpr double noisy = 0.04;  // contrast units, after reduction

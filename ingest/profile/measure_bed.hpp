@@ -61,7 +61,7 @@ struct MeasureOptions {
   std::optional<double> highest{};               // D; else just above the highest centre
   std::optional<double> lowest{};                // D; else 0
   std::optional<double> shaking_frequency_hz{};  // needs frame_rate_hz; found from the film if left out and it shakes
-  std::optional<double> frame_rate_hz{};         // of the stream: then profiles are told by the shaker's phase
+  std::optional<double> frame_rate_hz{};         // of the stream: then profiles by the phase of the shaking
   std::size_t phase_bins = 8;
   // The source's frames are reduced by this factor (FrameSourceOptions::reduction). All places and lengths, in and out,
   // are px of the frames as recorded.
@@ -71,7 +71,7 @@ struct MeasureOptions {
   unsigned threads = 1;                                     // results do not depend on it
   std::function<void(std::size_t frames_done)> progress{};  // called from one thread at a time
   // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
-  // that memory hardly grows with the film. Floor and walls, unless given, are then told from the first geometry_frames
+  // that memory hardly grows with the film. Floor and walls, unless given, then follow from the first geometry_frames
   // frames of the film (rim_frames at least, which tell the radius) instead of from all.
   std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink{};
   std::size_t geometry_frames = 100;

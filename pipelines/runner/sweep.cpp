@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t most_failures = 20;  // that are told one by one
+constexpr std::size_t most_failures = 20;  // that are listed one by one
 
 struct Shard {
   std::uint64_t number = 1, of = 1;  // 1 to of

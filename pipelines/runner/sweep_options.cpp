@@ -30,7 +30,7 @@ class SweepReader {
     fields_.problem(pointer, what, suggestion);
   }
 
-  // Only what a stage is told can be swept.
+  // Only options of a stage can be swept.
   void check_pointer(const std::string& pointer, const std::string& where) {
     std::vector<std::string> tokens;
     try {

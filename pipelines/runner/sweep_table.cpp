@@ -77,8 +77,8 @@ std::string column_name(const std::string& pointer, const std::string& unit) {
 Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
                   const std::vector<std::vector<std::string>>& rows) {
   std::vector<StatedColumn> columns{{"point", "", "folder of the point below points/"},
-                              {"replica", "1", "number of the replica, from 0"},
-                              {"status", "", "ok, check failed, failed or missing"}};
+                                    {"replica", "1", "number of the replica, from 0"},
+                                    {"status", "", "ok, check failed, failed or missing"}};
   std::vector<AxisKind> axes;
   for (const SweepAxis& axis : plan.sweep->axes) {
     axes.push_back(kind_of(rows, columns.size()));

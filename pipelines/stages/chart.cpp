@@ -11,8 +11,8 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/figure.hpp"
-#include "sim/measure/order.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "sim/measure/order.hpp"
 
 namespace shakebed::pipelines {
 namespace {

@@ -5,8 +5,8 @@
 #include "fit/profile_fit/critical_temperature.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
-#include "pipelines/stages/study_table.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "pipelines/stages/study_table.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -15,7 +15,7 @@ class Critical : public Stage {
  public:
   void describe(Fields& fields) override {
     fields.text("temperature", temperature_, {.help = "column of the study that is the temperature, in any unit"});
-    fields.text("unit", unit_, {.help = "its unit, to be told"});
+    fields.text("unit", unit_, {.help = "its unit, for messages and tables"});
     fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; \"\": none"});
     fields.numbers("densities", densities_, {.help = "T_c is where the bottom falls below these"});
     fields.text("order", order_, {.help = "column of the bond order psi_6; \"\": none"});

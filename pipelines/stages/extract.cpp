@@ -71,9 +71,10 @@ void describe_profile(Fields& fields, ExtractOptions& o) {
 }
 
 void describe_frames(Fields& fields, ExtractOptions& o) {
-  fields.integer("bead_number", o.bead_number,
-                 {.help = "how many beads there are in view, if known: beads missed or seen twice are then told",
-                  .range = at_least(1)});
+  fields.integer(
+      "bead_number", o.bead_number,
+      {.help = "how many beads there are in view, if known: then beads that are missed or seen twice are reported",
+       .range = at_least(1)});
   fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
   fields.integer("overlays", o.overlays,
                  {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});

@@ -41,7 +41,7 @@ constexpr std::size_t most_bad_frames_named = 5;
 // The most credible beads; where their number is given, of what may be beads, the kind that is as numerous.
 const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options) {
   const ingest::SurveyCandidate* chosen = &survey.candidates.front();
-  if (options.bead_number) {  // of what may be beads, the kind that is as numerous as told
+  if (options.bead_number) {  // of what may be beads, the kind whose number is nearest to the one given
     const auto off = [&](const ingest::SurveyCandidate& one) {
       return std::abs(std::log(static_cast<double>(std::max<std::size_t>(1, one.disks.size())) /
                                static_cast<double>(*options.bead_number)));

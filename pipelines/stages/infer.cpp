@@ -9,9 +9,9 @@
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/scene_options.hpp"
+#include "pipelines/stages/stage.hpp"
 #include "sim/measure/measure.hpp"
 #include "sim/measure/observables.hpp"
-#include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
 

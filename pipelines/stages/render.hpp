@@ -6,7 +6,4 @@
 
 #include "pipelines/stages/stage.hpp"
 
-namespace shakebed::pipelines {
-
-
-}  // namespace shakebed::pipelines
+namespace shakebed::pipelines {}  // namespace shakebed::pipelines

@@ -67,7 +67,7 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second) {
   TwoLanes d = second.place - first.place;
-  // Which images meet is told from the records, which are at hand before the flights are: both disks are in their
+  // Which images meet follows from the records, which are at hand before the flights are: both disks are in their
   // shells there as now.
   if constexpr (Space::wraps_x || Space::wraps_z)
     d += Period::to_nearest(period_x_, period_z_, pair_at(&disks_[j].x) - pair_at(&disks_[i].x));

@@ -3,7 +3,7 @@
 
 namespace shakebed::sim {
 
-// Sends for the neighbour lists of the two disks that come up so many events from now.
+// Prefetches the neighbour lists of the two disks of the event that many events ahead.
 template <class Space, class Rule, class Sizes>
 [[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::fetch_lists(std::size_t ahead) const {
   std::uint32_t a = 0, b = 0;
@@ -12,7 +12,7 @@ template <class Space, class Rule, class Sizes>
   fetch(&lists_.first_block(b));
 }
 
-// Sends for what will be asked for soon: first the neighbour lists of disks that will collide, some events later the
+// Prefetches what will be read soon: first the neighbour lists of disks that will collide, some events later the
 // neighbours' records, the contact clocks, and the cells round a disk that will leave its shell. (The records of disks
 // that come up at all are sent for by the queue, a bucket ahead; half of those events will be dead before their turn,
 // so no more than that.)
@@ -118,7 +118,7 @@ template <Order order>
   }
 }
 
-// The same, and the watcher is told what it did: apart from the loop that
+// The same, and the watcher is given what it did: apart from the loop that
 // nobody watches, which must not pay for it.
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] void Engine<Space, Rule, Sizes>::process_and_tell(std::uint32_t i, std::uint32_t k) {

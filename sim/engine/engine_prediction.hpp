@@ -5,7 +5,7 @@ namespace shakebed::sim {
 
 // Contact times of one disk, whose record is that of now_, with four others, ids 0 and 1 and the two from `beyond` on;
 // `never` where there is none or where the other has something earlier to do. If others may be ahead of now_, the
-// record may be an earlier one, and contacts before the others' flights began are not told.
+// record may be an earlier one, and contacts before the others' flights began are left out.
 template <class Space, class Rule, class Sizes>
 template <bool images, bool others_ahead>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,
@@ -123,7 +123,8 @@ template <class Space, class Rule, class Sizes>
   return best;
 }
 
-// What the disk meets next, if that is before `exit`, when it leaves its shell; later floors are not told.
+// What the disk meets next, if that is before `exit`, when it leaves its shell; later contacts with the floor are left
+// out.
 template <class Space, class Rule, class Sizes>
 template <bool images, bool others_ahead>
 [[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_event_by(std::uint32_t i, [[maybe_unused]] double exit) const

@@ -11,7 +11,7 @@
 // them the floor's velocity, which is their mean over a hop, and where some disks move the place in their flight (2e-5
 // D above that of rest): there they touch no disk.
 //
-// Rest is told from what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
+// Rest is judged by what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
 // too quick for it until it has done so. In beds that never look calm nothing is changed, not even by rounding.
 #pragma once
 

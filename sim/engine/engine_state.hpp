@@ -6,7 +6,7 @@ namespace shakebed::sim {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   watcher_ = watcher;
-  if constexpr (tiles_apply) {  // a watcher is told everything in the order of time
+  if constexpr (tiles_apply) {  // a watcher is given everything in the order of time
     if (watcher != nullptr && !tiles_.empty()) leave_tiles();
   }
   tell_all();

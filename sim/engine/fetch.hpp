@@ -1,4 +1,4 @@
-// Sends for a cache line that will be read (or written) soon.
+// Prefetches a cache line that will be read (or written) soon.
 #pragma once
 
 namespace shakebed::sim {

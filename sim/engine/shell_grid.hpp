@@ -146,7 +146,7 @@ class ShellGrid {
   // No more than that many eights are visited.
   std::size_t most_eights_round() const { return 9 + crowded_.size(); }
 
-  // Sends for the cells round i.
+  // Prefetches the cells round i.
   [[gnu::always_inline]] void fetch_round(std::uint32_t i) const {
     each_place_round(i, [](const Cell& cell) {
       fetch(&cell);

@@ -181,8 +181,7 @@ TEST(StageCodeOfTheProject, HoldsEveryFileThatComputes) {
     }
   }
   // For those who use the library: no stage measures by it.
-  for (const char* file : {"sim/measure/measured_bed.cpp", "ingest/profile/photographs.cpp"})
-    std::erase(outside, file);
+  for (const char* file : {"sim/measure/measured_bed.cpp", "ingest/profile/photographs.cpp"}) std::erase(outside, file);
   EXPECT_THAT(outside, IsEmpty()) << "name the header that it implements: // implements: <header>";
   // A change in fit/ is none of the bed's, nor of its photographs'.
   for (const char* stage : {"simulate", "render", "extract"}) {

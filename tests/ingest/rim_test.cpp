@@ -1,4 +1,4 @@
-// The radius told from a bead's profile, whatever its shading.
+// The radius measured from a bead's profile, whatever its shading.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -157,7 +157,7 @@ TEST(Study, AveragesTablesOverReplicas) {
   }
 }
 
-// A chain with a mistake is told of before anything runs, with its place.
+// A mistake in a chain is reported before anything runs, with its place.
 TEST(Study, NamesAMistakeInItsChain) {
   ScratchFolder folder;
   const ProgramResult result = run_shakebed(
