@@ -354,6 +354,7 @@ py::dict answer_of(const fit::Answer& answer) {
   out["std_error"] = answer.std_error;
   out["statistical_error"] = answer.statistical_error;
   out["bias_uncertainty"] = answer.bias_uncertainty;
+  out["contact_duration_uncertainty"] = answer.contact_duration_uncertainty;
   out["spread"] = answer.spread;
   out["low"] = answer.interval.low;
   out["high"] = answer.interval.high;

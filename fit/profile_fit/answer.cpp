@@ -236,7 +236,9 @@ class AnswerFinder {
   void combine() {
     Answer& a = answer_;
     a.spread = a.temperature * (a.verdict == Verdict::one_temperature ? spread_beyond_ : spread_of_all_);
-    a.std_error = std::hypot(a.statistical_error, a.bias_uncertainty, a.spread);
+    a.contact_duration_uncertainty = a.temperature * input_.contact_duration_effect;
+    a.std_error =
+        std::hypot(std::hypot(a.statistical_error, a.contact_duration_uncertainty), a.bias_uncertainty, a.spread);
     a.interval.confidence = input_.confidence;
     a.interval.status = FitStatus::ok;
     if (a.verdict == Verdict::no_single_temperature) {

@@ -20,6 +20,8 @@ struct AnswerInput {
   double base = 0.5 - 0.43301270189221932;
   std::optional<double> column_number{};                     // N D/W, where all disks are seen
   std::optional<Estimate> temperature_x{}, temperature_z{};  // kinetic, where velocities are known [m g D]
+  // One standard error of T, relative, that the simulation's contact duration leaves; 0 where nothing is simulated.
+  double contact_duration_effect = 0.0;
   double confidence = 0.95;
 };
 
@@ -46,13 +48,14 @@ struct Answer {
   Verdict verdict = Verdict::model_does_not_fit;
   std::string why, advice;  // a sentence each
 
-  std::string thermometer, model;  // that gave T
-  double temperature = 0.0;        // [m g D]; with no_single_temperature the middle of the range
-  double statistical_error = 0.0;  // one standard error each [m g D]:
-  double bias_uncertainty = 0.0;   // of the thermometer's known bias, which has been taken off
-  double spread = 0.0;             // of the admissible thermometers beyond what these two explain
-  double std_error = 0.0;          // all three in quadrature
-  double bias = 0.0;               // what has been taken off, relative
+  std::string thermometer, model;             // that gave T
+  double temperature = 0.0;                   // [m g D]; with no_single_temperature the middle of the range
+  double statistical_error = 0.0;             // one standard error each [m g D]:
+  double bias_uncertainty = 0.0;              // of the thermometer's known bias, which has been taken off
+  double spread = 0.0;                        // of the admissible thermometers beyond what these two explain
+  double contact_duration_uncertainty = 0.0;  // of the simulation that gave the profile
+  double std_error = 0.0;                     // all of these in quadrature
+  double bias = 0.0;                          // what has been taken off, relative
   // Of T; with no_single_temperature the range of all readings and kinetic T. Ends that are open lie a factor of twenty
   // away: T is then not known.
   Interval interval;

@@ -25,8 +25,8 @@ bool token_fits(std::string_view stated, std::string_view asked) {
 
 // Parts that quantities have.
 bool is_part_of_quantity(std::string_view token) {
-  return token == "value" || token == "std_error" || token == "unit" || token == "spread" || token == "fixed" ||
-         token == "runs";
+  return token == "value" || token == "std_error" || token == "unit" || token == "spread" || token == "within" ||
+         token == "fixed" || token == "runs";
 }
 
 std::string joined(const std::vector<std::string>& tokens) {

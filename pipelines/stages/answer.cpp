@@ -51,6 +51,12 @@ KineticTemperatures kinetic_temperatures(const Input& input, std::optional<doubl
   return found;
 }
 
+double contact_duration_effect(const Input& input) {
+  const Json result = input.result();
+  const Json* effect = find_pointer(result, "/contact_duration_effect/value");
+  return effect != nullptr && effect->is_number() ? effect->get<double>() : 0;
+}
+
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   Json out;
   out["verdict"] = fit::to_string(answer.verdict);
@@ -67,6 +73,7 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
   out["bias_uncertainty"] = quantity_json(answer.bias_uncertainty, "m g D");
   out["spread"] = quantity_json(answer.spread, "m g D");
+  out["contact_duration_uncertainty"] = quantity_json(answer.contact_duration_uncertainty, "m g D");
   out["bias"] = answer.bias;
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;

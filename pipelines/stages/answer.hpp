@@ -18,6 +18,8 @@ struct KineticTemperatures {
   std::optional<fit::Estimate> x, z;
 };
 KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter);
+// Relative effect of the contact duration on T, where a simulation states one; else 0.
+double contact_duration_effect(const Input& input);
 
 // Temperatures in m g D and, with the diameter [m], as T/(m g) in m.
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter);

@@ -153,8 +153,10 @@ BedMeasurement::BedMeasurement(const sim::Scene& scene, const sim::DiskPropertie
 }
 
 void BedMeasurement::begin(sim::Simulation& simulation) {
-  virial_ = simulation.counters().virial;
-  collisions_ = simulation.counters().disk_collisions;
+  counters_ = simulation.counters();
+  dissipated_ = simulation.energy().dissipated;
+  virial_ = counters_.virial;
+  collisions_ = counters_.disk_collisions;
   go_on(simulation);
   if (flights_) flights_->begin(simulation.time());
 }
@@ -184,7 +186,11 @@ void BedMeasurement::look(const sim::Simulation& simulation, const sim::Snapshot
   if (displacement_) displacement_->observe(at);
 }
 
-void BedMeasurement::end(const sim::Simulation& simulation) { end_period(simulation); }
+void BedMeasurement::end(const sim::Simulation& simulation) {
+  end_period(simulation);
+  contact_duration_ =
+      sim::contact_duration_effect(counters_, simulation.counters(), simulation.energy().dissipated - dissipated_);
+}
 
 void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scene, Json& out) const {
   const bool hard = std::holds_alternative<sim::HardSides>(scene.box.sides);
@@ -212,6 +218,13 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
   temperature("temperature_z", bed_.temperature_z());
   temperature("temperature_z_local", bed_.temperature_z_local());
   temperature("spin_temperature", bed_.spin_temperature());
+  if (!weightless) plain("drift_center_of_mass", bed_.drift_of_centre(), "D");
+  plain("drift_temperature_x", bed_.drift_of_temperature_x(), energy_name.c_str());
+  if (scene.disks.contact_duration > 0) {
+    out["elastic_share"] = quantity_json(contact_duration_.elastic_share, "1");
+    out["withheld_share"] = quantity_json(contact_duration_.withheld_share, "1");
+    out["contact_duration_effect"] = quantity_json(contact_duration_.temperature, "1");
+  }
   plain("collision_rate", {collision_rate_.mean(), collision_rate_.std_error()},
         weightless ? "sqrt(T0/m)/D" : "sqrt(g/D)");
   if (const auto* top = std::get_if<sim::PeriodicTop>(&scene.box.top)) {

@@ -14,6 +14,7 @@
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/stage.hpp"
 #include "sim/engine/simulation.hpp"
+#include "sim/measure/contact_duration.hpp"
 #include "sim/measure/flights.hpp"
 #include "sim/measure/observables.hpp"
 #include "sim/measure/order.hpp"
@@ -67,7 +68,7 @@ class BedMeasurement {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(bed_, frames_, virial_rate_, collision_rate_, virial_, collisions_, above_);
+    archive(bed_, frames_, virial_rate_, collision_rate_, virial_, collisions_, above_, counters_, dissipated_);
     if (order_) archive(*order_);
     if (lab_) archive(*lab_);
     if (floor_) archive(*floor_);
@@ -86,6 +87,9 @@ class BedMeasurement {
   sim::BlockedMean virial_rate_, collision_rate_;
   double virial_ = 0;
   std::uint64_t collisions_ = 0;
+  sim::Counters counters_;  // at the first look
+  double dissipated_ = 0;   // until then
+  sim::ContactDurationEffect contact_duration_;
   std::uint64_t above_ = 0;  // positions above the highest bin
   std::optional<sim::OrderObserver> order_;
   std::optional<sim::VelocityObserver> lab_, floor_;

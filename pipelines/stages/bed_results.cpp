@@ -42,11 +42,14 @@ class BedStatement {
     temperature("temperature_z", "kinetic temperature upwards, without the mean velocity of the phase");
     temperature("temperature_z_local", "kinetic temperature upwards, without the mean velocity of layer and phase");
     temperature("spin_temperature", "temperature of the rotation");
+    list_.quantity("/drift_temperature_x", energy_, "T_x in the second half of the measurement less that in the first");
     list_.quantity("/collision_rate", rate_, "contacts of a disk with others in a unit of time");
   }
 
   void heights() {
     list_.quantity("/center_of_mass", "D", "height of the centre of mass above the floor's mean position", heavy_);
+    list_.quantity("/drift_center_of_mass", "D",
+                   "center_of_mass in the second half of the measurement less that in the first", heavy_);
     list_.quantity("/center_of_mass_rise", "D", "rise of the centre of mass above ideal hexagonal packing", heavy_);
     list_.quantity("/ideal_center_of_mass", "D", "height of the centre of mass in ideal hexagonal packing", heavy_);
     list_.quantity("/bottom_row_density", "1/D^2", "number density of the lowest row", heavy_);
@@ -96,6 +99,15 @@ class BedStatement {
     list_.number("/wall_collisions", "1", "contacts with sides and lid");
     list_.number("/floor_collisions", "1", "contacts with the floor");
     list_.number("/elastic_contacts", "1", "contacts made elastic by the contact duration t_c");
+    const Given clocked = given_if(bed_.contact_duration, "contacts have a duration t_c");
+    list_.quantity("/elastic_share", "1", "share of the contacts made elastic by t_c, while measured", clocked);
+    list_.quantity("/withheld_share", "1",
+                   "energy that these contacts would have dissipated, over the energy dissipated, while measured",
+                   clocked);
+    list_.quantity("/contact_duration_effect", "1",
+                   "how much too high T is by t_c, as a part of it, against contacts without a duration; within a "
+                   "factor of two",
+                   clocked);
     list_.number("/events", "1", "events of all kinds");
     list_.number("/periods", "1", "periods over which the bed was measured");
     list_.quantity("/max_overlap", "D", "largest overlap of two disks, by rounding");

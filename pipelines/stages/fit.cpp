@@ -406,6 +406,7 @@ Json answer_of(const FitTask& task, const RunContext& context) {
   for (const Input& upstream : context.inputs()) {
     const KineticTemperatures kinetic = kinetic_temperatures(upstream, task.diameter);
     if (!input.temperature_x) input.temperature_x = kinetic.x, input.temperature_z = kinetic.z;
+    input.contact_duration_effect = std::max(input.contact_duration_effect, contact_duration_effect(upstream));
   }
   return answer_json(fit::find_answer(input), task.diameter);
 }

@@ -121,6 +121,8 @@ class FitStatement {
     list_.truth("/answer/interval/high_open", "whether the data set no upper end", found);
     list_.quantity("/answer/statistical_error", "m g D", "statistical error of T", found);
     list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
+    list_.quantity("/answer/contact_duration_uncertainty", "m g D",
+                   "uncertainty by the contact duration of the simulation", found);
     list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);
     list_.number("/answer/bias", "1", "known bias that has been taken off, relative", found);
     list_.text("/answer/thermometer", "model and window that gave T", found);

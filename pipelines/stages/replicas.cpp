@@ -1,12 +1,24 @@
 #include "pipelines/stages/replicas.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 namespace shakebed::pipelines {
 
 namespace {
+
+// Beds differ where their spread is so many times what each states, at this significance.
+constexpr double notable_spread = 2, spread_significance = 0.01;
+// A drift counts from so many of its standard errors on; they come from few samples, each run being cut in halves.
+constexpr double notable_drift = 4;
+constexpr double two_sided_95 = 0.975;
 
 // Mean and spread of a number over the replicas.
 struct Spread {
@@ -19,9 +31,76 @@ struct Spread {
   }
 };
 
+double root_mean_square(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+// 95 % of Student's distribution for the mean of n values, in those of a normal one.
+double few_values_factor(std::size_t n) {
+  return boost::math::quantile(boost::math::students_t(static_cast<double>(n - 1)), two_sided_95) /
+         boost::math::quantile(boost::math::normal(), two_sided_95);
+}
+
+// Of the mean of the replicas.
+double error_of_mean(double spread, double within, std::size_t n) {
+  const double between = few_values_factor(n) * spread;
+  return std::max(between, std::isfinite(within) ? within : 0) / std::sqrt(static_cast<double>(n));
+}
+
+std::vector<double> numbers_of(const std::vector<Json>& results, const std::string& key, const char* part) {
+  std::vector<double> values;
+  for (const Json& r : results) {
+    const Json& v = r.at(key);
+    if (v.is_object() && v.contains(part) && v.at(part).is_number()) values.push_back(v.at(part).get<double>());
+  }
+  return values;
+}
+
+void join_quantity(Json& value, const std::vector<double>& values, const std::vector<double>& errors) {
+  const Spread spread(values);
+  const double within = errors.size() == values.size() ? root_mean_square(errors) : 0;
+  value["value"] = spread.mean;
+  value["std_error"] = error_of_mean(spread.deviation, within, values.size());
+  value["spread"] = spread.deviation;
+  value["within"] = within;
+}
+
+const char* const drifting[][2] = {{"drift_temperature_x", "temperature_x"},
+                                   {"drift_center_of_mass", "center_of_mass_rise"}};
+
+const char* spoken(std::string_view key) {
+  return key == "temperature_x" ? "T_x" : key == "temperature_z" ? "T_z" : "the rise of the centre of mass";
+}
+
+double part_of(const Json& results, const char* key, const char* part) {
+  const Json* found = find_pointer(results, std::string("/") + key + "/" + part);
+  return found != nullptr && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+// "0.172 from the packing and 0.195 from a random fill"
+std::string by_start(const std::vector<Json>& results, const char* key) {
+  double sum[2] = {};
+  int count[2] = {};
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    sum[k % 2] += part_of(results[k], key, "value");
+    ++count[k % 2];
+  }
+  return fmt::format("{:.3g} on average where they begin as the recipe says, {:.3g} from a random fill",
+                     sum[0] / count[0], sum[1] / count[1]);
+}
+
+bool differ(double spread, double within, std::size_t n) {
+  if (!(within > 0) || !(spread > notable_spread * within)) return false;
+  const auto freedom = static_cast<double>(n - 1);
+  const boost::math::chi_squared chi2(freedom);
+  return freedom * spread * spread / (within * within) >
+         boost::math::quantile(boost::math::complement(chi2, spread_significance));
+}
+
 }  // namespace
 
-// Quantities become means with their error and spread, counts become sums; what is neither is the first's.
 Json joined_results(const std::vector<Json>& results) {
   Json out = results.front();
   for (auto& [key, value] : out.items()) {
@@ -39,14 +118,40 @@ Json joined_results(const std::vector<Json>& results) {
     } else if (key == "max_overlap") {
       value["value"] = *std::max_element(values.begin(), values.end());
     } else if (value.is_object() && value.contains("std_error")) {
-      const Spread spread(values);
-      value["value"] = spread.mean;
-      value["std_error"] = spread.deviation / std::sqrt(static_cast<double>(values.size()));
-      value["spread"] = spread.deviation;
+      join_quantity(value, values, numbers_of(results, key, "std_error"));
+    } else if (value.is_object()) {
+      value["value"] = Spread(values).mean;
     }
   }
   out["replicas"] = results.size();
   return out;
+}
+
+std::vector<std::string> replica_warnings(const std::vector<Json>& results, const Json& joined, ReplicaStarts starts) {
+  std::vector<std::string> warnings;
+  const std::size_t n = results.size();
+  for (const char* key : {"temperature_x", "temperature_z", "center_of_mass_rise"}) {
+    const double spread = part_of(joined, key, "spread"), within = part_of(joined, key, "within");
+    if (n < 2 || !differ(spread, within, n)) continue;
+    warnings.push_back(fmt::format(
+        "the {} beds differ by more than chance: {} scatters by {:.2g}, each bed states {:.2g}{}. The result depends "
+        "on how the bed was filled; the stated error allows for it. A longer \"settle\" may lessen it, more "
+        "\"replicas\" lessen the error",
+        n, spoken(key), spread, within,
+        starts == ReplicaStarts::alternate && n > 1 ? " (" + by_start(results, key) + ")" : ""));
+    break;
+  }
+  for (const auto& [drift, key] : drifting) {
+    const double change = part_of(joined, drift, "value"), error = part_of(joined, drift, "std_error");
+    if (!(error > 0) || !(std::abs(change) > notable_drift * error)) continue;
+    warnings.push_back(fmt::format(
+        "the bed still changes while it is measured: {} is {} by {:.2g} ({:.2g} %) in the second half of the time, "
+        "{:.1f} times the error of this difference. Let it settle longer",
+        spoken(key), change > 0 ? "higher" : "lower", std::abs(change),
+        100 * std::abs(change / part_of(joined, key, "value")), std::abs(change) / error));
+    break;
+  }
+  return warnings;
 }
 
 Table replicas_table(const std::vector<Json>& results) {
@@ -74,8 +179,10 @@ sim::Profile joined_density(const std::vector<const BedMeasurement*>& measuremen
     std::vector<double> values;
     for (const sim::Profile& p : profiles) values.push_back(p.number_density[i]);
     const Spread spread(values);
+    std::vector<double> errors;
+    for (const sim::Profile& p : profiles) errors.push_back(p.std_error[i]);
     out.number_density[i] = spread.mean;
-    out.std_error[i] = spread.deviation / std::sqrt(static_cast<double>(values.size()));
+    out.std_error[i] = error_of_mean(spread.deviation, root_mean_square(errors), values.size());
   }
   out.samples *= profiles.size();
   return out;

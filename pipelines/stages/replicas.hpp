@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
@@ -11,9 +12,20 @@
 
 namespace shakebed::pipelines {
 
-// Of observables.json. Quantities become means with their error and spread, counts become sums; what is neither is the
-// first's.
+// How the replicas of a bed begin.
+enum class ReplicaStarts {
+  alternate,  // the first as the recipe says, the next from a random fill, and so on in turn
+  same        // all as the recipe says
+};
+
+// Of observables.json. Quantities become means with their error, the spread between the replicas, and the error that
+// one of them states by itself (`within`); counts become sums; what is neither is the first's. The error is that of
+// the mean of independent beds, never below what the beds state: so wide that 1.96 of it hold the mean of further beds
+// in 95 % of all cases, few as the replicas are (Student's t).
 Json joined_results(const std::vector<Json>& results);
+// What the replicas say of the bed's measurement, a sentence each: that they differ by more than each of them states,
+// that the bed still changed while it was measured. Also for a single run.
+std::vector<std::string> replica_warnings(const std::vector<Json>& results, const Json& joined, ReplicaStarts starts);
 Table replicas_table(const std::vector<Json>& results);  // each replica by itself
 
 // The mean of the replicas' densities, with errors from their spread.

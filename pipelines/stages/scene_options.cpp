@@ -17,6 +17,8 @@ namespace {
 
 // Largest scene whose start is laid out and checked for overlap while a recipe is only being read.
 constexpr std::uint32_t checked_when_read = 50'000;
+// t_c where something dissipates and none is named [sqrt(D/g)]: 1.4 us for beads of 2 mm.
+constexpr double usual_contact_duration = 1e-4;
 constexpr Dimension cube_over_time{.length = 2, .time = -3};
 
 void describe_surface(Fields& fields, SurfaceOptions& surface) {
@@ -392,6 +394,24 @@ double SceneOptions::period() const {
   return 0;
 }
 
+bool SceneOptions::dissipates() const {
+  const auto loses = [](const auto& surface) { return surface.restitution < 1 || surface.friction > 0; };
+  const auto* sides = std::get_if<HardSidesOptions>(&box_.sides);
+  const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
+  return loses(disks_.surface) || loses(floor_.surface) || (sides != nullptr && loses(sides->surface)) ||
+         (lid != nullptr && loses(lid->surface));
+}
+
+double SceneOptions::contact_duration() const {
+  if (disks_.contact_duration) return *disks_.contact_duration / time_unit();
+  return dissipates() ? usual_contact_duration : 0;
+}
+
+bool SceneOptions::may_be_filled_at_random() const {
+  return gravity_ && std::holds_alternative<OpenLidOptions>(box_.lid) &&
+         std::holds_alternative<HexagonalStartOptions>(start_);
+}
+
 double SceneOptions::bath_temperature() const {
   double temperature = 0;
   if (const auto* b = std::get_if<LangevinOptions>(&bath_)) temperature = b->temperature;
@@ -418,21 +438,16 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   scene.disks.inertia_ratio = disks_.inertia == Inertia::sphere ? 0.4 : 0.5;
 
   scene.box.width = box_.width / length;
-  bool dissipates = disks_.surface.restitution < 1 || disks_.surface.friction > 0 || floor_.surface.restitution < 1 ||
-                    floor_.surface.friction > 0;
   if (const auto* hard = std::get_if<HardSidesOptions>(&box_.sides)) {
     scene.box.sides = sim::HardSides{to_sim(hard->surface, speed)};
-    dissipates = dissipates || hard->surface.restitution < 1 || hard->surface.friction > 0;
   } else {
     scene.box.sides = sim::PeriodicSides{};
   }
-  if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid)) {
+  if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid))
     scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface, speed)};
-    dissipates = dissipates || lid->surface.restitution < 1 || lid->surface.friction > 0;
-  }
   if (const auto* lid = std::get_if<PeriodicLidOptions>(&box_.lid))
     scene.box.top = sim::PeriodicTop{lid->height / length};
-  scene.disks.contact_duration = disks_.contact_duration ? *disks_.contact_duration / time : dissipates ? 1e-4 : 0;
+  scene.disks.contact_duration = contact_duration();
 
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
     scene.box.floor = sim::SinusoidalFloor{sine->amplitude / length, sine->frequency * time};

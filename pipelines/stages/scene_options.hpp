@@ -137,6 +137,10 @@ class SceneOptions {
   bool periodic_upwards() const { return std::holds_alternative<PeriodicLidOptions>(box_.lid); }
   // The floor's period in reduced units; 0 when it stands still.
   double period() const;
+  // t_c of the TC model in reduced units; 0: contacts have no duration.
+  double contact_duration() const;
+  // Nothing above the bed, and no places given: as many disks can as well be dropped at random.
+  bool may_be_filled_at_random() const;
   // T/(m g D) of the reservoir; 0 without one.
   double bath_temperature() const;
 
@@ -154,6 +158,7 @@ class SceneOptions {
   void warn_of_size(Fields& fields) const;
   void warn_of_locking(Fields& fields) const;
   double height_at_rest() const;  // [D]
+  bool dissipates() const;
   std::string length_text(double length) const;
 
   DiskOptions disks_;

@@ -168,7 +168,7 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
     if "stages" in content:
         stages = [dict(s, seed=seed) if s.get("stage") == "simulate" else s for s in content["stages"]]
         return _Document(json.dumps(dict(content, stages=stages)), file, directory, False, False)
-    stage: dict[str, Any] = {"stage": "simulate", "id": "bed", **content}
+    stage: dict[str, Any] = {"stage": "simulate", "id": "bed", "replicas": 1, **content}
     if seed is not None:
         stage["seed"] = seed
     recipe = {"name": "scene", "stages": [stage]}
@@ -312,7 +312,8 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
 
     Notes
     -----
-    The same scene and seed give the same numbers as ``shakebed run``, to the last digit. The GIL is released.
+    One bed is measured: its errors hold for this bed, not for the next one. The same scene with ``"replicas": 1`` gives
+    the same numbers as ``shakebed run``, to the last digit; `run` measures several beds. The GIL is released.
     """
     document = _document(scene, seed)
     call, close = reporter(progress, "simulating")

@@ -10,6 +10,7 @@ from shakebed.runs import program
 
 SCENE = {
     "seed": 3,
+    "replicas": 1,
     "disks": {"count": 60, "diameter": "3 mm", "density": "2700 kg/m^3", "restitution": 0.92,
               "contact_duration": "1 us"},
     "gravity": "9.81 m/s^2",

@@ -203,6 +203,7 @@ class Engine final : public Simulation {
   void hit_floor(std::uint32_t i, Motion& motion);
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
+  void withhold(double reduced_mass, double approach, const Contact& surface);
   std::optional<double> unusual_restitution(std::uint32_t i, std::uint32_t j, TwoLanes d, TwoLanes dv);
   bool locked();
   void relieve();

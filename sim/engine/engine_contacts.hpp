@@ -17,6 +17,13 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   return elastic;
 }
 
+// Writes down what a contact would have dissipated that the clock made elastic.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::withhold(double reduced_mass, double approach, const Contact& surface) {
+  const double e = surface.varies() ? surface.restitution_at(approach) : surface.restitution;
+  counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
+}
+
 // The restitution of two disks where it may depend on their approach; none if they touch as smooth elastic disks do.
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] std::optional<double> Engine<Space, Rule, Sizes>::unusual_restitution(std::uint32_t i,
@@ -122,7 +129,10 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   first.velocity = fused(to_first * impulse.normal, both(impulse.approach), first.velocity);
   second.velocity = fused(-to_second * impulse.normal, both(impulse.approach), second.velocity);
   counters_.virial -= momentum * impulse.approach;
-  if constexpr (Rule::dissipates) dissipated_ += reduced_mass * impulse.dissipated;
+  if constexpr (Rule::dissipates) {
+    dissipated_ += reduced_mass * impulse.dissipated;
+    if (elastic) withhold(reduced_mass, -impulse.approach / std::sqrt(contact_squared), disk_surface_);
+  }
 }
 
 template <class Space, class Rule, class Sizes>
@@ -187,6 +197,7 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
   Surface contact = surface;
   if constexpr (Rule::dissipates) {
     if (too_soon(i, i)) {
+      withhold(mass, gn, surface);
       contact = Surface{};
     } else if (surface.varies()) [[unlikely]] {
       contact.restitution = surface.restitution_at(gn);

@@ -45,6 +45,19 @@ namespace {
 
 enum Scalar : std::size_t { centre, t_x, spin_t, bottom_row, scalar_count };
 
+// An odd value in the middle belongs to neither half. Each half by its own blocks, so that a step between the two is no
+// noise.
+Measured drift_of(const std::vector<double>& series) {
+  const std::size_t half = series.size() / 2, second = series.size() - half;
+  if (half < 2) return {0, std::nan("")};
+  BlockedMean early, late;
+  for (std::size_t k = 0; k < half; ++k) {
+    early.add(series[k]);
+    late.add(series[second + k]);
+  }
+  return {late.mean() - early.mean(), std::hypot(early.std_error(), late.std_error())};
+}
+
 }  // namespace
 
 BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const HeightGrid& grid,
@@ -112,6 +125,8 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
   mean_mass_ = mass / n;
   if (phase + 1 == phases_) {
     means_.add(period_sum_);
+    centre_series_.push_back(scalars[centre]);
+    temperature_series_.push_back(scalars[t_x]);
     covariance_.add(std::span(period_sum_).first(grid_.points));
     ++periods_;
   }
@@ -141,6 +156,9 @@ Measured BedObserver::spin_temperature() const {
   const std::size_t i = 2 * grid_.points + spin_t;
   return {means_.mean(i), means_.std_error(i)};
 }
+
+Measured BedObserver::drift_of_centre() const { return drift_of(centre_series_); }
+Measured BedObserver::drift_of_temperature_x() const { return drift_of(temperature_series_); }
 
 Measured BedObserver::bottom_row_density() const {
   const std::size_t i = 2 * grid_.points + bottom_row;

@@ -47,6 +47,10 @@ class BedObserver {
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
   Measured temperature_z_local() const;  // without the mean velocity of each layer of 1 D at each phase
   Measured spin_temperature() const;     // I <w^2>; 0 for smooth disks
+  // The second half of the periods less the first: what still changes while the bed is measured. The error is not a
+  // number with fewer than four periods.
+  Measured drift_of_centre() const;
+  Measured drift_of_temperature_x() const;
   // Number density in the lowest row: centres between (1/2 -+ sqrt(3)/4) D above the moving floor. 2/sqrt 3 when every
   // site of a packed row is taken (between hard sides up to half a disk less).
   Measured bottom_row_density() const;
@@ -60,7 +64,8 @@ class BedObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(periods_, period_sum_, means_, covariance_, mean_vz_, mean_vz2_, mean_mass_, centre_by_phase_, layers_);
+    archive(periods_, period_sum_, means_, centre_series_, temperature_series_, covariance_, mean_vz_, mean_vz2_,
+            mean_mass_, centre_by_phase_, layers_);
   }
 
  private:
@@ -81,6 +86,7 @@ class BedObserver {
   std::uint64_t periods_ = 0;
   std::vector<double> period_sum_;  // lab profile, floor profile, then scalars: see observe()
   BlockedMean means_;
+  std::vector<double> centre_series_, temperature_series_;  // a value a period
   BlockedCovariance covariance_;
   std::vector<double> mean_vz_, mean_vz2_;  // a value a phase and period; the second with the mass
   double mean_mass_ = 1;

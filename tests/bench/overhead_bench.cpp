@@ -68,7 +68,7 @@ TEST(Speed, TenThousandPointsCostAtMost2MillisecondsEachAnd200Megabytes) {
   ScratchFolder folder;
   constexpr int points = 10'000;
   write_text(folder / "sweep.json", R"({ "name": "tiny", "stages": [
-  { "stage": "simulate", "id": "bed", "units": "reduced",
+  { "stage": "simulate", "id": "bed", "replicas": 1, "units": "reduced",
     "disks": { "count": 2, "restitution": 0.9 },
     "box": { "width": 4, "sides": { "kind": "hard", "restitution": 0.9 }, "lid": "open" },
     "floor": { "motion": "sinusoidal", "amplitude": 0.5, "frequency": 1, "restitution": 0.9 },

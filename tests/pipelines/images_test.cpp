@@ -24,7 +24,7 @@ std::string image_recipe() {
   return R"({
   "name": "camera",
   "stages": [
-    { "stage": "simulate", "id": "bed", "seed": 3,
+    { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1,
       "disks": { "count": 160, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
       "gravity": "9.81 m/s^2",
       "box": { "width": "48 mm", "sides": { "kind": "hard", "restitution": 0.9 } },

@@ -97,7 +97,7 @@ std::string small_recipe(const std::string& sweep) {
   return R"({
   "name": "small",
   "stages": [
-    { "stage": "simulate", "id": "bed", "seed": 7,
+    { "stage": "simulate", "id": "bed", "seed": 7, "replicas": 1,
       "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
       "gravity": "9.81 m/s^2",
       "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },

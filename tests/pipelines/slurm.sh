@@ -94,7 +94,7 @@ cd "$folder"
 cat >sweep.json <<'JSON'
 { "name": "forty",
   "stages": [
-    { "stage": "simulate", "id": "bed", "seed": 3, "units": "reduced",
+    { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1, "units": "reduced",
       "disks": { "count": 40, "restitution": 0.9, "friction": 0.2, "inertia": "sphere" },
       "box": { "width": 10, "sides": { "kind": "hard", "restitution": 0.9 }, "lid": "open" },
       "floor": { "motion": "sinusoidal", "amplitude": 1, "frequency": 0.3, "restitution": 0.9 },

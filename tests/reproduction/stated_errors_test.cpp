@@ -65,9 +65,8 @@ TEST_P(StatedErrors, AreWhatTScattersBy) {
                     interval["high"].get<double>() / truth});
     mean += fits.back().t / beds;
     stated += std::pow(json["temperature"]["std_error"].get<double>() / truth, 2) / beds;
-    const std::string covariance = read_text(folder / "o" / fmt::format("bed{}", k) / "covariance.csv");
-    const std::string key = "independent_blocks: ";
-    samples += std::stod(covariance.substr(covariance.find(key) + key.size())) / beds;
+    const Json notes = Json::parse(read_text(folder / "o" / fmt::format("bed{}", k) / "covariance.csv-metadata.json"));
+    samples += shakebed::pipelines::find_pointer(notes, "/notes/0/independent_samples")->get<double>() / beds;
   }
   int held = 0, held_mean = 0;
   for (const Fit& fit : fits) {

@@ -359,7 +359,7 @@ TEST_F(Faults, SignalsAtAnyMoment) {
 TEST(ExternalFiles, AFrameThatChangesWhileItIsReadIsNoticed) {
   const ScratchFolder folder;
   write_text(folder / "r.json", R"({ "name": "camera", "stages": [
-    { "stage": "simulate", "id": "bed", "seed": 3, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
+    { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
       "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.9 },
       "settle": "0.2 s", "measure": "0.5 s", "frames": { "count": 6, "phases": 3 } },

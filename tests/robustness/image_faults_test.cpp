@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 // A bed of 40 disks, photographed and found again: half a second of CPU.
 std::string recipe(const std::string& scale = "0.25 mm/px") {
   return R"({ "name": "camera", "stages": [
-    { "stage": "simulate", "id": "bed", "seed": 3, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
+    { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
       "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.9 },
       "settle": "0.2 s", "measure": "0.5 s", "frames": { "count": 6, "phases": 3 } },

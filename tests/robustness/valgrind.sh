@@ -10,7 +10,7 @@ command -v valgrind >/dev/null || { echo "skipped: there is no valgrind"; exit 7
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
-bed='{ "stage": "simulate", "id": "bed", "seed": 7, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
+bed='{ "stage": "simulate", "id": "bed", "seed": 7, "replicas": 1, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
   "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
   "floor": { "motion": "sinusoidal", "amplitude": "1.5 mm", "frequency": "20 Hz", "restitution": 0.9 },
   "observe": ["order", "velocities", "displacement", "pressure", "phases"],

@@ -250,6 +250,51 @@ TEST(Displacement, OfFreeFlightGrowsAsTheSquareOfTimeAcrossTheSides) {
   }
 }
 
+// The mean of the later half less that of the earlier, with the error of independent values.
+TEST(Drift, IsTheLaterHalfLessTheEarlier) {
+  Scene scene = dropped(1);
+  const auto simulation = simulate(scene);
+  Snapshot at;
+  simulation->snapshot(at);
+  const auto measured = [&](int periods, const auto& speed, const auto& height) {
+    BedObserver bed(scene, simulation->properties(), 2, {-2, 0.5, 40}, {KernelKind::gaussian, 0.5});
+    for (int p = 0; p < periods; ++p) {
+      at.vx[0] = speed(p);
+      at.z[0] = height(p);
+      bed.observe(at, 0);
+      bed.observe(at, 1);
+    }
+    return std::pair{bed.drift_of_temperature_x(), bed.drift_of_centre()};
+  };
+  // Nine periods: the fifth belongs to neither half.
+  const auto [hotter, lower] = measured(
+      9, [](int p) { return p < 4    ? 1.0
+                            : p == 4 ? 50.0
+                                     : 2.0; }, [](int p) { return p < 5 ? 3.0 : 2.5; });
+  EXPECT_NEAR(hotter.value, 3, 1e-14);
+  EXPECT_NEAR(lower.value, -0.5, 1e-14);
+  EXPECT_NEAR(hotter.std_error, 0, 1e-14);
+  const auto [none, nothing] = measured(
+      3, [](int) { return 1.0; }, [](int) { return 1.0; });
+  EXPECT_TRUE(std::isnan(none.std_error) && std::isnan(nothing.std_error));
+  // Heights of independent normal deviates: 400 differences in units of their stated error scatter by 1 +- 0.07
+  // (two standard errors, and half as much again since the errors themselves are estimated).
+  Random random(11);
+  double sum = 0, squares = 0;
+  constexpr int trials = 400;
+  for (int trial = 0; trial < trials; ++trial) {
+    const auto drift = measured(
+                           64, [](int) { return 1.0; }, [&](int) { return 5 + random.normal_pair().first; })
+                           .second;
+    const double pull = drift.value / drift.std_error;
+    sum += pull / trials;
+    squares += pull * pull / trials;
+  }
+  EXPECT_NEAR(sum, 0, 3.3 / std::sqrt(trials));
+  EXPECT_GT(std::sqrt(squares), 0.8);
+  EXPECT_LT(std::sqrt(squares), 1.15);
+}
+
 // Saved in the middle and read into new ones, observers end as if nothing had happened.
 TEST(Observers, GoOnFromTheirBytes) {
   Scene scene;

@@ -519,6 +519,7 @@ Json sweep_recipe(int points) {
        Json::array(
            {Json{{"stage", "simulate"},
                  {"id", "bed"},
+                 {"replicas", 1},
                  {"disks", {{"count", 40}, {"diameter", 3e-3}, {"restitution", 0.9}}},
                  {"gravity", 9.81},
                  {"box", {{"width", 30e-3}, {"sides", "periodic"}}},

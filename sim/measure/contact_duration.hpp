@@ -1,0 +1,24 @@
+// What the contact duration t_c of the TC model does to a measured bed.
+//
+// A contact is made elastic where one of its partners was hit less than t_c before. The energy that these contacts
+// would have dissipated stays in the bed and heats it. Its share of what is dissipated can be counted as the run goes
+// on; the temperature follows it (tests/physics/test_contact_duration.cpp, docs/thermometer.md).
+#pragma once
+
+#include "sim/engine/simulation.hpp"
+
+namespace shakebed::sim {
+
+struct ContactDurationEffect {
+  double elastic_share = 0;   // of the contacts
+  double withheld_share = 0;  // energy withheld over energy dissipated
+  double temperature = 0;     // how much too high T_x and T_z are, about, as a part of them: within a factor of two
+};
+
+// Of the part of a run between two moments: the counters at both, and the energy dissipated between them.
+ContactDurationEffect contact_duration_effect(const Counters& before, const Counters& after, double dissipated);
+
+// The contact duration at which the effect on T would be `wanted` or less, where it is `effect` now.
+double contact_duration_for(double effect, double contact_duration, double wanted);
+
+}  // namespace shakebed::sim

@@ -1,0 +1,110 @@
+// What several beds say together, on numbers for pencil and paper, and the replicas of a shaken bed as the program runs
+// them.
+#include "pipelines/stages/replicas.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/pipelines/program.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+using namespace shakebed::tests;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Json bed(double temperature, double error, double drift = 0, double drift_error = 0.1) {
+  return {{"temperature_x", {{"value", temperature}, {"std_error", error}, {"unit", "m g D"}}},
+          {"drift_temperature_x", {{"value", drift}, {"std_error", drift_error}, {"unit", "m g D"}}},
+          {"elastic_share", {{"value", temperature / 100}, {"unit", "1"}}},
+          {"collisions", 7u},
+          {"max_overlap", {{"value", temperature * 1e-15}, {"unit", "D"}}}};
+}
+
+TEST(Replicas, JoinToMeanSpreadAndErrors) {
+  const Json joined = joined_results({bed(1, 0.1), bed(2, 0.2), bed(3, 0.2)});
+  const Json& t = joined["temperature_x"];
+  EXPECT_NEAR(t["value"].get<double>(), 2, 1e-15);
+  EXPECT_NEAR(t["spread"].get<double>(), 1, 1e-15);
+  EXPECT_NEAR(t["within"].get<double>(), std::sqrt((0.01 + 0.04 + 0.04) / 3), 1e-15);
+  // Student's t for two degrees of freedom: 4.302653 [any table], over 1.959964.
+  EXPECT_NEAR(t["std_error"].get<double>(), 4.302653 / 1.959964 / std::sqrt(3.0), 1e-6);
+  EXPECT_NEAR(joined["elastic_share"]["value"].get<double>(), 0.02, 1e-15);
+  EXPECT_EQ(joined["collisions"], 21);
+  EXPECT_DOUBLE_EQ(joined["max_overlap"]["value"].get<double>(), 3e-15);
+  EXPECT_EQ(joined["replicas"], 3);
+  // Beds that agree by chance: the error is what they state.
+  const Json close = joined_results({bed(1, 0.3), bed(1, 0.3), bed(1, 0.3), bed(1, 0.3)});
+  EXPECT_NEAR(close["temperature_x"]["std_error"].get<double>(), 0.15, 1e-15);
+}
+
+std::vector<std::string> warnings_of(const std::vector<Json>& beds, ReplicaStarts starts = ReplicaStarts::alternate) {
+  return replica_warnings(beds, beds.size() > 1 ? joined_results(beds) : beds.front(), starts);
+}
+
+TEST(Replicas, ThatDifferByMoreThanTheyStateAreNamed) {
+  const auto warnings = warnings_of({bed(0.16, 0.003), bed(0.20, 0.003), bed(0.17, 0.003), bed(0.22, 0.003)});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_THAT(warnings[0], HasSubstr("the 4 beds differ by more than chance: T_x scatters by 0.028, each bed states "
+                                     "0.003 (0.165 on average where they begin as the recipe says, 0.21 from a random "
+                                     "fill)"));
+  EXPECT_THAT(warnings_of({bed(0.160, 0.003), bed(0.165, 0.003), bed(0.163, 0.003), bed(0.158, 0.003)}), IsEmpty());
+  // Two beds 2.1 times their error apart in spread: chance does that in 4 % of all cases.
+  EXPECT_THAT(warnings_of({bed(1, 0.1), bed(1.3, 0.1)}), IsEmpty());
+}
+
+TEST(Replicas, AndSingleBedsThatStillChangeAreNamed) {
+  EXPECT_THAT(warnings_of({bed(2, 0.1, -0.5, 0.1)}),
+              ElementsAre(HasSubstr("T_x is lower by 0.5 (25 %) in the second half of the time, 5.0 times")));
+  EXPECT_THAT(warnings_of({bed(2, 0.1, 0.39, 0.1)}), IsEmpty());
+  EXPECT_THAT(warnings_of({bed(2, 0.1, 0, 0)}), IsEmpty());
+}
+
+// A shaken bed that dissipates: four beds by default, half of them filled at random.
+TEST(Replicas, OfAShakenBedAreFourByDefault) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::string& more, const std::string& out) {
+    write_text(folder / (out + ".json"), R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 1,
+      "units": "reduced", "disks": { "count": 60, "restitution": 0.9 }, "box": { "width": 10.3, "sides": "periodic" },
+      "settle": 30, "measure": 60, )" + more +
+                                             " } ] }");
+    const ProgramResult result = run_shakebed({"run", out + ".json", "--out", out}, folder.path());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(read_text(folder / out / "bed/observables.json"));
+  };
+  const std::string shaken =
+      R"("floor": { "motion": "sinusoidal", "amplitude": 0.8, "frequency": 0.35, "restitution": 0.9 })";
+  const Json plain = run(shaken, "plain"), same = run(shaken + R"(, "replica_starts": "same")", "same"),
+             one = run(shaken + R"(, "replicas": 1)", "one");
+  EXPECT_EQ(plain["replicas"], 4);
+  EXPECT_FALSE(one.contains("replicas"));
+  EXPECT_FALSE(one["temperature_x"].contains("spread"));
+  const auto rows = [&](const std::string& out) {
+    const std::string text = read_text(folder / out / "bed/replicas.csv");
+    std::vector<std::string> lines;
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = text.find('\n', at);
+      if (text[at] != '#') lines.push_back(text.substr(at, end - at));
+      at = end + 1;
+    }
+    return lines;
+  };
+  const auto alternate = rows("plain"), alike = rows("same");
+  ASSERT_EQ(alternate.size(), 5u);
+  EXPECT_EQ(alternate[1], alike[1]);  // the first and the third begin as the recipe says
+  EXPECT_NE(alternate[2], alike[2]);
+  EXPECT_EQ(alternate[3], alike[3]);
+  EXPECT_NE(alternate[4], alike[4]);
+  // The first bed is the one that a single run gives.
+  EXPECT_THAT(alternate[1], HasSubstr(Json(one["temperature_x"]["value"]).dump()));
+  // A bed in a bath does not keep its start.
+  const Json bath = run(R"("bath": { "kind": "langevin", "temperature": 1, "rate": 1, "interval": 0.5 })", "bath");
+  EXPECT_FALSE(bath.contains("replicas"));
+}
+
+}  // namespace
+}  // namespace shakebed::pipelines
