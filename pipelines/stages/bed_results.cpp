@@ -102,11 +102,11 @@ class BedStatement {
     const Given clocked = given_if(bed_.contact_duration, "contacts have a duration t_c");
     list_.quantity("/elastic_share", "1", "share of the contacts made elastic by t_c, while measured", clocked);
     list_.quantity("/withheld_share", "1",
-                   "energy that these contacts would have dissipated, over the energy dissipated, while measured",
+                   "energy that the first of each chain of these would have dissipated, over the energy dissipated, "
+                   "while measured",
                    clocked);
     list_.quantity("/contact_duration_effect", "1",
-                   "how much too high T is by t_c, as a part of it, against contacts without a duration; within a "
-                   "factor of two",
+                   "how much too high T may be by t_c, as a part of it, against contacts without a duration; about",
                    clocked);
     list_.number("/events", "1", "events of all kinds");
     list_.number("/periods", "1", "periods over which the bed was measured");

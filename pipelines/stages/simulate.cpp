@@ -347,9 +347,9 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
                                       : "\"" + handy_text(two_digits(time * bed_.time_unit()), dimension::time) + "\"";
   };
   context.warning(fmt::format(
-      "the contact duration t_c = {} makes {:.2g} % of the contacts elastic, and T is higher by about {:.2g} % than "
-      "with contacts without a duration (within a factor of two). t_c is a numerical cut-off, not the time that a real "
-      "contact lasts. \"contact_duration\": {} would bring this to {:.2g} % or less, with more contacts",
+      "the contact duration t_c = {} makes {:.2g} % of the contacts elastic, and T may be higher by about {:.2g} % "
+      "than with contacts without a duration. t_c is a numerical cut-off, not the time that a real "
+      "contact lasts. \"contact_duration\": {} would bring this to about {:.2g} %, with more contacts",
       text(duration), 100 * results.at("elastic_share").at("value").get<double>(), 100 * effect->get<double>(),
       text(shorter), 100 * allowed_contact_effect));
 }

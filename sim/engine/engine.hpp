@@ -280,14 +280,16 @@ class Engine final : public Simulation {
   Bath bath_;
 
   // --- the state
-  LargeVector<Disk> disks_;            // and a sentinel after the last
-  std::vector<std::uint32_t> labels_;  // what a disk is called outside: its place in the start
-  std::vector<double> spins_;          // rough disks only
-  std::vector<double> last_contact_;   // contact clocks, dissipative disks only
-  double now_ = 0;                     // since base_
-  double base_ = 0;                    // of the present count, since the start
-  double interval_ = 1;                // the floor's period
-  std::uint64_t intervals_ = 1;        // that many of them between synchronisations now
+  LargeVector<Disk> disks_;             // and a sentinel after the last
+  std::vector<std::uint32_t> labels_;   // what a disk is called outside: its place in the start
+  std::vector<double> spins_;           // rough disks only
+  std::vector<double> last_contact_;    // contact clocks, dissipative disks only
+  std::vector<std::uint8_t> in_chain_;  // whether that contact was elastic by the clock; as many
+  bool begins_chain_ = false;           // the contact at hand is the first elastic one of both partners
+  double now_ = 0;                      // since base_
+  double base_ = 0;                     // of the present count, since the start
+  double interval_ = 1;                 // the floor's period
+  std::uint64_t intervals_ = 1;         // that many of them between synchronisations now
   std::uint64_t intervals_done_ = 0;
   double synchronise_at_ = 1;
   double event_rate_ = 1;

@@ -13,6 +13,8 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   if (contact_duration_ <= 0) return false;
   const bool elastic = now_ - last_contact_[i] < contact_duration_ || now_ - last_contact_[j] < contact_duration_;
   last_contact_[i] = last_contact_[j] = now_;
+  begins_chain_ = elastic && in_chain_[i] + in_chain_[j] == 0;
+  in_chain_[i] = in_chain_[j] = elastic;
   counters_.elastic_contacts += elastic;
   return elastic;
 }
@@ -20,6 +22,7 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
 // Writes down what a contact would have dissipated that the clock made elastic.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::withhold(double reduced_mass, double approach, const Contact& surface) {
+  if (!begins_chain_) return;  // counted already: the same energy is kept again
   const double e = surface.varies() ? surface.restitution_at(approach) : surface.restitution;
   counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
 }

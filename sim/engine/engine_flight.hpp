@@ -40,7 +40,10 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if constexpr (Rule::spins) {
     for (const Placed& p : placed) spins_.push_back(p.spin);
   }
-  if constexpr (Rule::dissipates) last_contact_.assign(count_, -never);
+  if constexpr (Rule::dissipates) {
+    last_contact_.assign(count_, -never);
+    in_chain_.assign(count_, 0);
+  }
   if constexpr (!Sizes::equal) {
     for (const Placed& p : placed) {
       sizes_.radii.push_back(scene.disks.species[p.species].diameter / 2);

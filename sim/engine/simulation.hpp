@@ -42,8 +42,10 @@ struct Counters {
   std::uint64_t shell_exits = 0;
   std::uint64_t synchronisations = 0;
   std::uint64_t locks_relieved = 0;  // endless chains of contacts at one instant that were ended
-  double withheld = 0;               // energy that the contacts made elastic would have dissipated, friction left aside
-  double virial = 0;                 // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
+  // Energy that contacts made elastic would have dissipated, friction left aside: of every chain of such contacts the
+  // first, since the others keep the same energy again.
+  double withheld = 0;
+  double virial = 0;  // sum over disk-disk contacts of r12.dp: P V = N T + virial / (2 time)
   std::uint64_t events() const {
     return disk_collisions + wall_collisions + floor_collisions + predictions_renewed + shell_exits;
   }

@@ -1,8 +1,8 @@
 // What the contact duration t_c of the TC model does to a measured bed.
 //
-// A contact is made elastic where one of its partners was hit less than t_c before. The energy that these contacts
-// would have dissipated stays in the bed and heats it. Its share of what is dissipated can be counted as the run goes
-// on; the temperature follows it (tests/physics/test_contact_duration.cpp, docs/thermometer.md).
+// A contact is made elastic where one of its partners was hit less than t_c before. The energy that the first of each
+// chain of such contacts would have dissipated stays in the bed and may heat it. Its share of what is dissipated is
+// counted as the run goes on; the temperature follows it (tests/physics/test_contact_duration.cpp).
 #pragma once
 
 #include "sim/engine/simulation.hpp"
@@ -12,7 +12,10 @@ namespace shakebed::sim {
 struct ContactDurationEffect {
   double elastic_share = 0;   // of the contacts
   double withheld_share = 0;  // energy withheld over energy dissipated
-  double temperature = 0;     // how much too high T_x and T_z are, about, as a part of them: within a factor of two
+  // How much too high T_x and T_z are, about, as a part of them: within a factor of two up to 0.05 where disks are
+  // smooth; too much in rough, strongly dissipating beds, whose contacts are mostly those of its landing; a lower bound
+  // above 0.1.
+  double temperature = 0;
 };
 
 // Of the part of a run between two moments: the counters at both, and the energy dissipated between them.

@@ -35,6 +35,10 @@ TEST(ContactDurationEffect, OfABouncingDiskIsItsSecondContactsEnergy) {
   EXPECT_NEAR(effect.elastic_share, 0.5, 1e-15);
   EXPECT_NEAR(effect.withheld_share, e * e, 1e-12);
   EXPECT_EQ(contact_duration_effect(after, after, 0).withheld_share, 0);
+  // The third contact keeps the same energy again.
+  simulation->advance_to(2 + 4 * e * 2 + 0.01);
+  EXPECT_EQ(simulation->counters().elastic_contacts, 2u);
+  EXPECT_EQ(simulation->counters().withheld, after.withheld);
 }
 
 // Two disks meet at time 4; they part with -0.75 and -0.25. The first turns at the wall at 10 and meets the second
