@@ -16,9 +16,10 @@ class LoneStage : public pipelines::RunContext {
  public:
   explicit LoneStage(const pipelines::StageRow& row) : row_(row) { std::filesystem::create_directory(output_); }
 
-  // A stage in "from": its folder is the scratch folder, where the test writes its files.
-  void add_input(const std::string& id, const pipelines::StageRow& row) {
-    inputs_.push_back({id, std::string(row.name), folder_.path(), std::string(row.result)});
+  // A stage in "from": its folder is the scratch folder, or one below it, where the test writes its files.
+  void add_input(const std::string& id, const pipelines::StageRow& row, const std::string& below = "") {
+    std::filesystem::create_directories(folder_ / below);
+    inputs_.push_back({id, std::string(row.name), folder_ / below, std::string(row.result)});
     kinds_.push_back(row.name);
   }
   std::filesystem::path file(const std::string& name) const { return folder_ / name; }

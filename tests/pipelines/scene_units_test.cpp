@@ -31,11 +31,12 @@ SceneOptions options_of(const std::string& text, bool reduced = false) {
   for (const Problem& problem : problems) ADD_FAILURE() << problem.pointer << ": " << problem.what;
   return options;
 }
-const std::string disks = R"("disks": { "count": 12, "diameter": "4 mm", "density": "2000 kg/m^3", "restitution": 0.9,
+const std::string disks_in_si =
+    R"("disks": { "count": 12, "diameter": "4 mm", "density": "2000 kg/m^3", "restitution": 0.9,
     "restitution_law": "power", "restitution_speed": "0.3 m/s", "friction": 0.2, "contact_duration": "20 us" })";
 const std::string box = R"("box": { "width": "48 mm", "sides": "periodic" })";
 std::string bed(const std::string& more = "") {
-  return R"({ "gravity": "10 m/s^2", )" + disks + ", " + box + (more.empty() ? "" : ", " + more) + " }";
+  return R"({ "gravity": "10 m/s^2", )" + disks_in_si + ", " + box + (more.empty() ? "" : ", " + more) + " }";
 }
 sim::Scene scene_of(const std::string& more = "") { return options_of(bed(more)).scene(7); }
 
@@ -125,7 +126,7 @@ TEST(FloorTable, LastsAsLongAsItsMomentsAndTheWayBack) {
 }
 
 TEST(SceneInSi, HasItsSidesAndLidInUnitsOfTheBed) {
-  const std::string text = R"({ "gravity": "10 m/s^2", )" + disks +
+  const std::string text = R"({ "gravity": "10 m/s^2", )" + disks_in_si +
                            R"(, "box": { "width": "48 mm", "sides": { "kind": "hard", "restitution": 0.7,
       "restitution_law": "power", "restitution_speed": "0.5 m/s", "friction": 0.1 },
       "lid": { "kind": "fixed", "height": "80 mm", "restitution": 0.6, "restitution_law": "power",
