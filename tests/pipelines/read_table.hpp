@@ -1,4 +1,4 @@
-// A CSV that the program wrote, by the names of its columns.
+// What the program wrote: tables by the names of their columns, quantities as numbers.
 #pragma once
 
 #include <cmath>
@@ -8,9 +8,13 @@
 #include <vector>
 
 #include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace shakebed::tests {
+
+inline double value(const pipelines::Json& quantity) { return quantity.at("value").get<double>(); }
+inline double error(const pipelines::Json& quantity) { return quantity.at("std_error").get<double>(); }
 
 class NumberTable {
  public:

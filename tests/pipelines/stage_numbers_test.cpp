@@ -20,9 +20,6 @@ using namespace shakebed;
 using namespace shakebed::pipelines;
 using namespace shakebed::tests;
 
-double value(const Json& quantity) { return quantity["value"].get<double>(); }
-double error(const Json& quantity) { return quantity["std_error"].get<double>(); }
-
 // --- critical
 
 // Between T = 1 and 2 the density falls by 0.04, so 1.13 is met three quarters of the way: T = 1.75, and of the errors

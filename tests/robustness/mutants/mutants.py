@@ -38,6 +38,7 @@ PROGRAMS = {
     "test_sim": "tests/sim/test_sim",
     "test_fit": "tests/fit/test_fit",
     "test_ingest": "tests/ingest/test_ingest",
+    "test_numbers": "tests/pipelines/test_numbers",
     "test_pipelines": "tests/pipelines/test_pipelines",
     "pipelines_images_test": "tests/pipelines/pipelines_images_test",
     "test_physics": "tests/physics/test_physics",
@@ -49,11 +50,11 @@ PROGRAMS = {
 }
 # The tests of a room first, then those of the rooms above.
 ORDER = {
-    "statistics": ("test_statistics", "test_sim", "test_fit", "test_ingest", "test_pipelines"),
-    "sim": ("test_sim", "test_physics", "test_pipelines", "digits_test", "resume_test"),
-    "fit": ("test_fit", "test_pipelines", "digits_test"),
+    "statistics": ("test_statistics", "test_sim", "test_fit", "test_ingest", "test_numbers", "test_pipelines"),
+    "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "resume_test"),
+    "fit": ("test_fit", "test_numbers", "test_pipelines", "digits_test"),
     "ingest": ("test_ingest", "pipelines_images_test"),
-    "pipelines": ("test_pipelines", "pipelines_images_test", "malformed_recipe_test", "damaged_recipe_test",
+    "pipelines": ("test_numbers", "test_pipelines", "pipelines_images_test", "malformed_recipe_test", "damaged_recipe_test",
                   "safety_test", "resume_test"),
 }
 
@@ -233,7 +234,7 @@ class Bench:
         self.tree = work / f"tree-{number}"
         self.build = self.tree / "build/release"  # as in the source: a compiler cache then knows the files
 
-    def prepare(self):
+    def prepare(self, programs):
         names = subprocess.run(["git", "-C", str(SOURCE), "ls-files", "-z", "--cached", "--others",
                                 "--exclude-standard"], check=True, capture_output=True, text=True).stdout
         wanted = {name for name in names.split("\0") if name and (SOURCE / name).is_file()}
@@ -245,7 +246,7 @@ class Bench:
                 path.unlink()
         if not (self.build / "build.ninja").exists():
             self.configure()
-        for program in PROGRAMS:
+        for program in programs:
             code, output = self.make(program)
             if code != 0:
                 sys.exit(f"{program} is not built without a fault:\n{output[-3000:]}")
@@ -273,7 +274,7 @@ class Bench:
     def make(self, program):
         return run_limited(["ninja", "-C", str(self.build), "-j1", program], BUILD_TIMEOUT)
 
-    def judge(self, row):
+    def judge(self, row, depth):
         path = self.tree / row["file"]
         text = path.read_text()
         offset = int(row["offset"])
@@ -281,12 +282,12 @@ class Bench:
             return "misplaced", ""
         path.write_text(text[:offset] + row["after"] + text[offset + len(row["before"]):])
         try:
-            return self.judge_changed(row["room"])
+            return self.judge_changed(row["room"], depth)
         finally:
             path.write_text(text)
 
-    def judge_changed(self, room):
-        for program in ORDER[room]:
+    def judge_changed(self, room, depth):
+        for program in ORDER[room][:depth]:
             code, _ = self.make(program)
             if code != 0:
                 return "not built", ""
@@ -308,14 +309,14 @@ def run(arguments):
 
     def work(number):
         bench = Bench(arguments.work, number)
-        bench.prepare()
+        bench.prepare(dict.fromkeys(name for row in waiting for name in ORDER[row["room"]][:arguments.depth]))
         while True:
             with lock:
                 if not waiting or time.monotonic() > ends:
                     return
                 row = waiting.pop(0)
             begin = time.monotonic()
-            row["state"], row["noticed_by"] = bench.judge(row)
+            row["state"], row["noticed_by"] = bench.judge(row, arguments.depth)
             row["seconds"] = f"{time.monotonic() - begin:.0f}"
             print(f"{row['id']} {row['file']}:{row['line']} {row['state']} {row['noticed_by']} {row['seconds']} s",
                   flush=True)
@@ -357,6 +358,7 @@ def main():
     judged = commands.add_parser("run")
     judged.add_argument("--jobs", type=int, default=1)
     judged.add_argument("--hours", type=float, default=8)
+    judged.add_argument("--depth", type=int, help="only so many test programs of a room's order")
     commands.add_parser("report")
     arguments = parser.parse_args()
     arguments.work = arguments.work.resolve()
