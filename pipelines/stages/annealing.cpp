@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/correlated_series.hpp"
+
 namespace shakebed::pipelines {
 
 // A ramp is cut into pieces of a time unit, each at the temperature of its middle: so many at least and at most.
@@ -33,7 +35,8 @@ std::vector<sim::BathStep> Annealing::bath() const {
 
 void Annealing::prepare(sim::Simulation& simulation) {
   mass_ = simulation.properties().mass;
-  means_.assign(steps_.size(), sim::BlockedMean(2));
+  temperatures_.assign(steps_.size(), {});
+  heights_.assign(steps_.size(), {});
 }
 
 void Annealing::step(sim::Simulation& simulation, std::uint64_t step) {
@@ -48,17 +51,18 @@ void Annealing::step(sim::Simulation& simulation, std::uint64_t step) {
     height += m * at.z[i];
     kinetic += m * (at.vx[i] * at.vx[i] + at.vz[i] * at.vz[i]) / 2;
   }
-  const double sample[] = {kinetic / static_cast<double>(at.z.size()), height / mass};
-  means_[piece.step].add(sample);
+  temperatures_[piece.step].push_back(kinetic / static_cast<double>(at.z.size()));
+  heights_[piece.step].push_back(height / mass);
 }
 
 Table Annealing::rows(Table table) const {
-  for (std::size_t k = 0; k < means_.size(); ++k) {
-    const sim::BlockedMean& means = means_[k];
-    const bool seen = means.samples() > 0;
-    table.add({count_cell(k), steps_[k].temperature, seen ? means.mean(0) : no_number,
-               seen ? means.std_error(0) : no_number, seen ? means.mean(1) : no_number,
-               seen ? means.std_error(1) : no_number});
+  for (std::size_t k = 0; k < steps_.size(); ++k) {
+    const bool seen = !heights_[k].empty();
+    const statistics::Mean temperature = statistics::mean_of(temperatures_[k]),
+                           height = statistics::mean_of(heights_[k]);
+    table.add({count_cell(k), steps_[k].temperature, seen ? temperature.value : no_number,
+               seen ? temperature.std_error : no_number, seen ? height.value : no_number,
+               seen ? height.std_error : no_number});
   }
   return table;
 }

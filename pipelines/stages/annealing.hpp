@@ -6,7 +6,6 @@
 
 #include "pipelines/formats/table.hpp"
 #include "sim/measure/measure.hpp"
-#include "sim/measure/statistics.hpp"
 
 namespace shakebed::pipelines {
 
@@ -28,8 +27,8 @@ class Annealing final : public sim::RunObserver {
   void prepare(sim::Simulation& simulation) override;
   void step(sim::Simulation& simulation, std::uint64_t step) override;
   void look(sim::Simulation&, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {}
-  void save(sim::ArchiveWriter& out) override { out(means_); }
-  void load(sim::ArchiveReader& in) override { in(means_); }
+  void save(sim::ArchiveWriter& out) override { out(temperatures_, heights_); }
+  void load(sim::ArchiveReader& in) override { in(temperatures_, heights_); }
 
  private:
   // The temperature of the bath up to a time; in the second half of a hold, with a look at the bed at its end.
@@ -41,7 +40,8 @@ class Annealing final : public sim::RunObserver {
   std::vector<AnnealingStep> steps_;
   std::vector<Piece> pieces_;
   std::vector<double> mass_;
-  std::vector<sim::BlockedMean> means_;  // of a step: temperature, height of the centre of mass
+  // Of each step, look by look: kinetic temperature, height of the centre of mass.
+  std::vector<std::vector<double>> temperatures_, heights_;
 };
 
 }  // namespace shakebed::pipelines

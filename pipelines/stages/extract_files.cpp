@@ -34,8 +34,6 @@ ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::
   return table;
 }
 
-}  // namespace
-
 Json profile_numbers(const ingest::DensityProfile& profile) {
   double greatest = 0;
   for (const double density : profile.number_density) greatest = std::max(greatest, density);
@@ -44,6 +42,84 @@ Json profile_numbers(const ingest::DensityProfile& profile) {
               {"memory_frames", profile.memory_frames},
               {"window_frames", profile.window_frames},
               {"independent_samples", profile.independent_samples}};
+}
+
+void add_beads(const ExtractOptions& options, const ingest::Measurement& found, Json& result) {
+  const ingest::BedCalibration& bed = found.calibration;
+  result["frames"] = found.frames.size();
+  result["frames_used"] = found.profile.samples;
+  result["disks_per_frame"] = quantity_json(found.disk_count_mean, "1");
+  result["disks_per_frame_scatter"] = found.disk_count_std;
+  if (options.bead_number) result["bead_number"] = *options.bead_number;
+  result["diameter"] = quantity_json(options.diameter, "m");
+  result["scale"] = quantity_json(bed.scale_m_per_px, "m/px", bed.scale_m_per_px * bed.scale_relative_std_error);
+  result["scale_given"] = bed.scale_given;
+  result["pixel_aspect"] = quantity_json(bed.lens.pixel_aspect, "1", bed.aspect_std_error);
+  result["lens"] = quantity_json(bed.lens.radial, "1", bed.lens_radial_std_error);
+  result["radius"] = quantity_json(bed.radius_px, "px", bed.radius_std_error_px);
+  result["edge_width"] = quantity_json(bed.edge_width_px, "px");
+  result["noise"] = quantity_json(bed.noise_level, "grey levels");
+  result["contrast"] = quantity_json(bed.contrast_level, "grey levels");
+  result["flicker"] = quantity_json(bed.flicker, "1");
+  result["polarity"] = bed.polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
+}
+
+void add_geometry(const ingest::Measurement& found, Json& result) {
+  const ingest::BedCalibration& bed = found.calibration;
+  result["floor"] = quantity_json(bed.floor_px, "px");
+  result["floor_given"] = bed.floor_given;
+  result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
+  if (bed.shaking_frequency_hz > 0) {
+    result["frequency"] = quantity_json(bed.shaking_frequency_hz, "Hz", bed.shaking_frequency_std_error_hz);
+    result["frequency_given"] = bed.frequency_given;
+    if (!bed.frequency_given) result["frequency_false_alarm"] = bed.frequency_false_alarm;
+    result["floor_amplitude"] = quantity_json(bed.floor_amplitude_px * bed.scale_m_per_px, "m");
+    result["floor_phase"] = bed.floor_phase;
+  }
+  result["left_wall"] = quantity_json(bed.left_wall_px, "px");
+  result["right_wall"] = quantity_json(bed.right_wall_px, "px");
+  result["walls_given"] = bed.walls_given;
+  result["walls_are_frame_sides"] = bed.walls_are_frame_sides;
+  result["width"] = quantity_json(bed.width, "D");
+}
+
+void add_density(const ExtractOptions& options, const ingest::Measurement& found, Json& result) {
+  const double width = found.calibration.width;
+  const double samples = std::max<double>(1, static_cast<double>(found.profile.samples));
+  result["column_number"] =
+      quantity_json(found.disk_count_mean / width, "1", found.disk_count_std / width / std::sqrt(samples));
+  result["kernel"] = Json{{"kind", to_string(options.kernel.kind)}, {"width", options.kernel.width}};
+  result["profile"] = profile_numbers(found.profile);
+  if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
+  if (found.second_finder) {
+    const ingest::FinderCalibration& finder = *found.second_finder;
+    double second = 0;  // in the frames used, as disks_per_frame
+    for (const ingest::FrameReport& frame : found.frames) second += static_cast<double>(frame.second);
+    result["second_species"] = Json{{"radius", quantity_json(finder.radius_px, "px", finder.radius_std_error_px)},
+                                    {"disks_per_frame", second / samples}};
+  }
+}
+
+}  // namespace
+
+Json bed_numbers(const ExtractOptions& options, const ingest::Measurement& found) {
+  Json result;
+  add_beads(options, found, result);
+  add_geometry(found, result);
+  add_density(options, found, result);
+  return result;
+}
+
+Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
+  const auto temperature = [](const ingest::KineticTemperature& t) {
+    Json json = quantity_json(t.over_mg_m, "m", t.std_error_m);
+    json["localisation_bias"] = t.localisation_bias_m, json["finite_time_factor"] = t.finite_time_factor;
+    return json;
+  };
+  return Json{{"temperature_x_over_mg", temperature(velocities.horizontal)},
+              {"temperature_z_over_mg", temperature(velocities.vertical)},
+              {"linked_share", velocities.linked_share},
+              {"mean_step", quantity_json(velocities.mean_step, "D")}};
 }
 
 Table bead_table(Table table, const ingest::FinderCalibration& finder) {

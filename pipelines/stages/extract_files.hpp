@@ -12,7 +12,10 @@
 
 namespace shakebed::pipelines {
 
-Json profile_numbers(const ingest::DensityProfile& profile);
+// What extract.json says of the bed and of its profile.
+Json bed_numbers(const ExtractOptions& options, const ingest::Measurement& found);
+// "/velocities" of extract.json.
+Json velocity_numbers(const ingest::VelocityMeasurement& velocities);
 
 // The bead as learned from the frames, by distance from its centre.
 Table bead_table(Table table, const ingest::FinderCalibration& finder);

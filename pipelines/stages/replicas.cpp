@@ -64,7 +64,7 @@ void join_quantity(Json& value, const std::vector<double>& values, const std::ve
   value["value"] = spread.mean;
   value["std_error"] = error_of_mean(spread.deviation, within, values.size());
   value["spread"] = spread.deviation;
-  value["within"] = within;
+  if (!errors.empty()) value["within"] = within;
 }
 
 const char* const drifting[][2] = {{"drift_temperature_x", "temperature_x"},
@@ -101,6 +101,8 @@ bool differ(double spread, double within, std::size_t n) {
 
 }  // namespace
 
+// A quantity that some beds do not have has no mean; one without an error that is the same in all of them stays as it
+// is.
 Json joined_results(const std::vector<Json>& results) {
   Json out = results.front();
   for (auto& [key, value] : out.items()) {
@@ -110,17 +112,21 @@ Json joined_results(const std::vector<Json>& results) {
       const Json& number = v.is_object() && v.contains("value") ? v.at("value") : v;
       if (number.is_number()) values.push_back(number.get<double>());
     }
-    if (values.size() != results.size()) continue;
+    const bool quantity = value.is_object() && value.contains("value");
+    if (values.size() != results.size()) {
+      if (quantity) value = Json();
+      continue;
+    }
     if (value.is_number_unsigned()) {
       std::uint64_t sum = 0;
       for (const Json& r : results) sum += r.at(key).get<std::uint64_t>();
       value = sum;
     } else if (key == "max_overlap") {
       value["value"] = *std::max_element(values.begin(), values.end());
-    } else if (value.is_object() && value.contains("std_error")) {
+    } else if (quantity) {
+      const bool same = std::equal(values.begin() + 1, values.end(), values.begin());
+      if (same && !value.contains("std_error")) continue;
       join_quantity(value, values, numbers_of(results, key, "std_error"));
-    } else if (value.is_object()) {
-      value["value"] = Spread(values).mean;
     }
   }
   out["replicas"] = results.size();
@@ -155,16 +161,25 @@ std::vector<std::string> replica_warnings(const std::vector<Json>& results, cons
 }
 
 Table replicas_table(const std::vector<Json>& results) {
+  // Every quantity that some bed has, in the order of the first that has it.
+  std::vector<std::pair<std::string, std::string>> quantities;  // name, unit
+  for (const Json& one : results) {
+    for (const auto& [key, value] : one.items()) {
+      const bool known =
+          std::any_of(quantities.begin(), quantities.end(), [&](const auto& q) { return q.first == key; });
+      if (!known && value.is_object() && value.contains("value"))
+        quantities.emplace_back(key, value.value("unit", std::string("1")));
+    }
+  }
   std::vector<StatedColumn> columns{{"replica", "1", "number of the replica, from 0"}};
-  for (const auto& [key, value] : results.front().items())
-    if (value.is_object() && value.contains("std_error"))
-      columns.push_back({key, value.value("unit", std::string("1")), key + " of the replica"});
+  for (const auto& [name, unit] : quantities) columns.push_back({name, unit, name + " of the replica"});
   Table table("each replica by itself", columns);
   for (std::size_t k = 0; k < results.size(); ++k) {
     std::vector<Cell> cells{count_cell(k)};
-    for (const auto& [key, value] : results[k].items())
-      if (value.is_object() && value.contains("std_error"))
-        cells.emplace_back(value["value"].is_number() ? value["value"].get<double>() : no_number);
+    for (const auto& [name, unit] : quantities) {
+      const Json* number = find_pointer(results[k], "/" + name + "/value");
+      cells.emplace_back(number != nullptr && number->is_number() ? number->get<double>() : no_number);
+    }
     table.add(std::move(cells));
   }
   return table;

@@ -2,13 +2,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <vector>
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
+#include "tests/pipelines/read_table.hpp"
 
 namespace {
 
@@ -55,6 +59,7 @@ class Images : public testing::Test {
     const Json* found = shakebed::pipelines::find_pointer(json, pointer);
     return found != nullptr ? *found : Json(nullptr);
   }
+  static Json read_geometry() { return read_json(*folder_ / "o/render/geometry.json"); }
   static ScratchFolder* folder_;
   static ProgramResult* result_;
 };
@@ -148,6 +153,14 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   EXPECT_FALSE(extract["scale_given"].get<bool>());
   EXPECT_NEAR(extract["scale"]["value"].get<double>(), 0.15e-3, 0.01 * 0.15e-3) << "within 1 % from the diameter alone";
   EXPECT_EQ(extract["frames_used"], 8);
+  // The scale is known as well as the radius of the beads.
+  EXPECT_GT(error(extract["scale"]), 0);
+  EXPECT_NEAR(error(extract["scale"]) / value(extract["scale"]), error(extract["radius"]) / value(extract["radius"]),
+              1e-6);
+  EXPECT_NEAR(value(extract["scale"]) * 2 * value(extract["radius"]), 3e-3, 1e-9) << "two radii are a diameter";
+  const Json bed = read_json(*folder_ / "photos/extract/bed.json");
+  EXPECT_DOUBLE_EQ(value(bed["width"]), 3e-3 * value(extract["width"]));
+  EXPECT_DOUBLE_EQ(bed["count"].get<double>(), value(extract["disks_per_frame"]));
   EXPECT_TRUE(fs::is_regular_file(*folder_ / "photos/report.html"));
   // Gamma with the height of the bed at rest counted between the walls that were found.
   const Json map = read_json(*folder_ / "photos/map/map.json");
@@ -189,6 +202,147 @@ TEST_F(Images, SameSeedGivesTheSameFrames) {
               shakebed::pipelines::sha256_of_file(*folder_ / "again" / name))
         << name;
   }
+}
+
+// --- numbers of extract and render, against the files beside them and against the bed that was photographed
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double one : values) sum += one;
+  return sum / static_cast<double>(values.size());
+}
+double deviation_of(const std::vector<double>& values) {
+  double squares = 0;
+  for (const double one : values) squares += std::pow(one - mean_of(values), 2);
+  return std::sqrt(squares / static_cast<double>(values.size() - 1));
+}
+
+TEST_F(Images, NumbersOfARenderedBedAreThoseOfItsGeometry) {
+  ASSERT_EQ(result_->exit_code, 0);
+  const Json render = read_json(*folder_ / "o/render/render.json");
+  EXPECT_EQ(render["frames"], 64);
+  EXPECT_DOUBLE_EQ(value(render["scale"]), 0.15e-3);
+  EXPECT_DOUBLE_EQ(value(render["radius"]), 10) << "3 mm are 20 px";
+  const NumberTable truth(*folder_ / "o/render/truth.csv");
+  ASSERT_EQ(truth.rows(), 64U * 160U);
+  for (std::size_t r = 0; r < truth.rows(); r += 997) EXPECT_NEAR(truth("radius_px", r), 10, 1e-6);
+  EXPECT_GE(value(render["width"]), 48 / 0.15);
+  const Json extract = read_json(*folder_ / "o/extract/extract.json");
+  EXPECT_DOUBLE_EQ(value(extract["scale"]), 0.15e-3);
+  EXPECT_DOUBLE_EQ(value(extract["diameter"]), 3e-3);
+  EXPECT_NEAR(value(extract["width"]), 16, 1e-9);
+  EXPECT_NEAR(value(extract["right_wall"]) - value(extract["left_wall"]), 320, 1e-9);
+  EXPECT_NEAR(value(extract["radius"]), 10, 0.05);
+  EXPECT_NEAR(value(extract["noise"]), 5, 0.5) << "drawn with 5 grey levels";
+  EXPECT_TRUE(extract["scale_given"] && extract["floor_given"] && extract["walls_given"]);
+}
+
+TEST_F(Images, CountsAreThoseOfTheTables) {
+  ASSERT_EQ(result_->exit_code, 0);
+  const Json extract = read_json(*folder_ / "o/extract/extract.json");
+  const NumberTable frames(*folder_ / "o/extract/frames.csv"), quality(*folder_ / "o/extract/quality.csv"),
+      details(*folder_ / "o/extract/disk_details.csv"), disks(*folder_ / "o/extract/disks.csv");
+  const std::vector<double> counts = frames.column("disks");
+  ASSERT_EQ(counts.size(), 64U);
+  EXPECT_EQ(extract["frames"], 64);
+  EXPECT_EQ(extract["frames_used"], 64);
+  EXPECT_NEAR(value(extract["disks_per_frame"]), mean_of(counts), 1e-9);
+  EXPECT_NEAR(extract["disks_per_frame_scatter"].get<double>(), deviation_of(counts), 1e-9);
+  EXPECT_NEAR(value(extract["column_number"]), mean_of(counts) / 16, 1e-9);
+  EXPECT_NEAR(error(extract["column_number"]), deviation_of(counts) / 16 / 8, 1e-12) << "of the mean of 64 frames";
+  double all = 0, cut = 0, hidden = 0, best = 0;
+  for (const double one : quality.column("disks")) all += one;
+  EXPECT_EQ(all, static_cast<double>(disks.rows()));
+  for (std::size_t r = 0; r < details.rows(); ++r) cut += details("cut", r), hidden += details("half_hidden", r);
+  EXPECT_EQ(extract["cut_disks"], cut);
+  EXPECT_EQ(extract["half_hidden_disks"], hidden);
+  std::vector<double> qualities = disks.column("quality");
+  std::sort(qualities.begin(), qualities.end());
+  EXPECT_NEAR(extract["quality"]["median"].get<double>(), qualities[qualities.size() / 2], 0.0201) << "classes of 0.02";
+  EXPECT_NEAR(extract["quality"]["lowest_percent"].get<double>(), qualities[qualities.size() / 100], 0.0201);
+  const NumberTable profile(*folder_ / "o/extract/profile.csv");
+  const double spacing = profile("height", 1) - profile("height", 0);
+  double area = 0;
+  for (std::size_t r = 0; r < profile.rows(); ++r) {
+    const double density = profile("number_density", r);
+    best = std::max(best, density), area += density * spacing;
+    EXPECT_NEAR(profile("area_fraction", r), M_PI / 4 * density, 1e-9);
+    EXPECT_NEAR(profile("samples", r), density * 16 * spacing * 64, 0.5 + 1e-6);
+  }
+  EXPECT_NEAR(area * 16, mean_of(counts), 0.002 * mean_of(counts));
+  EXPECT_DOUBLE_EQ(value(extract["profile"]["greatest_density"]), best);
+  EXPECT_EQ(extract["profile"]["frames"], 64);
+}
+
+// Each disk's own errors: 64 frames of 160 disks, centres found against the true ones, in units of the stated errors.
+TEST_F(Images, CentresScatterByTheirStatedErrors) {
+  ASSERT_EQ(result_->exit_code, 0);
+  const Json truth = read_json(*folder_ / "o/extract/extract.json")["truth"];
+  const NumberTable disks(*folder_ / "o/extract/disks.csv"), details(*folder_ / "o/extract/disk_details.csv"),
+      real(*folder_ / "o/render/truth.csv");
+  std::map<double, std::vector<std::pair<double, double>>> centres;
+  for (std::size_t r = 0; r < real.rows(); ++r)
+    centres[real("frame", r)].emplace_back(real("x_px", r), real("y_px", r));
+  const double left = value(read_geometry()["left_wall"]), floor = value(read_geometry()["floor"]);
+  double matched = 0, squares = 0, scaled_x = 0, scaled_y = 0;
+  for (std::size_t r = 0; r < disks.rows(); ++r) {
+    const double x = disks("x_px", r), y = disks("y_px", r);
+    double best = 25, dx = 0, dy = 0;  // half a radius
+    for (const auto& [tx, ty] : centres[disks("frame", r)]) {
+      const double distance = std::pow(tx - x, 2) + std::pow(ty - y, 2);
+      if (distance < best) best = distance, dx = tx - x, dy = ty - y;
+    }
+    if (best == 25) continue;
+    ++matched, squares += best;
+    scaled_x += std::pow(dx / details("std_error_x_px", r), 2),
+        scaled_y += std::pow(dy / details("std_error_y_px", r), 2);
+    // Pixels and D: x from the left wall, z from the floor, 20 px a diameter.
+    EXPECT_NEAR(disks("x", r), (x - left) / 20, 1e-4);
+    EXPECT_NEAR(disks("z", r), (floor - y) / 20, 1e-4);
+  }
+  EXPECT_NEAR(value(truth["center_rms_error"]), std::sqrt(squares / matched), 1e-3 * std::sqrt(squares / matched));
+  EXPECT_NEAR(truth["precision"].get<double>(), matched / static_cast<double>(disks.rows()), 1e-3);
+  EXPECT_NEAR(truth["recall"].get<double>(), matched / static_cast<double>(real.rows()), 1e-3);
+  EXPECT_NEAR(std::sqrt(scaled_x / matched), 1, 0.35);
+  EXPECT_NEAR(std::sqrt(scaled_y / matched), 1, 0.35);
+}
+
+// A film of a shaken bed, whose temperatures and shaking the simulation knows; then every second frame of it.
+TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
+  const ScratchFolder folder;
+  const std::string recipe = R"({ "name": "film", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 4, "disks": { "count": 50, "diameter": "3 mm", "restitution": 0.9 },
+      "box": { "width": "18.9 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "0.5 s", "measure": "0.3 s", "frames": { "count": 192, "phases": 64 } },
+    { "stage": "render", "from": "bed", "scale": "0.25 mm/px", "noise": 2 },
+    { "stage": "extract", "id": "all", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz" },
+    { "stage": "extract", "id": "second", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz", "stride": 2 } ] })";
+  write_text(folder / "r.json", recipe);
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json bed = read_json(folder / "o/bed/observables.json");
+  for (const char* id : {"all", "second"}) {
+    const Json extract = read_json(folder / (std::string("o/") + id + "/extract.json"));
+    EXPECT_EQ(extract["frames"], std::string(id) == "all" ? 192 : 96);
+    for (const char* axis : {"temperature_x_over_mg", "temperature_z_over_mg"}) {
+      const Json& found = extract["velocities"][axis];
+      ASSERT_TRUE(found.is_object()) << id << " " << extract["velocities"].dump();
+      const std::string local = std::string(axis) == "temperature_z_over_mg" ? "temperature_z_local_over_mg" : axis;
+      EXPECT_EQ(found["unit"], "m");
+      EXPECT_GT(value(found), 0.5 * value(bed[local])) << id << " " << axis;
+      EXPECT_LT(value(found), 2 * value(bed[axis])) << id << " " << axis;
+      EXPECT_GT(error(found), 0);
+      EXPECT_LT(error(found), value(found));
+    }
+    EXPECT_GT(extract["velocities"]["linked_share"], 0.8);
+    if (!extract.contains("frequency")) continue;
+    EXPECT_NEAR(value(extract["frequency"]), 20, 0.5) << id;
+    EXPECT_NEAR(value(extract["floor_amplitude"]), 2e-3, 0.4e-3) << id;
+    EXPECT_FALSE(extract["frequency_given"]);
+  }
+  const Json one = read_json(folder / "o/all/extract.json"), two = read_json(folder / "o/second/extract.json");
+  EXPECT_NEAR(value(two["velocities"]["mean_step"]) / value(one["velocities"]["mean_step"]), 2, 0.4);
 }
 
 }  // namespace

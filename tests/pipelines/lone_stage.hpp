@@ -1,6 +1,7 @@
 // One stage run by itself, on files made by hand.
 #pragma once
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -16,15 +17,21 @@ class LoneStage : public pipelines::RunContext {
  public:
   explicit LoneStage(const pipelines::StageRow& row) : row_(row) { std::filesystem::create_directory(output_); }
 
-  // A stage in "from": its folder is the scratch folder, where the test writes its files.
-  void add_input(const std::string& id, const pipelines::StageRow& row) {
-    inputs_.push_back({id, std::string(row.name), folder_.path(), std::string(row.result)});
+  // A stage in "from": its folder is the scratch folder, or one below it, where the test writes its files.
+  void add_input(const std::string& id, const pipelines::StageRow& row, const std::string& below = "") {
+    std::filesystem::create_directories(folder_ / below);
+    inputs_.push_back({id, std::string(row.name), folder_ / below, std::string(row.result)});
     kinds_.push_back(row.name);
   }
   std::filesystem::path file(const std::string& name) const { return folder_ / name; }
 
   // Runs it with these options; its result file. Throws what the stage throws, and runtime_error for bad options.
   pipelines::Json run(const std::string& options) {
+    read(options)->run(*this);
+    return pipelines::read_json(output(row_.result));
+  }
+  // The stage with these options, after it has stated its results.
+  std::unique_ptr<pipelines::Stage> read(const std::string& options) {
     std::vector<pipelines::Problem> problems;
     const auto node = pipelines::parse_json(options, "options", problems);
     pipelines::Fields::Source source{.file = "options", .problems = &problems};
@@ -32,7 +39,7 @@ class LoneStage : public pipelines::RunContext {
       source.upstream.push_back(inputs_[i].stage);
       source.from.push_back({inputs_[i].id, kinds_[i], nullptr});
     }
-    const std::unique_ptr<pipelines::Stage> stage = row_.make();
+    std::unique_ptr<pipelines::Stage> stage = row_.make();
     if (node) {
       pipelines::Fields fields = pipelines::Fields::decode(*node, "", source);
       stage->describe(fields);
@@ -41,8 +48,7 @@ class LoneStage : public pipelines::RunContext {
     for (const pipelines::Problem& problem : problems) throw std::runtime_error(problem.pointer + ": " + problem.what);
     stated_ = pipelines::ResultList(source.from);
     stage->results(stated_);
-    stage->run(*this);
-    return pipelines::read_json(output(row_.result));
+    return stage;
   }
 
   const std::vector<pipelines::Input>& inputs() const override { return inputs_; }

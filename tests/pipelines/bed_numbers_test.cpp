@@ -1,0 +1,338 @@
+// The numbers of the simulate stage against one another: sums, units and errors that hold for every bed.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "pipelines/formats/json.hpp"
+#include "pipelines/stages/replica_seed.hpp"
+#include "tests/pipelines/program.hpp"
+#include "tests/pipelines/read_table.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using shakebed::pipelines::Json;
+using shakebed::pipelines::replica_seed;
+
+// 24 disks of 4 mm in 25.2 mm: 6.3 D. With g = 10 m/s^2 the unit of time is 20 ms, a period of 50 ms is 2.5 of them.
+constexpr double disks = 24, width = 6.3, period = 2.5, periods = 12, phases = 8, looks = periods * phases;
+const std::string shaken_bed = R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5,
+    "disks": { "count": 24, "diameter": "4 mm", "restitution": 0.8, "friction": 0.2 }, "gravity": "10 m/s^2",
+    "box": { "width": "25.2 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
+    "floor": { "motion": "sinusoidal", "amplitude": "1 mm", "frequency": "20 Hz", "restitution": 0.8 },
+    "settle": "0 s", "measure": "0.6 s", "frames": { "count": 8, "phases": 8 },
+    "observe": ["order", "velocities", "displacement", "pressure", "phases"] } ] })";
+
+class ShakenBed : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new ScratchFolder;
+    write_text(*folder_ / "r.json", shaken_bed);
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder_->path());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    json_ = new Json(Json::parse(read_text(*folder_ / "o/bed/observables.json")));
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    delete json_;
+  }
+  static NumberTable table(const std::string& name) { return NumberTable(*folder_ / ("o/bed/" + name)); }
+  static double sum(const std::vector<double>& values) {
+    double total = 0;
+    for (const double one : values) total += one;
+    return total;
+  }
+  static ScratchFolder* folder_;
+  static Json* json_;
+};
+ScratchFolder* ShakenBed::folder_ = nullptr;
+Json* ShakenBed::json_ = nullptr;
+
+TEST_F(ShakenBed, HasItsTemperaturesAsLengthsToo) {
+  for (const std::string name : {"temperature_x", "temperature_z", "temperature_z_local", "spin_temperature"}) {
+    const Json &plain = (*json_)[name], &length = (*json_)[name + "_over_mg"];
+    EXPECT_EQ(plain["unit"], "m g D");
+    EXPECT_EQ(length["unit"], "m");
+    EXPECT_GT(error(plain), 0) << name;
+    EXPECT_DOUBLE_EQ(value(length), 0.004 * value(plain)) << name;
+    EXPECT_DOUBLE_EQ(error(length), 0.004 * error(plain)) << name;
+  }
+}
+
+TEST_F(ShakenBed, CountsItsContacts) {
+  const double pairs = (*json_)["disk_collisions"], time = periods * period;
+  EXPECT_NEAR(value((*json_)["collision_rate"]), 2 * pairs / (disks * time), 1e-9) << "either disk of a pair counts";
+  EXPECT_EQ((*json_)["collision_rate"]["unit"], "sqrt(g/D)");
+  EXPECT_EQ((*json_)["collisions"].get<double>(),
+            pairs + (*json_)["wall_collisions"].get<double>() + (*json_)["floor_collisions"].get<double>());
+  EXPECT_GE((*json_)["events"], (*json_)["collisions"]);
+  EXPECT_LE((*json_)["elastic_contacts"], (*json_)["collisions"]);
+  EXPECT_GT((*json_)["wall_collisions"], 0);
+  EXPECT_EQ((*json_)["periods"], periods);
+  EXPECT_LT(std::abs(value((*json_)["max_overlap"])), 1e-9);
+}
+
+// Rows of 6, 5, 6, 5 and 2 at heights 1/2 + k sqrt(3)/2.
+TEST_F(ShakenBed, RisesAboveItsRows) {
+  const double ideal = 0.5 + std::numbers::sqrt3 / 2 * (5 + 12 + 15 + 8) / 24;
+  EXPECT_NEAR(value((*json_)["ideal_center_of_mass"]), ideal, 1e-12);
+  const Json &centre = (*json_)["center_of_mass"], &rise = (*json_)["center_of_mass_rise"];
+  EXPECT_NEAR(value(rise), value(centre) - ideal, 1e-12);
+  EXPECT_EQ(error(rise), error(centre));
+  const Json& by_phase = (*json_)["center_of_mass_by_phase"];
+  ASSERT_EQ(by_phase.size(), phases);
+  double mean = 0;
+  for (const Json& one : by_phase) mean += one.get<double>() / phases;
+  EXPECT_NEAR(mean, value(centre), 1e-9);
+  EXPECT_NEAR(value((*json_)["column_number"]), disks / width, 1e-12);
+  EXPECT_NEAR(value((*json_)["gamma"]), 0.001 * std::pow(2 * std::numbers::pi * 20, 2) / 10, 1e-12);
+}
+
+TEST_F(ShakenBed, ClosesItsLedger) {
+  const Json& ledger = (*json_)["energy_ledger"];
+  const auto at = [&](const char* name) { return ledger[name].get<double>(); };
+  EXPECT_EQ(ledger["unit"], "m g D");
+  const double end = at("kinetic") + at("potential"),
+               made = at("initial") + at("floor_work") + at("bath_work") - at("dissipated");
+  EXPECT_NEAR(std::abs(end - made), std::abs(at("imbalance")), 1e-9 * end);
+  EXPECT_NEAR(end, made, 1e-8 * end);
+  EXPECT_GT(at("dissipated"), 0);
+  EXPECT_GT(at("floor_work"), 0);
+}
+
+// The profile holds all disks, its mean height is that of the centre of mass, and each row says how it was counted.
+TEST_F(ShakenBed, HasItsDisksInTheProfile) {
+  const NumberTable profile = table("profile.csv");
+  const double spacing = profile("height", 1) - profile("height", 0);
+  double area = 0, heights = 0;
+  for (std::size_t r = 0; r < profile.rows(); ++r) {
+    const double density = profile("number_density", r);
+    area += density * spacing, heights += density * spacing * profile("height", r);
+    EXPECT_NEAR(profile("area_fraction", r), std::numbers::pi / 4 * density, 1e-12);
+    EXPECT_NEAR(profile("samples", r), density * width * spacing * looks, 0.5 + 1e-6);
+  }
+  EXPECT_NEAR(area * width, disks, 1e-6);
+  EXPECT_NEAR(heights / area, value((*json_)["center_of_mass"]), 1e-6);
+  const NumberTable frames = table("profile_frames.csv"), floor = table("profile_floor_frame.csv");
+  for (const NumberTable* other : {&frames, &floor})
+    EXPECT_NEAR(sum(other->column("number_density")) * spacing * width, disks, 1e-6);
+  // Seen from the floor the mean height is the same: over a period the floor is at 0.
+  double seen = 0;
+  for (std::size_t r = 0; r < floor.rows(); ++r) seen += floor("number_density", r) * spacing * floor("height", r);
+  EXPECT_NEAR(seen * width / disks, value((*json_)["center_of_mass"]), 1e-6);
+  EXPECT_NEAR(sum(frames.column("samples")), 8 * disks, 0.02 * 8 * disks) << "frames, not looks";
+}
+
+// covariance.csv has the squares of the profile's errors on its diagonal, where they come from the same windows.
+TEST_F(ShakenBed, HasTheCovarianceOfItsProfile) {
+  const NumberTable covariance = table("covariance.csv"), profile = table("profile.csv");
+  std::map<double, double> diagonal;
+  for (std::size_t r = 0; r < covariance.rows(); ++r) {
+    EXPECT_LE(covariance("height_i", r), covariance("height_j", r));
+    if (covariance("height_i", r) == covariance("height_j", r))
+      diagonal[covariance("height_i", r)] = covariance("covariance", r);
+  }
+  double by_errors = 0, by_covariance = 0;
+  for (std::size_t r = 0; r < profile.rows(); ++r) {
+    if (!diagonal.contains(profile("height", r))) continue;
+    by_errors += std::pow(profile("std_error", r), 2), by_covariance += diagonal[profile("height", r)];
+  }
+  EXPECT_GT(by_covariance, 0.4 * by_errors);
+  EXPECT_LT(by_covariance, 2.5 * by_errors);
+}
+
+// Layers of 1 D with their middles at halves, the same in every table; shares of all disks.
+TEST_F(ShakenBed, HasTheSameLayersInEveryTable) {
+  const NumberTable layers = table("layers.csv"), order = table("order.csv"), velocities = table("velocities.csv");
+  ASSERT_EQ(layers.rows(), order.rows());
+  ASSERT_EQ(layers.rows(), velocities.rows());
+  double mean = 0, psi6 = 0, neighbours = 0;
+  for (std::size_t r = 0; r < layers.rows(); ++r) {
+    EXPECT_EQ(layers("height", r), order("height", r));
+    EXPECT_EQ(layers("height", r), velocities("height", r));
+    EXPECT_NEAR(layers("height", r) - std::floor(layers("height", r)), 0.5, 1e-12);
+    EXPECT_NEAR(layers("share", r), order("share", r), 1e-12);
+    EXPECT_NEAR(velocities("samples", r), order("share", r) * disks * looks, 1e-6);
+    EXPECT_NEAR(velocities("number_density", r), order("share", r) * disks / width, 1e-9) << "layers of 1 D";
+    mean += order("share", r) * order("height", r);
+    psi6 += order("share", r) * order("psi6", r);
+    neighbours += order("share", r) * order("neighbours", r);
+  }
+  EXPECT_NEAR(sum(order.column("share")), 1, 1e-12);
+  EXPECT_NEAR(mean, value((*json_)["center_of_mass"]), 0.25);
+  EXPECT_NEAR(psi6, value((*json_)["psi6_local"]), 1e-9);
+  EXPECT_NEAR(neighbours, value((*json_)["neighbours_per_disk"]), 1e-9);
+  for (const int percent : {70, 80, 90}) {
+    double share = 0;
+    for (std::size_t r = 0; r < order.rows(); ++r)
+      if (order("psi6", r) >= percent / 100.0) share += order("share", r);
+    EXPECT_NEAR(value((*json_)["crystal_share_" + std::to_string(percent)]), share, 1e-12) << percent;
+  }
+}
+
+TEST_F(ShakenBed, HasItsPhasesInPeriods) {
+  for (const char* name : {"phases.csv", "phases_floor_frame.csv"}) {
+    const NumberTable cells = table(name);
+    double samples = 0;
+    std::map<double, double> of_phase;
+    for (std::size_t r = 0; r < cells.rows(); ++r) {
+      samples += cells("samples", r);
+      of_phase[cells("phase", r)] += cells("number_density", r);
+    }
+    EXPECT_EQ(samples, disks * looks) << name;
+    ASSERT_EQ(of_phase.size(), phases) << name;
+    int k = 0;
+    for (const auto& [phase, density] : of_phase) {
+      EXPECT_DOUBLE_EQ(phase, k++ / phases) << name;
+      EXPECT_NEAR(density, disks / width, 1e-9) << name;
+    }
+  }
+}
+
+// The mean over phases, weighed by samples, is what the layer shows over all of them.
+TEST_F(ShakenBed, HasTheMeanOfItsPhasesInItsLayers) {
+  const NumberTable cells = table("phases.csv"), layers = table("velocities.csv");
+  for (std::size_t l = 0; l < layers.rows(); ++l) {
+    double samples = 0, x = 0, z = 0, energy = 0;
+    for (std::size_t r = 0; r < cells.rows(); ++r) {
+      if (cells("height", r) != layers("height", l)) continue;
+      const double n = cells("samples", r);
+      samples += n, x += n * cells("mean_velocity_x", r), z += n * cells("mean_velocity_z", r);
+      energy += n * (cells("temperature_z", r) + std::pow(cells("mean_velocity_z", r), 2));
+    }
+    ASSERT_EQ(samples, layers("samples", l));
+    EXPECT_NEAR(x / samples, layers("mean_velocity_x", l), 1e-9);
+    EXPECT_NEAR(z / samples, layers("mean_velocity_z", l), 1e-9);
+    if (samples > 50) {  // each cell takes its own mean off
+      const double layer = layers("temperature_z", l) + std::pow(layers("mean_velocity_z", l), 2);
+      EXPECT_NEAR(energy / samples, layer, 0.3 * layer);
+    }
+  }
+}
+
+TEST_F(ShakenBed, HasADistributionOfVelocitiesOfAreaOne) {
+  const NumberTable bins = table("velocity_histogram.csv");
+  double x = 0, z = 0, m = 0;
+  for (std::size_t r = 0; r < bins.rows(); ++r) {
+    const double step = bins("velocity", 1) - bins("velocity", 0), u = bins("velocity", r);
+    x += step * bins("density_x", r), z += step * bins("density_z", r), m += step * bins("maxwellian", r);
+    EXPECT_NEAR(bins("maxwellian", r), std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi), 1e-9);
+  }
+  EXPECT_NEAR(x, 1, 1e-9);
+  EXPECT_NEAR(z, 1, 1e-9);
+  EXPECT_NEAR(m, 1, 1e-3);
+}
+
+TEST_F(ShakenBed, CountsLagsInUnitsOfTimeAndPairsOfLooks) {
+  const NumberTable lags = table("displacement.csv");
+  ASSERT_GE(lags.rows(), 3U);
+  for (std::size_t r = 0; r < lags.rows(); ++r) {
+    const double look = lags("lag", r) / (period / phases);
+    EXPECT_NEAR(look, std::round(look), 1e-9) << "a lag is a whole number of looks";
+    EXPECT_GT(lags("origins", r), 0);
+    EXPECT_GE(lags("msd_x", r), 0);
+  }
+  EXPECT_NEAR(lags("lag", 0), period / phases, 1e-12);
+  // Hardly any time for a contact: sqrt(msd) is the mean speed times the lag, within a factor of two.
+  EXPECT_LT(lags("msd_x", 0), 1.5 * std::pow(lags("lag", 0), 2) * value((*json_)["temperature_x"]));
+}
+
+// Exact averages over time. The lowest layer carries all disks.
+TEST_F(ShakenBed, CarriesItsWeight) {
+  const NumberTable layers = table("pressure.csv");
+  const double thickness = layers("height", 1) - layers("height", 0);
+  EXPECT_NEAR(sum(layers.column("number_density")) * thickness * width, disks, 1e-6);
+  double below = 0, middle = 0;
+  for (std::size_t r = 0; r < layers.rows(); ++r) {
+    // The mean over the layer of what lies above: all but what lies below, and a part of the layer itself.
+    const double above = disks / width - below, layer = thickness * layers("number_density", r);
+    EXPECT_LE(layers("weight_above", r), above + 1e-6);
+    EXPECT_GE(layers("weight_above", r), above - layer - 1e-6);
+    middle += layers("weight_above", r) - (above - 0.5 * layer);
+    below += thickness * layers("number_density", r);
+  }
+  EXPECT_NEAR(middle, 0, 0.05 * disks / width) << "half a layer makes 0.5 N/W";
+  EXPECT_EQ((*json_)["floor_pressure"]["unit"], "m g/D");
+  EXPECT_NEAR(value((*json_)["floor_pressure"]), disks / width, 0.25 * disks / width);
+}
+
+// --- replicas
+
+const std::string replicated = R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 1,
+    "units": "reduced", "disks": { "count": 30, "restitution": 0.95, "friction": 0.1 },
+    "box": { "width": 5.3, "sides": "periodic" },
+    "bath": { "kind": "langevin", "temperature": 0.3, "rate": 0.5, "interval": 0.2 },
+    "settle": 5, "measure": 30, "observe": ["order", "velocities", "pressure"] } ] })";
+
+// Four beds together are the mean of the four one by one, and their standard deviation over two is the error.
+TEST(Replicas, AreTheMeanOfTheirBeds) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", replicated);
+  const auto run = [&](const std::string& out, const std::vector<std::string>& set) {
+    std::vector<std::string> arguments{"run", "r.json", "--out", out};
+    arguments.insert(arguments.end(), set.begin(), set.end());
+    const ProgramResult ran = run_shakebed(arguments, folder.path());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return Json::parse(read_text(folder / (out + "/bed/observables.json")));
+  };
+  const Json together = run("all", {"--set", "/stages/bed/replicas=4"});
+  std::vector<Json> single;
+  for (std::uint64_t r = 0; r < 4; ++r)
+    single.push_back(
+        run("one" + std::to_string(r), {"--set", "/stages/bed/seed=" + std::to_string(replica_seed(1, r))}));
+  const NumberTable table(folder / "all/bed/replicas.csv");
+  ASSERT_EQ(table.rows(), 4U);
+  std::size_t quantities = 0, counts = 0;
+  for (const auto& [name, found] : together.items()) {
+    if (found.is_object() && found.contains("value")) {
+      if (name == "max_overlap") continue;
+      double sum = 0, squares = 0;
+      for (const Json& one : single) sum += value(one[name]);
+      for (const Json& one : single) squares += std::pow(value(one[name]) - sum / 4, 2);
+      EXPECT_NEAR(value(found), sum / 4, 1e-12 * (1 + std::abs(sum))) << name;
+      EXPECT_EQ(found["unit"], single[0][name]["unit"]) << name;
+      if (squares == 0) continue;
+      ++quantities;
+      EXPECT_NEAR(error(found), std::sqrt(squares / 12), 1e-12 * (1 + std::abs(sum))) << name;
+      for (std::size_t r = 0; r < 4; ++r) EXPECT_DOUBLE_EQ(table(name, r), value(single[r][name])) << name;
+    } else if (found.is_number_integer() && name != "replicas" && name != "periods") {
+      double sum = 0;
+      for (const Json& one : single) sum += one[name].get<double>();
+      EXPECT_EQ(found.get<double>(), sum) << name;
+      ++counts;
+    }
+  }
+  EXPECT_GE(quantities, 15U);
+  EXPECT_GE(counts, 4U);
+  double largest = 0;
+  for (const Json& one : single) largest = std::max(largest, value(one["max_overlap"]));
+  EXPECT_EQ(value(together["max_overlap"]), largest);
+
+  const NumberTable profile(folder / "all/bed/profile.csv");
+  std::vector<NumberTable> profiles;
+  for (int r = 0; r < 4; ++r) profiles.emplace_back(folder / ("one" + std::to_string(r) + "/bed/profile.csv"));
+  double worst = 0;
+  for (std::size_t i = 0; i < profile.rows(); ++i) {
+    double sum = 0, squares = 0, samples = 0;
+    std::vector<double> densities;
+    for (const NumberTable& one : profiles) {
+      double density = 0;
+      for (std::size_t k = 0; k < one.rows(); ++k) {
+        if (one("height", k) != profile("height", i)) continue;
+        density = one("number_density", k), samples += one("samples", k);
+      }
+      densities.push_back(density), sum += density;
+    }
+    for (const double density : densities) squares += std::pow(density - sum / 4, 2);
+    EXPECT_NEAR(profile("number_density", i), sum / 4, 1e-12);
+    EXPECT_NEAR(profile("std_error", i), std::sqrt(squares / 12), 1e-9);
+    worst = std::max(worst, std::abs(profile("samples", i) - samples));
+  }
+  EXPECT_LE(worst, 2.5) << "each is rounded";
+}
+
+}  // namespace

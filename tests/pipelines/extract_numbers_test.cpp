@@ -1,0 +1,310 @@
+// What the extract stage writes of a measurement made by hand, in which no two numbers are alike: every number under
+// its own name, with its error and unit.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <string>
+
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/stages/disks_on_the_way.hpp"
+#include "pipelines/stages/extract_files.hpp"
+#include "tests/pipelines/lone_stage.hpp"
+#include "tests/pipelines/read_table.hpp"
+
+namespace {
+
+using namespace shakebed;
+using namespace shakebed::pipelines;
+using namespace shakebed::tests;
+
+ingest::DensityProfile a_profile(double density) {
+  ingest::DensityProfile profile;
+  profile.bins = {-0.25, 0.5, 4};  // middles at 0, 0.5, 1 and 1.5
+  profile.kernel = {KernelKind::top_hat, 0.5};
+  profile.number_density = {density, 0.8, 0.4, 0};
+  profile.std_error = {0.03, 0.02, 0.01, 0};
+  profile.area_fraction = {0.7, 0.6, 0.3, 0};
+  profile.covariance.assign(16, 0.0);
+  for (std::size_t i = 0; i < 3; ++i) profile.covariance[5 * i] = std::pow(profile.std_error[i], 2);
+  profile.covariance[1] = profile.covariance[4] = 2e-4;
+  profile.samples = 4;
+  profile.memory_frames = 1.7, profile.window_frames = 6, profile.independent_samples = 3;
+  return profile;
+}
+
+ingest::Measurement a_measurement() {
+  ingest::Measurement found;
+  ingest::BedCalibration& bed = found.calibration;
+  bed.lens.pixel_aspect = 1.02, bed.lens.radial = -0.03;
+  bed.aspect_std_error = 0.002, bed.lens_radial_std_error = 0.004;
+  bed.scale_m_per_px = 2e-4, bed.scale_relative_std_error = 0.05;
+  bed.radius_px = 7.5, bed.radius_std_error_px = 0.06;
+  bed.edge_width_px = 0.9, bed.noise_level = 3.5, bed.contrast_level = 120, bed.flicker = 0.07;
+  bed.polarity = ingest::Polarity::bright_beads;
+  bed.floor_px = 400, bed.floor_tilt_degrees = 1.5, bed.floor_tilt_std_error_degrees = 0.11;
+  bed.shaking_frequency_hz = 21, bed.shaking_frequency_std_error_hz = 0.13, bed.frequency_false_alarm = 1e-5;
+  bed.floor_amplitude_px = 12, bed.floor_phase = 0.3;
+  bed.left_wall_px = 10, bed.right_wall_px = 310, bed.width = 20;
+  bed.scale_given = false, bed.floor_given = true, bed.walls_given = false, bed.walls_are_frame_sides = true;
+  found.profile = a_profile(1.1);
+  found.second_profile = a_profile(0.9);
+  found.coverage_profile = a_profile(1.2);
+  found.phases = {{0.0625, a_profile(1.0)}, {0.5625, a_profile(0.95)}};
+  found.coverage_disagreement = 0.015;
+  found.disk_count_mean = 50, found.disk_count_std = 2;
+  found.second_finder.emplace();
+  found.second_finder->radius_px = 5.5, found.second_finder->radius_std_error_px = 0.08;
+  found.finder.profile.step_px = 0.25;
+  found.finder.profile.level = {1.0F, 0.5F}, found.finder.profile.fourth_harmonic = {0.0F, 0.125F};
+  for (std::size_t k = 0; k < 5; ++k) {
+    ingest::FrameReport frame;
+    frame.index = k, frame.origin.path = "folder/picture" + std::to_string(k) + ".png", frame.origin.page = 2 * k;
+    frame.disks = 48 + k, frame.second = k, frame.rejected = 7 + k,
+    frame.residual_level = 3 + 0.5 * static_cast<double>(k);
+    frame.light.gain = 1 + 0.25 * static_cast<double>(k);
+    if (k == 0) frame.status = ingest::FrameStatus::unreadable, frame.disks = 0;
+    found.frames.push_back(frame);
+  }
+  return found;
+}
+
+ExtractOptions some_options() {
+  ExtractOptions options;
+  options.diameter = 0.003;
+  options.kernel = {KernelKind::top_hat, 0.5};
+  options.bead_number = 51;
+  return options;
+}
+
+struct Stated {
+  const char* pointer;
+  double value, std_error;
+  const char* unit;
+};
+
+TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
+  const Json json = bed_numbers(some_options(), a_measurement());
+  for (const Stated& one : {Stated{"/disks_per_frame", 50, -1, "1"},
+                            {"/diameter", 0.003, -1, "m"},
+                            {"/scale", 2e-4, 1e-5, "m/px"},
+                            {"/pixel_aspect", 1.02, 0.002, "1"},
+                            {"/lens", -0.03, 0.004, "1"},
+                            {"/radius", 7.5, 0.06, "px"},
+                            {"/edge_width", 0.9, -1, "px"},
+                            {"/noise", 3.5, -1, "grey levels"},
+                            {"/contrast", 120, -1, "grey levels"},
+                            {"/flicker", 0.07, -1, "1"},
+                            {"/floor", 400, -1, "px"},
+                            {"/floor_tilt", 1.5, 0.11, "deg"},
+                            {"/frequency", 21, 0.13, "Hz"},
+                            {"/floor_amplitude", 0.0024, -1, "m"},
+                            {"/left_wall", 10, -1, "px"},
+                            {"/right_wall", 310, -1, "px"},
+                            {"/width", 20, -1, "D"},
+                            {"/column_number", 2.5, 0.05, "1"},
+                            {"/profile/greatest_density", 1.1, -1, "1/D^2"},
+                            {"/coverage_disagreement", 0.015, -1, "1/D^2"},
+                            {"/second_species/radius", 5.5, 0.08, "px"}}) {
+    const Json* found = find_pointer(json, one.pointer);
+    ASSERT_NE(found, nullptr) << one.pointer;
+    EXPECT_DOUBLE_EQ(value(*found), one.value) << one.pointer;
+    EXPECT_EQ((*found)["unit"], one.unit) << one.pointer;
+    EXPECT_EQ(found->contains("std_error"), one.std_error >= 0) << one.pointer;
+    if (one.std_error >= 0) {
+      EXPECT_DOUBLE_EQ(error(*found), one.std_error) << one.pointer;
+    }
+  }
+  for (const auto& [pointer, number] : {std::pair{"/frames", 5.0},
+                                        {"/frames_used", 4},
+                                        {"/disks_per_frame_scatter", 2},
+                                        {"/bead_number", 51},
+                                        {"/frequency_false_alarm", 1e-5},
+                                        {"/floor_phase", 0.3},
+                                        {"/kernel/width", 0.5},
+                                        {"/profile/frames", 4},
+                                        {"/profile/memory_frames", 1.7},
+                                        {"/profile/window_frames", 6},
+                                        {"/profile/independent_samples", 3},
+                                        {"/second_species/disks_per_frame", 2.5}}) {
+    const Json* found = find_pointer(json, pointer);
+    ASSERT_NE(found, nullptr) << pointer;
+    EXPECT_DOUBLE_EQ(found->get<double>(), number) << pointer;
+  }
+  EXPECT_EQ(json["polarity"], "bright");
+  EXPECT_EQ(json["kernel"]["kind"], "top_hat");
+  for (const auto& [name, truth] : {std::pair{"scale_given", false},
+                                    {"floor_given", true},
+                                    {"walls_given", false},
+                                    {"walls_are_frame_sides", true},
+                                    {"frequency_given", false}})
+    EXPECT_EQ(json[name], truth) << name;
+}
+
+TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
+  ingest::VelocityMeasurement velocities;
+  velocities.horizontal = {1e-3, 2e-4, 3e-5, 1.1};
+  velocities.vertical = {4e-3, 5e-4, 6e-5, 1.2};
+  velocities.linked_share = 0.97, velocities.mean_step = 0.14;
+  const Json json = velocity_numbers(velocities);
+  const Json &x = json["temperature_x_over_mg"], &z = json["temperature_z_over_mg"];
+  EXPECT_EQ(value(x), 1e-3);
+  EXPECT_EQ(error(x), 2e-4);
+  EXPECT_EQ(x["unit"], "m");
+  EXPECT_EQ(x["localisation_bias"], 3e-5);
+  EXPECT_EQ(x["finite_time_factor"], 1.1);
+  EXPECT_EQ(value(z), 4e-3);
+  EXPECT_EQ(error(z), 5e-4);
+  EXPECT_EQ(z["localisation_bias"], 6e-5);
+  EXPECT_EQ(z["finite_time_factor"], 1.2);
+  EXPECT_EQ(json["linked_share"], 0.97);
+  EXPECT_EQ(value(json["mean_step"]), 0.14);
+  EXPECT_EQ(json["mean_step"]["unit"], "D");
+}
+
+// The bed that photographs show, in metres.
+TEST(ExtractNumbers, DescribeTheBedInSi) {
+  ExtractOptions options = some_options();
+  options.gravity = 9.5, options.second_diameter = 0.002;
+  const BedDescription bed = bed_seen(options, a_measurement());
+  EXPECT_EQ(bed.count, 50);
+  EXPECT_EQ(bed.diameter, 0.003);
+  EXPECT_EQ(*bed.second_diameter, 0.002);
+  EXPECT_EQ(*bed.gravity, 9.5);
+  EXPECT_DOUBLE_EQ(bed.width, 0.06);
+  EXPECT_EQ(*bed.frequency, 21);
+  EXPECT_DOUBLE_EQ(*bed.amplitude, 0.0024);
+  EXPECT_FALSE(bed.mass);
+}
+
+class ExtractTables : public testing::Test {
+ protected:
+  ExtractTables() {
+    write_text(extract_.file("a.png"), "");
+    extract_.read(R"({ "images": ")" + extract_.file("a.png").string() +
+                  R"(", "diameter": "3 mm", "second_diameter": "2 mm" })");
+  }
+  NumberTable table(const std::string& name) const { return NumberTable(extract_.output(name)); }
+  LoneStage extract_{*find_stage("extract")};
+};
+
+TEST_F(ExtractTables, HoldTheProfilesOfEverySource) {
+  write_profiles(extract_, a_measurement(), 2.5);
+  for (const auto& [name, density] : {std::pair{"profile.csv", 1.1},
+                                      {"second_profile.csv", 0.9},
+                                      {"coverage_profile.csv", 1.2},
+                                      {"profile_phase_00.csv", 1.0},
+                                      {"profile_phase_01.csv", 0.95}}) {
+    const NumberTable profile = table(name);
+    ASSERT_EQ(profile.rows(), 3U) << name << ": without the empty rows";
+    const double densities[] = {density, 0.8, 0.4}, errors[] = {0.03, 0.02, 0.01}, areas[] = {0.7, 0.6, 0.3};
+    for (std::size_t r = 0; r < 3; ++r) {
+      EXPECT_DOUBLE_EQ(profile("height", r), 0.5 * static_cast<double>(r)) << name;
+      EXPECT_DOUBLE_EQ(profile("number_density", r), densities[r]) << name;
+      EXPECT_DOUBLE_EQ(profile("std_error", r), errors[r]) << name;
+      EXPECT_NEAR(profile("area_fraction", r), areas[r], 1e-15) << name;
+      EXPECT_EQ(profile("samples", r), std::round(densities[r] * 20 * 0.5 * 4)) << name;
+    }
+  }
+  EXPECT_EQ(table_notes(extract_.output("profile.csv"))["column_number"], 2.5);
+  EXPECT_EQ(table_notes(extract_.output("profile_phase_01.csv"))["phase"], 0.5625);
+  EXPECT_EQ(table_notes(extract_.output("covariance.csv"))["independent_samples"], 3);
+  const NumberTable covariance = table("covariance.csv");
+  ASSERT_EQ(covariance.rows(), 4U);
+  const double expected[][3] = {{0, 0, 9e-4}, {0, 0.5, 2e-4}, {0.5, 0.5, 4e-4}, {1, 1, 1e-4}};
+  for (std::size_t r = 0; r < 4; ++r) {
+    EXPECT_NEAR(covariance("height_i", r), expected[r][0], 1e-12);
+    EXPECT_NEAR(covariance("height_j", r), expected[r][1], 1e-12);
+    EXPECT_NEAR(covariance("covariance", r), expected[r][2], 1e-15);
+  }
+}
+
+TEST_F(ExtractTables, HoldFramesAndTheBead) {
+  const ingest::Measurement found = a_measurement();
+  frames_table(extract_.table("frames.csv"), found.frames).write(extract_.output("frames.csv"));
+  const NumberTable frames = table("frames.csv");
+  ASSERT_EQ(frames.rows(), 5U);
+  for (std::size_t r = 0; r < 5; ++r) {
+    const auto k = static_cast<double>(r);
+    EXPECT_EQ(frames("frame", r), k);
+    EXPECT_EQ(frames.text("image", r), "picture" + std::to_string(r) + ".png");
+    EXPECT_EQ(frames("page", r), 2 * k);
+    EXPECT_EQ(frames.text("status", r), r == 0 ? "unreadable" : "good");
+    EXPECT_EQ(frames("disks", r), r == 0 ? 0 : 48 + k);
+    EXPECT_EQ(frames("second", r), k);
+    EXPECT_EQ(frames("rejected", r), 7 + k);
+    EXPECT_EQ(frames("residual_level_grey_levels", r), 3 + 0.5 * k);
+    EXPECT_EQ(frames("contrast_gain", r), 1 + 0.25 * k);
+  }
+  bead_table(extract_.table("bead.csv"), found.finder).write(extract_.output("bead.csv"));
+  const NumberTable bead = table("bead.csv");
+  EXPECT_EQ(bead("radius_px", 1), 0.25);
+  EXPECT_EQ(bead("contrast", 1), 0.5);
+  EXPECT_EQ(bead("fourth_harmonic", 1), 0.125);
+}
+
+// Three disks in each of two frames, of which every second one of the film was read: frames 0 and 2. Of the six true
+// ones one is missed, and one disk is none. Centres are off by (0.3, 0.4) px.
+TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
+  ExtractOptions options = some_options();
+  options.stride = 2, options.overlays = 0;
+  std::istringstream truth(
+      "frame,disk,x_px,y_px,radius_px\n0,0,10,20,5\n0,1,40,20,5\n0,2,70,20,5\n1,0,500,500,5\n2,0,10,80,5\n"
+      "2,1,40,80,5\n2,2,70,80,5\n");
+  DisksOnTheWay on_the_way(extract_, options, &truth);
+  const auto disk = [](std::size_t frame, double x, double y, double quality) {
+    ingest::MeasuredDisk one;
+    one.frame = frame, one.x_px = x + 0.3, one.y_px = y + 0.4, one.radius_px = 5, one.x = x / 10, one.z = y / 10;
+    one.quality = quality, one.variance_x = 0.04, one.variance_y = 0.09, one.covariance_xy = 0.03;
+    one.contrast = 1.25, one.probability = 0.9;
+    return one;
+  };
+  std::vector<ingest::MeasuredDisk> first{disk(0, 10, 20, 0.99), disk(0, 40, 20, 0.95), disk(0, 70, 20, 0.95)},
+      second{disk(1, 10, 80, 0.95), disk(1, 40, 80, 0.31), disk(1, 90, 80, 0.11)};
+  first[0].cut = true, second[1].half_hidden = true, second[2].half_hidden = true, second[2].species = 2;
+  ingest::FrameReport frame;
+  on_the_way.take(frame, first);
+  frame.index = 1;
+  on_the_way.take(frame, second);
+  on_the_way.close();
+  const Json found = *on_the_way.truth();
+  EXPECT_DOUBLE_EQ(found["recall"].get<double>(), 5.0 / 6);
+  EXPECT_DOUBLE_EQ(found["precision"].get<double>(), 5.0 / 6);
+  EXPECT_NEAR(value(found["center_rms_error"]), 0.5, 1e-12);
+  EXPECT_EQ(found["center_rms_error"]["unit"], "px");
+  EXPECT_EQ(on_the_way.cut(), 1U);
+  EXPECT_EQ(on_the_way.half_hidden(), 2U);
+  EXPECT_NEAR(on_the_way.expected_wrong_share(), 0.1, 1e-12);
+  EXPECT_DOUBLE_EQ(on_the_way.quality()["lowest_percent"].get<double>(), 0.12) << "the class from 0.10 to 0.12";
+  EXPECT_DOUBLE_EQ(on_the_way.quality()["median"].get<double>(), 0.96);
+  on_the_way.quality_table(extract_.table("quality.csv")).write(extract_.output("quality.csv"));
+  const NumberTable quality = table("quality.csv"), disks = table("disks.csv"), details = table("disk_details.csv");
+  ASSERT_EQ(quality.rows(), 50U);
+  for (std::size_t r = 0; r < 50; ++r) {
+    EXPECT_NEAR(quality("from", r), 0.02 * static_cast<double>(r), 1e-12);
+    EXPECT_NEAR(quality("to", r), 0.02 * static_cast<double>(r + 1), 1e-12);
+    EXPECT_EQ(quality("disks", r), r == 5 || r == 15 || r == 49 ? 1 : r == 47 ? 3 : 0) << r;
+  }
+  ASSERT_EQ(disks.rows(), 6U);
+  EXPECT_EQ(disks("frame", 4), 1);
+  EXPECT_NEAR(disks("x_px", 4), 40.3, 1e-3);
+  EXPECT_NEAR(disks("y_px", 4), 80.4, 1e-3);
+  EXPECT_NEAR(disks("radius_px", 4), 5, 1e-3);
+  EXPECT_NEAR(disks("x", 4), 4, 1e-5);
+  EXPECT_NEAR(disks("z", 4), 8, 1e-5);
+  EXPECT_NEAR(disks("quality", 4), 0.31, 1e-3);
+  EXPECT_EQ(details("frame", 4), 1);
+  EXPECT_NEAR(details("x_px", 4), 40.3, 1e-3);
+  EXPECT_NEAR(details("y_px", 4), 80.4, 1e-3);
+  EXPECT_NEAR(details("std_error_x_px", 4), 0.2, 1e-6);
+  EXPECT_NEAR(details("std_error_y_px", 4), 0.3, 1e-6);
+  EXPECT_NEAR(details("correlation", 4), 0.5, 1e-6);
+  EXPECT_NEAR(details("contrast", 4), 1.25, 1e-6);
+  EXPECT_EQ(details("cut", 0), 1);
+  EXPECT_EQ(details("cut", 4), 0);
+  EXPECT_EQ(details("half_hidden", 4), 1);
+  EXPECT_EQ(details("species", 5), 2);
+}
+
+}  // namespace

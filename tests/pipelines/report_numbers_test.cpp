@@ -1,0 +1,96 @@
+// Numbers on the pages for people: ours beside the published ones, and the tables of sweeps.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "pipelines/formats/json.hpp"
+#include "tests/pipelines/program.hpp"
+#include "tests/pipelines/read_table.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using shakebed::pipelines::Json;
+using testing::HasSubstr;
+
+// A fit of a profile of the user's own, beside numbers in several units.
+class PublishedNumbers : public testing::Test {
+ protected:
+  PublishedNumbers() {
+    std::string profile = "# kernel: gaussian:0.5\n# column_number: 10\nheight,number_density,std_error\n";
+    for (int i = 0; i < 40; ++i) {
+      const double z = 0.5 + 0.4 * i;
+      profile += std::to_string(z) + "," + std::to_string(1.1 / (1 + std::exp((z - 9) / 1.2))) + ",0.01\n";
+    }
+    write_text(folder_ / "p.csv", profile);
+  }
+  void run(const std::string& published) {
+    write_text(folder_ / "r.json", R"({ "name": "t", "report": { "published": [ )" + published + R"( ] },
+      "stages": [ { "stage": "fit", "profile": "p.csv", "diameter": "3 mm", "answer": false, "sweep": false } ] })");
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder_.path());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    page_ = read_text(folder_ / "o/report.html");
+    fit_ = Json::parse(read_text(folder_ / "o/fit/fit.json"));
+  }
+  double value(const char* key) const { return fit_[key]["value"].get<double>(); }
+  double error(const char* key) const { return fit_[key]["std_error"].get<double>(); }
+  ScratchFolder folder_;
+  std::string page_;
+  Json fit_;
+};
+
+std::string cell(const char* format, double a, double b) {
+  char text[100];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+TEST_F(PublishedNumbers, StandBesideOursInTheUnitOfThePrint) {
+  run(R"({ "number": "/fit/temperature_over_mg", "label": "mm", "value": "3.0 mm", "relative": 0.5 },
+         { "number": "/fit/temperature_over_mg", "label": "um", "value": "2000 um", "relative": 0.01 },
+         { "number": "/fit/temperature", "label": "plain", "value": "1.25", "relative": 0.5 },
+         { "number": "/fit/solid_height", "label": "D", "value": "9", "relative": 0.9 })");
+  ASSERT_GT(error("temperature_over_mg"), 0);
+  EXPECT_DOUBLE_EQ(error("temperature_over_mg"), 3e-3 * error("temperature"));
+  const double mm = 1e3 * value("temperature_over_mg"), mm_error = 1e3 * error("temperature_over_mg");
+  EXPECT_THAT(page_, HasSubstr(">" + cell("%.4g ± %.2g mm", mm, mm_error) + "<"));
+  EXPECT_THAT(page_, HasSubstr(">" + cell("%.4g ± %.2g um", 1e3 * mm, 1e3 * mm_error) + "<"));
+  EXPECT_THAT(page_, HasSubstr(">" + cell("%.4g ± %.2g m g D", value("temperature"), error("temperature")) + "<"));
+  const double off = mm / 3 - 1, off_um = mm / 2 - 1, off_plain = value("temperature") / 1.25 - 1;
+  EXPECT_THAT(page_, HasSubstr(cell(std::abs(off) <= 0.5 ? "agrees (%+.1f %%)" : "differs (%+.1f %%)", 100 * off, 0)));
+  EXPECT_THAT(page_, HasSubstr(cell("differs (%+.1f %%)", 100 * off_um, 0)));
+  EXPECT_THAT(page_, HasSubstr(cell(std::abs(off_plain) <= 0.5 ? "agrees (%+.1f %%)" : "differs (%+.1f %%)",
+                                    100 * off_plain, 0)));
+}
+
+// A sweep over quantities in different units: its table holds SI numbers, the unit in the name of the column.
+TEST(SweepTable, HoldsItsAxesInSi) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t",
+    "sweep": { "kind": "zip", "over": { "/stages/map/diameter": ["3 mm", "0.4 cm"], "/stages/map/frequency": ["20 Hz", "0.03 kHz"] },
+               "collect": ["/map/diameter", "/map/critical_temperature"] },
+    "stages": [ { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const NumberTable table(folder / "o/sweep.csv");
+  ASSERT_EQ(table.rows(), 2U);
+  std::size_t seen = 0;
+  for (const std::string& name : table.header()) {
+    if (name.starts_with("map_diameter") && name.find("std_error") == std::string::npos) {
+      EXPECT_DOUBLE_EQ(table(name, 0), 0.003) << name;
+      EXPECT_DOUBLE_EQ(table(name, 1), 0.004) << name;
+      EXPECT_TRUE(name.ends_with("_m")) << name;
+      ++seen;
+    }
+    if (name.starts_with("map_frequency")) {
+      EXPECT_DOUBLE_EQ(table(name, 1), 30) << name;
+      ++seen;
+    }
+  }
+  EXPECT_GE(seen, 2U);
+  for (std::size_t r = 0; r < 2; ++r) EXPECT_EQ(table.text("status", r), "ok");
+}
+
+}  // namespace
