@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/theory/equation_of_state.hpp"
 #include "pipelines/formats/json.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "tests/pipelines/program.hpp"
@@ -258,6 +259,74 @@ TEST_F(ShakenBed, CarriesItsWeight) {
   EXPECT_NEAR(middle, 0, 0.05 * disks / width) << "half a layer makes 0.5 N/W";
   EXPECT_EQ((*json_)["floor_pressure"]["unit"], "m g/D");
   EXPECT_NEAR(value((*json_)["floor_pressure"]), disks / width, 0.25 * disks / width);
+}
+
+// What the floor shows is what the laboratory shows less the floor's own motion, a omega cos(2 pi phase) with a = 1/4
+// D.
+TEST_F(ShakenBed, MovesAgainstItsFloor) {
+  const NumberTable lab = table("phases.csv"), floor = table("phases_floor_frame.csv");
+  const auto mean_of_phase = [](const NumberTable& cells, double phase, const char* column) {
+    double sum = 0;
+    for (std::size_t r = 0; r < cells.rows(); ++r)
+      if (cells("phase", r) == phase) sum += cells("samples", r) * cells(column, r);
+    return sum / (disks * periods);
+  };
+  for (int k = 0; k < phases; ++k) {
+    const double phase = k / phases, omega = 2 * std::numbers::pi / period;
+    EXPECT_NEAR(mean_of_phase(floor, phase, "mean_velocity_z"),
+                mean_of_phase(lab, phase, "mean_velocity_z") - 0.25 * omega * std::cos(2 * std::numbers::pi * phase),
+                1e-6)
+        << phase;
+    EXPECT_NEAR(mean_of_phase(floor, phase, "mean_velocity_x"), mean_of_phase(lab, phase, "mean_velocity_x"), 1e-9);
+    const double lab_t = mean_of_phase(lab, phase, "temperature_x"), t = mean_of_phase(floor, phase, "temperature_x");
+    EXPECT_NEAR(t, lab_t, 0.3 * lab_t) << "layers are cut elsewhere";
+    EXPECT_GT(mean_of_phase(floor, phase, "temperature_z"), 0);
+  }
+}
+
+// layers.csv counts what velocities.csv counts, with the layer's mean velocity in the temperature.
+TEST_F(ShakenBed, HasTheVelocitiesOfItsLayersTwice) {
+  const NumberTable layers = table("layers.csv"), velocities = table("velocities.csv");
+  for (std::size_t r = 0; r < layers.rows(); ++r) {
+    EXPECT_NEAR(layers("temperature_x", r),
+                velocities("temperature_x", r) + std::pow(velocities("mean_velocity_x", r), 2), 1e-9);
+    EXPECT_NEAR(layers("mean_velocity_z", r), velocities("mean_velocity_z", r), 1e-9);
+    EXPECT_NEAR(layers("spin_temperature", r), velocities("spin_temperature", r), 1e-9);
+    // The mean of the phase, and not of the layer, is taken off the vertical velocity.
+    EXPECT_LT(layers("temperature_z", r), 4 * (velocities("temperature_z", r) + 0.2));
+    EXPECT_GE(velocities("a2", r), -1);
+  }
+}
+
+// Rows of six that hardly move: the lowest row is 6.06 D wide and sqrt(3)/2 D high.
+TEST(ColdBed, HasItsBottomRow) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 2,
+      "units": "reduced", "disks": { "count": 24 }, "box": { "width": 6.06, "sides": "periodic" },
+      "start_temperature": 1e-4, "settle": 0, "measure": 4 } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json row = Json::parse(read_text(folder / "o/bed/observables.json"))["bottom_row_density"];
+  EXPECT_NEAR(value(row), 6 / (6.06 * std::numbers::sqrt3 / 2), 1e-9);
+  EXPECT_EQ(row["unit"], "1/D^2");
+}
+
+// A fluid of elastic disks in a periodic box: its pressure is that of the best equation of state known.
+TEST(PeriodicFluid, HasItsPressureInTheResult) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 2,
+      "units": "reduced", "disks": { "count": 120 }, "gravity": 0,
+      "box": { "width": 15, "sides": "periodic", "lid": { "kind": "periodic", "height": 16 } },
+      "settle": 20, "measure": 400 } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json json = Json::parse(read_text(folder / "o/bed/observables.json"));
+  EXPECT_DOUBLE_EQ(value(json["number_density"]), 0.5);
+  const Json& z = json["compressibility_factor"];
+  const double expected = shakebed::fit::find_equation_of_state("kolafa-rottner")->compressibility_factor(0.5).value;
+  EXPECT_LT(error(z), 0.02);
+  // Of N disks Z differs from that of infinitely many by some 1/N.
+  EXPECT_NEAR(value(z), expected, 4 * error(z) + expected / 120);
 }
 
 // --- replicas

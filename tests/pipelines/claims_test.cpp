@@ -7,6 +7,7 @@
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "tests/pipelines/lone_stage.hpp"
+#include "tests/pipelines/read_table.hpp"
 
 namespace {
 
@@ -94,6 +95,10 @@ TEST_F(ClaimsVerdicts, StandInTheTableAndTheText) {
         else
           verdicts[cells[0]] = cells[shakebed::pipelines::csv_column(header, "verdict", "claims.csv")];
       });
+  const NumberTable table(claims_.output("claims.csv"));
+  EXPECT_EQ(table("measured", 0), 1.0);
+  EXPECT_EQ(table("std_error", 0), 0.1);
+  EXPECT_TRUE(std::isnan(table("measured", 1)) && std::isnan(table("std_error", 1)));
   EXPECT_EQ(verdicts, (std::map<std::string, std::string>{{"a|b", "does not hold"}, {"c", "not measured"}}));
   const std::string text = read_text(claims_.output("claims.md"));
   EXPECT_THAT(text, HasSubstr("| a\\|b | 3 | 1.00 ± 0.10 m g D | does not hold | Fig. 1 |\n"));

@@ -89,6 +89,14 @@ TEST_F(StudyTables, AreAMapFromGammaToTemperature) {
   EXPECT_NEAR(t, truth, 2 * error);
   EXPECT_LT(error, 0.2 * truth);
   EXPECT_NEAR(found["temperature_over_mg"]["value"].get<double>(), t * 2.99e-3, 1e-12);
+  EXPECT_NEAR(found["temperature_over_mg"]["std_error"].get<double>(), error * 2.99e-3, 1e-12);
+  const double critical = json["critical_temperature"]["value"];
+  EXPECT_NEAR(found["reduced_temperature"]["value"].get<double>(), t / critical, 1e-9 * t / critical);
+  EXPECT_NEAR(found["reduced_temperature"]["std_error"].get<double>(), error / critical, 1e-9 * t / critical);
+  EXPECT_EQ(found["at"]["gamma"], 3.5);
+  EXPECT_EQ(found["at"]["restitution"], 0.85);
+  EXPECT_EQ(found["at"]["friction"], 0.1);
+  EXPECT_LE(found["interpolation_error"].get<double>() * t, error) << "it is part of the error";
   EXPECT_TRUE(json["readings"].size() > 4) << "the theory stands beside it";
   EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("simulated beds at"));
   std::string outside = map_stage;

@@ -72,7 +72,13 @@ TEST_F(FitStage, MatchesAProfileAgainstSimulatedBeds) {
   EXPECT_NEAR(t, 0.6 * critical, 0.05 * 0.6 * critical);
   EXPECT_NEAR(t, 0.6 * critical, 4 * error);
   EXPECT_LT(error, 0.05 * t);
-  EXPECT_EQ(json["library"].size(), 8u);
+  ASSERT_EQ(json["library"].size(), 8u);
+  for (std::size_t k = 0; k < 8; ++k) {
+    const double reduced[] = {0.35, 0.5, 0.7, 0.95};
+    EXPECT_NEAR(json["library"][k]["temperature"]["value"].get<double>(), reduced[k / 2] * critical, 1e-6) << k;
+  }
+  EXPECT_GE(error, json["library_scatter"].get<double>() * t) << "the scatter of the library is part of the error";
+  EXPECT_LT(json["interpolation_error"]["value"].get<double>(), error);
   EXPECT_GT(json["interpolation_error"]["value"].get<double>(), 0);
   EXPECT_TRUE(json["library_scatter"].is_number());
   EXPECT_NEAR(json["solid_height"]["value"].get<double>(), 0.4 * 10.118, 0.03 * 10.118 + 3 * 0.06 * 10.118 * error / t);
