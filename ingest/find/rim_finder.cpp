@@ -148,6 +148,18 @@ std::vector<RimDisk> likely_ones(const std::vector<Circle>& circles, const EdgeM
   return disks;
 }
 
+Roundness roundness_of(const std::vector<RimDisk>& disks, const EdgeMap& edges, const ScaledPicture& at,
+                       Polarity polarity) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : disks) {
+    circles.push_back(disk.circle);
+    circles.back().x = at.from_frame_x(disk.circle.x);
+    circles.back().y = at.from_frame_y(disk.circle.y);
+    circles.back().radius = disk.circle.radius / at.scale;
+  }
+  return roundness_of(edges, circles, polarity);
+}
+
 }  // namespace
 
 double RimModel::probability_of(double support) const {
@@ -181,6 +193,7 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
   }
   learned.disks = likely_ones(circles, edges, at, model);
   learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
+  learned.roundness = roundness_of(learned.disks, edges, at, polarity);
   return learned;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ingest/find/circle_search.hpp"
+#include "ingest/find/outline.hpp"
 
 namespace shakebed::ingest {
 
@@ -33,6 +34,7 @@ struct LearnedRims {
   RimModel model;
   std::vector<RimDisk> disks;  // of the frame learned from
   double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
+  Roundness roundness;         // of the disks
 };
 
 // Learns from one frame, starting from a radius good to a tenth.

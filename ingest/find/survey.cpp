@@ -27,6 +27,9 @@ constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
 // Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all.
 constexpr double least_side = 0.15;
+// Radii, over which the level changes at a rim: beads up to 0.44, softly enlarged ones 0.73, noise smoothed over a
+// length 1.4, blurred spots 1.6. Spots are beads where they, and little else, make up the picture.
+constexpr double widest_rim = 1.1, spots_explained = 0.5;
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
@@ -101,7 +104,7 @@ std::string text_of(const char* format, double a, double b = 0) {
   return text;
 }
 
-void judge(SurveyCandidate& candidate, double edge_length_px) {
+void judge(SurveyCandidate& candidate, double edge_length_px, const Roundness& roundness) {
   double support = 0;
   for (const RimDisk& disk : candidate.disks) {
     const double rim = 2 * std::numbers::pi * disk.circle.radius;
@@ -125,8 +128,11 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
     candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
     candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
+  else if (roundness.rim_width > widest_rim && candidate.explained_share < spots_explained)
+    candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
   else
-    candidate.credible = true;
+    candidate.why_not = roundness.why_not();
+  candidate.credible = candidate.why_not.empty();
 }
 
 void enlarge(SurveyCandidate& candidate, int factor) {
@@ -164,7 +170,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px);
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
-    judge(candidate, learned.edge_length_px);
+    judge(candidate, learned.edge_length_px, learned.roundness);
     enlarge(candidate, frames.reduction);
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {

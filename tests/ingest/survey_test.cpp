@@ -17,6 +17,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/profile/measure_bed.hpp"
+#include "tests/ingest/drawn_pictures.hpp"
 #include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {
@@ -185,6 +186,45 @@ TEST(Survey, RefusesPicturesWithoutBeads) {
     GrayFrame noise = painted(width, height, [](double, double) { return 120.0; });
     for (float& level : noise.pixels) level += static_cast<float>(more() % 61) - 30.0F;
     EXPECT_FALSE(survey_of({{Channel::automatic, noise}}).found) << seed;
+  }
+}
+
+// FNV-1a: the same pictures everywhere.
+unsigned seed_of(const std::string& name, unsigned series) {
+  unsigned hash = 2166136261U;
+  for (const char letter : name) hash = (hash ^ static_cast<unsigned char>(letter)) * 16777619U;
+  return hash + series;
+}
+
+// Each kind with its sizes, places, directions, levels and noise at random. (Limits were chosen on series 0.)
+TEST(Survey, RefusesFiftyKindsOfPicturesWithoutBeads) {
+  constexpr unsigned series = 20;
+  EXPECT_GE(test::pictures_without_beads().size(), 45U);
+  for (const test::DrawnKind& kind : test::pictures_without_beads()) {
+    std::mt19937 random(seed_of(kind.name, series));
+    const Survey survey = survey_of({{Channel::automatic, kind.draw(random)}});
+    EXPECT_FALSE(survey.found) << kind.name << ": " << survey.candidates.front().disks.size() << " disks of "
+                               << survey.candidates.front().rims.radius_px << " px";
+    EXPECT_FALSE(survey.why_not.empty()) << kind.name;
+  }
+}
+
+// Beads of every look are still seen: none is refused for its shape, and what is found are beads.
+TEST(Survey, FindsDrawnBeadsOfEveryLook) {
+  constexpr unsigned series = 20;
+  for (const test::BeadLook& look : test::pictures_with_beads()) {
+    std::mt19937 random(seed_of(look.name, series));
+    const test::DrawnBeads drawn = look.draw(random);
+    std::vector<Place> truth;
+    for (const auto& [x, y] : drawn.centres_px) truth.push_back({x, y});
+    const Survey survey = survey_of({{Channel::automatic, drawn.frame}});
+    ASSERT_TRUE(survey.found) << look.name << ": " << survey.why_not;
+    const Score found = score(survey.candidates.front().disks, truth, drawn.radius_px, [](const RimDisk& disk) {
+      return Place{disk.circle.x, disk.circle.y};
+    });
+    // The survey leaves out what is uncertain, up to a third; the finder takes it up (learn_beads.hpp).
+    EXPECT_GE(3 * found.hits, 2 * truth.size()) << look.name;
+    EXPECT_EQ(found.found, found.hits) << look.name;
   }
 }
 

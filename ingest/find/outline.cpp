@@ -1,0 +1,387 @@
+#include "ingest/find/outline.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <optional>
+
+#include "ingest/find/nearby.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr int directions = 48;
+constexpr double pi = std::numbers::pi;
+constexpr std::size_t most_outlines = 120;                 // followed: enough for a median
+constexpr double nearest_edge = 0.5, farthest_edge = 1.6;  // radii: where an outline may run
+constexpr double ring_step = 0.5;                          // px
+// An outline of axis ratio 2 leaves the direction of the radius by up to 37 degrees.
+constexpr double least_alignment = 0.7;   // cosine between an edge's gradient and the radius
+constexpr double steepest_path = 0.11;    // radii from one direction to the next: 40 degrees
+constexpr double cost_of_turning = 0.15;  // of a full edge, for the steepest path
+// Edges of this share of a typical rim's slope begin to count for the shape, and of the second count in full: where
+// beads touch, their rims run into one another, are faint and lie farther in.
+constexpr double faint_share = 0.65, full_share = 0.9;
+constexpr double on_the_circle = 0.1, near_the_circle = 0.15;  // radii
+constexpr double hidden_within = 0.45;                         // rad, either side of the direction to a neighbour ...
+constexpr double neighbour_reach = 2.6;                        // ... whose centre is so many radii away
+// px: full width at half maximum of a sharp step's slope in the map of edges (a Gaussian of 1.1 px).
+constexpr double width_of_a_step = 2.6;
+constexpr double nearest_slope = 0.1, farthest_slope = 2, slope_step = 0.25;  // radii, radii, px: for the rim's width
+constexpr double least_followed = 0.3;                                        // share of the directions, for harmonics
+constexpr double hold_harmonics = 0.02;  // of all directions: keeps what no edge shows at 0
+
+// Limits. Drawn beads of eight looks (24 pictures), four laboratories' beads and coins: on the circle 0.99 or more, gap
+// up to 0.15, deviation up to 0.027, single harmonics up to 0.022 (second) and 0.019. Drawings of other shapes: on the
+// circle up to 0.96, or gap from 0.25, or deviation from 0.033, or a harmonic of 0.026 (hexagons) to 0.13.
+constexpr double least_on_circle = 0.97, largest_gap = 0.2, largest_deviation = 0.03, largest_harmonic = 0.0225;
+// The picture's aspect ratio, which the calibration corrects: an elongation by 8 %.
+constexpr double largest_common_elongation = 0.04;
+constexpr double largest_own_elongation = 0.035;
+// A single outline is noisier than the median.
+constexpr double largest_single_deviation = 0.045, least_single_on_circle = 0.85, largest_single_gap = 0.3;
+constexpr double most_not_round = 0.3;
+
+constexpr std::size_t terms = 1 + 2 * highest_harmonic;
+
+struct OneOutline {
+  double followed = 0, on_circle = 1, gap = 0, deviation = 0, rim_width = 0;
+  std::array<std::complex<double>, highest_harmonic + 1> harmonic{};
+  bool developed = false;
+};
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Ray {
+  double cosine = 0, sine = 0;
+  std::array<double, terms> basis{};
+};
+const std::array<Ray, directions>& rays() {
+  static const std::array<Ray, directions> table = [] {
+    std::array<Ray, directions> all{};
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const double angle = 2 * pi * static_cast<double>(k) / directions;
+      all[k] = {std::cos(angle), std::sin(angle), {1}};
+      for (std::size_t q = 1; q <= highest_harmonic; ++q) {
+        all[k].basis[2 * q - 1] = std::cos(static_cast<double>(q) * angle);
+        all[k].basis[2 * q] = std::sin(static_cast<double>(q) * angle);
+      }
+    }
+    return all;
+  }();
+  return table;
+}
+
+// Slopes along one direction that can be an outline's; nothing where the circle is out of view.
+class Slopes {
+ public:
+  Slopes(const EdgeMap& edges, Polarity polarity)
+      : edges_(edges), sign_(polarity == Polarity::bright_beads ? -1.0F : 1.0F) {}
+
+  [[nodiscard]] bool in_view(double x, double y) const {
+    return x >= 1 && y >= 1 && x < edges_.width - 2 && y < edges_.height - 2;
+  }
+  [[nodiscard]] float at(double x, double y, const Ray& ray) const {
+    if (!in_view(x, y)) return 0;
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    const float right = static_cast<float>(x - column), lower = static_cast<float>(y - row);
+    const std::size_t upper_left = edges_.at(column, row), below = upper_left + static_cast<std::size_t>(edges_.width);
+    const auto mix = [&](const std::vector<float>& field) {
+      return (1 - lower) * ((1 - right) * field[upper_left] + right * field[upper_left + 1]) +
+             lower * ((1 - right) * field[below] + right * field[below + 1]);
+    };
+    const float along_x = mix(edges_.x), along_y = mix(edges_.y);
+    const float radial = sign_ * (along_x * static_cast<float>(ray.cosine) + along_y * static_cast<float>(ray.sine));
+    const float slope = std::hypot(along_x, along_y);
+    return slope < edges_.threshold || radial < static_cast<float>(least_alignment) * slope ? 0.0F : slope;
+  }
+  // Towards the outside, whatever its size and direction.
+  [[nodiscard]] double outwards(double x, double y, const Ray& ray) const {
+    if (!in_view(x, y)) return 0;
+    const std::size_t at = edges_.at(static_cast<int>(x + 0.5), static_cast<int>(y + 0.5));
+    return static_cast<double>(sign_) *
+           (static_cast<double>(edges_.x[at]) * ray.cosine + static_cast<double>(edges_.y[at]) * ray.sine);
+  }
+  // The steepest within three steps of the circle.
+  [[nodiscard]] float at_rim(const Circle& circle, const Ray& ray) const {
+    float most = 0;
+    for (double off = -3 * ring_step; off <= 3 * ring_step; off += ring_step)
+      most = std::max(
+          most, at(circle.x + (circle.radius + off) * ray.cosine, circle.y + (circle.radius + off) * ray.sine, ray));
+    return most;
+  }
+
+ private:
+  const EdgeMap& edges_;
+  float sign_;
+};
+
+// The closed path of largest slope around one circle.
+class OutlinePath {
+ public:
+  OutlinePath(const Slopes& slopes, const Circle& circle, double typical_slope)
+      : circle_(circle),
+        rings_(static_cast<std::size_t>((farthest_edge - nearest_edge) * circle.radius / ring_step) + 1),
+        score_(directions * rings_) {
+    for (std::size_t k = 0; k < directions; ++k)
+      for (std::size_t ring = 0; ring < rings_; ++ring) {
+        const Ray& ray = rays()[k];
+        const double r = radius_of(static_cast<double>(ring));
+        const float slope = slopes.at(circle.x + r * ray.cosine, circle.y + r * ray.sine, ray);
+        score_[k * rings_ + ring] = std::min(1.0F, slope / static_cast<float>(typical_slope));
+      }
+    follow();
+  }
+
+  std::array<double, directions> offset{};  // from the circle, radii
+  std::array<double, directions> weight{};  // 0 .. 1: a faint edge or a clear one
+  std::array<bool, directions> met{};       // an edge at all
+
+ private:
+  [[nodiscard]] double radius_of(double ring) const { return nearest_edge * circle_.radius + ring * ring_step; }
+
+  // Three turns, of which the middle one closes well enough.
+  void follow() {
+    constexpr std::size_t turns = 3, steps = turns * directions;
+    const int jump = std::max(1, static_cast<int>(std::lround(steepest_path * circle_.radius / ring_step)));
+    const auto cost = static_cast<float>(cost_of_turning / jump);
+    std::vector<float> value(score_.begin(), score_.begin() + static_cast<std::ptrdiff_t>(rings_)), next(rings_);
+    std::vector<std::int8_t> came_from(steps * rings_, 0);
+    for (std::size_t step = 1; step < steps; ++step) {
+      for (int ring = 0; ring < static_cast<int>(rings_); ++ring) {
+        float best = -1e9F;
+        int by = 0;
+        const int last = std::min(jump, static_cast<int>(rings_) - 1 - ring);
+        for (int j = std::max(-jump, -ring); j <= last; ++j) {
+          const float here = value[static_cast<std::size_t>(ring + j)] - cost * static_cast<float>(std::abs(j));
+          if (here > best) best = here, by = j;
+        }
+        const auto at = static_cast<std::size_t>(ring);
+        next[at] = best + score_[(step % directions) * rings_ + at];
+        came_from[step * rings_ + at] = static_cast<std::int8_t>(by);
+      }
+      value.swap(next);
+    }
+    auto ring = static_cast<std::size_t>(std::max_element(value.begin(), value.end()) - value.begin());
+    for (std::size_t step = steps - 1; step >= directions; --step) {
+      if (step < 2 * directions) take(step - directions, ring);
+      ring = static_cast<std::size_t>(static_cast<int>(ring) + came_from[step * rings_ + ring]);
+    }
+  }
+
+  void take(std::size_t k, std::size_t ring) {
+    const float* along = score_.data() + k * rings_;
+    double part = 0;
+    if (ring > 0 && ring + 1 < rings_) {
+      const float bend = along[ring - 1] - 2 * along[ring] + along[ring + 1];
+      if (bend < 0) part = std::clamp(0.5 * static_cast<double>((along[ring - 1] - along[ring + 1]) / bend), -0.5, 0.5);
+    }
+    offset[k] = radius_of(static_cast<double>(ring) + part) / circle_.radius - 1;
+    met[k] = along[ring] > 0;
+    weight[k] = std::clamp((static_cast<double>(along[ring]) - faint_share) / (full_share - faint_share), 0.0, 1.0);
+  }
+
+  const Circle& circle_;
+  std::size_t rings_;
+  std::vector<float> score_;  // 0 .. 1, by direction and ring
+};
+
+// Weighted least squares of the outline's harmonics; those that no edge shows are held at 0.
+std::array<double, terms> harmonics_of(const OutlinePath& path) {
+  std::array<std::array<double, terms + 1>, terms> rows{};
+  for (std::size_t k = 0; k < directions; ++k) {
+    const auto& basis = rays()[k].basis;
+    for (std::size_t p = 0; p < terms; ++p) {
+      for (std::size_t q = 0; q < terms; ++q) rows[p][q] += path.weight[k] * basis[p] * basis[q];
+      rows[p][terms] += path.weight[k] * basis[p] * path.offset[k];
+    }
+  }
+  for (std::size_t p = 0; p < terms; ++p) rows[p][p] += p < 3 ? 1e-6 : hold_harmonics * directions;
+  for (std::size_t p = 0; p < terms; ++p)
+    for (std::size_t q = 0; q < terms; ++q) {
+      if (q == p) continue;
+      const double part = rows[q][p] / rows[p][p];
+      for (std::size_t c = p; c <= terms; ++c) rows[q][c] -= part * rows[p][c];
+    }
+  std::array<double, terms> amplitude{};
+  for (std::size_t p = 0; p < terms; ++p) amplitude[p] = rows[p][terms] / rows[p][p];
+  return amplitude;
+}
+
+class OutlineFollower {
+ public:
+  OutlineFollower(const EdgeMap& edges, const std::vector<Circle>& circles, Polarity polarity)
+      : circles_(circles),
+        slopes_(edges, polarity),
+        reach_(neighbour_reach * largest_radius(circles)),
+        near_(circles.size(), reach_, [&](std::size_t i) { return std::pair(circles[i].x, circles[i].y); }),
+        least_slope_(static_cast<double>(edges.threshold)) {}
+
+  // Nothing for what is cut by the border.
+  [[nodiscard]] std::optional<OneOutline> follow(const Circle& circle) const {
+    for (const Ray& ray : rays())
+      if (!slopes_.in_view(circle.x + circle.radius * ray.cosine, circle.y + circle.radius * ray.sine))
+        return std::nullopt;
+    std::vector<double> rim;
+    for (const Ray& ray : rays()) rim.push_back(static_cast<double>(slopes_.at_rim(circle, ray)));
+    const OutlinePath path(slopes_, circle, std::max(least_slope_, median_of(rim)));
+    OneOutline outline;
+    double clear = 0, on_circle = 0;
+    for (std::size_t k = 0; k < directions; ++k) {
+      clear += path.weight[k];
+      if (std::abs(path.offset[k]) < on_the_circle) on_circle += path.weight[k];
+    }
+    outline.followed = clear / directions;
+    outline.on_circle = clear > 0 ? on_circle / clear : 0;
+    outline.gap = gap_of(path, circle);
+    outline.rim_width = rim_width_of(circle);
+    if (outline.followed >= least_followed) develop(path, clear, outline);
+    return outline;
+  }
+
+ private:
+  static double largest_radius(const std::vector<Circle>& circles) {
+    double largest = 1;
+    for (const Circle& circle : circles) largest = std::max(largest, circle.radius);
+    return largest;
+  }
+
+  static void develop(const OutlinePath& path, double clear, OneOutline& outline) {
+    const std::array<double, terms> amplitude = harmonics_of(path);
+    double squares = 0;
+    for (std::size_t k = 0; k < directions; ++k) {
+      double shape = 0;
+      for (std::size_t p = 3; p < terms; ++p) shape += amplitude[p] * rays()[k].basis[p];
+      squares += path.weight[k] * shape * shape;
+    }
+    outline.deviation = std::sqrt(squares / clear);
+    for (std::size_t q = 2; q <= highest_harmonic; ++q) outline.harmonic[q] = {amplitude[2 * q - 1], amplitude[2 * q]};
+    outline.developed = true;
+  }
+
+  // From the slope averaged over all directions.
+  [[nodiscard]] double rim_width_of(const Circle& circle) const {
+    std::vector<double> slope;
+    std::size_t steepest = 0;
+    for (double r = nearest_slope * circle.radius; r < farthest_slope * circle.radius; r += slope_step) {
+      double sum = 0;
+      for (const Ray& ray : rays()) sum += slopes_.outwards(circle.x + r * ray.cosine, circle.y + r * ray.sine, ray);
+      slope.push_back(sum);
+      if (std::abs(r - circle.radius) < on_the_circle * circle.radius + 1 && sum > slope[steepest])
+        steepest = slope.size() - 1;
+    }
+    std::size_t first = steepest, last = steepest;
+    while (first > 0 && slope[first] > 0.5 * slope[steepest]) --first;
+    while (last + 1 < slope.size() && slope[last] > 0.5 * slope[steepest]) ++last;
+    const double width = static_cast<double>(last - first) * slope_step;
+    return std::sqrt(std::max(0.0, width * width - width_of_a_step * width_of_a_step)) / circle.radius;
+  }
+
+  [[nodiscard]] double gap_of(const OutlinePath& path, const Circle& circle) const {
+    std::array<bool, directions> hidden{};
+    near_.any_near(circle.x, circle.y, [&](std::size_t i) {
+      const double dx = circles_[i].x - circle.x, dy = circles_[i].y - circle.y, away = std::hypot(dx, dy);
+      if (away < 0.1 * circle.radius || away > neighbour_reach * circle.radius) return false;
+      for (std::size_t k = 0; k < directions; ++k)
+        hidden[k] = hidden[k] || dx * rays()[k].cosine + dy * rays()[k].sine > away * std::cos(hidden_within);
+      return false;
+    });
+    int run = 0, longest = 0;
+    for (std::size_t step = 0; step < 2 * directions; ++step) {
+      const std::size_t k = step % directions;
+      if (path.met[k] && std::abs(path.offset[k]) < near_the_circle)
+        run = 0;
+      else if (!hidden[k])
+        ++run;
+      longest = std::max(longest, std::min(run, directions));
+    }
+    return static_cast<double>(longest) / directions;
+  }
+
+  const std::vector<Circle>& circles_;
+  Slopes slopes_;
+  double reach_;
+  Nearby near_;
+  double least_slope_;
+};
+
+Roundness summary_of(const std::vector<OneOutline>& outlines) {
+  Roundness out;
+  std::vector<double> on_circle, gap, deviation, rim_width;
+  std::array<std::vector<double>, highest_harmonic + 1> harmonic;
+  std::complex<double> second;
+  for (const OneOutline& one : outlines) {
+    on_circle.push_back(one.on_circle);
+    gap.push_back(one.gap);
+    rim_width.push_back(one.rim_width);
+    if (!one.developed) continue;
+    second += one.harmonic[2];
+    for (std::size_t q = 2; q <= highest_harmonic; ++q) harmonic[q].push_back(std::abs(one.harmonic[q]));
+  }
+  const auto developed = static_cast<double>(harmonic[2].size());
+  if (developed > 0) second /= developed;
+  double not_round = 0;
+  for (const OneOutline& one : outlines) {
+    // Without what all share, which is the picture's aspect.
+    const double own = 0.5 * (std::norm(one.harmonic[2]) - std::norm(one.harmonic[2] - second));
+    const double left = std::sqrt(std::max(0.0, one.deviation * one.deviation - own));
+    if (one.developed) deviation.push_back(left);
+    not_round +=
+        left > largest_single_deviation || one.on_circle < least_single_on_circle || one.gap > largest_single_gap;
+  }
+  out.outlines = outlines.size();
+  if (outlines.empty()) return out;
+  out.not_round = not_round / static_cast<double>(outlines.size());
+  out.on_circle = median_of(on_circle);
+  out.gap = median_of(gap);
+  out.rim_width = median_of(rim_width);
+  if (deviation.empty()) return out;
+  out.deviation = median_of(deviation);
+  out.common_elongation = std::abs(second);
+  for (std::size_t q = 2; q <= highest_harmonic; ++q) out.harmonic[q] = median_of(harmonic[q]);
+  return out;
+}
+
+std::string text_of(const char* format, double a, double b = 0) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+}  // namespace
+
+std::string Roundness::why_not() const {
+  if (outlines == 0) return {};
+  if (on_circle < least_on_circle)
+    return text_of("the outlines are not round: only %.0f %% of a typical one lies on its circle", 100 * on_circle);
+  if (gap > largest_gap) return text_of("the outlines are open: %.0f %% of the turn is missing", 100 * gap);
+  if (common_elongation > largest_common_elongation || harmonic[2] > common_elongation + largest_own_elongation)
+    return text_of("the outlines are oval, their axes in the ratio %.2f", (1 + harmonic[2]) / (1 - harmonic[2]));
+  for (std::size_t q = 3; q <= highest_harmonic; ++q)
+    if (harmonic[q] > largest_harmonic)
+      return text_of("the outlines are not round: they have %.0f corners or bulges, %.1f %% of the radius high",
+                     static_cast<double>(q), 100 * harmonic[q]);
+  if (deviation > largest_deviation)
+    return text_of("the outlines are not round: they depart from a circle by %.1f %% of the radius", 100 * deviation);
+  if (not_round > most_not_round) return text_of("%.0f %% of the outlines are not round", 100 * not_round);
+  return {};
+}
+
+Roundness roundness_of(const EdgeMap& edges, const std::vector<Circle>& circles, Polarity polarity) {
+  const OutlineFollower follower(edges, circles, polarity);
+  std::vector<OneOutline> outlines;
+  const std::size_t step = std::max<std::size_t>(1, circles.size() / most_outlines);
+  for (std::size_t k = 0; k < circles.size(); k += step)
+    if (const auto outline = follower.follow(circles[k])) outlines.push_back(*outline);
+  return summary_of(outlines);
+}
+
+}  // namespace shakebed::ingest
