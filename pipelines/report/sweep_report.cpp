@@ -13,6 +13,7 @@
 #include "pipelines/formats/quantity.hpp"
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/sweep_record.hpp"
+#include "pipelines/runner/sweep_table.hpp"
 #include "pipelines/stages/figure.hpp"
 
 namespace shakebed::pipelines {
@@ -22,6 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_html_rows = 500, most_markdown_rows = 50;  // all are in sweep.csv
 constexpr std::size_t most_series = 6;                                // of one figure: as many colours are told apart
+
+constexpr std::string_view one_temperature = "one temperature";
 
 std::optional<double> number_of(const std::string& text) {
   double value = 0;
@@ -46,7 +49,7 @@ std::string words_of(const std::string& pointer, bool only_last) {
 class SweepFigures {
  public:
   SweepFigures(const Plan& plan, const SweepOutcome& sweep)
-      : sweep_(sweep), axes_(plan.sweep->axes), random_(plan.sweep->kind == SweepKind::random) {
+      : plan_(plan), sweep_(sweep), axes_(plan.sweep->axes), random_(plan.sweep->kind == SweepKind::random) {
     for (along_ = 0; along_ < axes_.size(); ++along_) {
       if (position(sweep.points.front(), true)) break;
     }
@@ -94,22 +97,44 @@ class SweepFigures {
     return label.empty() ? "points" : label;
   }
 
+  // "  [m g D]" of the number that is drawn.
+  std::string unit_text(std::size_t k) const {
+    const std::string unit = unit_of_result(plan_, sweep_.collected[k]);
+    return unit == "1" ? "" : "  [" + unit + "]";
+  }
+
+  // Points without one temperature are hollow.
+  bool hollow(std::size_t point) const {
+    const std::string& verdict = sweep_.table[point + 1].back();
+    return sweep_.table.front().back() == verdict_column && !verdict.empty() && verdict != one_temperature;
+  }
+
+  // Of the point: two series a label, filled and hollow. None beyond most_series labels.
+  Series* series_of(Picture& picture, std::map<std::string, std::size_t>& groups, std::size_t point) const {
+    const std::string label = label_of(sweep_.points[point]);
+    const auto [group, fresh] = groups.emplace(label, groups.size());
+    if (group->second >= most_series) return nullptr;
+    if (fresh) {
+      const int color = static_cast<int>(group->second);
+      picture.series.push_back({label, Series::Style::points, color, {}, {}, {}});
+      picture.series.push_back({label + ", not one temperature", Series::Style::points, color, {}, {}, {}, true});
+    }
+    return &picture.series[2 * group->second + (hollow(point) ? 1 : 0)];
+  }
+
   Picture picture_of(std::size_t k) {
     Picture picture{.x_label = words_of(axes_[along_].pointer, false) + (unit_.empty() ? "" : "  [" + unit_ + "]"),
-                    .y_label = words_of(sweep_.collected[k], false)};
+                    .y_label = words_of(sweep_.collected[k], false) + unit_text(k)};
     const std::size_t column = 3 + axes_.size() + 2 * k;
     std::map<std::string, std::size_t> groups;
     for (std::size_t i = 0; i < sweep_.points.size(); ++i) {
       const std::vector<std::string>& row = sweep_.table[i + 1];
       const std::optional<double> x = position(sweep_.points[i]), y = number_of(row[column]);
       if (!x || !y) continue;
-      const std::string label = label_of(sweep_.points[i]);
-      const auto [group, fresh] = groups.emplace(label, groups.size());
-      if (group->second >= most_series) continue;
-      if (fresh) picture.series.push_back({label, Series::Style::points, static_cast<int>(group->second), {}, {}, {}});
-      Series& series = picture.series[group->second];
-      series.x.push_back(*x), series.y.push_back(*y);
-      if (const std::optional<double> error = number_of(row[column + 1])) series.error.push_back(*error);
+      Series* series = series_of(picture, groups, i);
+      if (series == nullptr) continue;
+      series->x.push_back(*x), series->y.push_back(*y);
+      if (const std::optional<double> error = number_of(row[column + 1])) series->error.push_back(*error);
     }
     for (Series& series : picture.series) {
       if (series.error.size() != series.x.size()) series.error.clear();
@@ -117,12 +142,21 @@ class SweepFigures {
     return picture;
   }
 
+  const Plan& plan_;
   const SweepOutcome& sweep_;
   const std::vector<SweepAxis>& axes_;
   bool random_;
   std::size_t along_ = 0;
   std::string unit_;
 };
+
+// "Of 5 points 2 have one temperature, 3 no single temperature"; "" where no stage gives an answer.
+std::string verdicts_text(const SweepOutcome& sweep) {
+  std::string text;
+  for (const auto& [verdict, count] : sweep.verdicts)
+    text += fmt::format("{}{} {}", text.empty() ? "Verdicts: " : ", ", count, verdict);
+  return text;
+}
 
 std::string title_of(const Plan& plan) { return plan.report.title.empty() ? plan.name : plan.report.title; }
 
@@ -132,6 +166,17 @@ std::string html_of(const Plan& plan, const SweepOutcome& sweep, const std::vect
   if (!sweep.problems.empty()) {
     out += "<div class=\"warnings\"><strong>Points that failed</strong><ul>\n";
     for (const std::string& problem : sweep.problems) out += fmt::format("<li>{}</li>\n", escape_markup(problem));
+    out += "</ul></div>\n";
+  }
+  if (!sweep.verdicts.empty()) {
+    out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep)));
+    if (sweep.verdicts.size() > 1 || sweep.verdicts.begin()->first != one_temperature)
+      out += " Points without one temperature are drawn hollow.";
+    out += "</p>\n";
+  }
+  if (!sweep.warnings.empty()) {
+    out += "<div class=\"warnings\"><strong>Warnings of points</strong><ul>\n";
+    for (const std::string& warning : sweep.warnings) out += fmt::format("<li>{}</li>\n", escape_markup(warning));
     out += "</ul></div>\n";
   }
   if (!plan.warnings.empty()) {
@@ -161,7 +206,12 @@ std::string markdown_of(const Plan& plan, const SweepOutcome& sweep) {
   const std::vector<std::vector<std::string>>& table = sweep.table;
   const std::size_t points = table.size() - 1;
   const auto good = std::count_if(table.begin() + 1, table.end(), [](const auto& row) { return row[2] == "ok"; });
-  std::string out = fmt::format("# {}\n\n**{} of {} points are well**\n", markdown(title_of(plan)), good, points);
+  std::string out = fmt::format("# {}\n\n**{} of {} points are done**\n", markdown(title_of(plan)), good, points);
+  if (!sweep.verdicts.empty()) out += fmt::format("\n{}.\n", markdown(verdicts_text(sweep)));
+  if (!sweep.warnings.empty()) {
+    out += "\n## Warnings of points\n\n";
+    for (const std::string& warning : sweep.warnings) out += fmt::format("- {}\n", markdown(warning));
+  }
   if (!sweep.problems.empty()) {
     out += "\n## Points that failed\n\n";
     for (const std::string& problem : sweep.problems) out += fmt::format("- {}\n", markdown(problem));

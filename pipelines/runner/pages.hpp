@@ -2,6 +2,7 @@
 // page itself.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,8 @@ struct SweepOutcome {
   const std::vector<std::string>& collected;           // pointers to the numbers
   const std::vector<std::vector<std::string>>& table;  // the first row is the header
   const std::vector<std::string>& problems;            // of points that failed
+  const std::map<std::string, std::size_t>& verdicts;  // points by the verdict of their answer
+  std::vector<std::string> warnings;                   // of the points, each kind once
   bool complete = false;                               // every point is there
 };
 

@@ -6,11 +6,13 @@
 #include <atomic>
 #include <charconv>
 #include <chrono>
+#include <map>
 #include <mutex>
 #include <thread>
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/runner/gathered_warnings.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/pages.hpp"
 #include "pipelines/runner/shared_stages.hpp"
@@ -198,6 +200,7 @@ class SweepRun {
     record["failed_checks"] = outcome.failed_checks;
     record["cells"] = gather_cells(at, alone.out, pointers_);
     record["pointers"] = pointers_;
+    record["verdict"] = verdict_of(at, alone.out);
     write_file_atomically(alone.out / point_record, dump(record));
     return PointEnd::finished;
   }
@@ -221,6 +224,7 @@ class SweepRun {
     std::vector<std::string> header{"point", "replica", "status"};
     for (const SweepAxis& axis : plan_.sweep->axes) header.push_back(axis.pointer);
     for (const std::string& pointer : pointers_) header.push_back(pointer), header.push_back(pointer + "/std_error");
+    if (answering_stage(plan_) != nullptr) header.emplace_back(verdict_column);
     table_.push_back(std::move(header));
     for (const SweepPoint& point : all_) table_.push_back(row_of(point));
   }
@@ -239,7 +243,20 @@ class SweepRun {
     for (const Json& value : point.values) row.push_back(value_text(value));
     for (std::size_t k = 0; k < 2 * pointers_.size(); ++k)
       row.push_back(good ? (*record)["cells"][k].get<std::string>() : std::string());
+    if (answering_stage(plan_) != nullptr) {
+      row.push_back(good ? record->value("verdict", "") : "");
+      if (!row.back().empty()) ++verdicts_[row.back()];
+    }
+    if (good) warnings_.add((*record)["warnings"]);
     return row;
+  }
+
+  // "3 one temperature, 2 no single temperature"; "" where no stage gives an answer.
+  std::string verdicts_text() const {
+    std::string text;
+    for (const auto& [verdict, count] : verdicts_)
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, verdict);
+    return text;
   }
 
   // Shards that end at the same time write the same bytes; the last one sees all points.
@@ -254,6 +271,8 @@ class SweepRun {
                                        .collected = pointers_,
                                        .table = table_,
                                        .problems = failures_,
+                                       .verdicts = verdicts_,
+                                       .warnings = warnings_.lines(),
                                        .complete = !interrupted_ && there_ == all_.size()});
     } catch (const StageError& error) {
       console_.warning(fmt::format("the sweep is done, but its report is not: {}", error.what()));
@@ -261,6 +280,7 @@ class SweepRun {
   }
 
   void say_failures() {
+    for (const std::string& warning : warnings_.lines()) console_.warning(warning);
     for (const std::string& failure : failures_) console_.error(failure);
     if (failed_ > failures_.size()) console_.error(fmt::format("and {} more points", failed_ - failures_.size()));
     if (busy_ > 0) console_.warning(fmt::format("{} points are being run by somebody else", busy_.load()));
@@ -288,6 +308,8 @@ class SweepRun {
     summary["missing"] = all_.size() - there_;
     summary["failed"] = failed_.load();
     summary["failed_checks"] = checks_.load();
+    if (answering_stage(plan_) != nullptr) summary["verdicts"] = verdicts_;
+    summary["warnings_of_points"] = warnings_.lines();
     write_file_atomically(options_.out / "summary.json", dump(summary));
     write_file_atomically(options_.out / "manifest.json", dump(manifest(seconds, code)));
     if (arguments_.json) {
@@ -295,9 +317,11 @@ class SweepRun {
       summary["table"] = (options_.out / "sweep.csv").string();
       arguments_.result = std::move(summary);
     } else {
-      fmt::print("{} of {} points done{} in {}\ntable: {}\n", there_, all_.size(),
+      fmt::print("{} of {} points done{} in {}\n", there_, all_.size(),
                  failed_ > 0 ? fmt::format(", {} failed: run again to retry them alone", failed_.load()) : "",
-                 duration_text(seconds), (options_.out / "sweep.csv").string());
+                 duration_text(seconds));
+      if (!verdicts_.empty()) fmt::print("verdicts: {}\n", verdicts_text());
+      fmt::print("table: {}\n", (options_.out / "sweep.csv").string());
     }
     return code;
   }
@@ -340,6 +364,8 @@ class SweepRun {
   std::vector<std::vector<std::string>> table_;
   std::string csv_;
   std::size_t there_ = 0;
+  std::map<std::string, std::size_t> verdicts_;  // points by verdict
+  GatheredWarnings warnings_;
 };
 
 }  // namespace

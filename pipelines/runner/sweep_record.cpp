@@ -20,6 +20,7 @@ std::vector<std::string> collected(const Plan& plan) {
   std::vector<std::string> pointers;
   for (const PlannedStage& stage : plan.stages) {
     for (const std::string_view key : stage.row->headline) pointers.push_back(fmt::format("/{}/{}", stage.id, key));
+    if (!stage.row->answer.empty()) pointers.push_back(fmt::format("/{}{}/temperature", stage.id, stage.row->answer));
   }
   return pointers;
 }
@@ -50,6 +51,22 @@ std::vector<std::string> gather_cells(const Plan& plan, const fs::path& director
     cells.push_back(value), cells.push_back(error);
   }
   return cells;
+}
+
+const PlannedStage* answering_stage(const Plan& plan) {
+  for (const PlannedStage& stage : plan.stages) {
+    if (!stage.row->answer.empty()) return &stage;
+  }
+  return nullptr;
+}
+
+std::string verdict_of(const Plan& plan, const fs::path& directory) {
+  const PlannedStage* stage = answering_stage(plan);
+  std::error_code ignored;
+  if (stage == nullptr || !fs::is_regular_file(directory / stage->id / stage->row->result, ignored)) return "";
+  const Json result = read_json(directory / stage->id / stage->row->result);
+  const Json* verdict = find_pointer(result, std::string(stage->row->answer) + "/verdict");
+  return verdict != nullptr && verdict->is_string() ? verdict->get<std::string>() : "";
 }
 
 PointKeys keys_of(const Plan& at) {

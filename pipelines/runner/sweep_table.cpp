@@ -45,6 +45,8 @@ AxisKind kind_of(const std::vector<std::vector<std::string>>& rows, std::size_t 
   return kind;
 }
 
+}  // namespace
+
 std::string unit_of_result(const Plan& plan, const std::string& pointer) {
   const std::vector<std::string> tokens = split_pointer(pointer);
   const PlannedStage* stage = tokens.empty() ? nullptr : plan.find(tokens.front());
@@ -53,8 +55,6 @@ std::string unit_of_result(const Plan& plan, const std::string& pointer) {
       stage->results->find(std::string_view(pointer).substr(1 + escape_pointer_token(tokens.front()).size()));
   return stated == nullptr || stated->unit.empty() ? "1" : stated->unit;
 }
-
-}  // namespace
 
 std::string column_name(const std::string& pointer, const std::string& unit) {
   std::string name;
@@ -89,6 +89,9 @@ Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
     columns.push_back({column_name(pointer, unit), unit, pointer});
     columns.push_back({column_name(pointer + "/std_error", unit), unit, "standard error of " + pointer});
   }
+  if (columns.size() < rows.front().size())
+    columns.push_back({std::string(verdict_column), "",
+                       "of the answer: one temperature, model does not fit, or no single temperature"});
   Table table("the points of the sweep", columns);
   for (std::size_t r = 1; r < rows.size(); ++r) {
     std::vector<Cell> cells{rows[r][0], count_cell(std::atoll(rows[r][1].c_str())), rows[r][2]};

@@ -139,11 +139,14 @@ void run_gnuplot(const std::filesystem::path& directory, const std::string& name
 // The series as "plot" elements, their data at `index` and after in NAME.dat.
 std::string plot_elements(const std::vector<Series>& all, const std::string& name, std::size_t index, bool titles) {
   constexpr std::array points = {7, 5, 9, 13, 11, 6, 4, 8, 12, 10};  // filled circle, square, ...; then open ones
+  constexpr std::size_t open = points.size() / 2;
   std::size_t point = 0;
   std::string script;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Series& series = all[i];
-    const std::size_t shape = series.style == Series::Style::points ? point++ : 0;
+    const std::size_t shape = series.style != Series::Style::points ? 0
+                              : series.hollow && point > 0          ? point - 1
+                                                                    : point++;
     if (series.x.empty()) continue;
     script += script.empty() ? "" : ", \\\n     ";
     const char* color = palette[static_cast<std::size_t>(series.color) % palette.size()];
@@ -156,8 +159,8 @@ std::string plot_elements(const std::vector<Series>& all, const std::string& nam
     script += fmt::format("{} index {} using ", gnuplot_text(name + ".dat"), index + i);
     switch (series.style) {
       case Series::Style::points:
-        script +=
-            fmt::format("1:2 with points pt {} ps 0.55*scale lw 1.4 lc rgb '{}'", points[shape % points.size()], color);
+        script += fmt::format("1:2 with points pt {} ps 0.55*scale lw 1.4 lc rgb '{}'",
+                              points[(shape + (series.hollow ? open : 0)) % points.size()], color);
         break;
       case Series::Style::line:
         script += fmt::format("1:2 with lines lw 2 lc rgb '{}'", color);

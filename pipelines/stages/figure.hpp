@@ -17,6 +17,7 @@ struct Series {
   Style style = Style::points;
   int color = 0;                    // of the palette below
   std::vector<double> x, y, error;  // error may be empty
+  bool hollow = false;              // points: the symbol of the series before, open
   bool markup = false;              // of the label: T_c with a subscript, as on the axes; false: as it stands
 };
 struct Picture {

@@ -203,7 +203,7 @@ class Engine final : public Simulation {
   void hit_floor(std::uint32_t i, Motion& motion);
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
-  void withhold(double reduced_mass, double approach, const Contact& surface);
+  void withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach, const Contact& surface);
   std::optional<double> unusual_restitution(std::uint32_t i, std::uint32_t j, TwoLanes d, TwoLanes dv);
   bool locked();
   void relieve();
@@ -284,8 +284,7 @@ class Engine final : public Simulation {
   std::vector<std::uint32_t> labels_;   // what a disk is called outside: its place in the start
   std::vector<double> spins_;           // rough disks only
   std::vector<double> last_contact_;    // contact clocks, dissipative disks only
-  std::vector<std::uint8_t> in_chain_;  // whether that contact was elastic by the clock; as many
-  bool begins_chain_ = false;           // the contact at hand is the first elastic one of both partners
+  std::vector<std::uint8_t> withheld_;  // whether its latest contacts, elastic by the clock, have been counted; as many
   double now_ = 0;                      // since base_
   double base_ = 0;                     // of the present count, since the start
   double interval_ = 1;                 // the floor's period

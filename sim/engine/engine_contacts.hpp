@@ -13,18 +13,20 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   if (contact_duration_ <= 0) return false;
   const bool elastic = now_ - last_contact_[i] < contact_duration_ || now_ - last_contact_[j] < contact_duration_;
   last_contact_[i] = last_contact_[j] = now_;
-  begins_chain_ = elastic && in_chain_[i] + in_chain_[j] == 0;
-  in_chain_[i] = in_chain_[j] = elastic;
+  if (!elastic) withheld_[i] = withheld_[j] = 0;
   counters_.elastic_contacts += elastic;
   return elastic;
 }
 
-// Writes down what a contact would have dissipated that the clock made elastic.
+// Writes down what a contact would have dissipated that the clock made elastic; of a chain of them only the first that
+// would have dissipated anything, since the others keep the same energy again.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::withhold(double reduced_mass, double approach, const Contact& surface) {
-  if (!begins_chain_) return;  // counted already: the same energy is kept again
+void Engine<Space, Rule, Sizes>::withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach,
+                                          const Contact& surface) {
   const double e = surface.varies() ? surface.restitution_at(approach) : surface.restitution;
-  counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
+  const bool counted = withheld_[i] + withheld_[j] > 0;
+  if (!counted) counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
+  withheld_[i] = withheld_[j] = counted || e < 1;
 }
 
 // The restitution of two disks where it may depend on their approach; none if they touch as smooth elastic disks do.
@@ -134,7 +136,7 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   counters_.virial -= momentum * impulse.approach;
   if constexpr (Rule::dissipates) {
     dissipated_ += reduced_mass * impulse.dissipated;
-    if (elastic) withhold(reduced_mass, -impulse.approach / std::sqrt(contact_squared), disk_surface_);
+    if (elastic) withhold(i, j, reduced_mass, -impulse.approach / std::sqrt(contact_squared), disk_surface_);
   }
 }
 
@@ -200,7 +202,7 @@ void Engine<Space, Rule, Sizes>::bounce(std::uint32_t i, Motion& motion, double 
   Surface contact = surface;
   if constexpr (Rule::dissipates) {
     if (too_soon(i, i)) {
-      withhold(mass, gn, surface);
+      withhold(i, i, mass, gn, surface);
       contact = Surface{};
     } else if (surface.varies()) [[unlikely]] {
       contact.restitution = surface.restitution_at(gn);

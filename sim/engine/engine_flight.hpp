@@ -42,7 +42,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   }
   if constexpr (Rule::dissipates) {
     last_contact_.assign(count_, -never);
-    in_chain_.assign(count_, 0);
+    withheld_.assign(count_, 0);
   }
   if constexpr (!Sizes::equal) {
     for (const Placed& p : placed) {

@@ -55,7 +55,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
   if constexpr (Rule::spins) permute(spins_);
   if constexpr (Rule::dissipates) {
     permute(last_contact_);
-    permute(in_chain_);
+    permute(withheld_);
   }
   if constexpr (rests_apply) permute(rest_height_);
   if constexpr (!Sizes::equal) {
@@ -162,7 +162,7 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   }
   for (auto& spin : self.spins_) visit(spin);
   for (auto& clock : self.last_contact_) visit(clock);
-  for (auto& elastic : self.in_chain_) visit(elastic);
+  for (auto& elastic : self.withheld_) visit(elastic);
   if constexpr (rests_apply) {
     for (auto& height : self.rest_height_) visit(height);
     visit(self.resting_);

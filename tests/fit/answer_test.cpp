@@ -64,6 +64,20 @@ TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
   EXPECT_NEAR(answer.interval.low * answer.interval.high, answer.temperature * answer.temperature, 1e-9);
 }
 
+// What the simulation's contact duration leaves is one more part of the uncertainty, in quadrature, and nothing else.
+TEST(Answer, TakesInTheContactDuration) {
+  AnswerInput input = column(1.0);
+  const Answer without = find_answer(input);
+  EXPECT_EQ(without.contact_duration_uncertainty, 0);
+  input.contact_duration_effect = 0.1;
+  const Answer with = find_answer(input);
+  EXPECT_EQ(with.temperature, without.temperature);
+  EXPECT_NEAR(with.contact_duration_uncertainty, 0.1 * with.temperature, 1e-15);
+  EXPECT_NEAR(with.std_error, std::hypot(without.std_error, 0.1 * with.temperature), 1e-15);
+  EXPECT_LT(with.interval.low, without.interval.low);
+  EXPECT_GT(with.interval.high, without.interval.high);
+}
+
 TEST(Answer, TakesTheKnownBiasOff) {
   const Answer answer = find_answer(column(1.0));
   ASSERT_TRUE(answer.ok());

@@ -21,7 +21,8 @@ using shakebed::pipelines::replica_seed;
 
 // 24 disks of 4 mm in 25.2 mm: 6.3 D. With g = 10 m/s^2 the unit of time is 20 ms, a period of 50 ms is 2.5 of them.
 constexpr double disks = 24, width = 6.3, period = 2.5, periods = 12, phases = 8, looks = periods * phases;
-const std::string shaken_bed = R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5,
+const std::string shaken_bed =
+    R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5, "replicas": 1,
     "disks": { "count": 24, "diameter": "4 mm", "restitution": 0.8, "friction": 0.2 }, "gravity": "10 m/s^2",
     "box": { "width": "25.2 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
     "floor": { "motion": "sinusoidal", "amplitude": "1 mm", "frequency": "20 Hz", "restitution": 0.8 },
@@ -61,6 +62,32 @@ TEST_F(ShakenBed, HasItsTemperaturesAsLengthsToo) {
     EXPECT_GT(error(plain), 0) << name;
     EXPECT_DOUBLE_EQ(value(length), 0.004 * value(plain)) << name;
     EXPECT_DOUBLE_EQ(error(length), 0.004 * error(plain)) << name;
+  }
+}
+
+// Measured from the start: the shares are those of the whole run. What t_c withholds is what T is raised by.
+TEST_F(ShakenBed, HasTheSharesOfItsElasticContacts) {
+  EXPECT_GT((*json_)["elastic_contacts"], 0);
+  EXPECT_DOUBLE_EQ(value((*json_)["elastic_share"]),
+                   (*json_)["elastic_contacts"].get<double>() / (*json_)["collisions"].get<double>());
+  const double withheld = value((*json_)["withheld_share"]);
+  EXPECT_GT(withheld, 0);
+  EXPECT_LT(withheld, 1);
+  EXPECT_DOUBLE_EQ(value((*json_)["contact_duration_effect"]), withheld);
+}
+
+// The drift is twice what the mean of the whole exceeds that of its first half by.
+TEST_F(ShakenBed, DriftsByWhatItsFirstHalfMisses) {
+  const ProgramResult ran = run_shakebed(
+      {"run", "r.json", "--out", "half", "--set", "/stages/bed/measure=0.3 s", "--set", "/stages/bed/frames/count=4"},
+      folder_->path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json half = Json::parse(read_text(*folder_ / "half/bed/observables.json"));
+  for (const auto& [drift, mean] :
+       {std::pair{"drift_temperature_x", "temperature_x"}, std::pair{"drift_center_of_mass", "center_of_mass"}}) {
+    EXPECT_NEAR(value((*json_)[drift]), 2 * (value((*json_)[mean]) - value(half[mean])), 1e-9) << drift;
+    EXPECT_EQ((*json_)[drift]["unit"], (*json_)[mean]["unit"]);
+    EXPECT_GT(error((*json_)[drift]), 0);
   }
 }
 
@@ -337,7 +364,9 @@ const std::string replicated = R"({ "name": "t", "stages": [ { "stage": "simulat
     "bath": { "kind": "langevin", "temperature": 0.3, "rate": 0.5, "interval": 0.2 },
     "settle": 5, "measure": 30, "observe": ["order", "velocities", "pressure"] } ] })";
 
-// Four beds together are the mean of the four one by one, and their standard deviation over two is the error.
+// Four beds together are the mean of the four one by one. Their standard deviation over two, times Student's t for
+// three degrees of freedom, 3.182446, over the normal 1.959964, is the error, or what the beds state where that is
+// more.
 TEST(Replicas, AreTheMeanOfTheirBeds) {
   const ScratchFolder folder;
   write_text(folder / "r.json", replicated);
@@ -366,7 +395,12 @@ TEST(Replicas, AreTheMeanOfTheirBeds) {
       EXPECT_EQ(found["unit"], single[0][name]["unit"]) << name;
       if (squares == 0) continue;
       ++quantities;
-      EXPECT_NEAR(error(found), std::sqrt(squares / 12), 1e-12 * (1 + std::abs(sum))) << name;
+      double within = 0;
+      for (const Json& one : single) {
+        if (one[name].contains("std_error")) within += std::pow(error(one[name]), 2) / 4;
+      }
+      const double between = 3.182446 / 1.959964 * std::sqrt(squares / 3);
+      EXPECT_NEAR(error(found), std::max(between, std::sqrt(within)) / 2, 1e-6 * between) << name;
       for (std::size_t r = 0; r < 4; ++r) EXPECT_DOUBLE_EQ(table(name, r), value(single[r][name])) << name;
     } else if (found.is_number_integer() && name != "replicas" && name != "periods") {
       double sum = 0;
@@ -386,19 +420,21 @@ TEST(Replicas, AreTheMeanOfTheirBeds) {
   for (int r = 0; r < 4; ++r) profiles.emplace_back(folder / ("one" + std::to_string(r) + "/bed/profile.csv"));
   double worst = 0;
   for (std::size_t i = 0; i < profile.rows(); ++i) {
-    double sum = 0, squares = 0, samples = 0;
+    double sum = 0, squares = 0, samples = 0, within = 0;
     std::vector<double> densities;
     for (const NumberTable& one : profiles) {
       double density = 0;
       for (std::size_t k = 0; k < one.rows(); ++k) {
         if (one("height", k) != profile("height", i)) continue;
         density = one("number_density", k), samples += one("samples", k);
+        within += std::pow(one("std_error", k), 2) / 4;
       }
       densities.push_back(density), sum += density;
     }
     for (const double density : densities) squares += std::pow(density - sum / 4, 2);
     EXPECT_NEAR(profile("number_density", i), sum / 4, 1e-12);
-    EXPECT_NEAR(profile("std_error", i), std::sqrt(squares / 12), 1e-9);
+    const double between = 3.182446 / 1.959964 * std::sqrt(squares / 3);
+    EXPECT_NEAR(profile("std_error", i), std::max(between, std::sqrt(within)) / 2, 1e-9 + 1e-6 * between);
     worst = std::max(worst, std::abs(profile("samples", i) - samples));
   }
   EXPECT_LE(worst, 2.5) << "each is rounded";

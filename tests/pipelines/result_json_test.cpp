@@ -202,6 +202,7 @@ fit::Answer an_answer() {
   answer.thermometer = "whole column", answer.model = "fermi";
   answer.temperature = 0.25, answer.std_error = 0.025;
   answer.statistical_error = 0.011, answer.bias_uncertainty = 0.012, answer.spread = 0.013;
+  answer.contact_duration_uncertainty = 0.014;
   answer.bias = 0.07;
   answer.interval = {fit::FitStatus::ok, 0.21, 0.31, 0.9, false, true};
   answer.solid_height = {9.5, 0.14};
@@ -226,6 +227,7 @@ TEST(AnswerJson, HoldsEveryNumberWithItsErrorAndUnit) {
                            {"/interval/low", 0.21, -1, "m g D"},
                            {"/interval/high", 0.31, -1, "m g D"},
                            {"/statistical_error", 0.011, -1, "m g D"},
+                           {"/contact_duration_uncertainty", 0.014, -1, "m g D"},
                            {"/bias_uncertainty", 0.012, -1, "m g D"},
                            {"/spread", 0.013, -1, "m g D"},
                            {"/solid_height", 9.5, 0.14, "D"},

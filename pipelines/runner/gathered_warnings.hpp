@@ -1,0 +1,27 @@
+// The warnings of many runs: each kind once, with how many runs have it.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipelines/formats/json.hpp"
+
+namespace shakebed::pipelines {
+
+class GatheredWarnings {
+ public:
+  // The warnings of one run, an array of texts. Warnings that differ in their numbers alone are of one kind.
+  void add(const Json& warnings);
+  // The first of each kind in the order they came, "... (4 points)".
+  std::vector<std::string> lines() const;
+
+ private:
+  struct Kind {
+    std::string pattern, first;
+    std::size_t runs = 0;
+  };
+  std::vector<Kind> kinds_;
+};
+
+}  // namespace shakebed::pipelines
