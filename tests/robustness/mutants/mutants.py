@@ -54,6 +54,10 @@ SLOW = {
                  "Disks/EventQueueOrder*", "Engine.ReturnsAfter*", "ShellGrid*", "NarrowCell*"),
     "test_fit": ("FitHardCases.AnyProfile*", "Coverage.*", "Answer.OfAny*", "SimulatedProfiles.Repeats*", "CrossCheck*",
                  "Frames.Windows*", "FitHardCases.AHundred*", "Bounce.Nearly*", "Bias*"),
+    "test_ingest": ("Survey*", "FinderBenchmark*", "ShakingFrequency.Noise*", "Finder.APacked*", "Rim*", "RealFrames*",
+                    "HardCases.Half*", "HardCases.BeadsLit*", "HardCases.Saturated*", "HardCases.AFrame*",
+                    "HardCases.DisksOfThreeHundred*", "Finder.Steps*", "Finder.Rows*", "MeasureBed.TheShakers*",
+                    "MeasureBed.WithASink*", "MeasureBed.ASecond*", "Lens/*"),
     "test_numbers": ("StatedErrors*", "StudyNumbers*", "Tampering*", "Replicas*", "InferNumbers*"),
 }
 # The tests of a room first, then those of the rooms above.
