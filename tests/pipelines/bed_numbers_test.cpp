@@ -448,6 +448,19 @@ TEST(Replicas, AreTheMeanOfTheirBeds) {
     worst = std::max(worst, std::abs(profile("samples", i) - samples));
   }
   EXPECT_LE(worst, 2.5) << "each is rounded";
+
+  // The covariance: of a mean of four what each shows of itself, over 16, and more where they differ by more than that.
+  const auto variance = [](const NumberTable& covariance) {
+    double sum = 0;
+    for (std::size_t r = 0; r < covariance.rows(); ++r)
+      if (covariance("height_i", r) == covariance("height_j", r)) sum += covariance("covariance", r);
+    return sum;
+  };
+  double own = 0, seen = 0;
+  for (int r = 0; r < 4; ++r)
+    own += variance(NumberTable(folder / ("one" + std::to_string(r) + "/bed/covariance.csv"))) / 16;
+  for (const double one : profile.column("std_error")) seen += one * one;
+  EXPECT_NEAR(variance(NumberTable(folder / "all/bed/covariance.csv")) / std::max(own, seen), 1, 1e-6);
 }
 
 }  // namespace
