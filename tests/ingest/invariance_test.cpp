@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/find/find_disks.hpp"
+#include "ingest/find/learn_beads.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest {
@@ -86,6 +87,37 @@ TEST(FourBorders, OfARegionCutToo) {
     const FoundDisk* disk = nearest(found, all[k].x_px, all[k].y_px);
     ASSERT_NE(disk, nullptr) << k;
     EXPECT_EQ(disk->cut, k < 4) << k;
+  }
+}
+
+// Beads that are found by their rims alone are cut by the same borders, and by those of a region.
+TEST(FourBorders, CutWhatIsFoundByRimsToo) {
+  const GrayFrame frame = render_frame(beads(), camera());
+  const CalibrationResult learned = learn_by_rims(frame, {Polarity::dark_beads, bead_radius});
+  ASSERT_TRUE(learned.found && learned.calibration.by_rims) << learned.why_not;
+  const FindResult found = find_beads(frame, learned.calibration, {});
+  const std::vector<RenderedDisk> truth = beads();
+  std::size_t seen[2] = {0, 0};
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    const FoundDisk* disk = nearest(found, truth[k].x_px, truth[k].y_px);
+    if (disk == nullptr) continue;
+    EXPECT_EQ(disk->cut, k < 4) << k;
+    ++seen[k < 4 ? 0 : 1];
+  }
+  EXPECT_EQ(seen[0], 4U) << "of the four that are cut";
+  EXPECT_EQ(seen[1], 8U) << "of the whole ones";
+  // A region whose borders go through the middle of what was whole: left, right, top and bottom each cut their bead.
+  FindOptions options;
+  const double inside = bead_radius - 3;
+  for (const auto& [bead, roi] : {std::pair{8U, PixelRectangle{static_cast<int>(60.3 - inside), 0, 60, frame_height}},
+                                  {10U, PixelRectangle{60, 0, static_cast<int>(110.4 + inside) - 60, frame_height}},
+                                  {9U, PixelRectangle{0, static_cast<int>(55.1 - inside), frame_width, 60}},
+                                  {11U, PixelRectangle{0, 50, frame_width, static_cast<int>(95.2 + inside) - 50}}}) {
+    options.roi = roi;
+    const FindResult of_region = find_beads(frame, learned.calibration, options);
+    const FoundDisk* disk = nearest(of_region, truth[bead].x_px, truth[bead].y_px);
+    ASSERT_NE(disk, nullptr) << bead;
+    EXPECT_TRUE(disk->cut) << bead;
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "fit/theory/equation_of_state.hpp"
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/pipelines/read_table.hpp"
@@ -325,6 +326,51 @@ TEST_F(ShakenBed, HasTheVelocitiesOfItsLayersTwice) {
   }
 }
 
+// Three disks far from one another that bounce straight up and down: nothing at all happens across, so that no number
+// of one direction may stand in the place of the other.
+TEST(DisksThatBounceStraightUp, HaveNothingAcross) {
+  const ScratchFolder folder;
+  {
+    shakebed::pipelines::TrajectoryWriter start(folder / "start.extxyz");
+    shakebed::pipelines::TrajectoryFrame frame;
+    frame.width = 9;
+    frame.x = {1.5, 4.5, 7.5}, frame.z = {1.5, 2.25, 3.5}, frame.vx = {0, 0, 0}, frame.vz = {0.3, -0.2, 0.1};
+    start.write(frame);
+    start.close();
+  }
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 2,
+      "units": "reduced", "disks": { "count": 3 }, "box": { "width": 9 }, "start": { "kind": "file", "file": "start.extxyz" },
+      "settle": 0, "measure": 40, "observe": ["velocities", "displacement", "pressure", "phases"] } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json json = Json::parse(read_text(folder / "o/bed/observables.json"));
+  EXPECT_EQ(value(json["temperature_x"]), 0);
+  EXPECT_EQ(error(json["temperature_x"]), 0);
+  EXPECT_GT(value(json["temperature_z"]), 0.1);
+  EXPECT_GT(error(json["temperature_z"]), 0);
+  const auto expect_nothing = [&](const std::string& file,
+                                  const std::vector<std::pair<std::string, std::string>>& pairs) {
+    const NumberTable table(folder / ("o/bed/" + file));
+    for (const auto& [across, upwards] : pairs) {
+      double x = 0, z = 0;
+      for (std::size_t r = 0; r < table.rows(); ++r) {
+        if (!std::isfinite(table(upwards, r))) continue;  // of one pair of looks there is no error
+        x += std::abs(table(across, r)), z += std::abs(table(upwards, r));
+      }
+      EXPECT_EQ(x, 0) << file << " " << across;
+      EXPECT_GT(z, 0) << file << " " << upwards;
+    }
+  };
+  expect_nothing("layers.csv", {{"temperature_x", "temperature_z"}});
+  expect_nothing("velocities.csv", {{"temperature_x", "temperature_z"}, {"mean_velocity_x", "mean_velocity_z"}});
+  expect_nothing("phases.csv", {{"temperature_x", "temperature_z"}, {"mean_velocity_x", "mean_velocity_z"}});
+  expect_nothing("displacement.csv", {{"msd_x", "msd_z"}, {"std_error_x", "std_error_z"}});
+  expect_nothing("pressure.csv", {{"temperature_x", "temperature_z"},
+                                  {"temperature_x_error", "temperature_z_error"},
+                                  {"pressure_xx", "pressure_zz"},
+                                  {"pressure_xx_error", "pressure_zz_error"}});
+}
+
 // Rows of six that hardly move: the lowest row is 6.06 D wide and sqrt(3)/2 D high.
 TEST(ColdBed, HasItsBottomRow) {
   const ScratchFolder folder;
@@ -438,6 +484,19 @@ TEST(Replicas, AreTheMeanOfTheirBeds) {
     worst = std::max(worst, std::abs(profile("samples", i) - samples));
   }
   EXPECT_LE(worst, 2.5) << "each is rounded";
+
+  // The covariance: of a mean of four what each shows of itself, over 16, and more where they differ by more than that.
+  const auto variance = [](const NumberTable& covariance) {
+    double sum = 0;
+    for (std::size_t r = 0; r < covariance.rows(); ++r)
+      if (covariance("height_i", r) == covariance("height_j", r)) sum += covariance("covariance", r);
+    return sum;
+  };
+  double own = 0, seen = 0;
+  for (int r = 0; r < 4; ++r)
+    own += variance(NumberTable(folder / ("one" + std::to_string(r) + "/bed/covariance.csv"))) / 16;
+  for (const double one : profile.column("std_error")) seen += one * one;
+  EXPECT_NEAR(variance(NumberTable(folder / "all/bed/covariance.csv")) / std::max(own, seen), 1, 1e-6);
 }
 
 }  // namespace

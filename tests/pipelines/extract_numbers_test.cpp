@@ -307,4 +307,35 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   EXPECT_EQ(details("species", 5), 2);
 }
 
+// Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
+// every second frame of the film as well; half of g makes twice the length T/(m g).
+TEST_F(ExtractTables, HoldTemperaturesByTheFramesReadAndByGravity) {
+  const auto temperature = [&](double rate, std::uint32_t stride, double gravity) {
+    ExtractOptions options = some_options();
+    options.frame_rate = rate, options.stride = stride, options.gravity = gravity, options.overlays = 0;
+    DisksOnTheWay on_the_way(extract_, options, nullptr);
+    for (std::size_t frame = 0; frame < 6; ++frame) {
+      std::vector<ingest::MeasuredDisk> disks;
+      for (int k = 0; k < 20; ++k) {
+        ingest::MeasuredDisk disk;
+        disk.frame = frame, disk.radius_px = 5, disk.quality = 1;
+        disk.x = 2 + 3 * (k % 5) + 0.02 * std::sin(3.0 * k) * static_cast<double>(frame);
+        disk.z = 2 + 0.01 * k + 3 * (k / 5) + 0.02 * std::cos(5.0 * k) * static_cast<double>(frame);
+        disk.x_px = 10 * disk.x, disk.y_px = 10 * disk.z;
+        disks.push_back(disk);
+      }
+      ingest::FrameReport report;
+      report.index = frame;
+      on_the_way.take(report, disks);
+    }
+    on_the_way.close();
+    return on_the_way.velocities()->horizontal.over_mg_m;
+  };
+  const double plain = temperature(1000, 1, 9.81);
+  ASSERT_GT(plain, 0);
+  EXPECT_NEAR(temperature(500, 1, 9.81) / plain, 0.25, 1e-9);
+  EXPECT_NEAR(temperature(1000, 2, 9.81) / plain, 0.25, 1e-9);
+  EXPECT_NEAR(temperature(1000, 1, 4.905) / plain, 2, 1e-9);
+}
+
 }  // namespace

@@ -167,6 +167,7 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   EXPECT_GT(map["readings"].size(), 4u);
   EXPECT_NEAR(map["gamma"].is_number() ? map["gamma"].get<double>() : map["gamma"]["value"].get<double>(), 3.2194,
               1e-3);
+  EXPECT_NEAR(value(map["initial_height"]), value(extract["column_number"]) / 1.1, 1e-9) << "N D/W over phi_0";
   std::size_t overlays = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(*folder_ / "photos/extract"))
     overlays += entry.path().filename().string().starts_with("overlay_");

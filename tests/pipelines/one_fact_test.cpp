@@ -65,6 +65,9 @@ TEST_F(OneFact, WhatTheBedKnowsNeedNotBeStatedAgain) {
   EXPECT_DOUBLE_EQ(fit["temperature_over_mg"]["value"].get<double>(), 3e-3 * fit["temperature"]["value"].get<double>());
   EXPECT_DOUBLE_EQ(bed["diameter"]["value"].get<double>(), 3e-3);
   EXPECT_NEAR(map["gamma"]["value"].get<double>(), 2.5e-3 * std::pow(2 * M_PI * 20, 2) / 9.81, 1e-12);
+  EXPECT_DOUBLE_EQ(map["initial_height"]["value"].get<double>(),
+                   40 / 16.3 / fit["plateau_density"]["value"].get<double>())
+      << "N D/W over phi_0";
 }
 
 TEST_F(OneFact, PhotographsOfTheUsersOwnNeedTheirDiameterAndCarryIt) {

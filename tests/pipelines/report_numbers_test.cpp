@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
@@ -91,6 +93,34 @@ TEST(SweepTable, HoldsItsAxesInSi) {
   }
   EXPECT_GE(seen, 2U);
   for (std::size_t r = 0; r < 2; ++r) EXPECT_EQ(table.text("status", r), "ok");
+}
+
+// A point's numbers depend on its values alone: not on its place in the sweep, nor on the shard that ran it.
+TEST(SweepTable, DoesNotSeeTheOrderOfItsPointsNorTheirShards) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::string& out, const std::string& values, const std::vector<std::string>& shards) {
+    write_text(folder / "r.json", R"({ "name": "t", "sweep": { "over": { "/stages/bed/floor/amplitude": )" + values +
+                                      R"( }, "collect": ["/bed/temperature_x", "/bed/center_of_mass"] },
+      "stages": [ { "stage": "simulate", "id": "bed", "seed": 3, "units": "reduced",
+        "disks": { "count": 20, "restitution": 0.9 }, "box": { "width": 5.3, "sides": "periodic" },
+        "floor": { "motion": "sinusoidal", "amplitude": 1, "frequency": 0.35, "restitution": 0.9 },
+        "settle": 2, "measure": 6 } ] })");
+    for (const std::string& shard : shards) {
+      std::vector<std::string> arguments{"run", "r.json", "--out", out};
+      if (!shard.empty()) arguments.insert(arguments.end(), {"--shard", shard});
+      EXPECT_EQ(run_shakebed(arguments, folder.path()).exit_code, 0) << shard;
+    }
+    const NumberTable table(folder / (out + "/sweep.csv"));
+    std::map<double, std::vector<double>> found;
+    for (std::size_t r = 0; r < table.rows(); ++r)
+      for (const char* column : {"bed_temperature_x", "bed_temperature_x_std_error", "bed_center_of_mass"})
+        found[table("bed_floor_amplitude", r)].push_back(table(column, r));
+    return found;
+  };
+  const auto plain = run("plain", "[0.7, 0.9, 1.2]", {""});
+  ASSERT_EQ(plain.size(), 3U);
+  EXPECT_EQ(run("turned", "[1.2, 0.7, 0.9]", {""}), plain);
+  EXPECT_EQ(run("shards", "[0.7, 0.9, 1.2]", {"2/2", "1/2"}), plain);
 }
 
 }  // namespace

@@ -269,4 +269,56 @@ TEST(AnswerText, IsInMillimetresWhereTheDiameterIsKnown) {
             "T between 0.21 and 0.31 m g D. No single temperature: so it is");
 }
 
+// --- theory and map: lengths are T times the diameter, T/T_c is T over T_c
+
+TEST(TheoryJson, HoldsItsNumbersInTheirUnits) {
+  TheoryQuestion question;
+  question.plateau_density = 1.1, question.diameter = diameter, question.initial_height = 10,
+  question.temperature = 0.05;
+  const Json json = theory_json(question);
+  const double critical = json["critical_temperature"];
+  const double mu_0 = json["mu_0"];
+  EXPECT_NEAR(critical, 10 * 1.1 / mu_0, 1e-9 * critical) << "N D/W = phi_0 mu is T_c mu_0";
+  expect_numbers(json, {{"/plateau_density", 1.1},
+                        {"/diameter", 0.004},
+                        {"/initial_height", 10},
+                        {"/column_number", 11},
+                        {"/temperature", 0.05},
+                        {"/temperature_over_mg", 0.0002},
+                        {"/critical_temperature_over_mg", 0.004 * critical},
+                        {"/reduced_temperature", 0.05 / critical}});
+  EXPECT_NEAR(json["solid_height"].get<double>(), (11 - 0.05 * mu_0) / 1.1, 1e-9);
+  EXPECT_GT(json["center_of_mass_rise"].get<double>(), 0);
+  for (const auto& [name, unit] : {std::pair{"diameter", "m"},
+                                   {"initial_height", "D"},
+                                   {"temperature", "m g D"},
+                                   {"temperature_over_mg", "m"},
+                                   {"critical_temperature", "m g D"},
+                                   {"critical_temperature_over_mg", "m"},
+                                   {"solid_height", "D"},
+                                   {"center_of_mass_rise", "D"},
+                                   {"plateau_density", "1/D^2"},
+                                   {"mu_0", "1"}})
+    EXPECT_EQ(json["units"][name], unit) << name;
+  const std::string text = theory_text(question);
+  EXPECT_NE(text.find("temperature_over_mg                        0.0002 m\n"), std::string::npos) << text;
+}
+
+TEST(MapText, ShowsTheNumbersOfTheMap) {
+  MapQuestion question;
+  question.gamma = 4, question.frequency = 20, question.diameter = 0.003, question.initial_height = 10;
+  question.measured_temperature = 0.05;
+  const Json map = map_json(question);
+  const std::string text = map_text(map);
+  for (const Json& row : map["readings"]) {
+    if (row["jump"].is_null()) continue;
+    char line[200];
+    std::snprintf(line, sizeof line, "%-40s %10.4f %12.4f %9s\n", row["name"].get<std::string>().c_str(),
+                  row["jump"]["value"].get<double>(), row["reduced_temperature"]["value"].get<double>(),
+                  row["in_range"].get<bool>() ? "yes" : "no");
+    EXPECT_NE(text.find(line), std::string::npos) << line << "in\n" << text;
+  }
+  EXPECT_NE(text.find("Gamma = 4\n"), std::string::npos);
+}
+
 }  // namespace
