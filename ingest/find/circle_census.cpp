@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/picture_scale.hpp"
 
@@ -19,62 +20,13 @@ constexpr double mode_width = 0.1;                                // radii of on
 constexpr double faintest_support = 0.35;
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
-// The window of at most `side` px with the most change of level; returns its left and top.
-std::array<int, 2> busiest_corner(const GrayFrame& frame, int wide, int high) {
-  constexpr int block = 16;
-  const int columns = frame.width / block, rows = frame.height / block;
-  std::vector<double> sums(static_cast<std::size_t>(columns + 1) * static_cast<std::size_t>(rows + 1), 0.0);
-  const auto at = [&](int column, int row) -> double& {
-    return sums[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +
-                static_cast<std::size_t>(column)];
-  };
-  for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < columns; ++column) {
-      double sum = 0;
-      for (int y = row * block; y < (row + 1) * block - 2; y += 2)
-        for (int x = column * block; x < (column + 1) * block - 2; x += 2) {
-          const float change =
-              std::abs(frame.at(x + 2, y) - frame.at(x, y)) + std::abs(frame.at(x, y + 2) - frame.at(x, y));
-          sum += unseen(change) ? 0.0 : static_cast<double>(change);
-        }
-      at(column + 1, row + 1) = sum + at(column, row + 1) + at(column + 1, row) - at(column, row);
-    }
-  const int window_columns = std::min(columns, wide / block), window_rows = std::min(rows, high / block);
-  int best_column = 0, best_row = 0;
-  double best = -1;
-  for (int row = 0; row + window_rows <= rows; ++row)
-    for (int column = 0; column + window_columns <= columns; ++column) {
-      const double sum = at(column + window_columns, row + window_rows) - at(column, row + window_rows) -
-                         at(column + window_columns, row) + at(column, row);
-      if (sum > best) {
-        best = sum;
-        best_column = column;
-        best_row = row;
-      }
-    }
-  return {std::min(best_column * block, frame.width - wide), std::min(best_row * block, frame.height - high)};
-}
-
-GrayFrame cut_out(const GrayFrame& frame, int left, int top, int wide, int high) {
-  GrayFrame window;
-  window.width = wide;
-  window.height = high;
-  window.pixels.reserve(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
-  for (int row = top; row < top + high; ++row) {
-    const auto from = frame.pixels.begin() + static_cast<std::ptrdiff_t>(row) * frame.width + left;
-    window.pixels.insert(window.pixels.end(), from, from + wide);
-  }
-  return window;
-}
-
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
   ScaledPicture level;
-  const int wide = std::min(side, picture.width), high = std::min(side, picture.height);
-  const auto [left, top] = busiest_corner(picture, wide, high);
-  level.picture = cut_out(picture, left, top, wide, high);
+  const PicturePart part = busiest_part(picture, side, {.block = 16, .reach = 2, .stride = 2});
+  level.picture = cut_out(picture, part);
   level.scale = scale;
-  level.left = left * scale;
-  level.top = top * scale;
+  level.left = part.left * scale;
+  level.top = part.top * scale;
   return level;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "ingest/find/nearby.hpp"
@@ -137,57 +138,92 @@ bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, doubl
   return met >= 6 && 10 * met >= 4 * in_view;
 }
 
-std::vector<float> vote_map(const EdgeMap& edges, double radius, float sign) {
-  const std::size_t width = static_cast<std::size_t>(edges.width);
-  std::vector<float> votes(width * static_cast<std::size_t>(edges.height), 0.0F);
-  const float shift = static_cast<float>(-radius) * sign;
-  for (const RidgePixel& edge : edges.ridge) {
-    const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
-    const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
-    if (column < 1 || row < 1 || column >= edges.width - 1 || row >= edges.height - 1) continue;
-    votes[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] += 1.0F;
-  }
-  return votes;
-}
+// Votes for centres one radius away from each edge, and where most are gathered in 3 x 3 pixels. The tables are kept
+// from one radius to the next: pages fresh from the system cost more than the votes.
+class VoteMap {
+ public:
+  explicit VoteMap(const EdgeMap& edges)
+      : edges_(edges),
+        width_(static_cast<std::size_t>(edges.width)),
+        height_(static_cast<std::size_t>(edges.height)),
+        votes_(width_ * height_),
+        across_(width_),
+        sums_(window * width_) {}
 
-// Sums over 3 x 3 pixels.
-std::vector<float> gathered(const std::vector<float>& votes, int width_px, int height_px) {
-  const std::size_t width = static_cast<std::size_t>(width_px), height = static_cast<std::size_t>(height_px);
-  std::vector<float> across(votes.size(), 0.0F), sums(votes.size(), 0.0F);
-  for (std::size_t row = 0; row < height; ++row) {
-    const float* from = votes.data() + row * width;
-    float* to = across.data() + row * width;
-    for (std::size_t k = 1; k + 1 < width; ++k) to[k] = from[k - 1] + from[k] + from[k + 1];
+  std::vector<Circle> peaks(double radius, float sign) {
+    vote(static_cast<float>(-radius) * sign);
+    const double least = std::ceil(least_votes * 2 * std::numbers::pi * radius);
+    std::vector<Circle> peaks;
+    if (height_ < window) return peaks;
+    // Sums of the two rows above and below a row are at hand when its peaks are looked for.
+    std::fill(sums_.begin(), sums_.end(), Count{0});
+    for (std::size_t row = 1; row < height_; ++row) {
+      gather(row);
+      if (row >= 4) find_peaks_in(row - 2, static_cast<Count>(least), radius, peaks);
+    }
+    return peaks;
   }
-  for (std::size_t row = 1; row + 1 < height; ++row) {
-    const float* from = across.data() + row * width;
-    float* to = sums.data() + row * width;
-    for (std::size_t k = 0; k < width; ++k) to[k] = *(from + k - width) + from[k] + from[k + width];
-  }
-  return sums;
-}
 
-std::vector<Circle> peaks_of(const std::vector<float>& sums, int width, int height, double radius) {
-  const float least = static_cast<float>(least_votes * 2 * std::numbers::pi * radius);
-  std::vector<Circle> peaks;
-  for (int row = 2; row + 2 < height; ++row) {
-    const float* here = sums.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
-    for (int column = 2; column + 2 < width; ++column) {
-      const float value = here[column];
-      if (value < least) continue;
-      bool highest = true;
-      for (int dy = -2; dy <= 2 && highest; ++dy)
-        for (int dx = -2; dx <= 2 && highest; ++dx) {
-          const float other = *(here + dy * width + column + dx);
-          highest =
-              dy < 0 || (dy == 0 && dx < 0) ? other <= value : (dx == 0 && dy == 0) || other < value || other == value;
-          if (other == value && (dy < 0 || (dy == 0 && dx < 0))) highest = false;
-        }
-      if (highest) peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius});
+ private:
+  using Count = std::uint16_t;
+  static constexpr std::size_t window = 5;
+
+  void vote(float shift) {
+    std::fill(votes_.begin(), votes_.end(), Count{0});
+    for (const RidgePixel& edge : edges_.ridge) {
+      const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
+      const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
+      if (column < 1 || row < 1 || column >= edges_.width - 1 || row >= edges_.height - 1) continue;
+      ++votes_[static_cast<std::size_t>(row) * width_ + static_cast<std::size_t>(column)];
     }
   }
-  return peaks;
-}
+
+  Count* sums_of(std::size_t row) { return sums_.data() + row % window * width_; }
+
+  // Sums over 3 x 3 pixels; 0 in the outermost rows and columns.
+  void gather(std::size_t row) {
+    Count* to = sums_of(row);
+    if (row + 1 >= height_) {
+      std::fill(to, to + width_, Count{0});
+      return;
+    }
+    const Count *middle = votes_.data() + row * width_, *above = middle - width_, *below = middle + width_;
+    Count* across = across_.data();
+    const std::size_t width = width_;
+    for (std::size_t k = 0; k < width; ++k) across[k] = static_cast<Count>(above[k] + middle[k] + below[k]);
+    for (std::size_t k = 1; k + 1 < width; ++k) to[k] = static_cast<Count>(across[k - 1] + across[k] + across[k + 1]);
+    to[0] = to[width - 1] = 0;
+  }
+
+  // Most blocks of a row hold nothing.
+  void find_peaks_in(std::size_t row, Count least, double radius, std::vector<Circle>& peaks) {
+    constexpr std::size_t block = 64;
+    const Count* here = sums_of(row);
+    for (std::size_t first = 2; first + 2 < width_; first += block) {
+      const std::size_t last = std::min(first + block, width_ - 2);
+      Count most = 0;
+      for (std::size_t column = first; column < last; ++column) most = std::max(most, here[column]);
+      for (std::size_t column = most < least ? last : first; column < last; ++column)
+        if (here[column] >= least && highest(row, column, here[column]))
+          peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius});
+    }
+  }
+
+  // Of equal ones the first counts.
+  bool highest(std::size_t row, std::size_t column, Count value) {
+    for (std::size_t y = row - 2; y <= row + 2; ++y)
+      for (std::size_t x = column - 2; x <= column + 2; ++x) {
+        const Count other = sums_of(y)[x];
+        const bool earlier = y < row || (y == row && x < column);
+        if (other > value || (earlier && other == value)) return false;
+      }
+    return true;
+  }
+
+  const EdgeMap& edges_;
+  std::size_t width_, height_;
+  std::vector<Count> votes_, across_, sums_;
+};
 
 }  // namespace
 
@@ -246,10 +282,10 @@ std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, P
   if (edges.ridge.size() < 8) return found;
   const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
   const int count = static_cast<int>(std::ceil(std::log(to / from) / std::log(radius_ratio) - 1e-9)) + 1;
+  VoteMap votes(edges);
   for (int k = 0; k < count; ++k) {
     const double radius = from * std::pow(radius_ratio, k);
-    const std::vector<float> sums = gathered(vote_map(edges, radius, sign), edges.width, edges.height);
-    for (const Circle& peak : peaks_of(sums, edges.width, edges.height, radius)) {
+    for (const Circle& peak : votes.peaks(radius, sign)) {
       const Circle circle = fit_circle(edges, peak, polarity);
       if (circle.support >= least_support) found.push_back(circle);
     }

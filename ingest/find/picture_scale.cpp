@@ -11,22 +11,6 @@ namespace {
 constexpr double least_radius = 5, wanted_radius = 8;  // px: below the first a rim is too coarse to tell a circle
 }
 
-GrayFrame halved(const GrayFrame& frame) {
-  GrayFrame half;
-  half.width = frame.width / 2;
-  half.height = frame.height / 2;
-  half.pixels.resize(static_cast<std::size_t>(half.width) * static_cast<std::size_t>(half.height));
-  for (int row = 0; row < half.height; ++row) {
-    const float* upper =
-        frame.pixels.data() + static_cast<std::size_t>(2 * row) * static_cast<std::size_t>(frame.width);
-    const float* lower = upper + frame.width;
-    float* to = half.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(half.width);
-    for (int column = 0; column < half.width; ++column)
-      to[column] = 0.25F * (upper[2 * column] + upper[2 * column + 1] + lower[2 * column] + lower[2 * column + 1]);
-  }
-  return half;
-}
-
 GrayFrame doubled(const GrayFrame& frame) {
   GrayFrame twice;
   twice.width = 2 * frame.width;

@@ -5,8 +5,7 @@
 
 namespace shakebed::ingest {
 
-// Half the resolution (averages of 2 x 2 pixels); twice the resolution (bilinear).
-GrayFrame halved(const GrayFrame& frame);
+// Twice the resolution (bilinear).
 GrayFrame doubled(const GrayFrame& frame);
 
 // The picture stretched by sqrt(ratio) along the axis at `angle` and shrunk by as much across it, about its middle;

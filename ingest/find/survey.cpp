@@ -30,6 +30,7 @@ constexpr double least_side = 0.15;
 // Radii, over which the level changes at a rim: beads up to 0.44, softly enlarged ones 0.73, noise smoothed over a
 // length 1.4, blurred spots 1.6. Spots are beads where they, and little else, make up the picture.
 constexpr double widest_rim = 1.1, spots_explained = 0.5;
+constexpr double much_smaller = 0.7;  // radii
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
@@ -132,7 +133,24 @@ void judge(SurveyCandidate& candidate, double edge_length_px, const Roundness& r
     candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
   else
     candidate.why_not = roundness.why_not();
+  candidate.not_round = !roundness.round();
   candidate.credible = candidate.why_not.empty();
+}
+
+// Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.
+void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
+  for (SurveyCandidate& candidate : candidates) {
+    if (!candidate.credible) continue;
+    for (const SurveyCandidate& other : candidates) {
+      if (!other.not_round || other.rims.radius_px > much_smaller * candidate.rims.radius_px ||
+          other.explained_share <= candidate.explained_share)
+        continue;
+      candidate.credible = false;
+      candidate.why_not =
+          text_of("things of %.1f px that are not round make up more of the edges than circles of %.1f px",
+                  other.rims.radius_px, candidate.rims.radius_px);
+    }
+  }
 }
 
 void enlarge(SurveyCandidate& candidate, int factor) {
@@ -180,6 +198,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     }
     survey.candidates.push_back(std::move(candidate));
   }
+  compare_with_smaller(survey.candidates);
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
                    [](const SurveyCandidate& a, const SurveyCandidate& b) {
                      if (a.credible != b.credible) return a.credible;

@@ -17,6 +17,7 @@ struct SurveyCandidate {
   double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
+  bool not_round = false;      // circles are seen, but on outlines that are not round
   bool credible = false;       // "no beads here" does not explain the picture as well
   std::string why_not;         // a sentence, unless credible
 };

@@ -10,21 +10,37 @@
 
 namespace shakebed::ingest {
 
+namespace {
+
+// Pixels: a larger overlay takes longer to write than the disks to find, and pages cannot hold it. Ten million pixels
+// are more than a screen shows.
+constexpr double most_overlay_pixels = 1e7;
+
+// As asked for, or less; a large frame is reduced by a whole number.
+double magnification_for(const GrayFrame& frame, int wanted) {
+  const double pixels = static_cast<double>(frame.width) * frame.height;
+  if (pixels > most_overlay_pixels) return 1 / std::ceil(std::sqrt(pixels / most_overlay_pixels));
+  int magnification = std::clamp(wanted, 1, 8);
+  while (magnification > 1 && pixels * magnification * magnification > most_overlay_pixels) --magnification;
+  return magnification;
+}
+
+}  // namespace
+
 void write_overlay(const std::filesystem::path& path, const GrayFrame& frame, const std::vector<FoundDisk>& disks,
                    const OverlayOptions& options) {
   if (frame.width <= 0 || frame.height <= 0 ||
       frame.pixels.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height))
     throw InputError(path.string(), "no frame to draw on", "it is empty or its size is wrong", "check the frame");
-  int magnification = std::clamp(options.magnification, 1, 8);
-  while (magnification > 1 && static_cast<double>(frame.width) * frame.height * magnification * magnification > 3e7)
-    --magnification;
+  const double magnification = magnification_for(frame, options.magnification);
   cv::Mat gray(frame.height, frame.width, CV_8U);
   for (int row = 0; row < frame.height; ++row)
     for (int column = 0; column < frame.width; ++column)
       gray.at<std::uint8_t>(row, column) =
           static_cast<std::uint8_t>(std::min(255.0F, std::max(0.0F, frame.at(column, row))) + 0.5F);
   cv::Mat large, picture;
-  cv::resize(gray, large, cv::Size(), magnification, magnification, cv::INTER_NEAREST);
+  cv::resize(gray, large, cv::Size(), magnification, magnification,
+             magnification < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);
   cv::cvtColor(large, picture, cv::COLOR_GRAY2BGR);
   constexpr int shift = 6;  // sub-pixel drawing: 1/64 px
   const auto place = [&](double px) {

@@ -11,7 +11,7 @@
 namespace shakebed::ingest {
 
 struct OverlayOptions {
-  int magnification = 2;           // px of the overlay per px of the frame
+  int magnification = 2;           // px of the overlay per px of the frame; large frames are reduced instead
   std::optional<double> floor_px;  // draw the floor: y_px at the left edge of the frame ...
   double floor_slope = 0;          // ... and its slope (px down per px right)
   std::optional<double> left_wall_px, right_wall_px;

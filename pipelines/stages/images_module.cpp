@@ -2,6 +2,9 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <filesystem>
 
@@ -10,6 +13,21 @@
 #include "pipelines/version.hpp"
 
 namespace shakebed::pipelines {
+
+namespace {
+
+// Frames of many megapixels are taken and given back all the time; fresh pages for each cost a fifth of the whole run
+// (photograph of 20 megapixels: 1.6 s of the system's time, 0.5 s with this, peak memory 10 % larger).
+void keep_memory_of_pictures() {
+#ifdef __GLIBC__
+  constexpr int largest_threshold = 32 << 20;  // bytes, the most that the C library accepts
+  constexpr int never = 2'000'000'000;         // bytes
+  ::mallopt(M_MMAP_THRESHOLD, largest_threshold);
+  ::mallopt(M_TRIM_THRESHOLD, never);
+#endif
+}
+
+}  // namespace
 
 const ImagesModule& images_module() {
   static const ImagesModule* const module = [] {
@@ -29,6 +47,7 @@ const ImagesModule& images_module() {
       const ImagesModule* found = entry != nullptr ? entry(SHAKEBED_VERSION) : nullptr;
       if (found == nullptr)
         throw StageError(fmt::format("{} belongs to another version of shakebed; install both together", name));
+      keep_memory_of_pictures();
       return found;
     }
     throw StageError(fmt::format("{} is missing: it belongs beside the program; install both together", name));

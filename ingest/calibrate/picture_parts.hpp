@@ -1,0 +1,25 @@
+#pragma once
+// Parts and copies of a picture, for searches that need not look at all of it.
+
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// Half the resolution: averages of 2 x 2 pixels.
+GrayFrame halved(const GrayFrame& frame);
+
+// A part of `width` x `height` px whose first pixel is at (left, top).
+struct PicturePart {
+  int left = 0, top = 0, width = 0, height = 0;
+};
+GrayFrame cut_out(const GrayFrame& frame, const PicturePart& part);
+
+// How changes of level are looked for: in blocks of pixels, between pixels `reach` apart, at every `stride`-th column
+// of every second row.
+struct ChangeSampling {
+  int block = 16, reach = 2, stride = 2;  // px
+};
+// The part of at most `side` x `side` px with the most change of level.
+PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling& sampling);
+
+}  // namespace shakebed::ingest
