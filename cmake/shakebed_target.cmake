@@ -51,6 +51,19 @@ endif()
 # What is compiled often and run briefly: a third less time to compile. No result depends on it.
 set(SHAKEBED_QUICK_COMPILE $<$<CONFIG:Release>:-O1>)
 
+# Headers that many files read, read once.
+option(SHAKEBED_PRECOMPILE "Precompiled headers" ON)
+function(shakebed_test_headers)
+  file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "int main() {}\n")
+  add_executable(shakebed_test_headers EXCLUDE_FROM_ALL "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
+  target_link_libraries(shakebed_test_headers PRIVATE shakebed_options nlohmann_json::nlohmann_json GTest::gtest
+                        GTest::gmock)
+  target_compile_options(shakebed_test_headers PRIVATE ${SHAKEBED_QUICK_COMPILE})
+  target_precompile_headers(shakebed_test_headers PRIVATE <gtest/gtest.h> <gmock/gmock.h> <nlohmann/json.hpp>
+                            <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <optional>
+                            <sstream> <string> <vector>)
+endfunction()
+
 # shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [OPTIMIZED])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
 # compute long.
@@ -63,6 +76,9 @@ function(shakebed_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} shakebed_options GTest::gtest GTest::gmock GTest::gtest_main)
   if(NOT ARG_OPTIMIZED)
     target_compile_options(${name} PRIVATE ${SHAKEBED_QUICK_COMPILE})
+    if(SHAKEBED_PRECOMPILE)
+      target_precompile_headers(${name} REUSE_FROM shakebed_test_headers)
+    endif()
   endif()
   target_compile_definitions(${name} PRIVATE "SHAKEBED_SOURCE_DIR=\"${PROJECT_SOURCE_DIR}\"")
   # With PRE_TEST discovery a list of labels loses all but its first on the way to ctest: the properties are set by a
