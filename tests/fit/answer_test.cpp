@@ -84,6 +84,9 @@ TEST(Answer, TakesTheKnownBiasOff) {
   for (const ThermometerReading& reading : answer.readings) {
     if (reading.status != FitStatus::ok) continue;
     EXPECT_NEAR(reading.temperature * (1.0 + reading.bias), reading.fitted.value, 1e-9) << reading.thermometer;
+    EXPECT_NEAR(reading.std_error / reading.temperature,
+                std::hypot(reading.fitted.std_error / reading.fitted.value, reading.bias_uncertainty), 1e-9)
+        << reading.thermometer << ": both relative, in quadrature";
   }
   const auto chosen = std::find_if(answer.readings.begin(), answer.readings.end(),
                                    [&](const ThermometerReading& r) { return r.thermometer == answer.thermometer; });
@@ -247,7 +250,10 @@ TEST(Answer, FindsTheSolidOfAColdBed) {
   ASSERT_TRUE(answer.ok()) << answer.why;
   const double mu = 20.0 / close_packing_density;
   EXPECT_NEAR(answer.solid_height.value / mu, 0.4, 0.03);
-  EXPECT_GT(answer.solid_height.std_error, 0.0);
+  // By the sum rule the solid loses mu/T_c of its height for every bit of T.
+  const double by_temperature = mu * answer.std_error / critical;
+  EXPECT_GT(answer.solid_height.std_error, 0.3 * by_temperature);
+  EXPECT_LT(answer.solid_height.std_error, 3.0 * by_temperature);
 }
 
 TEST(Answer, WithoutATemperatureSaysWhy) {

@@ -73,6 +73,34 @@ TEST_P(EveryModel, HasErrorsInProportionToThoseOfTheData) {
   }
 }
 
+// Without errors in the file they follow from the scatter about the curve: those of the parameters and of what follows
+// from them are what equal errors of that size give.
+TEST_P(EveryModel, HasTheErrorsOfItsScatterWhereNoneAreGiven) {
+  Profile silent = measured(90, 6);
+  silent.std_error.clear();
+  const FitResult one = fit_profile(silent, options_of(GetParam()));
+  ASSERT_TRUE(one.ok() && one.errors_scaled) << one.message;
+  Profile stated = silent;
+  double squares = 0.0;
+  for (const Residual& r : one.residuals)
+    if (r.used) squares += std::pow(r.density - r.model, 2);
+  stated.std_error.assign(silent.height.size(), std::sqrt(squares / one.dof));
+  const FitResult other = fit_profile(stated, options_of(GetParam()));
+  ASSERT_TRUE(other.ok() && !other.errors_scaled) << other.message;
+  EXPECT_NEAR(other.chi2_per_dof, 1.0, 1e-6);
+  std::size_t compared = 0;
+  for (const auto member :
+       {&FitResult::temperature, &FitResult::shift, &FitResult::solid_height, &FitResult::column_number,
+        &FitResult::critical_temperature, &FitResult::reduced_temperature}) {
+    const Estimate &a = one.*member, &b = other.*member;
+    EXPECT_NEAR(a.value, b.value, 1e-6);
+    if (!(b.std_error > 0.0)) continue;
+    EXPECT_NEAR(a.std_error / b.std_error, 1.0, 1e-3);
+    ++compared;
+  }
+  EXPECT_GE(compared, 4U);
+}
+
 // Each row twice with errors larger by the root of two says the same.
 TEST_P(EveryModel, DoesNotSeeThatARowIsTheMeanOfTwo) {
   const Profile plain = measured(90, 3);

@@ -82,6 +82,12 @@ TEST_F(FitStage, MatchesAProfileAgainstSimulatedBeds) {
   EXPECT_GT(json["interpolation_error"]["value"].get<double>(), 0);
   EXPECT_TRUE(json["library_scatter"].is_number());
   EXPECT_NEAR(json["solid_height"]["value"].get<double>(), 0.4 * 10.118, 0.03 * 10.118 + 3 * 0.06 * 10.118 * error / t);
+  // By the sum rule the solid shrinks by mu/T_c for every bit of T: the error of T is most of its error.
+  const double by_temperature = 10.118 * error / critical;
+  EXPECT_GT(json["solid_height"]["std_error"].get<double>(), 0.3 * by_temperature);
+  EXPECT_LT(json["solid_height"]["std_error"].get<double>(), 3 * by_temperature);
+  EXPECT_GT(json["shift"]["std_error"].get<double>(), 0.3 * by_temperature);
+  EXPECT_NEAR(json["reduced_temperature"]["std_error"].get<double>() / (error / critical), 1, 0.02);
   EXPECT_THAT(read_text(folder_ / "o/fit/residuals.csv"), HasSubstr("height,number_density,std_error,model,used"));
 }
 

@@ -2,6 +2,7 @@
 // units.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <sstream>
@@ -106,6 +107,10 @@ class Comparison {
     const Json metadata = read_json(metadata_path(path));
     for (std::size_t i = 0; i < header.size(); ++i)
       compare_column(*table, header[i], metadata["tableSchema"]["columns"][i], path.filename().string());
+    for (const StatedColumn& column : table->columns) {
+      if (std::find(header.begin(), header.end(), column.name) == header.end())
+        fail("writes " + path.filename().string() + " without the column " + column.name + ", which it states");
+    }
   }
 
   // The unit beside the table is the one stated, and so is the one at the end of a column's name.

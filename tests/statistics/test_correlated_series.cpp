@@ -36,6 +36,11 @@ TEST(CorrelatedSeries, KnowsHowLongASeriesRemembers) {
   }
 }
 
+// Four up, four down: squares add up to 8, neighbours to 5, and of eight values no farther ones are asked.
+TEST(CorrelatedSeries, HasAMemoryDoneByHand) {
+  EXPECT_DOUBLE_EQ(memory_of(std::vector<double>{1, 1, 1, 1, -1, -1, -1, -1}), 1 + 2 * 5.0 / 8);
+}
+
 TEST(CorrelatedSeries, HasNothingToTellOfFewValuesOrOfEqualOnes) {
   EXPECT_EQ(memory_of({}), 1);
   const std::vector<double> few = {1, -2, 1}, none(100, 0.0);

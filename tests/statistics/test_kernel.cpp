@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "statistics/kernel.hpp"
@@ -28,6 +29,32 @@ TEST(Kernel, HasTheShapeOfItsDefinition) {
   for (const Kernel& kernel : windows)
     for (double s = -1.2; s < 1.2; s += 0.017)
       EXPECT_NEAR(kernel_density(kernel, s), by_definition(kernel, s), 1e-14) << to_string(kernel) << " " << s;
+}
+
+// Half a width, and 6.5 standard deviations of a Gaussian: nothing lies beyond, something just before.
+TEST(Kernel, ReachesAsFarAsItsWidthSays) {
+  EXPECT_EQ(kernel_reach({}), 0);
+  for (const auto& [kernel, reach] : {std::pair{Kernel{KernelKind::gaussian, 0.4}, 2.6},
+                                      {Kernel{KernelKind::top_hat, 2.5}, 1.25},
+                                      {Kernel{KernelKind::top_hat, 0.5}, 0.25},
+                                      {Kernel{KernelKind::disk_chord, 2.5}, 1.25},
+                                      {Kernel{KernelKind::disk_chord, 0.5}, 0.25}}) {
+    EXPECT_DOUBLE_EQ(kernel_reach(kernel), reach) << to_string(kernel);
+    EXPECT_LT(kernel_density(kernel, 1.001 * reach), 1e-8) << to_string(kernel);
+    EXPECT_GT(kernel_density(kernel, 0.999 * reach), 0) << to_string(kernel);
+  }
+}
+
+// A centre under a window wider than a diameter counts at every height that the window reaches.
+TEST(AddDensity, OfAWideWindowReachesAllItsHeights) {
+  const HeightGrid grid{0, 0.125, 81};
+  for (const Kernel& kernel :
+       {Kernel{KernelKind::top_hat, 2.25}, Kernel{KernelKind::disk_chord, 2.25}, Kernel{KernelKind::gaussian, 1.5}}) {
+    std::vector<double> density(grid.points);
+    add_density(grid, kernel, 4, std::vector<double>{5.03}, 0, density);
+    for (std::size_t i = 0; i < grid.points; ++i)
+      EXPECT_NEAR(density[i], by_definition(kernel, grid.height(i) - 5.03) / 4, 1e-12) << to_string(kernel) << " " << i;
+  }
 }
 
 TEST(Kernel, CumulativeIsTheIntegralOfTheDensity) {
