@@ -42,6 +42,17 @@ bool hollow(const BeadProfile& profile, double radius) {
   return sum < well_filled * most * area;
 }
 
+// Sizes of the residual at some 20,000 pixels.
+std::vector<float> residual_sizes(const JointFit& fit) {
+  std::vector<float> sizes;
+  const std::size_t total = static_cast<std::size_t>(fit.width()) * static_cast<std::size_t>(fit.height());
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(total) / 20000)));
+  for (int row = 0; row < fit.height(); row += step)
+    for (int column = (row / step) % 2; column < fit.width(); column += step)
+      if (!unseen(fit.residual(column, row))) sizes.push_back(std::abs(fit.residual(column, row)));
+  return sizes;
+}
+
 }  // namespace
 
 double noise_of(const GrayFrame& flat) {
@@ -58,16 +69,22 @@ double noise_of(const GrayFrame& flat) {
 }
 
 double residual_spread(const JointFit& fit) {
-  std::vector<float> sizes;
-  const std::size_t total = static_cast<std::size_t>(fit.width()) * static_cast<std::size_t>(fit.height());
-  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(total) / 20000)));
-  for (int row = 0; row < fit.height(); row += step)
-    for (int column = (row / step) % 2; column < fit.width(); column += step)
-      if (!unseen(fit.residual(column, row))) sizes.push_back(std::abs(fit.residual(column, row)));
+  std::vector<float> sizes = residual_sizes(fit);
   if (sizes.empty()) return 0;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
   return 1.4826 * static_cast<double>(*middle);
+}
+
+double residual_noise(const JointFit& fit) {
+  std::vector<float> sizes = residual_sizes(fit);
+  if (sizes.size() < 2) return 0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  double sum = 0;
+  for (auto at = sizes.begin(); at != middle; ++at) sum += static_cast<double>(*at);
+  constexpr double of_normal_law = 0.32465;  // mean size of the smaller half, 4 (phi(0) - phi(0.6745)), for one of 1
+  return sum / static_cast<double>(sizes.size() / 2) / of_normal_law;
 }
 
 std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double noise, double score) {

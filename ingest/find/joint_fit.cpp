@@ -7,6 +7,7 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/vector_lanes.hpp"
+#include "ingest/frames/smooth_field.hpp"
 
 namespace shakebed::ingest {
 
@@ -291,6 +292,33 @@ bool solve_own(const ModelDisk& disk, double bx, double by, double& step_x, doub
   return true;
 }
 
+// A matrix of 2 x 2 blocks, one for each bead of a group; the lower triangle is filled.
+class BlockMatrix {
+ public:
+  explicit BlockMatrix(std::size_t beads) : size_(2 * beads), values_(size_ * size_, 0.0) {}
+  void add(std::size_t row, std::size_t column, double xx, double xy, double yy) {
+    values_[2 * row * size_ + 2 * column] += xx;
+    values_[2 * row * size_ + 2 * column + 1] += xy;
+    values_[(2 * row + 1) * size_ + 2 * column] += xy;
+    values_[(2 * row + 1) * size_ + 2 * column + 1] += yy;
+  }
+  // The first bead's block of the inverse, times `factor`; 0 where the matrix is not positive definite.
+  [[nodiscard]] CentreCovariance covariance_of_first(double factor) const {
+    std::array<std::array<double, 2>, 2> inverse{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      std::vector<double> left = values_, right(size_, 0.0);
+      right[k] = 1;
+      if (!solve_symmetric(left, right, size_)) return {};
+      inverse[k] = {right[0], right[1]};
+    }
+    return {factor * inverse[0][0], factor * inverse[0][1], factor * inverse[1][1]};
+  }
+
+ private:
+  std::size_t size_;
+  std::vector<double> values_;
+};
+
 }  // namespace
 
 double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, double tolerance, double bound) {
@@ -321,6 +349,64 @@ double JointFit::sweep(std::vector<ModelDisk>& disks, double largest_step, doubl
     disk.y += step_y;
   }
   return largest;
+}
+
+JointFit::Coupling JointFit::coupling_of(const ModelDisk& one, const ModelDisk& other) const {
+  const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
+  if (squared < 1e-6) return {};
+  const auto [along, across] = table_->overlap(std::sqrt(squared));
+  // Of a bead cut by the border only a part is there to be shared.
+  const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
+  const double along_more = scale * (along - across) / squared;
+  return {scale * across + along_more * dx * dx, along_more * dx * dy, scale * across + along_more * dy * dy};
+}
+
+JointFit::Coupling JointFit::eliminated(const ModelDisk& disk, const Coupling& pair) {
+  const double damping = 1e-9 + 1e-4 * (disk.hessian_xx + disk.hessian_yy);
+  const double xx = disk.hessian_xx + damping, yy = disk.hessian_yy + damping, xy = disk.hessian_xy;
+  const double determinant = xx * yy - xy * xy;
+  if (!(determinant > 0)) return {};
+  const double a = (pair.xx * yy - pair.xy * xy) / determinant, b = (pair.xy * xx - pair.xx * xy) / determinant;
+  const double c = (pair.xy * yy - pair.yy * xy) / determinant, d = (pair.yy * xx - pair.xy * xy) / determinant;
+  return {a * pair.xx + b * pair.xy, a * pair.xy + b * pair.yy, c * pair.xy + d * pair.yy};
+}
+
+std::vector<CentreCovariance> JointFit::covariances(const std::vector<ModelDisk>& disks) const {
+  const Nearby near(disks.size(), 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
+  std::vector<std::vector<std::size_t>> groups(disks.size());  // each bead, then those that share pixels with it
+  for (std::size_t i = 0; i < disks.size(); ++i) groups[i].push_back(i);
+  near.pairs([&](std::size_t a, std::size_t b) {
+    groups[a].push_back(b);
+    groups[b].push_back(a);
+    return false;
+  });
+  std::vector<CentreCovariance> all;
+  for (const auto& group : groups) {
+    BlockMatrix matrix(group.size());
+    for (std::size_t a = 0; a < group.size(); ++a) {
+      const ModelDisk& one = disks[group[a]];
+      const double damping = 1e-9 + 1e-4 * (one.hessian_xx + one.hessian_yy);
+      matrix.add(a, a, one.hessian_xx + damping, one.hessian_xy, one.hessian_yy + damping);
+      for (std::size_t b = 0; b < a; ++b) {
+        const Coupling pair = coupling_of(one, disks[group[b]]);
+        matrix.add(a, b, pair.xx, pair.xy, pair.yy);
+      }
+      // What lies beyond the group is eliminated bead by bead: its own block's Schur complement.
+      for (const std::size_t beyond : groups[group[a]]) {
+        if (std::find(group.begin(), group.end(), beyond) != group.end()) continue;
+        const Coupling lost = eliminated(disks[beyond], coupling_of(one, disks[beyond]));
+        matrix.add(a, a, -lost.xx, -lost.xy, -lost.yy);
+      }
+    }
+    const double factor = table_->relaxation_ * table_->relaxation_;
+    all.push_back(matrix.covariance_of_first(factor));
+    if (all.back().xx > 0 && all.back().yy > 0) continue;
+    const ModelDisk& own = disks[group.front()];  // couplings are approximate: beads nearly on top of one another
+    BlockMatrix alone(1);
+    alone.add(0, 0, own.hessian_xx, own.hessian_xy, own.hessian_yy);
+    all.back() = alone.covariance_of_first(factor);
+  }
+  return all;
 }
 
 double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
@@ -355,20 +441,11 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
   // Pairs that share pixels, with the off-diagonal block of the Hessian: symmetric.
   struct Pair {
     std::size_t one, other;
-    double xx, xy, yy;
+    Coupling block;
   };
   std::vector<Pair> pairs;
   near.pairs([&](std::size_t a, std::size_t b) {
-    if (place[a] == stays || place[b] == stays) return false;
-    const ModelDisk &one = disks[a], &other = disks[b];
-    const double dx = other.x - one.x, dy = other.y - one.y, squared = dx * dx + dy * dy;
-    if (squared < 1e-6) return false;
-    const auto [along, across] = table_->overlap(std::sqrt(squared));
-    // Of a bead cut by the border only a part is there to be shared.
-    const double scale = 0.5 * std::sqrt((one.hessian_xx + one.hessian_yy) * (other.hessian_xx + other.hessian_yy));
-    const double along_more = scale * (along - across) / squared;
-    pairs.push_back({place[a], place[b], scale * across + along_more * dx * dx, along_more * dx * dy,
-                     scale * across + along_more * dy * dy});
+    if (place[a] != stays && place[b] != stays) pairs.push_back({place[a], place[b], coupling_of(disks[a], disks[b])});
     return false;
   });
   // Conjugate gradients, each bead's own 2 x 2 block taken out beforehand.
@@ -399,10 +476,11 @@ double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& di
     }
     for (const Pair& pair : pairs) {
       const std::size_t a = 2 * pair.one, b = 2 * pair.other;
-      image[a] += pair.xx * direction[b] + pair.xy * direction[b + 1];
-      image[a + 1] += pair.xy * direction[b] + pair.yy * direction[b + 1];
-      image[b] += pair.xx * direction[a] + pair.xy * direction[a + 1];
-      image[b + 1] += pair.xy * direction[a] + pair.yy * direction[a + 1];
+      const auto& [xx, xy, yy] = pair.block;
+      image[a] += xx * direction[b] + xy * direction[b + 1];
+      image[a + 1] += xy * direction[b] + yy * direction[b + 1];
+      image[b] += xx * direction[a] + xy * direction[a + 1];
+      image[b + 1] += xy * direction[a] + yy * direction[a + 1];
     }
     const double curvature = product(direction, image);
     if (!(curvature > 0)) break;  // not a minimum that way: what was found so far is a descent all the same

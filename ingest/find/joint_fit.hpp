@@ -23,6 +23,10 @@ struct ModelDisk {
   double best_explained = 1;       // and the best
 };
 
+struct CentreCovariance {
+  double xx = 0, xy = 0, yy = 0;  // px^2; 0 where it is unknown
+};
+
 // A bead's profile tabulated against the squared distance, so that no square root is taken per pixel.
 class ProfileTable {
  public:
@@ -75,6 +79,10 @@ class JointFit {
   // they are. Returns the largest move, at most `largest_step` px.
   double step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
                        double still = 0);
+  // Covariances of the centres under white noise of one contrast unit a pixel, their neighbours' places being unknown
+  // as well: where blur makes touching beads share pixels, a bead alone would seem better known than it is. From the
+  // curvatures of the last step. (Of neighbours of neighbours each is eliminated by itself.)
+  [[nodiscard]] std::vector<CentreCovariance> covariances(const std::vector<ModelDisk>& disks) const;
   // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
   void judge(std::vector<ModelDisk>& disks, double radius) const;
   // Residual (flat frame minus model) at a pixel.
@@ -99,6 +107,13 @@ class JointFit {
     double x = 0, y = 0;
   };
   Descent descent_of(ModelDisk& disk, float bound);
+  // Of two beads that share pixels, the off-diagonal block of the Hessian: symmetric.
+  struct Coupling {
+    double xx = 0, xy = 0, yy = 0;
+  };
+  // What eliminating a bead takes from the block of one that is coupled to it: C H^-1 C.
+  [[nodiscard]] static Coupling eliminated(const ModelDisk& disk, const Coupling& pair);
+  [[nodiscard]] Coupling coupling_of(const ModelDisk& one, const ModelDisk& other) const;
   void move(double old_x, double old_y, double new_x, double new_y);
   int width_, height_;
   std::size_t stride_;
