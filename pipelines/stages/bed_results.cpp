@@ -108,6 +108,9 @@ class BedStatement {
     list_.quantity("/contact_duration_effect", "1",
                    "how much too high T may be by t_c, as a part of it, against contacts without a duration; about",
                    clocked);
+    list_.quantity("/hertz_contact_time", "s",
+                   "how long a real contact lasts, by Hertz, at the floor's greatest speed or the bath's thermal one",
+                   given_if(bed_.material, "\"disks\" name a \"material\""));
     list_.number("/events", "1", "events of all kinds");
     list_.number("/periods", "1", "periods over which the bed was measured");
     list_.quantity("/max_overlap", "D", "largest overlap of two disks, by rounding");

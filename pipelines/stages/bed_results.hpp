@@ -11,6 +11,7 @@ namespace shakebed::pipelines {
 struct BedOutput {
   bool reduced = false, weightless = false, periodic_upwards = false;
   bool contact_duration = false;  // the TC model's
+  bool material = false;          // is named
   bool shaken = false, frames = false, annealed = false;
   std::uint32_t replicas = 1;
   ObserveOptions observe;

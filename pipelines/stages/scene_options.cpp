@@ -101,6 +101,19 @@ void describe_disks(Fields& f, DiskOptions& d) {
   f.integer("count", d.count, {.help = "number of disks N", .required = true, .range = at_least(1), .example = "337"});
   f.quantity("diameter", d.diameter, dimension::length,
              {.help = "diameter D", .required = !f.reduced(), .range = positive, .example = "\"2.99 mm\""});
+  if (!f.reduced()) {
+    f.choice("material", d.material,
+             {{Material::unnamed, "unnamed"},
+              {Material::aluminium, "aluminium"},
+              {Material::steel, "steel"},
+              {Material::glass, "glass"},
+              {Material::brass, "brass"},
+              {Material::polystyrene, "polystyrene"},
+              {Material::acetate, "acetate"}},
+             {.help = "gives the density, where none is named, and the time that a real contact lasts "
+                      "(hertz_contact_time); restitution and friction are for the recipe to state"});
+    if (f.decoding() && d.material != Material::unnamed) d.density = constants_of(d.material).density;
+  }
   f.quantity("density", d.density, dimension::density, {.help = "mass density of the material", .range = positive});
   describe_surface(f, d.surface);
   f.choice("inertia", d.inertia, {{Inertia::disk, "disk"}, {Inertia::sphere, "sphere"}},
@@ -405,6 +418,18 @@ bool SceneOptions::dissipates() const {
 double SceneOptions::contact_duration() const {
   if (disks_.contact_duration) return *disks_.contact_duration / time_unit();
   return dissipates() ? usual_contact_duration : 0;
+}
+
+std::optional<double> SceneOptions::hertz_contact_time() const {
+  if (disks_.material == Material::unnamed || !gravity_) return std::nullopt;
+  double speed = std::sqrt(*gravity_ * disks_.diameter);
+  if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
+    speed = 2 * std::numbers::pi * sine->frequency * sine->amplitude;
+  else if (bath_temperature() > 0)
+    speed *= std::sqrt(bath_temperature());
+  MaterialConstants material = constants_of(disks_.material);
+  material.density = disks_.density;
+  return shakebed::pipelines::hertz_contact_time(material, disks_.diameter, speed);
 }
 
 bool SceneOptions::may_be_filled_at_random() const {

@@ -9,6 +9,7 @@
 
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/config.hpp"
+#include "pipelines/stages/materials.hpp"
 #include "sim/scene/scene.hpp"
 
 namespace shakebed::pipelines {
@@ -30,6 +31,7 @@ struct SecondSpeciesOptions {
 struct DiskOptions {
   std::uint32_t count = 0;
   double diameter = 1;
+  Material material = Material::unnamed;
   double density = 1;
   SurfaceOptions surface;
   Inertia inertia = Inertia::disk;
@@ -139,6 +141,9 @@ class SceneOptions {
   double period() const;
   // t_c of the TC model in reduced units; 0: contacts have no duration.
   double contact_duration() const;
+  // How long a real contact lasts [s], at the floor's greatest speed; in a bath at the thermal speed, else at that of a
+  // fall from D. Nothing without a named material.
+  std::optional<double> hertz_contact_time() const;
   // Nothing above the bed, and no places given: as many disks can as well be dropped at random.
   bool may_be_filled_at_random() const;
   // T/(m g D) of the reservoir; 0 without one.

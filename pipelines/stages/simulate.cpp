@@ -56,6 +56,7 @@ class Simulate : public Stage {
                              .weightless = bed_.weightless(),
                              .periodic_upwards = bed_.periodic_upwards(),
                              .contact_duration = bed_.contact_duration() > 0,
+                             .material = bed_.hertz_contact_time().has_value(),
                              .shaken = bed_.period() > 0,
                              .frames = frames_.count > 0,
                              .annealed = !annealing_.empty(),
@@ -257,6 +258,12 @@ MeasurementPlan Simulate::measurement_plan(const sim::Scene& scene) const {
   return plan;
 }
 
+// ", 8.4 us by Hertz"; "" where no material is named.
+std::string contact_time_text(const SceneOptions& bed) {
+  const std::optional<double> time = bed.hertz_contact_time();
+  return time ? fmt::format(", {:.2g} us by Hertz", 1e6 * *time) : "";
+}
+
 double two_digits(double value) {
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
   return std::round(value / unit) * unit;
@@ -349,9 +356,9 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
   context.warning(fmt::format(
       "the contact duration t_c = {} makes {:.2g} % of the contacts elastic, and T may be higher by about {:.2g} % "
       "than with contacts without a duration. t_c is a numerical cut-off, not the time that a real "
-      "contact lasts. \"contact_duration\": {} would bring this to about {:.2g} %, with more contacts",
+      "contact lasts{}. \"contact_duration\": {} would bring this to about {:.2g} %, with more contacts",
       text(duration), 100 * results.at("elastic_share").at("value").get<double>(), 100 * effect->get<double>(),
-      text(shorter), 100 * allowed_contact_effect));
+      contact_time_text(bed_), text(shorter), 100 * allowed_contact_effect));
 }
 
 // The densities of all replicas together, in place of the first's.

@@ -183,6 +183,8 @@ Json BedRun::results(const SceneOptions& options) const {
   const sim::Counters counters = simulation_->counters();
   out["gamma"] = quantity_json(options.gamma(), "1");
   out["column_number"] = quantity_json(bed.column_number(), "1");
+  if (const std::optional<double> time = options.hertz_contact_time())
+    out["hertz_contact_time"] = quantity_json(*time, "s");
   out["energy_ledger"] = {{"unit", options.weightless() ? "T0" : "m g D"},
                           {"initial", energy.initial},
                           {"kinetic", energy.kinetic},
