@@ -62,6 +62,30 @@ TEST(SimulatedProfiles, MatchFindsTheTemperatureOfALayeredBed) {
   EXPECT_LE(held, 196);
 }
 
+// A measurement at heights between those of the library: densities are interpolated, T stays.
+TEST(SimulatedProfiles, AMeasurementAtOtherHeightsHasTheSameTemperature) {
+  const auto smooth_bed = [](double temperature, double offset) {
+    const auto bed = HydrostaticProfile::of_column(best_of(), temperature, {23.0, 1.10});
+    Profile profile;
+    for (int i = 0; i < 110; ++i) {
+      profile.height.push_back(offset + 0.25 * i);
+      profile.number_density.push_back(bed.density(profile.height.back()));
+      profile.std_error.push_back(synthetic::bin_error(profile.number_density.back(), 0.01));
+    }
+    return profile;
+  };
+  std::vector<SimulatedProfile> library;
+  for (double t = 0.05; t < 0.45; t *= 1.1) library.push_back({t, smooth_bed(t, 0.125), 0.0});
+  for (const double t : {0.2, 0.35}) {  // the tail is several bins long
+    const MatchResult same = match_simulated(smooth_bed(t, 0.125), library);
+    const MatchResult between = match_simulated(smooth_bed(t, 0.0), library);
+    ASSERT_EQ(same.status, FitStatus::ok) << same.message;
+    ASSERT_EQ(between.status, FitStatus::ok) << between.message;
+    EXPECT_NEAR(same.temperature.value / t, 1.0, 0.02);
+    EXPECT_NEAR(between.temperature.value / t, 1.0, 0.02);
+  }
+}
+
 TEST(SimulatedProfiles, RepeatsTeachThePreparationSpread) {
   // Beds whose surface lies 0.1 D up or down by preparation: the errors must grow to hold that, and do only with
   // repeats.

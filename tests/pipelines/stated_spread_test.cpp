@@ -111,8 +111,8 @@ StatedSpread spread_of(const std::string& bed, bool heavy) {
 TEST(StatedErrors, OfABedAreWhatBedsScatterBy) {
   const StatedSpread spread = spread_of(
       R"("units": "reduced", "disks": { "count": 20, "friction": 0.3 }, "box": { "width": 5.3, "sides": "periodic" },
-      "bath": { "kind": "langevin", "temperature": 1, "rate": 1, "interval": 0.1 }, "start_temperature": 1,
-      "schedule": [ { "temperature": 1, "hold": 120 } ],
+      "bath": { "kind": "langevin", "temperature": 2, "rate": 1, "interval": 0.1 }, "start_temperature": 2,
+      "schedule": [ { "temperature": 2, "hold": 120 } ],
       "settle": 5, "measure": 150, "observe": ["order", "velocities", "displacement", "pressure"])",
       true);
   EXPECT_GE(spread.expect(0.6, 1.6), 25U);
