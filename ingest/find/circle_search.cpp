@@ -91,17 +91,46 @@ Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double
   return met;
 }
 
+struct MetEdge {
+  double cosine = 0, sine = 0, offset = 0, weight = 1;
+};
+
+float median_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Faint edges count little.
+void weigh(std::vector<MetEdge>& met, const std::vector<float>& slopes, double faint) {
+  constexpr double from_none_to_full = 0.25;
+  std::vector<float> ranked = slopes;
+  const auto typical = static_cast<double>(median_of(ranked));
+  for (std::size_t k = 0; k < met.size(); ++k)
+    met[k].weight = std::clamp((static_cast<double>(slopes[k]) / typical - faint) / from_none_to_full, 0.0, 1.0);
+}
+
+double weighted_scatter(const std::vector<MetEdge>& met) {
+  double squares = 0, weights = 0;
+  for (const MetEdge& edge : met) {
+    squares += edge.weight * edge.offset * edge.offset;
+    weights += edge.weight;
+  }
+  return std::sqrt(squares / std::max(1e-9, weights));
+}
+
 // Least squares of offset = dx cos + dy sin + dr over the edges met; a poorly seen arc moves little.
 struct CircleStep {
   double x = 0, y = 0, radius = 0;
 };
-CircleStep step_towards(const std::vector<std::array<double, 3>>& met, int rays) {
-  double cc = 0, cs = 0, ss = 0, c = 0, s = 0, oc = 0, os = 0, o = 0;
-  for (const auto& [cosine, sine, offset] : met) {
-    cc += cosine * cosine, cs += cosine * sine, ss += sine * sine, c += cosine, s += sine;
-    oc += offset * cosine, os += offset * sine, o += offset;
+CircleStep step_towards(const std::vector<MetEdge>& met, int rays) {
+  double cc = 0, cs = 0, ss = 0, c = 0, s = 0, oc = 0, os = 0, o = 0, weights = 0;
+  for (const auto& [cosine, sine, offset, weight] : met) {
+    const double wc = weight * cosine, ws = weight * sine;
+    cc += wc * cosine, cs += wc * sine, ss += ws * sine, c += wc, s += ws, weights += weight;
+    oc += offset * wc, os += offset * ws, o += weight * offset;
   }
-  const double hold = 0.02 * rays, n = static_cast<double>(met.size()) + hold;
+  const double hold = 0.02 * rays, n = weights + hold;
   cc += hold, ss += hold;
   // The radius eliminated, then the two of the centre.
   const double a = cc - c * c / n, b = cs - c * s / n, d = ss - s * s / n;
@@ -232,7 +261,7 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
   Circle circle = start;
   if (!worth_fitting(edges, start, sign, std::max(1.2, rays.reach * start.radius))) return circle;
   constexpr int rounds = 3;
-  std::vector<std::array<double, 3>> met;
+  std::vector<MetEdge> met;
   std::vector<float> slopes;
   for (int round = 0; round <= rounds; ++round) {
     const double narrow = std::max(least_tolerance, rays.tolerance * circle.radius);
@@ -257,6 +286,10 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
     circle.rays = in_view;
     circle.support = 2 * in_view < rays.count ? 0 : static_cast<double>(met.size()) / in_view;
     circle.scatter = met.empty() ? 0 : std::sqrt(square / static_cast<double>(met.size())) / circle.radius;
+    if (rays.faint > 0 && !met.empty()) {
+      weigh(met, slopes, rays.faint);
+      circle.scatter = weighted_scatter(met) / circle.radius;
+    }
     if (round == rounds || circle.support < 0.15) break;
     const CircleStep step = step_towards(met, rays.count);
     circle.x += std::clamp(step.x, -reach, reach);
@@ -269,11 +302,23 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
     }
   }
   if (!slopes.empty()) {
-    const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
-    std::nth_element(slopes.begin(), middle, slopes.end());
-    circle.contrast = step_per_slope * static_cast<double>(*middle);
+    circle.contrast = step_per_slope * static_cast<double>(median_of(slopes));
   }
   return circle;
+}
+
+double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polarity, std::uint64_t open, int fewest) {
+  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
+  constexpr double reach = 0.15;  // radii
+  std::vector<float> distances;
+  for (int k = 0; k < circle.directions; ++k) {
+    if ((open >> static_cast<unsigned>(k) & 1U) == 0) continue;
+    const auto [cosine, sine] = direction_of(k, circle.directions);
+    const Met met = look_along(edges, circle, cosine, sine, sign, std::max(1.2, reach * circle.radius));
+    if (met.edge && met.in_view) distances.push_back(static_cast<float>(circle.radius + met.offset));
+  }
+  if (static_cast<int>(distances.size()) < fewest) return 0;
+  return static_cast<double>(median_of(distances));
 }
 
 std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, Polarity polarity,

@@ -28,10 +28,17 @@ struct RimRays {
   int count = 32;
   double reach = 0.2;       // radii, how far from the rim an edge is first looked for
   double tolerance = 0.07;  // radii, how far from it an edge may lie in the end (at least 0.6 px)
+  // Share of the median slope from which an edge begins to count for centre and radius: where beads touch, their rims
+  // run into one another, are faint and seem to lie farther in. 0: all count alike.
+  double faint = 0;
 };
 
 // The circle nearest to `start` through edges of this polarity; its support is 0 when there is none.
 Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, const RimRays& rays = {});
+
+// Median distance of the edges from the centre of a fitted circle in those of its directions that are `open` (a bit
+// each); 0 when fewer than `fewest` are met.
+double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polarity, std::uint64_t open, int fewest);
 
 // Circles of all radii from `from` to `to` px with at least this support, each radius by itself: one circle can be
 // found from several radii (see without_doubles).

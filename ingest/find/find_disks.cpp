@@ -39,7 +39,8 @@ class FrameFinder {
         options_(options),
         radius_(calibration.rim_radius_px),
         edge_(calibration.edge_width_px),
-        noise_(std::max(1e-3, calibration.noise_level / std::max(1e-6, std::abs(calibration.contrast_level)))),
+        noise_(in_contrast_units(calibration.residual_level)),
+        white_noise_(in_contrast_units(calibration.noise_level)),
         seen_(seen_part(frame, calibration)),
         soft_(calibration.profile, radius_, edge_, softening_for(edge_)),
         exact_(calibration.profile, radius_, edge_, 0.6 * softening_for(edge_)),
@@ -250,7 +251,7 @@ class FrameFinder {
     found.y_px = disk.y;
     found.radius_px = calibration_.radius_px;
     // Noise is as wide as a pixel of the camera.
-    const double noise = noise_ * frame_.enlargement, model = model_error_px * frame_.enlargement;
+    const double noise = white_noise_ * frame_.enlargement, model = model_error_px * frame_.enlargement;
     if (covariance.xx > 0 && covariance.yy > 0) {
       found.variance_x = noise * noise * covariance.xx + model * model;
       found.variance_y = noise * noise * covariance.yy + model * model;
@@ -264,10 +265,15 @@ class FrameFinder {
     return found;
   }
 
+  [[nodiscard]] double in_contrast_units(double level) const {
+    return std::max(1e-3, level / std::max(1e-6, std::abs(calibration_.contrast_level)));
+  }
+
   const GrayFrame& frame_;
   const FinderCalibration& calibration_;
   const FindOptions& options_;
-  const double radius_, edge_, noise_;  // px, px, contrast units
+  const double radius_, edge_;        // px
+  const double noise_, white_noise_;  // contrast units: by which disks are searched for, and of which errors are made
   FindResult result_;
   const GrayFrame seen_;
   const ProfileTable soft_, exact_;

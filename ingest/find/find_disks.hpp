@@ -56,10 +56,11 @@ struct FinderCalibration {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   double radius_std_error_px = 0;
-  double rim_radius_px = 0;         // where the recorded profile has its edge: radius_px unless the tone curve moves it
-  double edge_width_px = 0;         // sigma of the blurred edge, the pixel's own 0.29 px included
-  double noise_level = 0;           // sigma of the residuals in grey levels, away from edges
-  double contrast_level = 0;        // bead minus background, grey levels, at the middle of the frame
+  double rim_radius_px = 0;   // where the recorded profile has its edge: radius_px unless the tone curve moves it
+  double edge_width_px = 0;   // sigma of the blurred edge, the pixel's own 0.29 px included
+  double noise_level = 0;     // sigma of the residuals in grey levels, away from edges
+  double residual_level = 0;  // median size of the residuals as a sigma, grey levels: what disks are searched with
+  double contrast_level = 0;  // bead minus background, grey levels, at the middle of the frame
   bool radius_of_all_rims = false;  // from the profile below, the rims of all beads, not of open ones alone
   double tone_exponent = 1;         // recorded level = light^exponent, from the rims; 1 for a linear camera
   bool solid_borders = false;       // floor, walls or lid are in view; each frame is searched without them

@@ -172,7 +172,7 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
   calibration.polarity = rims.model.polarity;
-  calibration.radius_px = calibration.rim_radius_px = rims.model.radius_px;
+  calibration.radius_px = calibration.rim_radius_px = rims.model.open_radius_px;
   // Rims of an unknown blur are known to a fifth of a pixel at best.
   constexpr double unknown_blur_px = 0.2;
   calibration.radius_std_error_px = std::hypot(rims.model.radius_std_error_px, unknown_blur_px);

@@ -341,6 +341,7 @@ class BeadLearner {
     calibration.light = light_;
     calibration.contrast_level = mean_contrast(light_);
     calibration.noise_level = residual_noise(*beads_->fits.front()) * std::abs(calibration.contrast_level);
+    calibration.residual_level = spread * std::abs(calibration.contrast_level);
     calibration.radius_std_error_px = radius_error(calibration, spread, static_cast<double>(total), 0);
     calibration.level_deciles = level_deciles(beads_->seen.front());
     calibration.frames_used = recorded_.size();

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
+#include "ingest/find/nearby.hpp"
 #include "ingest/find/picture_scale.hpp"
 
 namespace shakebed::ingest {
@@ -23,7 +25,17 @@ constexpr double well_supported = 0.9;     // probability from which a circle co
 // Where blurred beads touch, their steepest edges lie farther out than a lone one's: in a photograph of beads of 2.5 px
 // at 1.4 times its radius. A circle so much smaller than the others must show most of its rim.
 constexpr double lone_share = 0.75, lone_support = 0.6;
-const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07};
+// A side is open where no other centre lies within this many radii and this angle of it (rad): beyond the void between
+// three touching beads.
+constexpr double open_reach = 3.2, open_angle = 0.9, same_circle = 0.1;
+constexpr int fewest_open_directions = 5;  // of 48
+constexpr std::size_t fewest_open_circles = 5;
+// px of the map: over which the noise of edges is one and the same, 2 sqrt(pi) times the smoothing by 1 px.
+constexpr double correlated_px = 3.5;
+// px^2 of the map: variance of its smoothing (1), differences (1/3) and pixels (1/12). A disk blurred by sigma is
+// steepest at R - sigma^2 / (2 R).
+constexpr double blur_of_map_px2 = 1.42;
+const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07, .faint = 0.65};
 
 std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity polarity) {
   std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_support);
@@ -121,7 +133,8 @@ RimDisk disk_of(const Circle& circle, const ScaledPicture& at, const RimModel& m
   disk.circle.y = at.to_frame_y(circle.y);
   disk.circle.radius = circle.radius * at.scale;
   disk.probability = model.probability_of(circle.support);
-  const double met = std::max(3.0, circle.support * circle.rays);
+  const double apart = 2 * std::numbers::pi * circle.radius / correlated_px;
+  const double met = std::max(3.0, circle.support * std::min(apart, static_cast<double>(circle.rays)));
   const double offset = circle.scatter * disk.circle.radius;
   disk.variance_px2 = 2 * offset * offset / met;
   return disk;
@@ -148,8 +161,41 @@ std::vector<RimDisk> likely_ones(const std::vector<Circle>& circles, const EdgeM
   return disks;
 }
 
-Roundness roundness_of(const std::vector<RimDisk>& disks, const EdgeMap& edges, const ScaledPicture& at,
-                       Polarity polarity) {
+// Directions in which no other circle is near, a bit each.
+std::uint64_t open_directions(const Circle& circle, const std::vector<Circle>& circles, const Nearby& near) {
+  std::uint64_t open = ~std::uint64_t{0};
+  near.any_near(circle.x, circle.y, [&](std::size_t i) {
+    const double dx = circles[i].x - circle.x, dy = circles[i].y - circle.y, away = std::hypot(dx, dy);
+    if (away < same_circle * circle.radius || away > open_reach * circle.radius) return false;
+    for (int k = 0; k < circle.directions; ++k) {
+      const double angle = 2 * std::numbers::pi * k / circle.directions;
+      if (dx * std::cos(angle) + dy * std::sin(angle) > away * std::cos(open_angle))
+        open &= ~(std::uint64_t{1} << static_cast<unsigned>(k));
+    }
+    return false;
+  });
+  return open;
+}
+
+// From the circles that have an open side.
+void measure_open_rims(const std::vector<Circle>& circles, const EdgeMap& edges, double scale, RimModel& model) {
+  model.open_radius_px = model.radius_px;
+  double largest = 1;
+  for (const Circle& circle : circles) largest = std::max(largest, circle.radius);
+  const Nearby near(circles.size(), open_reach * largest,
+                    [&](std::size_t i) { return std::pair(circles[i].x, circles[i].y); });
+  std::vector<double> radii;
+  for (const Circle& circle : circles)
+    if (const double radius = radius_towards(edges, circle, model.polarity, open_directions(circle, circles, near),
+                                             fewest_open_directions);
+        radius > 0)
+      radii.push_back(radius);
+  if (radii.size() < fewest_open_circles) return;
+  const double steepest = median_of(radii);
+  model.open_radius_px = (steepest + blur_of_map_px2 / (2 * steepest)) * scale;
+}
+
+std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPicture& at) {
   std::vector<Circle> circles;
   for (const RimDisk& disk : disks) {
     circles.push_back(disk.circle);
@@ -157,7 +203,7 @@ Roundness roundness_of(const std::vector<RimDisk>& disks, const EdgeMap& edges, 
     circles.back().y = at.from_frame_y(disk.circle.y);
     circles.back().radius = disk.circle.radius / at.scale;
   }
-  return roundness_of(edges, circles, polarity);
+  return circles;
 }
 
 }  // namespace
@@ -193,7 +239,9 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
   }
   learned.disks = likely_ones(circles, edges, at, model);
   learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
-  learned.roundness = roundness_of(learned.disks, edges, at, polarity);
+  const std::vector<Circle> seen = on_the_map(learned.disks, at);
+  learned.roundness = roundness_of(edges, seen, polarity);
+  measure_open_rims(seen, edges, at.scale, model);
   return learned;
 }
 

@@ -17,6 +17,9 @@ struct RimModel {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   double radius_std_error_px = 0;
+  // The radius towards sides where no neighbour is near, if enough of them are seen, else the above: where beads touch,
+  // blur moves the rims inwards (by 2 to 8 % at radii of 7 to 13 px).
+  double open_radius_px = 0;
   double radius_spread = 0;         // standard deviation of single radii over their mean
   double contrast = 0;              // median step across a rim, grey levels
   float threshold = 0;              // weakest edge, grey levels per px of the reduced frame

@@ -329,7 +329,7 @@ void RadiusFromFrames::refine(FinderCalibration& calibration) const {
   mean.step_px = step_px_;
   for (const double sum : sums_) mean.level.push_back(static_cast<float>(sum / static_cast<double>(beads_)));
   const double contrast = calibration.contrast_level, background = mean_background(calibration.light);
-  const double spread = calibration.noise_level / std::max(1e-6, std::abs(contrast));
+  const double spread = calibration.residual_level / std::max(1e-6, std::abs(contrast));
   const double beads = static_cast<double>(beads_);
   const RimChoice choice = choose_rim(mean, {.radius_px = calibration.rim_radius_px,
                                              .edge_px = calibration.edge_width_px,

@@ -156,6 +156,7 @@ void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
 void enlarge(SurveyCandidate& candidate, int factor) {
   const double scale = factor, shift = 0.5 * (scale - 1);
   candidate.rims.radius_px *= scale;
+  candidate.rims.open_radius_px *= scale;
   candidate.rims.radius_std_error_px *= scale;
   for (RimDisk& disk : candidate.disks) {
     disk.circle.x = scale * disk.circle.x + shift;

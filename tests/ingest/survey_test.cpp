@@ -228,6 +228,21 @@ TEST(Survey, FindsDrawnBeadsOfEveryLook) {
   }
 }
 
+// Where beads touch, blur moves the steepest edge inwards, by up to 8 % of these radii.
+TEST(Survey, RimsOfTouchingBeadsGiveTheRadiusOfTheirOpenSides) {
+  for (const test::BeadLook& look : test::pictures_with_beads()) {
+    if (look.name != "flat" && look.name != "of uneven brightness") continue;
+    for (unsigned series = 70; series < 74; ++series) {
+      std::mt19937 random(seed_of(look.name, series));
+      const test::DrawnBeads drawn = look.draw(random);
+      const LearnedRims dark = learn_rims(drawn.frame, Polarity::dark_beads, drawn.radius_px);
+      const LearnedRims bright = learn_rims(drawn.frame, Polarity::bright_beads, drawn.radius_px);
+      const LearnedRims& rims = dark.disks.size() > bright.disks.size() ? dark : bright;
+      EXPECT_NEAR(rims.model.open_radius_px / drawn.radius_px, 1, 0.03) << look.name << ' ' << series;
+    }
+  }
+}
+
 TEST(Survey, DarkSurroundingsHoldNoBeads) {
   const double radius = 11;
   std::vector<Place> truth;
