@@ -206,7 +206,7 @@ class FilmLearner {
     if (find_.seen) {
       film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
       if (!film_.second)
-        film_.warnings.push_back("No beads of the second diameter were found: no rims of that radius are seen.");
+        film_.warnings.emplace_back("No beads of the second diameter were found: no rims of that radius are seen.");
       return;
     }
     const double expected = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;

@@ -111,7 +111,7 @@ std::vector<std::string> validate(const MeasureOptions& options) {
   if (!(options.bin_width > 0) || !std::isfinite(options.bin_width))
     problems.push_back(text_of("bin_width is %g; it must be above 0", options.bin_width));
   if (!kernel_is_valid(options.kernel) || options.kernel.kind == KernelKind::none)
-    problems.push_back("the kernel must have a shape and a finite width: density is measured through a window");
+    problems.emplace_back("the kernel must have a shape and a finite width: density is measured through a window");
   return problems;
 }
 
