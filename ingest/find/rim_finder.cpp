@@ -239,10 +239,16 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
   }
   learned.disks = likely_ones(circles, edges, at, model);
   learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
-  const std::vector<Circle> seen = on_the_map(learned.disks, at);
-  learned.roundness = roundness_of(edges, seen, polarity);
-  measure_open_rims(seen, edges, at.scale, model);
+  measure_open_rims(on_the_map(learned.disks, at), edges, at.scale, model);
   return learned;
+}
+
+Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks) {
+  if (disks.empty()) return {};
+  // Corners show at twice the resolution that circles are searched at.
+  const double radius = scaled_for(frame, model.radius_px).scale < 2 ? model.radius_px : 0.5 * model.radius_px;
+  const ScaledPicture at = scaled_for(frame, radius);
+  return roundness_of(find_edges(at.picture), on_the_map(disks, at), model.polarity);
 }
 
 std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model) {

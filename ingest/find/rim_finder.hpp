@@ -37,11 +37,13 @@ struct LearnedRims {
   RimModel model;
   std::vector<RimDisk> disks;  // of the frame learned from
   double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
-  Roundness roundness;         // of the disks
 };
 
 // Learns from one frame, starting from a radius good to a tenth.
 LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px);
+
+// Whether the outlines of the disks are round.
+Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);
 
 // Disks that are beads with a probability of 0.8 or more, from top to bottom.
 std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model);

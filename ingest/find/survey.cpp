@@ -105,7 +105,16 @@ std::string text_of(const char* format, double a, double b = 0) {
   return text;
 }
 
-void judge(SurveyCandidate& candidate, double edge_length_px, const Roundness& roundness) {
+// Things that are not round are no beads, nor are spots without a rim among much else.
+void judge_shape(SurveyCandidate& candidate, const Roundness& roundness) {
+  candidate.not_round = !roundness.round();
+  if (roundness.rim_width > widest_rim && candidate.explained_share < spots_explained)
+    candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
+  else
+    candidate.why_not = roundness.why_not();
+}
+
+void judge(SurveyCandidate& candidate, double edge_length_px) {
   double support = 0;
   for (const RimDisk& disk : candidate.disks) {
     const double rim = 2 * std::numbers::pi * disk.circle.radius;
@@ -129,12 +138,6 @@ void judge(SurveyCandidate& candidate, double edge_length_px, const Roundness& r
     candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
     candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
-  else if (roundness.rim_width > widest_rim && candidate.explained_share < spots_explained)
-    candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
-  else
-    candidate.why_not = roundness.why_not();
-  candidate.not_round = !roundness.round();
-  candidate.credible = candidate.why_not.empty();
 }
 
 // Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.
@@ -189,7 +192,10 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px);
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
-    judge(candidate, learned.edge_length_px, learned.roundness);
+    judge(candidate, learned.edge_length_px);
+    if (candidate.why_not.empty())
+      judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks));
+    candidate.credible = candidate.why_not.empty();
     enlarge(candidate, frames.reduction);
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
