@@ -49,6 +49,26 @@ TEST(EmpiricalMap, InterpolatesWithinItsStatedError) {
   }
 }
 
+// One axis, and no more beds than set the width of the weights: a power law is a line in the logarithms.
+TEST(EmpiricalMap, OfOneAxisIsExactForAPowerLaw) {
+  for (const int beds : {5, 9}) {
+    std::vector<MapPoint> points;
+    for (int k = 0; k < beds; ++k) {
+      const double gamma = 2.0 + 0.5 * k;
+      points.push_back({{gamma}, 0.1 * gamma * gamma, 0.0});
+    }
+    const EmpiricalMap map({{"gamma", true}}, std::move(points));
+    ASSERT_EQ(map.status(), FitStatus::ok) << map.message();
+    for (const double gamma : {2.2, 3.1, 3.9}) {
+      const double position[] = {gamma};
+      const auto found = map.at(position);
+      ASSERT_EQ(found.status, FitStatus::ok) << gamma;
+      EXPECT_NEAR(found.temperature.value, 0.1 * gamma * gamma, 1e-6) << gamma;
+    }
+    EXPECT_NEAR(map.interpolation_error(), 0.0, 1e-6);
+  }
+}
+
 TEST(EmpiricalMap, SaysWhereItExtrapolatesOrCannot) {
   const EmpiricalMap map = make_map(0.0);
   const double outside[] = {20.0, 0.7};
