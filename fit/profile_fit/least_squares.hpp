@@ -30,7 +30,7 @@ struct LeastSquaresOptions {
   double robust_threshold = 1.345;
   bool errors_known = true;  // robust only: the scale of the residuals is 1, else their median absolute deviation
   int max_iterations = 100;
-  double lowest_temperature = 0.0;  // a bound below which the tail cannot be told from a step
+  double lowest_temperature = 0.0;  // a bound below which the tail looks like a step
 };
 
 struct Solution {

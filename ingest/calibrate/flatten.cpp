@@ -164,18 +164,22 @@ std::vector<double> hugging_polynomial(const std::vector<BlockValue>& blocks, in
   return coefficients;
 }
 
-}  // namespace
+double value_of(const std::vector<double>& fit, double u, double v) {
+  std::array<double, 6> values{};
+  polynomial_values(u, v, 2, values.data());
+  double sum = 0;
+  for (std::size_t i = 0; i < fit.size(); ++i) sum += fit[i] * values[i];
+  return sum;
+}
 
-LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity polarity) {
-  if (frame.width <= 0 || frame.height <= 0 ||
-      frame.pixels.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height))
-    throw std::invalid_argument("estimate_light: the frame's pixel count is not width x height");
-  const int factor = std::max(1, static_cast<int>(radius_px / 4));
-  const GrayFrame small = radius_px < 2.5 ? frame : box3(reduced(frame, factor));
-  const int block = std::max(8, static_cast<int>(std::lround(7 * radius_px / factor)));
+int order_for(std::size_t blocks) { return blocks >= 40 ? 2 : blocks >= 12 ? 1 : 0; }
+
+// The brightest and the darkest levels of square blocks, those of the same block side by side.
+struct Blocks {
   std::vector<BlockValue> upper, lower;
-  const auto add_block = [&](int top, int left, int bottom, int right, std::size_t fewest) {
-    if ((bottom - top) * (right - left) * 3 < block * block && !(upper.empty())) return;
+
+  // Of what is seen between the rows and columns; left out where fewer than `fewest` pixels are.
+  void add(const GrayFrame& small, int top, int left, int bottom, int right, std::size_t fewest) {
     std::vector<float> levels;
     for (int row = top; row < bottom; ++row)
       for (int column = left; column < right; ++column)
@@ -190,29 +194,41 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
     const double median = pick(0.5);
     upper.push_back({u, v, pick(0.97), median, false});
     lower.push_back({u, v, pick(0.03), median, false});
-  };
+  }
+};
+
+Blocks blocks_of(const GrayFrame& small, int block) {
+  Blocks blocks;
   for (int top = 0; top < small.height; top += block)
     for (int left = 0; left < small.width; left += block) {
       const int bottom = std::min(small.height, top + block), right = std::min(small.width, left + block);
-      add_block(top, left, bottom, right, static_cast<std::size_t>((bottom - top) * (right - left) / 3));
+      const int area = (bottom - top) * (right - left);
+      if (area * 3 < block * block && !blocks.upper.empty()) continue;
+      blocks.add(small, top, left, bottom, right, static_cast<std::size_t>(area / 3));
     }
-  if (upper.empty()) add_block(0, 0, small.height, small.width, 1);  // hardly anything in view
-  if (upper.empty()) throw std::invalid_argument("estimate_light: nothing of the frame is to be seen");
-  // The beads' envelope is told by the blocks that hold beads: those with a fair share of the largest contrast.
+  if (blocks.upper.empty()) blocks.add(small, 0, 0, small.height, small.width, 1);  // hardly anything in view
+  if (blocks.upper.empty()) throw std::invalid_argument("estimate_light: nothing of the frame is to be seen");
+  return blocks;
+}
+
+// Polynomials through the levels of the background and of the beads.
+struct Envelopes {
+  std::vector<double> background, bead;
+};
+
+// The beads' envelope follows from the blocks that hold beads: those with a fair share of the largest contrast. A block
+// of little contrast is either empty, and gives the background by its median, noise or not, or so full of beads that
+// hardly any background shows; the nearer envelope decides.
+Envelopes envelopes_of(const Blocks& blocks, bool dark) {
+  constexpr double fair_share = 0.3;
   std::vector<double> spans;
-  for (std::size_t k = 0; k < upper.size(); ++k) spans.push_back(upper[k].value - lower[k].value);
+  for (std::size_t k = 0; k < blocks.upper.size(); ++k) spans.push_back(blocks.upper[k].value - blocks.lower[k].value);
   std::vector<double> sorted_spans = spans;
   std::sort(sorted_spans.begin(), sorted_spans.end());
   const double largest_span =
       sorted_spans[static_cast<std::size_t>(0.98 * static_cast<double>(sorted_spans.size() - 1))];
-  constexpr double fair_share = 0.3;
-  // A block of little contrast is either empty, and tells the background by its median, noise or not, or so full of
-  // beads that hardly any background shows; the nearer envelope decides.
-  const bool dark = polarity != Polarity::bright_beads;
-  std::vector<BlockValue> background_side = dark ? upper : lower;
-  const std::vector<BlockValue>& bead_side = dark ? lower : upper;
-  const auto order_for = [](std::size_t blocks) { return blocks >= 40 ? 2 : blocks >= 12 ? 1 : 0; };
-  const double background_direction = dark ? 1 : -1;
+  std::vector<BlockValue> background_side = dark ? blocks.upper : blocks.lower;
+  const std::vector<BlockValue>& bead_side = dark ? blocks.lower : blocks.upper;
   std::vector<BlockValue> with_beads;
   std::vector<std::size_t> plain;
   for (std::size_t k = 0; k < spans.size(); ++k) {
@@ -221,47 +237,50 @@ LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity pol
     else
       plain.push_back(k);
   }
-  const int background_order = order_for(background_side.size());
-  std::vector<double> background_fit = hugging_polynomial(background_side, background_order, background_direction);
-  std::vector<double> bead_fit = hugging_polynomial(with_beads, order_for(with_beads.size()), -background_direction);
-  const auto value_of = [](const std::vector<double>& fit, double u, double v) {
-    std::array<double, 6> values{};
-    polynomial_values(u, v, 2, values.data());
-    double sum = 0;
-    for (std::size_t i = 0; i < fit.size(); ++i) sum += fit[i] * values[i];
-    return sum;
+  const double background_direction = dark ? 1 : -1;
+  const auto fitted = [&] {
+    return Envelopes{hugging_polynomial(background_side, order_for(background_side.size()), background_direction),
+                     hugging_polynomial(with_beads, order_for(with_beads.size()), -background_direction)};
   };
+  const Envelopes first = fitted();
   for (const std::size_t k : plain) {
-    BlockValue& told = background_side[k];
-    const double to_background = std::abs(told.median - value_of(background_fit, told.u, told.v));
-    const double to_bead = std::abs(told.median - value_of(bead_fit, told.u, told.v));
+    BlockValue& block = background_side[k];
+    const double to_background = std::abs(block.median - value_of(first.background, block.u, block.v));
+    const double to_bead = std::abs(block.median - value_of(first.bead, block.u, block.v));
     if (to_background < to_bead) {
-      told.value = told.median;
-      told.exact = true;
+      block.value = block.median;
+      block.exact = true;
     } else {
       with_beads.push_back(bead_side[k]);
     }
   }
-  background_fit = hugging_polynomial(background_side, background_order, background_direction);
-  bead_fit = hugging_polynomial(with_beads, order_for(with_beads.size()), -background_direction);
+  return fitted();
+}
+
+}  // namespace
+
+LightField estimate_light(const GrayFrame& frame, double radius_px, Polarity polarity) {
+  if (frame.width <= 0 || frame.height <= 0 ||
+      frame.pixels.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height))
+    throw std::invalid_argument("estimate_light: the frame's pixel count is not width x height");
+  const int factor = std::max(1, static_cast<int>(radius_px / 4));
+  const GrayFrame small = radius_px < 2.5 ? frame : box3(reduced(frame, factor));
+  const int block = std::max(8, static_cast<int>(std::lround(7 * radius_px / factor)));
+  const bool dark = polarity != Polarity::bright_beads;
+  const Envelopes envelopes = envelopes_of(blocks_of(small, block), dark);
 
   LightField light;
   light.spacing_px = 32;
   light.columns = static_cast<int>(std::ceil(frame.width / light.spacing_px)) + 1;
   light.rows = static_cast<int>(std::ceil(frame.height / light.spacing_px)) + 1;
-  const std::size_t nodes = static_cast<std::size_t>(light.columns) * static_cast<std::size_t>(light.rows);
-  light.background.resize(nodes);
-  light.contrast.resize(nodes);
   std::vector<double> contrasts;
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.columns; ++column) {
       const double u = std::min(1.0, 2 * column * light.spacing_px / frame.width - 1);
       const double v = std::min(1.0, 2 * row * light.spacing_px / frame.height - 1);
-      const double background = value_of(background_fit, u, v), bead = value_of(bead_fit, u, v);
-      const std::size_t at =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) + static_cast<std::size_t>(column);
-      light.background[at] = static_cast<float>(background);
-      light.contrast[at] = static_cast<float>(bead - background);
+      const double background = value_of(envelopes.background, u, v), bead = value_of(envelopes.bead, u, v);
+      light.background.push_back(static_cast<float>(background));
+      light.contrast.push_back(static_cast<float>(bead - background));
       contrasts.push_back(std::abs(bead - background));
     }
   std::sort(contrasts.begin(), contrasts.end());

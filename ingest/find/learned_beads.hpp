@@ -17,7 +17,7 @@ struct LearnedBeads {
   double knot = 0.25;                              // px, of the profile
   double spread = 0.1;                             // of the residuals, contrast units
   bool hold_radius = false, learn_profile = true;  // as asked for
-  bool told = false;
+  bool noted = false;
   [[nodiscard]] std::size_t total() const {
     std::size_t sum = 0;
     for (const auto& one : disks) sum += one.size();

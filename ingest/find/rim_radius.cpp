@@ -305,8 +305,8 @@ class RadiusFromRims {
 }  // namespace
 
 void tell_radius(CalibrationResult& result) {
-  if (!result.found || !result.beads || result.beads->told) return;
-  result.beads->told = true;
+  if (!result.found || !result.beads || result.beads->noted) return;
+  result.beads->noted = true;
   RadiusFromRims(result.calibration, *result.beads).find();
 }
 

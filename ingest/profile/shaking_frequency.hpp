@@ -32,7 +32,7 @@ struct FoundFrequency {
 constexpr double most_false_alarm = 1e-4;
 FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places);
 
-// The same told from a longer stretch of the film once it is known from its beginning.
+// The same from a longer stretch of the film once it is known from its beginning.
 FoundFrequency refine_frequency(const std::vector<PlaceInFrame>& places, const FoundFrequency& from_beginning);
 
 }  // namespace shakebed::ingest

@@ -71,128 +71,186 @@ std::vector<Link> link_disks(const Measurement& measurement, double largest_step
   return links;
 }
 
-VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options) {
-  if (!(options.frame_rate_hz > 0)) throw std::invalid_argument("measure_velocities: frame_rate_hz must be positive");
-  VelocityMeasurement result;
-  const std::vector<MeasuredDisk>& disks = measurement.disks;
-  const std::vector<Link> links = link_disks(measurement, options.largest_step);
-  result.links = links.size();
-  const auto ranges = ranges_of(measurement);
-  std::size_t could = 0;
-  for (std::size_t frame = 0; frame + 1 < ranges.size(); ++frame)
-    if (ranges[frame + 1].second > 0) could += ranges[frame].second - ranges[frame].first;
-  result.linked_share = could ? static_cast<double>(links.size()) / static_cast<double>(could) : 0;
-  if (links.empty()) {
-    result.warnings.emplace_back("No disk could be followed from one frame to the next.");
-    return result;
-  }
-  const double scale = measurement.calibration.scale_m_per_px;
-  const double diameter_px = 2 * measurement.calibration.radius_px;
-  const double diameter_m = scale * diameter_px;
-  const double dt = 1 / options.frame_rate_hz;
+namespace {
 
-  // Steps less the flow of their height bin; the flow takes one of n degrees of freedom.
+// Of a velocity with memory, mean steps of a time x (in units of the memory): the correlation of two that follow one
+// another over their mean square, (1 - e)^2/(2 (x - 1 + e)) with e = exp(-x), and the mean square lost.
+double correlation_of_steps(double x) {
+  const double e = std::exp(-x);
+  return (1 - e) * (1 - e) / (2 * (x - 1 + e));
+}
+double finite_time_factor(double correlation) {
+  double low = 1e-4, high = 50;
+  for (int round = 0; round < 100; ++round) {
+    const double x = std::sqrt(low * high);
+    (correlation_of_steps(x) > correlation ? low : high) = x;
+  }
+  const double x = std::sqrt(low * high);
+  return x < 1e-3 ? 1 + x / 3 : x * x / (2 * (x - 1 + std::exp(-x)));
+}
+
+// Kinetic temperatures from links: steps from frame to frame, less the flow, less the localisation error, corrected for
+// the time between the frames.
+class StepStatistics {
+ public:
+  StepStatistics(const Measurement& measurement, const VelocityOptions& options)
+      : disks_(measurement.disks),
+        options_(options),
+        ranges_(ranges_of(measurement)),
+        links_(link_disks(measurement, options.largest_step)),
+        diameter_px_(2 * measurement.calibration.radius_px),
+        diameter_m_(measurement.calibration.scale_m_per_px * diameter_px_) {}
+
+  VelocityMeasurement operator()() {
+    count_links();
+    if (links_.empty()) {
+      result_.warnings.emplace_back("No disk could be followed from one frame to the next.");
+      return result_;
+    }
+    take_steps();
+    subtract_flow();
+    sum_by_frame();
+    result_.horizontal = temperature(along_x_);
+    result_.vertical = temperature(along_z_);
+    warn();
+    return result_;
+  }
+
+ private:
   struct Step {
     double x = 0, z = 0, weight = 0;
   };
-  std::vector<Step> steps(links.size());
-  std::map<std::pair<std::size_t, long>, std::vector<std::size_t>> bins;
-  for (std::size_t k = 0; k < links.size(); ++k) {
-    const MeasuredDisk &from = disks[links[k].from], &to = disks[links[k].to];
-    steps[k].x = to.x - from.x;
-    steps[k].z = to.z - from.z;
-    result.mean_step += std::hypot(steps[k].x, steps[k].z) / static_cast<double>(links.size());
-    bins[{links[k].frame, std::lround(std::floor(from.z / options.flow_bin_width))}].push_back(k);
+  struct Sums {                   // of one component
+    std::vector<double> squares;  // a frame
+    double next = 0;              // products of steps that follow one another
+  };
+
+  void count_links() {
+    result_.links = links_.size();
+    std::size_t could = 0;
+    for (std::size_t frame = 0; frame + 1 < ranges_.size(); ++frame)
+      if (ranges_[frame + 1].second > 0) could += ranges_[frame].second - ranges_[frame].first;
+    result_.linked_share = could ? static_cast<double>(links_.size()) / static_cast<double>(could) : 0;
   }
-  for (const auto& [bin, members] : bins) {
-    const double n = static_cast<double>(members.size());
-    if (members.size() < 3) continue;  // no flow to speak of can be told: these steps stay out
-    double mean_x = 0, mean_z = 0;
-    for (const std::size_t k : members) {
-      mean_x += steps[k].x / n;
-      mean_z += steps[k].z / n;
-    }
-    for (const std::size_t k : members) {
-      steps[k].x -= mean_x;
-      steps[k].z -= mean_z;
-      steps[k].weight = n / (n - 1);
+
+  void take_steps() {
+    for (const Link& link : links_) {
+      const MeasuredDisk &from = disks_[link.from], &to = disks_[link.to];
+      steps_.push_back({to.x - from.x, to.z - from.z, 0});
+      result_.mean_step += std::hypot(steps_.back().x, steps_.back().z) / static_cast<double>(links_.size());
     }
   }
 
-  // Correlation of successive steps of one disk, for the finite-time loss. The localisation error of the frame between
-  // the two enters both with opposite signs: -sigma^2 per component.
-  std::unordered_map<std::size_t, std::size_t> link_from;
-  for (std::size_t k = 0; k < links.size(); ++k) link_from[links[k].from] = k;
-  const std::size_t frames = ranges.size();
-  std::vector<double> sum_xx(frames, 0), sum_zz(frames, 0), counted(frames, 0), noise(frames, 0);
-  double next_xx = 0, next_zz = 0, next_count = 0;
-  double variance = 0, variance_count = 0;
-  for (std::size_t k = 0; k < links.size(); ++k) {
-    const Step& step = steps[k];
-    if (step.weight == 0) continue;
-    const MeasuredDisk &from = disks[links[k].from], &to = disks[links[k].to];
-    const double blur =
-        (from.std_error_px * from.std_error_px + to.std_error_px * to.std_error_px) / (diameter_px * diameter_px);
-    sum_xx[links[k].frame] += step.weight * step.x * step.x;
-    sum_zz[links[k].frame] += step.weight * step.z * step.z;
-    noise[links[k].frame] += blur;
-    counted[links[k].frame] += 1;
-    variance += 0.5 * blur;
-    variance_count += 1;
-    const auto follower = link_from.find(links[k].to);
-    if (follower == link_from.end() || steps[follower->second].weight == 0) continue;
-    const double weight = std::sqrt(step.weight * steps[follower->second].weight);
-    next_xx += weight * step.x * steps[follower->second].x;
-    next_zz += weight * step.z * steps[follower->second].z;
-    next_count += 1;
+  // Steps less the mean of their frame and bin of height; it takes one of n degrees of freedom.
+  void subtract_flow() {
+    std::map<std::pair<std::size_t, long>, std::vector<std::size_t>> bins;
+    for (std::size_t k = 0; k < links_.size(); ++k)
+      bins[{links_[k].frame, std::lround(std::floor(disks_[links_[k].from].z / options_.flow_bin_width))}].push_back(k);
+    for (const auto& [bin, members] : bins) {
+      const double n = static_cast<double>(members.size());
+      if (members.size() < 3) continue;  // too few for a flow: these steps stay out
+      double mean_x = 0, mean_z = 0;
+      for (const std::size_t k : members) {
+        mean_x += steps_[k].x / n;
+        mean_z += steps_[k].z / n;
+      }
+      for (const std::size_t k : members) {
+        steps_[k].x -= mean_x;
+        steps_[k].z -= mean_z;
+        steps_[k].weight = n / (n - 1);
+      }
+    }
   }
-  variance = variance_count > 0 ? variance / variance_count : 0;
 
-  const auto temperature = [&](const std::vector<double>& sums, double next_sum) {
+  // Squares of the steps, and products of those of one disk that follow one another, for the finite-time loss. The
+  // localisation error of the frame between the two enters both with opposite signs: -sigma^2 per component.
+  void sum_by_frame() {
+    std::unordered_map<std::size_t, std::size_t> link_from;
+    for (std::size_t k = 0; k < links_.size(); ++k) link_from[links_[k].from] = k;
+    for (std::vector<double>* sums : {&along_x_.squares, &along_z_.squares, &counted_, &noise_})
+      sums->assign(ranges_.size(), 0);
+    double variance_count = 0;
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const Step& step = steps_[k];
+      if (step.weight == 0) continue;
+      const std::size_t frame = links_[k].frame;
+      const double blur = localisation_error(disks_[links_[k].from], disks_[links_[k].to]);
+      along_x_.squares[frame] += step.weight * step.x * step.x;
+      along_z_.squares[frame] += step.weight * step.z * step.z;
+      noise_[frame] += blur;
+      counted_[frame] += 1;
+      variance_ += 0.5 * blur;
+      variance_count += 1;
+      const auto follower = link_from.find(links_[k].to);
+      if (follower == link_from.end() || steps_[follower->second].weight == 0) continue;
+      const double weight = std::sqrt(step.weight * steps_[follower->second].weight);
+      along_x_.next += weight * step.x * steps_[follower->second].x;
+      along_z_.next += weight * step.z * steps_[follower->second].z;
+      next_count_ += 1;
+    }
+    variance_ = variance_count > 0 ? variance_ / variance_count : 0;
+  }
+
+  // Of a step between the two, per component [D^2].
+  double localisation_error(const MeasuredDisk& from, const MeasuredDisk& to) const {
+    return (from.std_error_px * from.std_error_px + to.std_error_px * to.std_error_px) / (diameter_px_ * diameter_px_);
+  }
+
+  KineticTemperature temperature(const Sums& sums) const {
     KineticTemperature t;
     std::vector<double> series;
     double total = 0, total_noise = 0, total_count = 0;
-    for (std::size_t frame = 0; frame < frames; ++frame) {
-      if (counted[frame] == 0) continue;
-      series.push_back((sums[frame] - noise[frame]) / counted[frame]);
-      total += sums[frame];
-      total_noise += noise[frame];
-      total_count += counted[frame];
+    for (std::size_t frame = 0; frame < ranges_.size(); ++frame) {
+      if (counted_[frame] == 0) continue;
+      series.push_back((sums.squares[frame] - noise_[frame]) / counted_[frame]);
+      total += sums.squares[frame];
+      total_noise += noise_[frame];
+      total_count += counted_[frame];
     }
     if (total_count == 0) return t;
-    const double to_temperature = diameter_m * diameter_m / (dt * dt * options.gravity_m_per_s2);
+    const double dt = 1 / options_.frame_rate_hz;
+    const double to_temperature = diameter_m_ * diameter_m_ / (dt * dt * options_.gravity_m_per_s2);
     const double mean_square = std::max(0.0, (total - total_noise) / total_count);
-    // Mean steps of a velocity with memory tau: <s_k s_k+1>/<s_k^2> = (1 - e)^2/(2 (x - 1 + e)), e = exp(-x).
-    double factor = 1;
-    // (Only where motion stands out of the localisation error: below it the correlation says nothing.)
-    if (next_count > 30 && mean_square > 0.2 * total_noise / total_count) {
-      const double correlation = std::clamp((next_sum / next_count + variance) / mean_square, 0.05, 0.999);
-      double low = 1e-4, high = 50;
-      for (int round = 0; round < 100; ++round) {
-        const double x = std::sqrt(low * high), e = std::exp(-x);
-        const double expected = (1 - e) * (1 - e) / (2 * (x - 1 + e));
-        (expected > correlation ? low : high) = x;
-      }
-      const double x = std::sqrt(low * high);
-      factor = x < 1e-3 ? 1 + x / 3 : x * x / (2 * (x - 1 + std::exp(-x)));
-    }
-    t.finite_time_factor = factor;
+    // Only where motion stands out of the localisation error: below it the correlation says nothing.
+    if (next_count_ > 30 && mean_square > 0.2 * total_noise / total_count)
+      t.finite_time_factor =
+          finite_time_factor(std::clamp((sums.next / next_count_ + variance_) / mean_square, 0.05, 0.999));
+    else
+      t.finite_time_factor = 1;
     t.localisation_bias_m = total_noise / total_count * to_temperature;
-    t.over_mg_m = mean_square * factor * to_temperature;
-    t.std_error_m = statistics::mean_of(series).std_error * factor * to_temperature;
+    t.over_mg_m = mean_square * t.finite_time_factor * to_temperature;
+    t.std_error_m = statistics::mean_of(series).std_error * t.finite_time_factor * to_temperature;
     return t;
-  };
-  result.horizontal = temperature(sum_xx, next_xx);
-  result.vertical = temperature(sum_zz, next_zz);
-  if (result.linked_share < 0.9)
-    result.warnings.emplace_back("Only " + std::to_string(static_cast<int>(100 * result.linked_share)) +
-                                 " % of the disks could be followed: the frames follow too slowly for velocities.");
-  if (result.mean_step > 0.25)
-    result.warnings.emplace_back("Disks move by " + std::to_string(result.mean_step) +
-                                 " D between frames on average: fast ones are lost and T is too low.");
-  if (result.horizontal.finite_time_factor > 1.5 || result.vertical.finite_time_factor > 1.5)
-    result.warnings.emplace_back("Velocities change much between frames: T leans on the finite-time correction.");
-  return result;
+  }
+
+  void warn() {
+    if (result_.linked_share < 0.9)
+      result_.warnings.emplace_back("Only " + std::to_string(static_cast<int>(100 * result_.linked_share)) +
+                                    " % of the disks could be followed: the frames follow too slowly for velocities.");
+    if (result_.mean_step > 0.25)
+      result_.warnings.emplace_back("Disks move by " + std::to_string(result_.mean_step) +
+                                    " D between frames on average: fast ones are lost and T is too low.");
+    if (result_.horizontal.finite_time_factor > 1.5 || result_.vertical.finite_time_factor > 1.5)
+      result_.warnings.emplace_back("Velocities change much between frames: T leans on the finite-time correction.");
+  }
+
+  const std::vector<MeasuredDisk>& disks_;
+  const VelocityOptions& options_;
+  const std::vector<std::pair<std::size_t, std::size_t>> ranges_;
+  const std::vector<Link> links_;
+  const double diameter_px_, diameter_m_;
+  std::vector<Step> steps_;  // a link each [D]
+  Sums along_x_, along_z_;
+  std::vector<double> counted_, noise_;   // a frame: steps, and their localisation errors
+  double next_count_ = 0, variance_ = 0;  // variance_: of the place in one frame [D^2]
+  VelocityMeasurement result_;
+};
+
+}  // namespace
+
+VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options) {
+  if (!(options.frame_rate_hz > 0)) throw std::invalid_argument("measure_velocities: frame_rate_hz must be positive");
+  return StepStatistics(measurement, options)();
 }
 
 VelocityMeter::VelocityMeter(double bead_diameter_m, const VelocityOptions& options, std::size_t stretch_frames)

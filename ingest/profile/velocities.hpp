@@ -41,8 +41,8 @@ struct VelocityMeasurement {
 std::vector<Link> link_disks(const Measurement& measurement, double largest_step);
 
 // T_x and T_z of the linked disks. The flow of each height bin in each pair of frames is removed (with the loss of one
-// degree of freedom a bin restored); the localisation error's share is subtracted, told from the stated variances; the
-// finite-time loss is told from the velocity's own correlation between successive steps, C(dt)/C(0) = exp(-dt/tau), for
+// degree of freedom a bin restored); the localisation error's share, by the stated variances, is subtracted; the
+// finite-time loss follows from the velocity's own correlation between successive steps, C(dt)/C(0) = exp(-dt/tau), for
 // which the mean over dt of a velocity with that memory has 2 (x - 1 + exp(-x))/x^2 of the variance, x = dt/tau.
 // Throws std::invalid_argument without a frame rate.
 VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options);

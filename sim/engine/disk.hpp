@@ -20,7 +20,7 @@ enum Partner : std::int32_t {
 };
 
 // Bits of Disk::near: what the disk could touch while it stays in its shell, and whether a neighbour could be on the
-// other side of a periodic box's edge, so that nearest images must be told.
+// other side of a periodic box's edge, so that nearest images must be found.
 enum Near : std::uint8_t {
   near_left_wall = 1,
   near_right_wall = 2,

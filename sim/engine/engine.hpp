@@ -4,7 +4,7 @@
 // Every disk has one next event, kept in its record: with another disk, with a
 // wall, or with the edge of its shell. It is predicted when something happens
 // to the disk, and only then. A pair's contact is taken when it is earlier than
-// the partner's own next event; the partner's former partner is not told, it
+// the partner's own next event; the partner's former partner is left as it is, it
 // finds out when its old time comes and then predicts anew. Between events
 // disks fly freely: straight lines in pairs' relative coordinates, gravity or
 // not. What was predicted is written down only when the next event has begun,
@@ -145,7 +145,7 @@ class Engine final : public Simulation {
   TwoLanes shell_exits_of(std::uint32_t i, std::uint32_t j, const Motion& first, const Motion& second) const;
   void commit(std::uint32_t i, Candidate next, double exit);
   void settle();
-  // Must what is pending be written down before the event of disks i and k at `time` can be told? Not if all of it
+  // Must what is pending be written down before the event of disks i and k at `time` is known? Not if all of it
   // comes later and is that of other disks: one that it claims has nothing to do until then, or it would not be
   // claimed.
   bool waits_for(double time, std::uint32_t i, std::uint32_t k) const {

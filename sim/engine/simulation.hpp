@@ -52,7 +52,7 @@ struct Counters {
   std::uint64_t collisions() const { return disk_collisions + wall_collisions + floor_collisions; }
 };
 
-// Told of everything that happens between looks, as it happens. Disks by their place in the start, times since the
+// Called with everything that happens between looks, as it happens. Disks by their place in the start, times since the
 // start, in reduced units; under periodic sides positions may lie a little outside the box.
 class Watcher {
  public:
@@ -93,8 +93,8 @@ class Simulation {
   virtual double next_synchronisation() const = 0;
   virtual std::vector<std::uint8_t> checkpoint() const = 0;
   virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;
-  // From now on the watcher (nullptr: nobody) is told; first of all how every disk flies now. It changes nothing of the
-  // run, but that it then is one in the order of time; it must outlive the run, and is not part of a checkpoint.
+  // From now on the watcher (nullptr: none) is called; first of all with how every disk flies now. It changes nothing
+  // of the run, but that it then is one in the order of time; it must outlive the run, and is not part of a checkpoint.
   virtual void watch(Watcher* watcher) = 0;
   // Another temperature for the Langevin, Andersen or thermal-floor reservoir, from now on. Not part of a checkpoint.
   // Throws std::invalid_argument where the scene has none of them.

@@ -1,5 +1,5 @@
 // Tiles of a large periodic bed, and the log of contacts by which some can be taken back. How the engine goes on tile
-// by tile is told in engine_tiles.hpp.
+// by tile stands in engine_tiles.hpp.
 #pragma once
 
 #include <algorithm>

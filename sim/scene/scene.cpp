@@ -82,7 +82,7 @@ class Check {
     // Beyond it a place is known to no better than 1e-7 D, and cells are more than can be counted.
     constexpr double most = 1e9;
     require(!(b.width > most) && !(std::isfinite(height()) && height() > most), "/box",
-            "the box is larger than 1e9 D: places so far apart cannot be told to 1e-7 D");
+            "the box is larger than 1e9 D: places so far apart have no digits for 1e-7 D");
     const bool periodic = std::holds_alternative<PeriodicSides>(b.sides);
     const double least = 2 * largest + 3;  // a disk must never meet two images of one neighbour
     require(!periodic || b.width >= least, "/box/width",
