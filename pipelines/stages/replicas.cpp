@@ -1,11 +1,9 @@
 #include "pipelines/stages/replicas.hpp"
 
 #include <fmt/format.h>
+#include <gsl/gsl_cdf.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -39,8 +37,7 @@ double root_mean_square(const std::vector<double>& values) {
 
 // 95 % of Student's distribution for the mean of n values, in those of a normal one.
 double few_values_factor(std::size_t n) {
-  return boost::math::quantile(boost::math::students_t(static_cast<double>(n - 1)), two_sided_95) /
-         boost::math::quantile(boost::math::normal(), two_sided_95);
+  return gsl_cdf_tdist_Pinv(two_sided_95, static_cast<double>(n - 1)) / gsl_cdf_ugaussian_Pinv(two_sided_95);
 }
 
 // Of the mean of the replicas.
@@ -94,9 +91,7 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
 bool differ(double spread, double within, std::size_t n) {
   if (!(within > 0) || !(spread > notable_spread * within)) return false;
   const auto freedom = static_cast<double>(n - 1);
-  const boost::math::chi_squared chi2(freedom);
-  return freedom * spread * spread / (within * within) >
-         boost::math::quantile(boost::math::complement(chi2, spread_significance));
+  return freedom * spread * spread / (within * within) > gsl_cdf_chisq_Qinv(spread_significance, freedom);
 }
 
 }  // namespace
