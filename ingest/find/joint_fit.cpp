@@ -409,91 +409,130 @@ std::vector<CentreCovariance> JointFit::covariances(const std::vector<ModelDisk>
   return all;
 }
 
-double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
-                               double still) {
-  const Nearby near(disks.size(), 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
-  // The beads that take part, and their places in what follows.
-  constexpr std::size_t stays = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> place(disks.size(), stays), moving;
-  for (std::size_t i = 0; i < disks.size(); ++i) place[i] = disks[i].last_step >= still ? 0 : stays;
+namespace {
+
+constexpr std::size_t stays = static_cast<std::size_t>(-1);
+
+// Two beads that share pixels, by their places among those that move, with the off-diagonal block of the Hessian:
+// symmetric.
+struct CoupledPair {
+  std::size_t one, other;
+  double xx, xy, yy;
+};
+
+double product(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
+  return sum;
+}
+
+// The beads that take part in a step: those whose last one was `still` or more, and their neighbours.
+std::vector<std::size_t> moving_beads(const std::vector<ModelDisk>& disks, const Nearby& near, double still) {
+  std::vector<char> moves(disks.size());
+  for (std::size_t i = 0; i < disks.size(); ++i) moves[i] = disks[i].last_step >= still;
   if (still > 0) {
     std::vector<std::size_t> woken;
     near.pairs([&](std::size_t a, std::size_t b) {
-      const bool one = disks[a].last_step >= still, other = disks[b].last_step >= still;
-      if (one != other) woken.push_back(one ? b : a);
+      if (moves[a] != moves[b]) woken.push_back(moves[a] ? b : a);
       return false;
     });
-    for (const std::size_t i : woken) place[i] = 0;
+    for (const std::size_t i : woken) moves[i] = 1;
   }
-  for (std::size_t i = 0; i < disks.size(); ++i) {
-    if (place[i] == stays) continue;
-    place[i] = moving.size();
-    moving.push_back(i);
-  }
-  const std::size_t n = moving.size();
-  if (n == 0) return 0;
-  std::vector<double> descent(2 * n), step(2 * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Descent one = descent_of(disks[moving[i]], static_cast<float>(bound));
-    descent[2 * i] = table_->relaxation_ * one.x;
-    descent[2 * i + 1] = table_->relaxation_ * one.y;
-  }
-  // Pairs that share pixels, with the off-diagonal block of the Hessian: symmetric.
-  struct Pair {
-    std::size_t one, other;
-    Coupling block;
-  };
-  std::vector<Pair> pairs;
-  near.pairs([&](std::size_t a, std::size_t b) {
-    if (place[a] != stays && place[b] != stays) pairs.push_back({place[a], place[b], coupling_of(disks[a], disks[b])});
-    return false;
-  });
-  // Conjugate gradients, each bead's own 2 x 2 block taken out beforehand.
-  std::vector<double> left = descent, direction(2 * n), towards(2 * n), image(2 * n);
-  const auto own_solution = [&](const std::vector<double>& from, std::vector<double>& to) {
-    for (std::size_t i = 0; i < n; ++i) {
-      to[2 * i] = to[2 * i + 1] = 0;
-      solve_own(disks[moving[i]], from[2 * i], from[2 * i + 1], to[2 * i], to[2 * i + 1]);
+  std::vector<std::size_t> moving;
+  for (std::size_t i = 0; i < disks.size(); ++i)
+    if (moves[i]) moving.push_back(i);
+  return moving;
+}
+
+// Newton's step of all beads at once, two numbers a bead: by conjugate gradients, each bead's own 2 x 2 block taken out
+// beforehand.
+class NewtonStep {
+ public:
+  NewtonStep(const std::vector<ModelDisk>& disks, const std::vector<std::size_t>& moving,
+             const std::vector<CoupledPair>& pairs)
+      : disks_(disks), moving_(moving), pairs_(pairs) {}
+
+  std::vector<double> operator()(const std::vector<double>& descent) const {
+    const std::size_t size = descent.size();
+    std::vector<double> step(size, 0.0), left = descent, towards(size), image(size);
+    own_solution(left, towards);
+    std::vector<double> direction = towards;
+    double norm = product(left, towards);
+    const double enough = 1e-6 * norm;  // a thousandth of the step
+    constexpr int most_rounds = 60;
+    for (int round = 0; round < most_rounds && norm > enough; ++round) {
+      apply(direction, image);
+      const double curvature = product(direction, image);
+      if (!(curvature > 0)) break;  // not a minimum that way: what was found so far is a descent all the same
+      const double length = norm / curvature;
+      for (std::size_t k = 0; k < size; ++k) {
+        step[k] += length * direction[k];
+        left[k] -= length * image[k];
+      }
+      own_solution(left, towards);
+      const double next = product(left, towards);
+      for (std::size_t k = 0; k < size; ++k) direction[k] = towards[k] + next / norm * direction[k];
+      norm = next;
     }
-  };
-  const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
-    double sum = 0;
-    for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
-    return sum;
-  };
-  own_solution(left, towards);
-  direction = towards;
-  double norm = product(left, towards);
-  const double enough = 1e-6 * norm;  // a thousandth of the step
-  constexpr int most_rounds = 60;
-  for (int round = 0; round < most_rounds && norm > enough; ++round) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const ModelDisk& disk = disks[moving[i]];
+    return step;
+  }
+
+ private:
+  void own_solution(const std::vector<double>& from, std::vector<double>& to) const {
+    for (std::size_t i = 0; i < moving_.size(); ++i) {
+      to[2 * i] = to[2 * i + 1] = 0;
+      solve_own(disks_[moving_[i]], from[2 * i], from[2 * i + 1], to[2 * i], to[2 * i + 1]);
+    }
+  }
+
+  // The damped Hessian times a direction.
+  void apply(const std::vector<double>& direction, std::vector<double>& image) const {
+    for (std::size_t i = 0; i < moving_.size(); ++i) {
+      const ModelDisk& disk = disks_[moving_[i]];
       const double damping = 1e-9 + 1e-4 * (disk.hessian_xx + disk.hessian_yy);
       const double x = direction[2 * i], y = direction[2 * i + 1];
       image[2 * i] = (disk.hessian_xx + damping) * x + disk.hessian_xy * y;
       image[2 * i + 1] = disk.hessian_xy * x + (disk.hessian_yy + damping) * y;
     }
-    for (const Pair& pair : pairs) {
+    for (const CoupledPair& pair : pairs_) {
       const std::size_t a = 2 * pair.one, b = 2 * pair.other;
-      const auto& [xx, xy, yy] = pair.block;
+      const double xx = pair.xx, xy = pair.xy, yy = pair.yy;
       image[a] += xx * direction[b] + xy * direction[b + 1];
       image[a + 1] += xy * direction[b] + yy * direction[b + 1];
       image[b] += xx * direction[a] + xy * direction[a + 1];
       image[b + 1] += xy * direction[a] + yy * direction[a + 1];
     }
-    const double curvature = product(direction, image);
-    if (!(curvature > 0)) break;  // not a minimum that way: what was found so far is a descent all the same
-    const double length = norm / curvature;
-    for (std::size_t k = 0; k < 2 * n; ++k) {
-      step[k] += length * direction[k];
-      left[k] -= length * image[k];
-    }
-    own_solution(left, towards);
-    const double next = product(left, towards);
-    for (std::size_t k = 0; k < 2 * n; ++k) direction[k] = towards[k] + next / norm * direction[k];
-    norm = next;
   }
+
+  const std::vector<ModelDisk>& disks_;
+  const std::vector<std::size_t>& moving_;
+  const std::vector<CoupledPair>& pairs_;
+};
+
+}  // namespace
+
+double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
+                               double still) {
+  const Nearby near(disks.size(), 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
+  const std::vector<std::size_t> moving = moving_beads(disks, near, still);
+  const std::size_t n = moving.size();
+  if (n == 0) return 0;
+  std::vector<std::size_t> place(disks.size(), stays);
+  std::vector<double> descent(2 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    place[moving[i]] = i;
+    const Descent one = descent_of(disks[moving[i]], static_cast<float>(bound));
+    descent[2 * i] = table_->relaxation_ * one.x;
+    descent[2 * i + 1] = table_->relaxation_ * one.y;
+  }
+  std::vector<CoupledPair> pairs;
+  near.pairs([&](std::size_t a, std::size_t b) {
+    if (place[a] == stays || place[b] == stays) return false;
+    const Coupling block = coupling_of(disks[a], disks[b]);
+    pairs.push_back({place[a], place[b], block.xx, block.xy, block.yy});
+    return false;
+  });
+  const std::vector<double> step = NewtonStep(disks, moving, pairs)(descent);
   double largest = 0;
   const bool few = 4 * n < disks.size();  // then each is taken from the residual and put back on its own
   for (std::size_t i = 0; i < n; ++i) {

@@ -14,6 +14,7 @@
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 #include "pipelines/runner/sweep_table.hpp"
+#include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/figure.hpp"
 
 namespace shakebed::pipelines {
@@ -23,8 +24,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_html_rows = 500, most_markdown_rows = 50;  // all are in sweep.csv
 constexpr std::size_t most_series = 6;                                // of one figure: as many colours are told apart
-
-constexpr std::string_view one_temperature = "one temperature";
 
 std::optional<double> number_of(const std::string& text) {
   double value = 0;
@@ -106,7 +105,7 @@ class SweepFigures {
   // Points without one temperature are hollow.
   bool hollow(std::size_t point) const {
     const std::string& verdict = sweep_.table[point + 1].back();
-    return sweep_.table.front().back() == verdict_column && !verdict.empty() && verdict != one_temperature;
+    return sweep_.table.front().back() == verdict_column && !verdict.empty() && !is_one_temperature(verdict);
   }
 
   // Of the point: two series a label, filled and hollow. None beyond most_series labels.
@@ -150,14 +149,6 @@ class SweepFigures {
   std::string unit_;
 };
 
-// "Of 5 points 2 have one temperature, 3 no single temperature"; "" where no stage gives an answer.
-std::string verdicts_text(const SweepOutcome& sweep) {
-  std::string text;
-  for (const auto& [verdict, count] : sweep.verdicts)
-    text += fmt::format("{}{} {}", text.empty() ? "Verdicts: " : ", ", count, verdict);
-  return text;
-}
-
 std::string title_of(const Plan& plan) { return plan.report.title.empty() ? plan.name : plan.report.title; }
 
 std::string html_of(const Plan& plan, const SweepOutcome& sweep, const std::vector<fs::path>& figures) {
@@ -169,8 +160,8 @@ std::string html_of(const Plan& plan, const SweepOutcome& sweep, const std::vect
     out += "</ul></div>\n";
   }
   if (!sweep.verdicts.empty()) {
-    out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep)));
-    if (sweep.verdicts.size() > 1 || sweep.verdicts.begin()->first != one_temperature)
+    out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep.verdicts)));
+    if (sweep.verdicts.size() > 1 || !is_one_temperature(sweep.verdicts.begin()->first))
       out += " Points without one temperature are drawn hollow.";
     out += "</p>\n";
   }
@@ -207,7 +198,7 @@ std::string markdown_of(const Plan& plan, const SweepOutcome& sweep) {
   const std::size_t points = table.size() - 1;
   const auto good = std::count_if(table.begin() + 1, table.end(), [](const auto& row) { return row[2] == "ok"; });
   std::string out = fmt::format("# {}\n\n**{} of {} points are done**\n", markdown(title_of(plan)), good, points);
-  if (!sweep.verdicts.empty()) out += fmt::format("\n{}.\n", markdown(verdicts_text(sweep)));
+  if (!sweep.verdicts.empty()) out += fmt::format("\n{}.\n", markdown(verdicts_text(sweep.verdicts)));
   if (!sweep.warnings.empty()) {
     out += "\n## Warnings of points\n\n";
     for (const std::string& warning : sweep.warnings) out += fmt::format("- {}\n", markdown(warning));

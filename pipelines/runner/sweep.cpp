@@ -251,14 +251,6 @@ class SweepRun {
     return row;
   }
 
-  // "3 one temperature, 2 no single temperature"; "" where no stage gives an answer.
-  std::string verdicts_text() const {
-    std::string text;
-    for (const auto& [verdict, count] : verdicts_)
-      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, verdict);
-    return text;
-  }
-
   // Shards that end at the same time write the same bytes; the last one sees all points.
   void write_results() {
     const Table csv = sweep_table(plan_, pointers_, table_);
@@ -320,7 +312,7 @@ class SweepRun {
       fmt::print("{} of {} points done{} in {}\n", there_, all_.size(),
                  failed_ > 0 ? fmt::format(", {} failed: run again to retry them alone", failed_.load()) : "",
                  duration_text(seconds));
-      if (!verdicts_.empty()) fmt::print("verdicts: {}\n", verdicts_text());
+      if (!verdicts_.empty()) fmt::print("{}\n", verdicts_text(verdicts_));
       fmt::print("table: {}\n", (options_.out / "sweep.csv").string());
     }
     return code;

@@ -74,6 +74,13 @@ std::string column_name(const std::string& pointer, const std::string& unit) {
   return name;
 }
 
+std::string verdicts_text(const std::map<std::string, std::size_t>& verdicts) {
+  std::string text;
+  for (const auto& [verdict, count] : verdicts)
+    text += fmt::format("{}{} {}", text.empty() ? "Verdicts: " : ", ", count, verdict);
+  return text;
+}
+
 Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
                   const std::vector<std::vector<std::string>>& rows) {
   std::vector<StatedColumn> columns{{"point", "", "folder of the point below points/"},

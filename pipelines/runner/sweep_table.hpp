@@ -1,6 +1,8 @@
 // sweep.csv: a row a point, plain numbers in SI, units in the names of the columns.
 #pragma once
 
+#include <cstddef>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +20,9 @@ std::string unit_of_result(const Plan& plan, const std::string& pointer);
 
 // The last column where a stage of the recipe gives an answer.
 inline constexpr std::string_view verdict_column = "verdict";
+
+// "Verdicts: 3 one temperature, 2 no single temperature" of points by verdict; "" where there are none.
+std::string verdicts_text(const std::map<std::string, std::size_t>& verdicts);
 
 // From what was gathered: point, replica, status, the values of the axes as they stand in the recipe, then value and
 // standard error of every collected number, and the verdict of the point's answer.

@@ -57,6 +57,8 @@ double contact_duration_effect(const Input& input) {
   return effect != nullptr && effect->is_number() ? effect->get<double>() : 0;
 }
 
+bool is_one_temperature(std::string_view verdict) { return verdict == fit::to_string(fit::Verdict::one_temperature); }
+
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   Json out;
   out["verdict"] = fit::to_string(answer.verdict);

@@ -21,6 +21,9 @@ KineticTemperatures kinetic_temperatures(const Input& input, std::optional<doubl
 // Relative effect of the contact duration on T, where a simulation states one; else 0.
 double contact_duration_effect(const Input& input);
 
+// Whether a verdict, as it stands in the results, says that the bed has one temperature.
+bool is_one_temperature(std::string_view verdict);
+
 // Temperatures in m g D and, with the diameter [m], as T/(m g) in m.
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter);
 

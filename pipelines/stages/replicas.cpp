@@ -1,12 +1,14 @@
 #include "pipelines/stages/replicas.hpp"
 
 #include <fmt/format.h>
-#include <gsl/gsl_cdf.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string_view>
 #include <utility>
+
+#include "fit/profile_fit/few_samples.hpp"
+#include "fit/profile_fit/straight_line.hpp"
 
 namespace shakebed::pipelines {
 
@@ -35,14 +37,9 @@ double root_mean_square(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-// 95 % of Student's distribution for the mean of n values, in those of a normal one.
-double few_values_factor(std::size_t n) {
-  return gsl_cdf_tdist_Pinv(two_sided_95, static_cast<double>(n - 1)) / gsl_cdf_ugaussian_Pinv(two_sided_95);
-}
-
 // Of the mean of the replicas.
 double error_of_mean(double spread, double within, std::size_t n) {
-  const double between = few_values_factor(n) * spread;
+  const double between = fit::student_over_normal(two_sided_95, static_cast<double>(n - 1)) * spread;
   return std::max(between, std::isfinite(within) ? within : 0) / std::sqrt(static_cast<double>(n));
 }
 
@@ -76,7 +73,7 @@ double part_of(const Json& results, const char* key, const char* part) {
   return found != nullptr && found->is_number() ? found->get<double>() : std::nan("");
 }
 
-// "0.172 from the packing and 0.195 from a random fill"
+// The means of the two kinds of start that alternate.
 std::string by_start(const std::vector<Json>& results, const char* key) {
   double sum[2] = {};
   int count[2] = {};
@@ -90,8 +87,8 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
 
 bool differ(double spread, double within, std::size_t n) {
   if (!(within > 0) || !(spread > notable_spread * within)) return false;
-  const auto freedom = static_cast<double>(n - 1);
-  return freedom * spread * spread / (within * within) > gsl_cdf_chisq_Qinv(spread_significance, freedom);
+  const auto freedom = static_cast<int>(n - 1);
+  return fit::chance_of_chi2(freedom * spread * spread / (within * within), freedom) < spread_significance;
 }
 
 }  // namespace
@@ -138,8 +135,7 @@ std::vector<std::string> replica_warnings(const std::vector<Json>& results, cons
         "the {} beds differ by more than chance: {} scatters by {:.2g}, each bed states {:.2g}{}. The result depends "
         "on how the bed was filled; the stated error allows for it. A longer \"settle\" may lessen it, more "
         "\"replicas\" lessen the error",
-        n, spoken(key), spread, within,
-        starts == ReplicaStarts::alternate && n > 1 ? " (" + by_start(results, key) + ")" : ""));
+        n, spoken(key), spread, within, starts == ReplicaStarts::alternate ? " (" + by_start(results, key) + ")" : ""));
     break;
   }
   for (const auto& [drift, key] : drifting) {

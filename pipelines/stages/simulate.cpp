@@ -33,8 +33,8 @@ namespace {
 
 // Looks at a bed whose floor stands still: so many a time unit, within these bounds.
 constexpr double looks_a_time = 4, fewest_looks = 100, most_looks = 20'000;
-// A shaken bed that dissipates may keep for long how it was filled. Four beds, two of them filled at random, gave
-// errors that held the mean of further beds in 92 to 99 % of cases; four from the same packing in 74 % of the worst.
+// A shaken bed that dissipates may keep for long how it was filled. Four beds, two of them filled at random, give
+// errors that hold the mean of further beds: the study is in docs/thermometer.md.
 constexpr std::uint32_t replicas_of_shaken = 4;
 // Of T: so much error by the contact duration is left without a word.
 constexpr double allowed_contact_effect = 0.02;
