@@ -6,7 +6,6 @@
 #include <random>
 #include <utility>
 
-#include "fit/profile_fit/few_samples.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
 #include "statistics/correlated_series.hpp"
 
@@ -163,7 +162,7 @@ double spread_of(const std::vector<double>& values) {
 // Percentiles about the centre, moved apart as Student's are from the normal ones: the windows are few.
 Interval interval_of(const std::vector<double>& sorted, double centre, double confidence, double degrees) {
   const double upper = 0.5 * (1.0 + confidence);
-  const double apart = student_over_normal(upper, degrees);
+  const double apart = gsl_cdf_tdist_Pinv(upper, degrees) / gsl_cdf_ugaussian_Pinv(upper);
   Interval interval;
   interval.status = FitStatus::ok;
   interval.confidence = confidence;

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <string_view>
 #include <utility>
-
-#include "fit/profile_fit/few_samples.hpp"
-#include "fit/profile_fit/straight_line.hpp"
 
 namespace shakebed::pipelines {
 
@@ -19,6 +19,9 @@ constexpr double notable_spread = 2, spread_significance = 0.01;
 // A drift counts from so many of its standard errors on; they come from few samples, each run being cut in halves.
 constexpr double notable_drift = 4;
 constexpr double two_sided_95 = 0.975;
+
+// In double precision: what is prepared at start-up in long double overflows where that has no more digits (valgrind).
+using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
 
 // Mean and spread of a number over the replicas.
 struct Spread {
@@ -37,9 +40,16 @@ double root_mean_square(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
+// 95 % of Student's distribution for the mean of n values, in those of a normal one.
+double few_values_factor(std::size_t n) {
+  const boost::math::students_t_distribution<double, InDouble> student(static_cast<double>(n - 1));
+  return boost::math::quantile(student, two_sided_95) /
+         boost::math::quantile(boost::math::normal_distribution<double, InDouble>(), two_sided_95);
+}
+
 // Of the mean of the replicas.
 double error_of_mean(double spread, double within, std::size_t n) {
-  const double between = fit::student_over_normal(two_sided_95, static_cast<double>(n - 1)) * spread;
+  const double between = few_values_factor(n) * spread;
   return std::max(between, std::isfinite(within) ? within : 0) / std::sqrt(static_cast<double>(n));
 }
 
@@ -87,8 +97,10 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
 
 bool differ(double spread, double within, std::size_t n) {
   if (!(within > 0) || !(spread > notable_spread * within)) return false;
-  const auto freedom = static_cast<int>(n - 1);
-  return fit::chance_of_chi2(freedom * spread * spread / (within * within), freedom) < spread_significance;
+  const auto freedom = static_cast<double>(n - 1);
+  const boost::math::chi_squared_distribution<double, InDouble> chi2(freedom);
+  return boost::math::cdf(boost::math::complement(chi2, freedom * spread * spread / (within * within))) <
+         spread_significance;
 }
 
 }  // namespace
