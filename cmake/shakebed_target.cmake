@@ -50,16 +50,17 @@ endif()
 
 # What is compiled often and run briefly: a third less time to compile. No result depends on it.
 set(SHAKEBED_QUICK_COMPILE $<$<CONFIG:Release>:-O1>)
+# Tests that start the program wait for it, hardly ever for themselves.
+set(SHAKEBED_QUICKEST_COMPILE $<$<CONFIG:Release>:-O0>)
 
 # Headers that many files read, read once.
 option(SHAKEBED_PRECOMPILE "Precompiled headers" ON)
-function(shakebed_test_headers)
+function(shakebed_test_headers name)
   file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "int main() {}\n")
-  add_executable(shakebed_test_headers EXCLUDE_FROM_ALL "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
-  target_link_libraries(shakebed_test_headers PRIVATE shakebed_options nlohmann_json::nlohmann_json GTest::gtest
-                        GTest::gmock)
-  target_compile_options(shakebed_test_headers PRIVATE ${SHAKEBED_QUICK_COMPILE})
-  target_precompile_headers(shakebed_test_headers PRIVATE <gtest/gtest.h> <gmock/gmock.h> <nlohmann/json.hpp>
+  add_executable(${name} EXCLUDE_FROM_ALL "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
+  target_link_libraries(${name} PRIVATE shakebed_options nlohmann_json::nlohmann_json GTest::gtest GTest::gmock)
+  target_compile_options(${name} PRIVATE ${ARGN})
+  target_precompile_headers(${name} PRIVATE <gtest/gtest.h> <gmock/gmock.h> <nlohmann/json.hpp>
                             <algorithm> <cmath> <filesystem> <fstream> <functional> <map> <optional>
                             <sstream> <string> <vector>)
 endfunction()
@@ -74,10 +75,17 @@ function(shakebed_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} shakebed_options GTest::gtest GTest::gmock GTest::gtest_main)
+  if("shakebed_test_program" IN_LIST ARG_LIBRARIES)
+    set(compile ${SHAKEBED_QUICKEST_COMPILE})
+    set(headers shakebed_program_test_headers)
+  else()
+    set(compile ${SHAKEBED_QUICK_COMPILE})
+    set(headers shakebed_test_headers)
+  endif()
   if(NOT ARG_OPTIMIZED)
-    target_compile_options(${name} PRIVATE ${SHAKEBED_QUICK_COMPILE})
+    target_compile_options(${name} PRIVATE ${compile})
     if(SHAKEBED_PRECOMPILE)
-      target_precompile_headers(${name} REUSE_FROM shakebed_test_headers)
+      target_precompile_headers(${name} REUSE_FROM ${headers})
     endif()
   endif()
   target_compile_definitions(${name} PRIVATE "SHAKEBED_SOURCE_DIR=\"${PROJECT_SOURCE_DIR}\"")

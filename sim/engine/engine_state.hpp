@@ -96,11 +96,7 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::largest_overlap() const {
   Snapshot here;
   snapshot(here);
-  double cell = 1;
-  if constexpr (!Sizes::equal) cell = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
-  const DiskProperties disks = properties();
-  return sim::largest_overlap(here, cell, period_x_.length, period_z_.length,
-                              [&](std::uint32_t i, std::uint32_t k) { return disks.radius[i] + disks.radius[k]; });
+  return sim::largest_overlap(here, properties().radius, period_x_.length, period_z_.length);
 }
 
 template <class Space, class Rule, class Sizes>

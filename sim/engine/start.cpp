@@ -164,6 +164,7 @@ std::vector<Point> random_insertion(const Room& room, const RandomStart& start, 
 void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
   const Room room = room_of(scene);
   Snapshot at;
+  std::vector<double> radii;
   for (std::size_t i = 0; i < disks.size(); ++i) {
     const Placed& p = disks[i];
     if (p.species >= scene.disks.species.size())
@@ -179,12 +180,10 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
     }
     at.x.push_back(p.x);
     at.z.push_back(p.z);
+    radii.push_back(scene.disks.species[p.species].diameter / 2);
   }
-  const double overlap = largest_overlap(
-      at, room.diameter, room.periodic_x ? room.width : 0, room.periodic_z ? room.height : 0,
-      [&](std::uint32_t i, std::uint32_t k) {
-        return (scene.disks.species[disks[i].species].diameter + scene.disks.species[disks[k].species].diameter) / 2;
-      });
+  const double overlap =
+      largest_overlap(at, radii, room.periodic_x ? room.width : 0, room.periodic_z ? room.height : 0);
   if (overlap > 1e-10) {
     std::ostringstream out;
     out << "two disks of the start overlap by " << overlap << " D";

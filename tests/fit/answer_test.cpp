@@ -269,7 +269,7 @@ TEST(Answer, WithoutATemperatureSaysWhy) {
 }
 
 TEST(Answer, OfAnyProfileIsFiniteAndInOrder) {
-  for (std::uint64_t seed = 0; seed < 120; ++seed) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
     synthetic::Normal normal(17 * seed + 5);
     const auto uniform = [&] { return 0.5 * std::erfc(-normal() / std::sqrt(2.0)); };
     AnswerInput input;

@@ -635,7 +635,7 @@ TEST(FitHardCases, AnyProfileEndsInFiniteTimeWithFiniteNumbers) {
                           "hydrostatic:luding",  "fermi",
                           "rectangle",           "hydrostatic:henderson"};
   int succeeded = 0;
-  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+  for (std::uint64_t seed = 0; seed < 160; ++seed) {
     synthetic::Normal normal(31 * seed + 7);
     const auto uniform = [&] { return 0.5 * std::erfc(-normal() / std::sqrt(2.0)); };
     Profile data;
@@ -668,8 +668,8 @@ TEST(FitHardCases, AnyProfileEndsInFiniteTimeWithFiniteNumbers) {
     EXPECT_TRUE(fit.ok() || !fit.message.empty()) << seed << " " << to_string(fit.status);
     succeeded += fit.ok() ? 1 : 0;
   }
-  std::printf("[ measured ] %d of 400 random profiles could be fitted\n", succeeded);
-  EXPECT_GT(succeeded, 40);
+  std::printf("[ measured ] %d of 160 random profiles could be fitted\n", succeeded);
+  EXPECT_GT(succeeded, 16);
 }
 
 }  // namespace

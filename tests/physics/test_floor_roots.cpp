@@ -277,8 +277,8 @@ Verdict judge_adversarial(int flights, std::uint64_t seed, int only = -1) {
 TEST(FloorRoots, AgreeWith60DigitsOnRandomFlights) {
   expect_no_fault("random, 60 digits", judge_random<Digits60>(2'000, 31));
 }
-TEST(FloorRoots, AgreeWithExtendedPrecisionOnAMillionRandomFlights) {
-  expect_no_fault("random, extended precision", judge_random<long double>(1'000'000, 32));
+TEST(FloorRoots, AgreeWithExtendedPrecisionOnRandomFlights) {
+  expect_no_fault("random, extended precision", judge_random<long double>(100'000, 32));
 }
 TEST(FloorRoots, AgreeWith60DigitsOnAdversarialFlights) {
   for (int k = 0; k < 7; ++k) expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(300, 33, k));

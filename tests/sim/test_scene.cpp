@@ -6,7 +6,6 @@
 #include <string>
 #include <typeinfo>
 
-#include "sim/engine/overlap.hpp"
 #include "sim/engine/simulation.hpp"
 #include "sim/engine/start.hpp"
 
