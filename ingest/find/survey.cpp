@@ -106,12 +106,13 @@ std::string text_of(const char* format, double a, double b = 0) {
 }
 
 // Things that are not round are no beads, nor are spots without a rim among much else.
-void judge_shape(SurveyCandidate& candidate, const Roundness& roundness) {
+void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool any_shape) {
   candidate.not_round = !roundness.round();
+  candidate.why_not_round = roundness.why_not();
   if (roundness.rim_width > widest_rim && candidate.explained_share < spots_explained)
     candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
-  else
-    candidate.why_not = roundness.why_not();
+  else if (!any_shape)
+    candidate.why_not = candidate.why_not_round;
 }
 
 void judge(SurveyCandidate& candidate, double edge_length_px) {
@@ -194,7 +195,8 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.disks = std::move(learned.disks);
     judge(candidate, learned.edge_length_px);
     if (candidate.why_not.empty())
-      judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks));
+      judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
+                  options.any_shape);
     candidate.credible = candidate.why_not.empty();
     enlarge(candidate, frames.reduction);
     candidate.gain_px *= frames.reduction;
@@ -205,7 +207,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     }
     survey.candidates.push_back(std::move(candidate));
   }
-  compare_with_smaller(survey.candidates);
+  if (!options.any_shape) compare_with_smaller(survey.candidates);
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
                    [](const SurveyCandidate& a, const SurveyCandidate& b) {
                      if (a.credible != b.credible) return a.credible;

@@ -17,7 +17,8 @@ struct SurveyCandidate {
   double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
-  bool not_round = false;      // circles are seen, but on outlines that are not round
+  bool not_round = false;      // circles are seen, but on outlines that are not round ...
+  std::string why_not_round;   // ... a sentence
   bool credible = false;       // "no beads here" does not explain the picture as well
   std::string why_not;         // a sentence, unless credible
 };
@@ -32,6 +33,7 @@ struct SurveyOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;  // px of the full frame
   std::optional<PixelRectangle> roi;
+  bool any_shape = false;  // outlines that are not round may be beads
 };
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options = {});

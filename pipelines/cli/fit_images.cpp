@@ -19,6 +19,7 @@ namespace {
 
 constexpr const char* default_gravity = "9.81 m/s^2";
 const std::vector<std::string> polarities{"automatic", "dark", "bright"};
+const std::vector<std::string> shapes{"round", "any"};
 const std::vector<std::string> channels{"automatic",          "red", "green", "blue", "grey", "saturation",
                                         "background_distance"};
 
@@ -27,7 +28,7 @@ struct ImageArguments {
   std::vector<std::string> files;
   std::string diameter;
   std::optional<std::string> model, scale, frequency, amplitude, frame_rate, gravity, initial_height, polarity,
-      second_diameter, kernel, channel;
+      second_diameter, kernel, channel, shape;
   std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens, radius;
   bool preview = false;
   std::optional<std::uint64_t> bead_number;
@@ -44,6 +45,7 @@ int preview_images(const Call& call, const ImageArguments& image) {
   request.options.roi = image.roi;
   request.options.radius = image.radius;
   request.options.polarity = choice_of<BeadPolarity>(image.polarity, polarities);
+  request.options.shape = choice_of<BeadShape>(image.shape, shapes);
   request.options.channel = choice_of<BeadChannel>(image.channel, channels);
   const fs::path folder = call.out.value_or("shakebed-preview");
   fs::create_directories(folder);
@@ -74,6 +76,7 @@ Json extract_stage(const ImageArguments& image) {
   give("left_wall", image.left_wall), give("right_wall", image.right_wall);
   if (!image.roi.empty()) stage["roi"] = image.roi;
   give("polarity", image.polarity), give("channel", image.channel), give("radius", image.radius);
+  give("shape", image.shape);
   give("second_diameter", image.second_diameter), give("gravity", image.gravity);
   give("pixel_aspect", image.pixel_aspect), give("lens", image.lens), give("bead_number", image.bead_number);
   if (image.kernel) stage["kernel"] = kernel_json(*image.kernel);
@@ -147,6 +150,10 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       ->check(CLI::PositiveNumber);
   command.add_option("--channel", image.channel, "part of a colour picture that is used (default: found)")
       ->check(CLI::IsMember(channels));
+  command
+      .add_option("--shape", image.shape,
+                  "round: beads have round outlines (default); any: measure what is seen all the same")
+      ->check(CLI::IsMember(shapes));
   command.add_flag("--preview", image.preview,
                    "draw what would be found in the first frame, with the command for each alternative, and stop");
   command.add_option("--second-diameter", image.second_diameter, "of beads of another size, to be found too");

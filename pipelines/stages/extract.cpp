@@ -52,6 +52,9 @@ void describe_beads(Fields& fields, ExtractOptions& o) {
                  {BeadChannel::background_distance, "background_distance"}},
                 {.help = "which part of a colour picture is used: saturation is the largest of red, green and blue "
                          "less the smallest, background_distance the distance from the most frequent colour"});
+  fields.choice("shape", o.shape, {{BeadShape::round, "round"}, {BeadShape::any, "any"}},
+                {.help = "which outlines may be beads: round ones, or any, where round things look oval or rough (then "
+                         "the program warns)"});
   fields.number("radius", o.radius,
                 {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
   fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});

@@ -29,7 +29,7 @@ constexpr std::size_t most_bad_frames_named = 5;
       fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (context.scratch() / "preview.html").string());
   message += survey.candidates.empty()
                  ? ". If there are beads, give their radius in pixels (--radius) and a region (--roi)"
-                 : ". If the beads are those of one of its pictures, crop to them with --roi, or try";
+                 : ". If the beads are those of one of its pictures, crop to them with --roi, or give";
   for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
     message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
   const bool any = std::any_of(survey.candidates.begin(), survey.candidates.end(),
@@ -61,6 +61,11 @@ void use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   if (!look) return;  // measure_bed() says which files cannot be read
   if (!look->survey.found) refuse(options, context, *look);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
+  if (chosen->not_round)
+    context.warning(
+        fmt::format("{}: the outlines are not those of disks ({}); they are measured because of shape "
+                    "\"any\". Positions hold if these are your beads; radii and densities hold for disks",
+                    look->path, chosen->why_not_round));
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};

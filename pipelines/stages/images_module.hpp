@@ -33,6 +33,7 @@ struct RenderOptions {
 };
 
 enum class BeadPolarity { automatic, dark, bright };
+enum class BeadShape { round, any };
 enum class BeadChannel { automatic, red, green, blue, grey, saturation, background_distance };
 
 // Pixels count from the centre of the top-left one, x to the right, y downwards.
@@ -51,6 +52,7 @@ struct ExtractOptions {
   std::optional<double> lens_radial;            // how far the corners move, in half diagonals; found if left out
   BeadPolarity polarity = BeadPolarity::automatic;
   BeadChannel channel = BeadChannel::automatic;
+  BeadShape shape = BeadShape::round;
   std::optional<double> radius;  // first value [px]
   bool keep_half_hidden = false;
   Kernel kernel{KernelKind::gaussian, 0.5};

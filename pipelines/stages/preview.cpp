@@ -53,6 +53,7 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
   ingest::SurveyOptions asked;
   asked.polarity = polarity_of(options.polarity);
   asked.radius_px = options.radius;
+  asked.any_shape = options.shape == BeadShape::any;
   if (options.roi.size() == 4)
     asked.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
                                        static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
@@ -77,7 +78,8 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
     text = fmt::format("--channel {} ", ingest::name_of(candidate.channel));
   return text + fmt::format("--polarity {} --radius {:.2f}",
                             candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                            candidate.rims.radius_px);
+                            candidate.rims.radius_px) +
+         (candidate.not_round ? " --shape any" : "");
 }
 
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,

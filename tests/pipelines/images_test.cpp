@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <vector>
 
 #include "pipelines/formats/csv.hpp"
@@ -190,6 +192,43 @@ TEST_F(Images, FramesWithoutDisksAreAnInputError) {
   EXPECT_EQ(run_shakebed({"fit-images", "nowhere.png", "--diameter", "3 mm", "--out", "n"}, folder_->path()).exit_code,
             4);
   EXPECT_EQ(run_shakebed({"fit-images", "noise.pgm", "--diameter", "-3 mm"}, folder_->path()).exit_code, 2);
+}
+
+// Ovals on a lattice, 1.3 times as long as wide, each turned another way, drawn pixel by pixel.
+std::string picture_of_ovals() {
+  constexpr int columns = 9, rows = 6, step = 34, width = columns * step + 40, height = rows * step + 40;
+  std::string pixels;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int column = std::clamp((x - 20) / step, 0, columns - 1), row = std::clamp((y - 20) / step, 0, rows - 1);
+      const double u = x - (20 + step * (column + 0.5)), v = y - (20 + step * (row + 0.5));
+      const double turn = 0.7 * column + 1.9 * row, a = 14.8, b = 11.4;
+      const double along = (u * std::cos(turn) + v * std::sin(turn)) / a,
+                   across = (v * std::cos(turn) - u * std::sin(turn)) / b;
+      const double outside = (std::hypot(along, across) - 1) * b;
+      const int noise = (x * 7919 + y * 104729) % 7 - 3;
+      pixels += std::to_string(static_cast<int>(200 - 150 * std::clamp(0.5 - outside, 0.0, 1.0)) + noise) + " ";
+    }
+    pixels += "\n";
+  }
+  return "P2\n" + std::to_string(width) + " " + std::to_string(height) + "\n255\n" + pixels;
+}
+
+// The refusal names an option that, given as it stands, leads to the 54 ovals and a warning.
+TEST_F(Images, WhatIsNotRoundIsRefusedAndMeasuredOnDemand) {
+  write_text(*folder_ / "ovals.pgm", picture_of_ovals());
+  const std::vector<std::string> arguments{"fit-images", "ovals.pgm", "--diameter", "3 mm", "--out", "ovals"};
+  const ProgramResult refused = run_shakebed(arguments, folder_->path());
+  ASSERT_EQ(refused.exit_code, 5) << refused.err;
+  const std::size_t from = refused.err.find("--polarity"), to = refused.err.find("--shape any");
+  ASSERT_NE(to, std::string::npos) << refused.err;
+  std::vector<std::string> followed = arguments;
+  std::istringstream options(refused.err.substr(from, to + 11 - from));
+  for (std::string word; options >> word;) followed.push_back(word);
+  const ProgramResult measured = run_shakebed(followed, folder_->path());
+  EXPECT_THAT(measured.err, HasSubstr("the outlines are not those of disks"));
+  const Json extract = read_json(*folder_ / "ovals/extract/extract.json");
+  EXPECT_NEAR(value(extract["disks_per_frame"]), 54, 1) << measured.err;
 }
 
 TEST_F(Images, SameSeedGivesTheSameFrames) {
