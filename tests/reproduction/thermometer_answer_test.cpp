@@ -8,6 +8,7 @@
 
 #include "tests/reproduction/thermometer_beds.hpp"
 #include "tests/reproduction/thermometer_calibration.hpp"
+#include "tests/reproduction/thermometer_coverage.hpp"
 
 namespace shakebed::fit::simulated {
 namespace {
@@ -51,57 +52,20 @@ TEST(ThermometerTable, IsWhatBedsOfKnownTemperatureSay) {
 
 // --- known temperatures
 
-struct Count {
-  int beds = 0, held = 0, one = 0, far = 0;
-  void add(const Answer& answer, double truth) {
-    ++beds;
-    held += answer.interval.low <= truth && truth <= answer.interval.high;
-    if (answer.verdict != Verdict::one_temperature) return;
-    ++one;
-    far += std::abs(answer.temperature - truth) > 3 * answer.std_error;
-  }
-};
-
-// The beds seen with more or less known beside their profile, in four ranges of T.
-class Coverage {
- public:
-  explicit Coverage(const char* what) : what_(what) {}
-
-  void add(const AnswerInput& input, double reduced, double truth) {
-    const Answer answer = find_answer(input);
-    ASSERT_TRUE(answer.ok()) << what_ << " " << reduced << ": " << answer.why;
-    all_.add(answer, truth);
-    part_[reduced < 1 ? 0 : reduced < 4 ? 1 : reduced < 12 ? 2 : 3].add(answer, truth);
-  }
-
-  // 200 intervals of 95 %: 190 +- 3.1 hold T if all is as stated; 92 to 98 % is what is asked for. Of 200 normal
-  // numbers 0.54 lie beyond three standard errors; of Student's with some ten degrees of freedom, as these errors have,
-  // 2.7: more than 7 by chance in 1 %.
-  void expect_as_stated() const {
-    const char* const names[] = {"0.4 to 1 T_c", "1 to 4 T_c", "4 to 12 T_c", "12 to 40 T_c"};
-    for (int i = 0; i < 4; ++i)
-      std::printf("| %s | %s | %d | %d | %d | %d |\n", what_, names[i], part_[i].beds, part_[i].held, part_[i].one,
-                  part_[i].far);
-    std::printf("| %s | all | %d | %d (%.1f %%) | %d | %d |\n", what_, all_.beds, all_.held,
-                100.0 * all_.held / all_.beds, all_.one, all_.far);
-    EXPECT_GE(all_.held, 184) << what_;
-    EXPECT_LE(all_.held, 196) << what_;
-    EXPECT_LE(all_.far, 7) << what_;
-    EXPECT_GE(all_.one, 190) << what_ << ": beds in equilibrium have one temperature";
-  }
-
- private:
-  const char* what_;
-  Count all_, part_[4];
-};
-
 TEST(ThermometerAnswer, HoldsTheTemperatureOf200Beds) {
   Coverage profile("the profile"), number("and N"), velocities("and velocities");
   for (const EquilibriumBed& bed : verification_beds()) {
     const Measured measured = measure(bed);
-    profile.add(profile_alone(measured.input, false), bed.reduced, measured.truth);
-    number.add(profile_alone(measured.input, true), bed.reduced, measured.truth);
-    velocities.add(measured.input, bed.reduced, measured.truth);
+    const auto judge = [&](Coverage& coverage, const AnswerInput& input) {
+      const Answer answer = find_answer(input);
+      ASSERT_TRUE(answer.ok()) << bed.reduced << ": " << answer.why;
+      coverage.add({answer.temperature, answer.std_error, answer.interval.low, answer.interval.high,
+                    answer.verdict == Verdict::one_temperature},
+                   bed.reduced, measured.truth);
+    };
+    judge(profile, profile_alone(measured.input, false));
+    judge(number, profile_alone(measured.input, true));
+    judge(velocities, measured.input);
   }
   std::printf("| known: | T | beds | 95 %% intervals that hold T | one temperature | off by more than 3 errors |\n");
   for (const Coverage* coverage : {&profile, &number, &velocities}) coverage->expect_as_stated();
