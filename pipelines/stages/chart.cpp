@@ -38,6 +38,7 @@ struct PointsOptions {
 struct CurveOptions {
   std::string name, label;
   std::vector<double> polynomial;
+  double exponent = 0;  // the polynomial is multiplied by x^exponent
   double from = 0, to = 1;
   Look look = Look::line;
   int color = 0;
@@ -68,7 +69,7 @@ const std::vector<Choice<Look>> looks{{Look::points, "points"},
 double value_at(const CurveOptions& curve, double x) {
   double y = 0;
   for (std::size_t k = curve.polynomial.size(); k-- > 0;) y = y * x + curve.polynomial[k];
-  return y;
+  return curve.exponent == 0 ? y : y * std::pow(x, curve.exponent);
 }
 
 // Rows of a table that fulfil `where`, with x rising.
@@ -229,9 +230,11 @@ Json against_json(const CurveOptions& curve, const Used& used, bool has_errors) 
     against["chi2_per_dof"] = chi2 / n, against["p_value"] = fit::chance_of_chi2(chi2, dof);
   }
   const double mean = sum / n;
+  // Of several points the error follows from their scatter, of one it is its own.
+  const double own = used.weighted ? used.error.front() : 0;
+  const double spread = used.x.size() > 1 ? std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)) : own;
   against["mean_difference"] =
-      used.x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
-                        : quantity_json(mean, "1");
+      used.x.size() > 1 || own > 0 ? quantity_json(mean, "1", spread) : quantity_json(mean, "1");
   // d rms = sum d_i delta_i/(n rms); rms is never less than the errors make it.
   const double rms = std::sqrt(squares / n);
   against["rms_difference"] =
@@ -531,18 +534,19 @@ void Chart::describe(Fields& fields) {
         f.boolean("logarithmic_y", chart.logarithmic_y, {.help = "decades along y"});
         f.boolean("lead", chart.lead, {.help = "the picture that the report begins with"});
         f.array<PointsOptions>("points", chart.points, describe_points, {.help = "what is drawn", .required = true});
-        f.array<CurveOptions>("curves", chart.curves,
-                              [](Fields& g, CurveOptions& c) {
-                                g.text("name", c.name, {.help = "for \"against\"", .required = true});
-                                g.text("label", c.label, {.help = "in the key"});
-                                g.numbers("polynomial", c.polynomial,
-                                          {.help = "coefficients, constant first", .required = true});
-                                g.number("from", c.from, {.help = "smallest x"});
-                                g.number("to", c.to, {.help = "largest x"});
-                                g.choice("look", c.look, looks, {.help = "how it is drawn"});
-                                g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
-                              },
-                              {.help = "polynomials to compare with"});
+        f.array<CurveOptions>(
+            "curves", chart.curves,
+            [](Fields& g, CurveOptions& c) {
+              g.text("name", c.name, {.help = "for \"against\"", .required = true});
+              g.text("label", c.label, {.help = "in the key"});
+              g.numbers("polynomial", c.polynomial, {.help = "coefficients, constant first", .required = true});
+              g.number("exponent", c.exponent, {.help = "the polynomial is multiplied by x to this power"});
+              g.number("from", c.from, {.help = "smallest x"});
+              g.number("to", c.to, {.help = "largest x"});
+              g.choice("look", c.look, looks, {.help = "how it is drawn"});
+              g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
+            },
+            {.help = "polynomials to compare with"});
         if (!f.decoding()) return;
         f.require(!chart.name.empty() && chart.name.find_first_of("/\\ ") == std::string::npos && chart.name[0] != '.',
                   "name", "is no name of a file");
