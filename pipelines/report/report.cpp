@@ -33,7 +33,8 @@ th, td { text-align: left; padding: 6px 10px; border-top: 1px solid var(--line);
 tr:first-child th { border-top: 0; background: var(--card); } td.number { white-space: nowrap; }
 .warnings, .banner { background: var(--warn); color: var(--warn-text); border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
 .warnings ul { margin: 0; padding-left: 1.2em; } .banner strong { display: block; }
-.answer { border: 1px solid currentColor; border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
+.answer, .lead { border: 1px solid currentColor; border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
+.lead p { font-size: 1.08rem; margin: 0.35em 0; max-width: none; }
 .good { color: var(--good); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
 .tag { display: inline-block; border: 1px solid currentColor; border-radius: 4px; padding: 0 6px; font-size: 0.8rem; color: var(--bad); }
 figure { margin: 14px 0; } figure > svg, figure img { max-width: 100%; height: auto; display: block; border-radius: 6px; }
@@ -87,7 +88,7 @@ class Report {
   std::string page() {
     const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
     std::string out = page_head(title);
-    out += verdict_line();
+    out += sections(ReportPlace::lead) + sections(ReportPlace::lead_picture) + verdict_line();
     for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
       out += fmt::format("<p>{}</p>\n", html(plan_.description));

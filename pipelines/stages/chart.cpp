@@ -26,6 +26,7 @@ struct PointsOptions {
   Look look = Look::points;
   int color = -1;
   double times = 1, plus = 0, x_times = 1, x_plus = 0;
+  bool logarithm = false;
   std::optional<double> x_least, x_most;  // of those drawn and used
   bool line_fit = false, power_fit = false;
   std::optional<double> fit_least, fit_most;
@@ -37,6 +38,7 @@ struct PointsOptions {
 struct CurveOptions {
   std::string name, label;
   std::vector<double> polynomial;
+  double exponent = 0;  // the polynomial is multiplied by x^exponent
   double from = 0, to = 1;
   Look look = Look::line;
   int color = 0;
@@ -44,7 +46,7 @@ struct CurveOptions {
 struct ChartOptions {
   std::string name, caption, x_label, y_label, residual_label;
   std::optional<double> x_low, x_high, y_low, y_high;
-  bool logarithmic_x = false, logarithmic_y = false;
+  bool logarithmic_x = false, logarithmic_y = false, lead = false;
   std::vector<PointsOptions> points;
   std::vector<CurveOptions> curves;
 };
@@ -67,7 +69,7 @@ const std::vector<Choice<Look>> looks{{Look::points, "points"},
 double value_at(const CurveOptions& curve, double x) {
   double y = 0;
   for (std::size_t k = curve.polynomial.size(); k-- > 0;) y = y * x + curve.polynomial[k];
-  return y;
+  return curve.exponent == 0 ? y : y * std::pow(x, curve.exponent);
 }
 
 // Rows of a table that fulfil `where`, with x rising.
@@ -111,7 +113,12 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
     if (options.x_least && place < *options.x_least) return;
     if (options.x_most && place > *options.x_most) return;
     const auto spread = data.has_errors ? number_in(cell(error)) : std::nullopt;
-    rows.push_back({place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0});
+    Row row{place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0};
+    if (options.logarithm) {
+      if (!(row.y > 0)) return;
+      row.error /= row.y, row.y = std::log(row.y);
+    }
+    rows.push_back(row);
   });
   // What is only counted may be nothing: no prediction in range, say.
   if (!any && options.look != Look::none)
@@ -223,9 +230,11 @@ Json against_json(const CurveOptions& curve, const Used& used, bool has_errors) 
     against["chi2_per_dof"] = chi2 / n, against["p_value"] = fit::chance_of_chi2(chi2, dof);
   }
   const double mean = sum / n;
+  // Of several points the error follows from their scatter, of one it is its own.
+  const double own = used.weighted ? used.error.front() : 0;
+  const double spread = used.x.size() > 1 ? std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)) : own;
   against["mean_difference"] =
-      used.x.size() > 1 ? quantity_json(mean, "1", std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1)))
-                        : quantity_json(mean, "1");
+      used.x.size() > 1 || own > 0 ? quantity_json(mean, "1", spread) : quantity_json(mean, "1");
   // d rms = sum d_i delta_i/(n rms); rms is never less than the errors make it.
   const double rms = std::sqrt(squares / n);
   against["rms_difference"] =
@@ -385,6 +394,9 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.integer("color", p.color, {.help = "of the palette, 0 to 6; left out, one after the other"});
   fields.number("times", p.times, {.help = "factor of y"});
   fields.number("plus", p.plus, {.help = "added to y after the factor"});
+  fields.boolean(
+      "logarithm", p.logarithm,
+      {.help = "take the natural logarithm of y, after factor and sum; where y is not positive it has none"});
   fields.number("x_times", p.x_times, {.help = "factor of x"});
   fields.number("x_plus", p.x_plus, {.help = "added to x after the factor"});
   fields.number("x_least", p.x_least, {.help = "points with a smaller x are left out"});
@@ -492,6 +504,7 @@ void Chart::results(ResultList& list) const {
   for (const ChartOptions& chart : charts_) {
     const std::string at = pointer_join("", chart.name);
     list.text(at + "/caption", "text below the chart", given_if(!chart.caption.empty(), "there is a \"caption\""));
+    list.truth(at + "/lead", "whether the report begins with it", given_if(chart.lead, "\"lead\" is true"));
     for (const PointsOptions& points : chart.points)
       PointsStatement(list, pointer_join(at, points.name), points).state();
   }
@@ -519,19 +532,21 @@ void Chart::describe(Fields& fields) {
         f.number("y_high", chart.y_high, {.help = "where it ends"});
         f.boolean("logarithmic_x", chart.logarithmic_x, {.help = "decades along x"});
         f.boolean("logarithmic_y", chart.logarithmic_y, {.help = "decades along y"});
+        f.boolean("lead", chart.lead, {.help = "the picture that the report begins with"});
         f.array<PointsOptions>("points", chart.points, describe_points, {.help = "what is drawn", .required = true});
-        f.array<CurveOptions>("curves", chart.curves,
-                              [](Fields& g, CurveOptions& c) {
-                                g.text("name", c.name, {.help = "for \"against\"", .required = true});
-                                g.text("label", c.label, {.help = "in the key"});
-                                g.numbers("polynomial", c.polynomial,
-                                          {.help = "coefficients, constant first", .required = true});
-                                g.number("from", c.from, {.help = "smallest x"});
-                                g.number("to", c.to, {.help = "largest x"});
-                                g.choice("look", c.look, looks, {.help = "how it is drawn"});
-                                g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
-                              },
-                              {.help = "polynomials to compare with"});
+        f.array<CurveOptions>(
+            "curves", chart.curves,
+            [](Fields& g, CurveOptions& c) {
+              g.text("name", c.name, {.help = "for \"against\"", .required = true});
+              g.text("label", c.label, {.help = "in the key"});
+              g.numbers("polynomial", c.polynomial, {.help = "coefficients, constant first", .required = true});
+              g.number("exponent", c.exponent, {.help = "the polynomial is multiplied by x to this power"});
+              g.number("from", c.from, {.help = "smallest x"});
+              g.number("to", c.to, {.help = "largest x"});
+              g.choice("look", c.look, looks, {.help = "how it is drawn"});
+              g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
+            },
+            {.help = "polynomials to compare with"});
         if (!f.decoding()) return;
         f.require(!chart.name.empty() && chart.name.find_first_of("/\\ ") == std::string::npos && chart.name[0] != '.',
                   "name", "is no name of a file");
@@ -561,6 +576,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
   Picture picture = empty_picture(chart);
   Json out = Json::object();
   if (!chart.caption.empty()) out["caption"] = chart.caption;
+  if (chart.lead) out["lead"] = true;
   int color = 1;
   for (const PointsOptions& options : chart.points) {
     Data data = read_data(input_named(context, options.from).file(options.file), options);
@@ -629,7 +645,7 @@ void Chart::run(RunContext& context) const {
 StageRow chart_stage() {
   return {.name = "chart",
           .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
-          .accepts = {"study", "simulate", "fit", "extract", "map"},
+          .accepts = {"study", "scaling", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "chart.json",

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/stages/published.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -14,13 +15,16 @@ namespace {
 constexpr double interval_95 = 1.96;
 
 struct Claim {
-  std::string claim, place, pointer, note, measured_as;
+  std::string claim, place, pointer, note, measured_as, published;
   std::optional<double> value, least, most;
   double tolerance = 0;
+  bool main = false;
+  bool unread = false;  // the published number is from memory: it gives no verdict
 };
 
-// The interval of 95 % against what is claimed. A claim of a number to some tolerance is an interval too.
-enum class ClaimVerdict { holds, open, fails, missing };
+// The interval of the measured number, by default of 95 %, against what is claimed. A claim of a number to some
+// tolerance is an interval too.
+enum class ClaimVerdict { holds, open, fails, missing, unread };
 std::string_view name_of(ClaimVerdict verdict) {
   switch (verdict) {
     case ClaimVerdict::holds:
@@ -29,6 +33,8 @@ std::string_view name_of(ClaimVerdict verdict) {
       return "open";
     case ClaimVerdict::fails:
       return "does not hold";
+    case ClaimVerdict::unread:
+      return "no verdict";
     default:
       return "not measured";
   }
@@ -63,12 +69,13 @@ Measured read_number(const Claim& claim, const std::vector<Input>& inputs) {
   return measured;
 }
 
-ClaimVerdict verdict_of(const Claim& claim, const Measured& measured) {
+ClaimVerdict verdict_of(const Claim& claim, const Measured& measured, double half_width) {
   if (!std::isfinite(measured.value)) return ClaimVerdict::missing;
+  if (claim.unread) return ClaimVerdict::unread;
   const double low = claim.value ? *claim.value - claim.tolerance : claim.least.value_or(-INFINITY),
                high = claim.value ? *claim.value + claim.tolerance : claim.most.value_or(INFINITY);
-  const double least = measured.value - interval_95 * measured.error,
-               most = measured.value + interval_95 * measured.error;
+  const double least = measured.value - half_width * measured.error,
+               most = measured.value + half_width * measured.error;
   if (least >= low && most <= high) return ClaimVerdict::holds;
   return most < low || least > high ? ClaimVerdict::fails : ClaimVerdict::open;
 }
@@ -113,6 +120,8 @@ Json claim_json(const Claim& c, const Measured& number, const Judged& judged) {
   if (!c.measured_as.empty()) row["measured_as"] = c.measured_as;
   if (!c.note.empty()) row["note"] = c.note;
   row["number"] = c.pointer;
+  if (!c.published.empty()) row["published"] = c.published;
+  if (c.main) row["main"] = true;
   return row;
 }
 
@@ -128,27 +137,51 @@ std::string markdown_row(const Claim& c, const Judged& judged) {
                      cell(c.place));
 }
 
+// The published number takes the place of what a recipe would say of it. A recipe with every option written out says it
+// again, and must say the same.
+void take_published(Fields& fields, Claim& claim) {
+  const PublishedLookup found = find_published(claim.published);
+  if (!found.number) return fields.problem("/published", found.problem, found.suggestion);
+  const PublishedClaim& number = *found.number;
+  const auto same = [](const std::optional<double>& given, const std::optional<double>& published) {
+    return !given || given == published;
+  };
+  fields.require(same(claim.value, number.value) && same(claim.least, number.least) && same(claim.most, number.most) &&
+                     (claim.tolerance == 0 || claim.tolerance == number.tolerance),
+                 "published", "the recipe's own value or bounds are not those published", "Leave them out");
+  claim.value = number.value, claim.least = number.least, claim.most = number.most;
+  claim.tolerance = number.tolerance, claim.unread = number.from_memory;
+  if (claim.place.empty()) claim.place = number.place;
+}
+
+void describe_claim(Fields& f, Claim& c) {
+  f.text("claim", c.claim, {.help = "what is said", .required = true});
+  f.text("place", c.place, {.help = "where it stands"});
+  f.text("number", c.pointer, {.help = "/<stage id>/<name in its result>", .required = true});
+  f.text("measured_as", c.measured_as, {.help = "what the number is, in words"});
+  f.text("published", c.published,
+         {.help = "<paper>/<name>: the number of reference-data/<paper>/numbers.json is claimed"});
+  f.number("value", c.value, {.help = "claimed"});
+  f.number("tolerance", c.tolerance, {.help = "of the claimed value", .range = non_negative});
+  f.number("least", c.least, {.help = "claimed lower bound"});
+  f.number("most", c.most, {.help = "claimed upper bound"});
+  f.text("note", c.note, {.help = "what else there is to say"});
+  f.boolean("main", c.main, {.help = "the report and the list of results begin with it"});
+  if (!f.decoding()) return;
+  if (!c.published.empty()) take_published(f, c);
+  f.require(c.value || c.least || c.most || !c.published.empty(), "",
+            "nothing is claimed: neither a published number, nor value, least or most");
+  f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
+  if (f.has("number")) f.check_result("/number", c.pointer);
+}
+
 class Claims : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.array<Claim>(
-        "claims", claims_,
-        [](Fields& f, Claim& c) {
-          f.text("claim", c.claim, {.help = "what is said", .required = true});
-          f.text("place", c.place, {.help = "where it stands"});
-          f.text("number", c.pointer, {.help = "/<stage id>/<name in its result>", .required = true});
-          f.text("measured_as", c.measured_as, {.help = "what the number is, in words"});
-          f.number("value", c.value, {.help = "claimed"});
-          f.number("tolerance", c.tolerance, {.help = "of the claimed value", .range = non_negative});
-          f.number("least", c.least, {.help = "claimed lower bound"});
-          f.number("most", c.most, {.help = "claimed upper bound"});
-          f.text("note", c.note, {.help = "what else there is to say"});
-          if (!f.decoding()) return;
-          f.require(c.value || c.least || c.most, "", "nothing is claimed: neither value nor least nor most");
-          f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
-          if (f.has("number")) f.check_result("/number", c.pointer);
-        },
-        {.help = "sentence by sentence", .required = true});
+    fields.number(
+        "standard_errors", standard_errors_,
+        {.help = "half the width of the interval that decides, in standard errors; 1.96: 95 %", .range = positive});
+    fields.array<Claim>("claims", claims_, describe_claim, {.help = "sentence by sentence", .required = true});
     if (fields.decoding()) fields.require(!claims_.empty() || !fields.has("claims"), "claims", "there are none");
   }
 
@@ -158,7 +191,7 @@ class Claims : public Stage {
     list.text(row + "claim", "what is claimed");
     list.text(row + "claimed", "the claim as a number or an interval");
     list.text(row + "measured", "the measured number with its error");
-    list.text(row + "verdict", "holds, open, does not hold, or not measured");
+    list.text(row + "verdict", "holds, open, does not hold, no verdict, or not measured");
     list.number(row + "value", "1", "the measured number, in its own unit", {}, true);
     list.number(row + "std_error", "1", "its standard error", given_when("the number has an error"));
     list.text(row + "number", "where the number is");
@@ -166,6 +199,8 @@ class Claims : public Stage {
     list.text(row + "place", "where the claim stands", written);
     list.text(row + "measured_as", "what the number is", written);
     list.text(row + "note", "what else there is to say", written);
+    list.text(row + "published", "the published number: paper and name", written);
+    list.truth(row + "main", "whether the report begins with it", written);
     list.table({"claims.csv",
                 "the claims and what was measured",
                 {{"claim", "", "what is claimed"},
@@ -173,7 +208,7 @@ class Claims : public Stage {
                  {"claimed", "", "the claim as a number or an interval"},
                  {"measured", "1", "the measured number, in its own unit"},
                  {"std_error", "1", "its standard error, in that unit"},
-                 {"verdict", "", "holds, open, does not hold, or not measured"},
+                 {"verdict", "", "holds, open, does not hold, no verdict, or not measured"},
                  {"place", "", "where the claim stands"}}});
   }
 
@@ -183,22 +218,31 @@ class Claims : public Stage {
     std::string markdown = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
     for (const Claim& claim : claims_) {
       const Measured number = read_number(claim, context.inputs());
-      const Judged judged{claimed_text(claim), measured_text(claim, number), verdict_of(claim, number)};
+      const Judged judged{claimed_text(claim), measured_text(claim, number),
+                          verdict_of(claim, number, standard_errors_)};
       rows.push_back(claim_json(claim, number, judged));
       verdicts.add({claim.claim, claim.measured_as, judged.claimed, number.value,
                     number.error > 0 ? number.error : no_number, name_of(judged.verdict), claim.place});
       markdown += markdown_row(claim, judged);
     }
-    write_file(context.output("claims.json"),
-               dump(Json{{"verdict_is",
-                          "the interval of 95 % of the measured number (1.96 standard errors) lies within "
-                          "what is claimed (holds), outside of it (does not hold), or in both (open)"},
-                         {"claims", std::move(rows)}}));
+    write_file(context.output("claims.json"), dump(Json{{"verdict_is", rule()}, {"claims", std::move(rows)}}));
     verdicts.write(context.output("claims.csv"));
     write_file(context.output("claims.md"), markdown);
   }
 
  private:
+  std::string rule() const {
+    std::string rule =
+        standard_errors_ == interval_95
+            ? "the interval of 95 % of the measured number (1.96 standard errors)"
+            : fmt::format("the interval of {:g} standard errors of the measured number", standard_errors_);
+    rule += " lies within what is claimed (holds), outside of it (does not hold), or in both (open)";
+    if (std::any_of(claims_.begin(), claims_.end(), [](const Claim& claim) { return claim.unread; }))
+      rule += "; a published number that was not read in print gives no verdict";
+    return rule;
+  }
+
+  double standard_errors_ = interval_95;
   std::vector<Claim> claims_;
 };
 
@@ -207,7 +251,7 @@ class Claims : public Stage {
 StageRow claims_stage() {
   return {.name = "claims",
           .summary = "sets a paper's claims beside what was measured, with verdicts",
-          .accepts = {"chart", "critical", "study", "simulate", "fit", "map", "extract"},
+          .accepts = {"chart", "critical", "scaling", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,
           .result = "claims.json",

@@ -7,6 +7,26 @@
 namespace shakebed::pipelines {
 namespace {
 
+std::string_view colour_of(const std::string& verdict) {
+  return verdict == "holds" ? "good" : verdict == "does not hold" ? "bad" : "soft";
+}
+
+// The main claims: what is said, what was measured, whether it holds.
+std::string lead_html(const FinishedStage& stage, int&) {
+  std::string out;
+  for (const Json& row : stage.result.value("claims", Json::array())) {
+    if (!row.value("main", false)) continue;
+    const std::string verdict = row.value("verdict", ""), measured_as = row.value("measured_as", "");
+    out += fmt::format(
+        "<p><strong>Claim:</strong> {} ({}).<br><strong>Measured:</strong> {}{}. <strong>Verdict:</strong> <span "
+        "class=\"{}\">{}</span></p>\n",
+        prose(row.value("claim", "")), escape_markup(row.value("claimed", "")),
+        escape_markup(row.value("measured", "")), measured_as.empty() ? "" : " (" + prose(measured_as) + ")",
+        colour_of(verdict), escape_markup(verdict));
+  }
+  return out.empty() ? out : "<div class=\"lead\">\n" + out + "</div>\n";
+}
+
 std::string claims_html(const FinishedStage& stage, int&) {
   std::string out =
       "<h2>Claim by claim</h2>\n<div class=\"scroll\"><table>\n<tr><th>claim</th><th>claimed</th><th>measured</th>"
@@ -21,17 +41,16 @@ std::string claims_html(const FinishedStage& stage, int&) {
         "<tr><td>{}{}</td><td>{}</td><td class=\"number\">{}</td><td><span class=\"{}\">{}</span>{}</td><td>{}</td>"
         "</tr>\n",
         prose(row.value("claim", "")), aside("measured_as"), escape_markup(row.value("claimed", "")),
-        escape_markup(row.value("measured", "")),
-        verdict == "holds"           ? "good"
-        : verdict == "does not hold" ? "bad"
-                                     : "soft",
-        escape_markup(verdict), aside("note"), prose(row.value("place", "")));
+        escape_markup(row.value("measured", "")), colour_of(verdict), escape_markup(verdict), aside("note"),
+        prose(row.value("place", "")));
   }
   return out + "</table></div>\n<p class=\"soft\">" + escape_markup(stage.result.value("verdict_is", "")) + ".</p>\n";
 }
 
 }  // namespace
 
-StagePages claims_pages() { return {.sections = {{ReportPlace::claims, "", claims_html}}}; }
+StagePages claims_pages() {
+  return {.sections = {{ReportPlace::lead, "", lead_html}, {ReportPlace::claims, "", claims_html}}};
+}
 
 }  // namespace shakebed::pipelines

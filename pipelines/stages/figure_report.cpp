@@ -27,10 +27,16 @@ std::vector<fs::path> pictures_of(const FinishedStage& stage) {
   return files;
 }
 
-std::string figures_html(const FinishedStage& stage, int& pictures) {
+bool leads(const FinishedStage& stage, const std::string& name) {
+  const Json* lead = find_pointer(stage.result, "/" + escape_pointer_token(name) + "/lead");
+  return lead != nullptr && lead->is_boolean() && lead->get<bool>();
+}
+
+std::string pictures_html(const FinishedStage& stage, int& pictures, bool leading) {
   std::string out;
   for (const fs::path& path : pictures_of(stage)) {
     const std::string name = path.stem().string();
+    if (leads(stage, name) != leading) continue;
     const Json* own = find_pointer(stage.result, "/" + escape_pointer_token(name) + "/caption");
     const std::string caption =
         own != nullptr && own->is_string() ? own->get<std::string>()
@@ -43,9 +49,13 @@ std::string figures_html(const FinishedStage& stage, int& pictures) {
   }
   return out;
 }
+std::string lead_html(const FinishedStage& stage, int& pictures) { return pictures_html(stage, pictures, true); }
+std::string figures_html(const FinishedStage& stage, int& pictures) { return pictures_html(stage, pictures, false); }
 
 }  // namespace
 
-StagePages figure_pages() { return {.sections = {{ReportPlace::figures, "Figures", figures_html}}}; }
+StagePages figure_pages() {
+  return {.sections = {{ReportPlace::lead_picture, "", lead_html}, {ReportPlace::figures, "Figures", figures_html}}};
+}
 
 }  // namespace shakebed::pipelines

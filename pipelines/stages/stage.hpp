@@ -181,7 +181,7 @@ struct FinishedStage {
   Json result;
 };
 // Where on the page; in this order, with the sections of the page itself between them.
-enum class ReportPlace { banner, claims, figures, checks, motion, frames, fits, maps };
+enum class ReportPlace { lead, lead_picture, banner, claims, figures, checks, motion, frames, fits, maps };
 struct ReportSection {
   ReportPlace place;
   std::string_view heading = {};  // once above all sections of this place; none: the section has its own

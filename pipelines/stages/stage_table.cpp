@@ -13,6 +13,7 @@
   row(fit) \
   row(map) \
   row(critical) \
+  row(scaling) \
   row(figure) \
   row(chart) \
   row(claims) \

@@ -28,8 +28,19 @@ struct Change {  // of a series: pointer → value
   std::vector<std::pair<std::string, Json>> set;
   std::optional<double> times;  // instead of the parameter's
 };
+// Of a bed: its series, and the value of the second parameter.
+struct Kind {
+  std::string name;
+  Change change;
+  std::optional<double> second;
+};
+// What is taken of a column of a table.
+enum class Take { largest, smallest, place_of_largest, place_of_smallest };
 struct Collected {
-  std::string at;  // "/fit/temperature"
+  std::string at;  // "/fit/temperature", or a table "/bed/profile.csv" with the options below
+  std::string column, by = "height";
+  Take take = Take::largest;
+  std::optional<double> least, most;  // of `by`
   double times = 1, plus = 0;
 };
 // A number of one run: missing where the chain does not give it.
@@ -103,31 +114,73 @@ class Study : public Stage {
     std::size_t missing = 0;
   };
   Averages average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const;
-  std::string series_name(std::size_t k) const { return series_.empty() ? "all" : series_[k].first; }
+  std::vector<Kind> kinds() const;
+  std::vector<StatedColumn> place_columns() const;
+  std::string place_header() const;
+  std::string place_cells(const Point& point) const;
 
   Json chain_;
   Parameter parameter_;
+  std::optional<Parameter> second_;
   std::vector<std::pair<std::string, Change>> series_;
   std::vector<std::pair<std::string, Collected>> collect_;
   std::vector<std::pair<std::string, Tabulated>> tables_;
   std::uint32_t replicas_ = 1;
-  std::shared_ptr<const Chain> first_;  // the chain of the first point, once it has been read
+  std::vector<Kind> kinds_{{"all", {}, {}}};  // every series with every value of the second parameter
+  std::shared_ptr<const Chain> first_;        // the chain of the first point, once it has been read
 };
+
+const std::vector<Choice<Take>> takes{{Take::largest, "largest"},
+                                      {Take::smallest, "smallest"},
+                                      {Take::place_of_largest, "place_of_largest"},
+                                      {Take::place_of_smallest, "place_of_smallest"}};
+bool takes_place(Take take) { return take == Take::place_of_largest || take == Take::place_of_smallest; }
+
+// The table of the chain that a pointer "/bed/profile.csv" leads to; nullptr where it leads to none.
+const StatedTable* table_at(const Chain& chain, const std::string& at) {
+  const std::vector<std::string> tokens = split_pointer(at);
+  const ChainStage* stage = tokens.size() == 2 ? chain.find(tokens[0]) : nullptr;
+  return stage == nullptr ? nullptr : stage->results->find_table(tokens[1]);
+}
+
+// Of one run: no number where no row of the table lies within the places asked for.
+Number taken(const Collected& c, const fs::path& path) {
+  const Rows rows = read_rows(path);
+  const std::size_t y = csv_column(rows.header, c.column, path.string()),
+                    x = csv_column(rows.header, c.by, path.string());
+  const bool largest = c.take == Take::largest || c.take == Take::place_of_largest;
+  double best = NAN, place = NAN;
+  for (const std::vector<std::string>& cells : rows.rows) {
+    const auto value = number_in(cells[y]), at = number_in(cells[x]);
+    if (!value || !at || *at < c.least.value_or(-INFINITY) || *at > c.most.value_or(INFINITY)) continue;
+    if (std::isnan(best) || (largest ? *value > best : *value < best)) best = *value, place = *at;
+  }
+  Number number;
+  number.value = c.plus + c.times * (takes_place(c.take) ? place : best);
+  return number;
+}
+
+void describe_parameter(Fields& f, Parameter& p) {
+  f.text("name", p.name, {.help = "name of its column"});
+  f.numbers("values", p.values, {.help = "its values", .required = true});
+  f.number("times", p.times, {.help = "what is written into the chain is the value times this"});
+  f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
+  f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
+}
+
+// A whole number is written as one: a count takes nothing else.
+Json written_value(const Parameter& parameter, double value) {
+  if (!parameter.unit.empty()) return Json(number_text(value) + " " + parameter.unit);
+  return std::abs(value) < 1e15 && value == std::round(value) ? Json(static_cast<std::int64_t>(value)) : Json(value);
+}
 
 void Study::describe(Fields& fields) {
   fields.any("stages", chain_,
              {.help = "the chain that is run at every point: stages as in a recipe, which read no files of their own",
               .required = true});
-  fields.object<Parameter>(
-      "parameter", parameter_,
-      [](Fields& f, Parameter& p) {
-        f.text("name", p.name, {.help = "name of its column"});
-        f.numbers("values", p.values, {.help = "its values", .required = true});
-        f.number("times", p.times, {.help = "what is written into the chain is the value times this"});
-        f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
-        f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
-      },
-      {.help = "what is varied", .required = true});
+  fields.object<Parameter>("parameter", parameter_, describe_parameter, {.help = "what is varied", .required = true});
+  fields.object<Parameter>("second", second_, describe_parameter,
+                           {.help = "a second parameter: every value of the first with every value of this one"});
   fields.map<Change>("series", series_,
                      [](Fields& f, Change& change) {
                        Json set = Json::object();
@@ -142,13 +195,22 @@ void Study::describe(Fields& fields) {
                          for (const auto& [pointer, value] : set.items()) change.set.emplace_back(pointer, value);
                      },
                      {.help = "kinds of beds: name → what is changed in the chain for it; none: one series, \"all\""});
-  fields.map<Collected>("collect", collect_,
-                        [](Fields& f, Collected& c) {
-                          f.text("at", c.at, {.help = "/<stage id>/<name in its result>", .required = true});
-                          f.number("times", c.times, {.help = "factor"});
-                          f.number("plus", c.plus, {.help = "added after the factor"});
-                        },
-                        {.help = "name of a column → where its number is", .required = true});
+  fields.map<Collected>(
+      "collect", collect_,
+      [](Fields& f, Collected& c) {
+        f.text("at", c.at,
+               {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv with a column", .required = true});
+        f.text("column", c.column, {.help = "column of the table of which one number is taken"});
+        f.choice("take", c.take, takes,
+                 {.help = "which: the largest or smallest number, or where it stands; noise makes "
+                          "the largest too large and the smallest too small"});
+        f.text("by", c.by, {.help = "column that says where"});
+        f.number("least", c.least, {.help = "smallest place that is looked at"});
+        f.number("most", c.most, {.help = "largest place that is looked at"});
+        f.number("times", c.times, {.help = "factor"});
+        f.number("plus", c.plus, {.help = "added after the factor"});
+      },
+      {.help = "name of a column → where its number is", .required = true});
   fields.map<Tabulated>(
       "tables", tables_,
       [](Fields& f, Tabulated& t) {
@@ -161,6 +223,40 @@ void Study::describe(Fields& fields) {
   if (!fields.decoding() || fields.problem_count() > 0) return;
   fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
   fields.require(!collect_.empty(), "collect", "nothing is collected");
+  if (second_) {
+    fields.require(second_->name != parameter_.name, "second/name", "both parameters have the same name");
+    fields.require(!second_->values.empty(), "second/values", "there are no values");
+  }
+  kinds_ = kinds();
+}
+
+std::vector<Kind> Study::kinds() const {
+  std::vector<Kind> kinds;
+  for (const auto& [name, change] : series_) kinds.push_back({name, change, {}});
+  if (kinds.empty()) kinds.push_back({"all", {}, {}});
+  if (!second_) return kinds;
+  std::vector<Kind> out;
+  for (const Kind& kind : kinds) {
+    for (const double value : second_->values) {
+      const std::string own = fmt::format("{} = {}", second_->name, value);
+      out.push_back({series_.empty() ? own : kind.name + ", " + own, kind.change, value});
+    }
+  }
+  return out;
+}
+
+// The columns that say which bed a row is of.
+std::vector<StatedColumn> Study::place_columns() const {
+  const auto unit_of = [](const Parameter& parameter, bool scaled) {
+    return scaled || parameter.unit.empty() ? std::string("1") : parameter.unit;  // scaled: in a unit of the user's own
+  };
+  bool scaled = parameter_.times != 1;
+  std::vector<std::string> names;
+  for (const Kind& kind : kinds_) scaled |= kind.change.times.value_or(1) != 1, names.push_back(kind.name);
+  std::vector<StatedColumn> columns{{"series", "", "kind of bed", names},
+                                    {parameter_.name, unit_of(parameter_, scaled), "what is varied"}};
+  if (second_) columns.push_back({second_->name, unit_of(*second_, second_->times != 1), "what is varied, too"});
+  return columns;
 }
 
 std::vector<std::string> Study::chain_kinds() const {
@@ -177,8 +273,9 @@ std::vector<std::string> Study::chain_kinds() const {
 void Study::check_chains(Fields& fields, const ChainReader& read) {
   std::map<std::pair<std::string, std::string>, std::pair<Warning, std::size_t>> warnings;  // by kind and pointer
   std::size_t points_read = 0;
-  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) {
-    const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[k].first);
+  for (std::size_t k = 0; k < kinds_.size(); ++k) {
+    const std::size_t of_series = k / (second_ ? second_->values.size() : 1);
+    const std::string where = series_.empty() ? "" : "/series/" + escape_pointer_token(series_[of_series].first);
     for (std::size_t v = 0; v < parameter_.values.size(); ++v) {
       try {
         const auto chain = std::make_shared<const Chain>(read(recipe_at({k, v, 0}, 1)));
@@ -218,6 +315,20 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
   }
   const std::vector<StatedStage> stated = chain.stated();
   for (const auto& [name, collected] : collect_) {
+    if (!collected.column.empty()) {
+      const std::string where = "/collect/" + escape_pointer_token(name);
+      const StatedTable* table = table_at(chain, collected.at);
+      if (table == nullptr) {
+        fields.problem(where + "/at", "\"" + collected.at + "\" leads to no table of the chain",
+                       "Write /<stage id>/<file>.csv");
+        continue;
+      }
+      for (const auto& [key, column] : {std::pair("/column", collected.column), std::pair("/by", collected.by)}) {
+        if (const auto misfit = misfit_of_column(*table, column))
+          fields.problem(where + key, misfit->what, misfit->suggestion);
+      }
+      continue;
+    }
     const auto misfit = misfit_of_pointer(stated, collected.at, "the chain");
     if (misfit) fields.problem("/collect/" + escape_pointer_token(name) + "/at", misfit->what, misfit->suggestion);
   }
@@ -247,13 +358,9 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
 }
 
 void Study::results(ResultList& list) const {
-  bool scaled_values = parameter_.times != 1;  // then they are in a unit of the user's own
-  for (const auto& [name, change] : series_) scaled_values |= change.times.value_or(1) != 1;
-  const std::string unit_of_values = scaled_values || parameter_.unit.empty() ? "1" : parameter_.unit;
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k) names.push_back(series_name(k));
-  std::vector<StatedColumn> columns{{"series", "", "kind of bed", names},
-                                    {parameter_.name, unit_of_values, "what is varied"}};
+  std::vector<StatedColumn> columns = place_columns();
+  const std::vector<StatedColumn> places = columns;
+  const std::vector<std::string> names = columns.front().values;
   std::vector<StatedColumn> runs = columns;
   runs.push_back({"replica", "1", "number of the run"});
   list.number("/replicas", "1", "runs at every point");
@@ -265,8 +372,14 @@ void Study::results(ResultList& list) const {
         stage == nullptr ? nullptr
                          : stage->results->find(collected.at.substr(1 + escape_pointer_token(tokens.front()).size()));
     const bool scaled = collected.times != 1 || collected.plus != 0;
-    const std::string unit = number == nullptr || scaled ? "1" : number->unit;  // scaled: in a unit of its own
-    const std::string meaning = number == nullptr ? "" : number->meaning;
+    std::string unit = number == nullptr ? "1" : number->unit, meaning = number == nullptr ? "" : number->meaning;
+    if (const StatedTable* table = collected.column.empty() ? nullptr : table_at(*first_, collected.at)) {
+      const std::string& of = takes_place(collected.take) ? collected.by : collected.column;
+      for (const StatedColumn& column : table->columns) {
+        if (column.name == of) unit = column.unit, meaning = column.meaning;
+      }
+    }
+    if (scaled) unit = "1";  // in a unit of its own
     columns.push_back({name, unit, meaning});
     columns.push_back({name + "_error", unit, "its standard error"});
     runs.push_back({name, unit, meaning});
@@ -274,13 +387,14 @@ void Study::results(ResultList& list) const {
       list.quantity(pointer_join(pointer_join("/series", one) + "/#", name), unit, meaning, {}, true);
   }
   for (const std::string& one : names)
-    list.number(pointer_join(pointer_join("/series", one) + "/#", parameter_.name), unit_of_values, "what is varied");
+    for (std::size_t c = 1; c < places.size(); ++c)
+      list.number(pointer_join(pointer_join("/series", one) + "/#", places[c].name), places[c].unit, places[c].meaning);
   list.table({"table.csv", "means over the runs of each point", columns});
   list.table({"replicas.csv", "the numbers of each run", runs});
   for (const auto& [name, table] : tables_) {
     const auto tokens = split_pointer(table.at);
     const StatedTable* source = first_->find(tokens[0])->results->find_table(tokens[1]);
-    StatedTable out{name + ".csv", source->meaning + ", averaged over the runs", {columns[0], columns[1]}};
+    StatedTable out{name + ".csv", source->meaning + ", averaged over the runs", places};
     for (const StatedColumn& column : source->columns) {
       if (column.name == table.key) out.columns.push_back(column);
     }
@@ -296,7 +410,7 @@ void Study::results(ResultList& list) const {
 
 std::vector<Study::Point> Study::points() const {
   std::vector<Point> points;
-  for (std::size_t k = 0; k < std::max<std::size_t>(1, series_.size()); ++k)
+  for (std::size_t k = 0; k < kinds_.size(); ++k)
     for (std::size_t v = 0; v < parameter_.values.size(); ++v)
       for (std::uint32_t r = 0; r < replicas_; ++r) points.push_back({k, v, r});
   return points;
@@ -305,16 +419,14 @@ std::vector<Study::Point> Study::points() const {
 // Seeds differ between all runs, also between values and series: their errors are independent.
 JsonNode Study::recipe_at(const Point& point, std::uint64_t seed) const {
   JsonNode document = to_node(Json{{"name", "study"}, {"stages", chain_}});
-  if (!series_.empty()) {
-    for (const auto& [pointer, value] : series_[point.series].second.set)
-      set_pointer(document, pointer, to_node(value));
-  }
-  const double value =
-      parameter_.values[point.value] *
-      (series_.empty() ? parameter_.times : series_[point.series].second.times.value_or(parameter_.times));
-  for (const std::string& pointer : parameter_.set) {
-    set_pointer(document, pointer,
-                to_node(parameter_.unit.empty() ? Json(value) : Json(number_text(value) + " " + parameter_.unit)));
+  const Kind& bed = kinds_[point.series];
+  for (const auto& [pointer, value] : bed.change.set) set_pointer(document, pointer, to_node(value));
+  const double value = parameter_.values[point.value] * bed.change.times.value_or(parameter_.times);
+  for (const std::string& pointer : parameter_.set)
+    set_pointer(document, pointer, to_node(written_value(parameter_, value)));
+  if (bed.second) {
+    for (const std::string& pointer : second_->set)
+      set_pointer(document, pointer, to_node(written_value(*second_, *bed.second * second_->times)));
   }
   const std::uint64_t own =
       replica_seed(seed, 1 + point.replica + 1000 * (point.value + 10'000 * static_cast<std::uint64_t>(point.series)));
@@ -332,7 +444,13 @@ std::vector<Number> Study::numbers(const std::vector<Input>& chain) const {
   std::map<std::string, Json> results;
   std::vector<Number> out;
   for (const auto& [name, collected] : collect_) {
-    const std::string id = split_pointer(collected.at).front();
+    const std::vector<std::string> tokens = split_pointer(collected.at);
+    const std::string& id = tokens.front();
+    if (!collected.column.empty()) {
+      const auto stage = std::find_if(chain.begin(), chain.end(), [&](const Input& i) { return i.id == id; });
+      out.push_back(taken(collected, stage->file(tokens[1])));
+      continue;
+    }
     if (!results.contains(id))
       results[id] = std::find_if(chain.begin(), chain.end(), [&](const Input& i) { return i.id == id; })->result();
     const Json& result = results[id];
@@ -373,13 +491,21 @@ std::vector<Number> kept_numbers(const Json& run) {
 std::string cell(double value) { return std::isfinite(value) ? number_text(value) : std::string(); }
 }  // namespace
 
+std::string Study::place_header() const { return "series," + parameter_.name + (second_ ? "," + second_->name : ""); }
+std::string Study::place_cells(const Point& point) const {
+  const Kind& kind = kinds_[point.series];
+  std::string cells = quoted(kind.name) + fmt::format(",{}", parameter_.values[point.value]);
+  if (kind.second) cells += fmt::format(",{}", *kind.second);
+  return cells;
+}
+
 // Runs the chain at one point: {"numbers": [[value, error], ...], "tables": [{"header", "rows"}, ...]}.
 Json Study::run_once(RunContext& context, const Point& point, const fs::path& folder) const {
   std::vector<Input> chain;
   try {
     chain = context.run_chain(recipe_at(point, context.seed()), folder);
   } catch (const StageError& error) {
-    throw StageError(fmt::format("{}, {} = {}, replica {}: {}", series_name(point.series), parameter_.name,
+    throw StageError(fmt::format("{}, {} = {}, replica {}: {}", kinds_[point.series].name, parameter_.name,
                                  parameter_.values[point.value], point.replica, error.what()));
   }
   Json found{{"numbers", Json::array()}, {"tables", Json::array()}};
@@ -414,7 +540,7 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
         const Json& one = kept[r]["tables"][k];
         if (header.empty()) {
           header = one["header"].get<std::vector<std::string>>();
-          text += fmt::format("series,{},{}", parameter_.name, table.key);
+          text += place_header() + "," + table.key;
           for (const std::string& column : header) {
             if (column != table.key) text += fmt::format(",{0},{0}_error", column);
           }
@@ -433,7 +559,7 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
         }
       }
       for (const auto& [key, values] : columns) {
-        text += fmt::format("{},{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value], cell(key));
+        text += place_cells(all[i]) + "," + cell(key);
         for (std::size_t c = 0; c < header.size(); ++c) {
           if (header[c] == table.key) continue;
           const Mean mean(values[c]);
@@ -466,12 +592,11 @@ std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& 
 
 // replicas.csv: every run with its numbers.
 std::string Study::replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
-  std::string text = "series," + parameter_.name + ",replica";
+  std::string text = place_header() + ",replica";
   for (const auto& [name, ignored] : collect_) text += "," + name;
   text += "\n";
   for (std::size_t i = 0; i < all.size(); ++i) {
-    text +=
-        fmt::format("{},{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value], all[i].replica);
+    text += place_cells(all[i]) + fmt::format(",{}", all[i].replica);
     for (const Number& number : found[i]) text += "," + cell(number.value);
     text += "\n";
   }
@@ -481,13 +606,14 @@ std::string Study::replicas_csv(const std::vector<Point>& all, const std::vector
 // table.csv and the rows of study.json: means over the replicas of a point, with their errors.
 Study::Averages Study::average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
   Averages out;
-  out.csv = "series," + parameter_.name;
+  out.csv = place_header();
   for (const auto& [name, ignored] : collect_) out.csv += fmt::format(",{0},{0}_error", name);
   out.csv += "\n";
   for (std::size_t i = 0; i < all.size(); i += replicas_) {
-    out.csv += fmt::format("{},{}", quoted(series_name(all[i].series)), parameter_.values[all[i].value]);
+    out.csv += place_cells(all[i]);
     Json row;
     row[parameter_.name] = parameter_.values[all[i].value];
+    if (kinds_[all[i].series].second) row[second_->name] = *kinds_[all[i].series].second;
     for (std::size_t c = 0; c < collect_.size(); ++c) {
       std::vector<Number> values;
       for (std::size_t r = i; r < i + replicas_; ++r) values.push_back(found[r][c]);
@@ -500,7 +626,7 @@ Study::Averages Study::average(const std::vector<Point>& all, const std::vector<
       row[collect_[c].first] = std::move(quantity);
     }
     out.csv += "\n";
-    out.series[series_name(all[i].series)].push_back(std::move(row));
+    out.series[kinds_[all[i].series].name].push_back(std::move(row));
   }
   return out;
 }

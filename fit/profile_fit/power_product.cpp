@@ -1,0 +1,71 @@
+#include "fit/profile_fit/power_product.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "fit/profile_fit/straight_line.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+// Columns of the design count as dependent where their part that no other column explains is below this share of
+// their length: 1e-8 leaves 8 of the 16 digits of a double.
+constexpr double independent_share = 1e-8;
+
+bool all_positive(std::span<const double> numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double number) { return number > 0 && std::isfinite(number); });
+}
+
+}  // namespace
+
+double PowerProduct::at(std::span<const double> x) const {
+  double sum = log_amplitude;
+  for (std::size_t k = 0; k < exponents.size(); ++k) sum += exponents[k] * std::log(x[k]);
+  return std::exp(sum);
+}
+
+PowerProduct fit_power_product(const std::vector<std::vector<double>>& x, std::span<const double> y,
+                               std::span<const double> error) {
+  PowerProduct fit;
+  const auto points = static_cast<Eigen::Index>(y.size()), unknowns = static_cast<Eigen::Index>(x.size()) + 1;
+  fit.dof = static_cast<int>(points - unknowns);
+  if (fit.dof < 1 || !all_positive(y) || !all_positive(error)) return fit;
+  for (const std::vector<double>& column : x) {
+    if (!all_positive(column)) return fit;
+  }
+  Eigen::MatrixXd design(points, unknowns);  // each row divided by the error of ln y
+  Eigen::VectorXd target(points);
+  for (Eigen::Index i = 0; i < points; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double weight = y[at] / error[at];
+    target(i) = weight * std::log(y[at]);
+    design(i, 0) = weight;
+    for (Eigen::Index k = 1; k < unknowns; ++k)
+      design(i, k) = weight * std::log(x[static_cast<std::size_t>(k - 1)][at]);
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(design);
+  solver.setThreshold(independent_share);
+  if (solver.rank() < unknowns) return fit;
+  const Eigen::VectorXd solution = solver.solve(target);
+  const Eigen::MatrixXd covariance = (design.transpose() * design).inverse();
+  fit.ok = true;
+  fit.chi2 = (design * solution - target).squaredNorm();
+  fit.p_value = chance_of_chi2(fit.chi2, fit.dof);
+  const double widened = std::sqrt(std::max(1.0, fit.chi2 / fit.dof));
+  fit.log_amplitude = solution(0), fit.log_amplitude_error = widened * std::sqrt(covariance(0, 0));
+  for (Eigen::Index k = 1; k < unknowns; ++k) {
+    fit.exponents.push_back(solution(k));
+    fit.exponent_errors.push_back(widened * std::sqrt(covariance(k, k)));
+  }
+  double squares = 0;
+  std::vector<double> place(x.size());
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    for (std::size_t k = 0; k < x.size(); ++k) place[k] = x[k][i];
+    squares += std::pow(std::log(y[i] / fit.at(place)), 2);
+  }
+  fit.rms_log_ratio = std::sqrt(squares / static_cast<double>(y.size()));
+  return fit;
+}
+
+}  // namespace shakebed::fit
