@@ -34,7 +34,7 @@ class Surrogate {
   std::size_t parameters() const { return parameters_; }
   std::size_t outputs() const { return outputs_; }
   const std::vector<double>& lengths() const { return lengths_; }
-  // Standard deviation between runs at one point.
+  // Standard deviation between runs at one point, where the value is in the middle of all.
   double scatter(std::size_t output) const { return spread_[output]; }
   // Each run predicted from all others, (value - mean)/standard deviation: run by run, output by output. They are
   // standard normal where the surrogate is right.
@@ -45,7 +45,7 @@ class Surrogate {
   std::size_t parameters_ = 0, outputs_ = 0, runs_ = 0;
   std::vector<double> points_;
   std::vector<double> lengths_;
-  double signal_ = 0, trend_ = 0;                          // variances, in units of the noise
+  double signal_ = 0, trend_ = 0, growth_ = 0;             // variances, in units of the noise
   std::vector<double> factor_;                             // Cholesky factor of the covariance, column by column
   std::vector<double> weights_;                            // covariance^-1 values, a column an output
   std::vector<double> middle_, unit_, spread_, left_out_;  // by output; left_out_ by run, too
