@@ -118,6 +118,7 @@ class Fields {
   Mode mode() const { return mode_; }
   bool decoding() const { return mode_ == Mode::decode; }
   const std::string& pointer() const { return pointer_; }
+  const Source& source() const { return source_; }
 
   // In a stage with "units": "reduced" every quantity is a plain number (lengths in D, masses in m, g or the starting T
   // equal to 1) and a string with a unit is a mistake. Options structs then hold reduced numbers instead of SI.

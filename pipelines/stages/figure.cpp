@@ -115,6 +115,8 @@ void remove_date(const std::filesystem::path& pdf) {
   write_file(pdf, bytes);
 }
 
+}  // namespace
+
 void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script) {
   write_file(directory / (name + ".gp"), script);
   ProcessResult result;
@@ -135,6 +137,8 @@ void run_gnuplot(const std::filesystem::path& directory, const std::string& name
   }
   remove_date(directory / (name + ".pdf"));
 }
+
+namespace {
 
 // The series as "plot" elements, their data at `index` and after in NAME.dat.
 std::string plot_elements(const std::vector<Series>& all, const std::string& name, std::size_t index, bool titles) {

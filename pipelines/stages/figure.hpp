@@ -38,6 +38,8 @@ struct DiskPicture {
   double color_low = 0, color_high = 1;
 };
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
+// Writes the script as NAME.gp and runs it; it must make NAME.svg and NAME.pdf. Throws StageError when it does not.
+void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script);
 // Writes NAME.dat, NAME.gp, NAME.svg and NAME.pdf into the folder. Throws StageError when gnuplot is missing or fails.
 void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name);
 

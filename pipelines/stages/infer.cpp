@@ -1,444 +1,510 @@
+#include "pipelines/stages/infer.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <random>
 
-#include "fit/profile_fit/fit_profile.hpp"
+#include "pipelines/formats/embedded.hpp"
 #include "pipelines/formats/files.hpp"
-#include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
-#include "pipelines/stages/scene_options.hpp"
-#include "pipelines/stages/stage.hpp"
-#include "sim/measure/measure.hpp"
-#include "sim/measure/observables.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 
 namespace {
 
-struct Target {
-  double temperature_over_mg = 0;  // [m], reduced: [D]
-  double density = 0;              // of the dense region [1/D^2]
-};
-struct Grid {
-  std::vector<double> restitution, friction;
-  std::vector<std::string> side_friction{"none", "as disks"};
-};
-
-// What one simulated bed gives.
-struct Bed {
-  fit::FitStatus status = fit::FitStatus::not_converged;
-  sim::Measured temperature;  // of the fit [m g D]
-  double solid_height = 0;    // of the fit [D]
-  sim::Measured density;      // greatest of the profile
-  sim::Measured temperature_x, temperature_z, temperature_z_local;
-  sim::Measured rise;  // of the centre of mass [D]
-  std::uint64_t collisions = 0;
-};
-
-// A pair of restitution and friction, and the mean of its beds. The errors are those of that mean: from the spread
-// between the beds, or the bed's own where there is only one.
-struct Point {
-  double restitution = 0, friction = 0, side_friction = 0;
-  fit::FitStatus status =
-      fit::FitStatus::not_converged;  // of the first bed whose fit did not succeed, else that of all
-  bool all_ok = false;
-  sim::Measured temperature, solid_height, density, temperature_x, temperature_z, temperature_z_local, rise;
-  double distance = INFINITY, distance_error = 0;
-  std::uint64_t collisions = 0;
-};
-
-// Of one-sided 2.5 %: Student's t for `freedom` degrees of freedom [Abramowitz and Stegun, 26.7.5].
-double student_t(int freedom) {
-  constexpr double z = 1.959963984540054;
-  static constexpr double table[] = {12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228};
-  if (freedom <= 10) return table[std::max(freedom, 1) - 1];
-  return z + (z * z * z + z) / (4 * freedom) +
-         (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96.0 * freedom * freedom);
-}
-
-constexpr double profile_spacing = 0.25;  // of the heights [D]
-
-// Of a bed up to its last look.
-class CollisionCount final : public sim::RunObserver {
- public:
-  std::uint64_t collisions() const { return collisions_; }
-  void look(sim::Simulation& simulation, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {
-    collisions_ = simulation.counters().collisions();
-  }
-  void save(sim::ArchiveWriter& out) override { out(collisions_); }
-  void load(sim::ArchiveReader& in) override { in(collisions_); }
-
- private:
-  std::uint64_t collisions_ = 0;
-};
+// Keys of a stage that describe its scene.
+constexpr std::array scene_keys = {"disks", "gravity", "box", "floor", "bath", "start", "start_temperature"};
+// Corners of the prior at which the scene is checked before anything runs.
+constexpr std::size_t most_corners = 64;
+// Best beds are this far from one another, the range of a parameter being 1.
+constexpr double distance_of_best = 0.3;
+// Streams of seeds: beds of the design count from 1.
+constexpr std::uint64_t best_stream = 1'000'000, calibration_stream = 2'000'000;
 
 class Infer : public Stage {
  public:
   void describe(Fields& fields) override;
-  void results(ResultList& list) const override;
-  Json facts() const override { return bed_.facts(); }
+  void results(ResultList& list) const override { state_inference(list, options_); }
+  Json facts() const override { return options_.written.facts(); }
   void run(RunContext& context) const override;
 
  private:
-  std::vector<Point> points() const;
-  Bed simulate(const Point& point, std::uint64_t seed, const RunContext& context) const;
-  void average(Point& point, const Bed* beds) const;  // replicas_ of them
-  // Those that are no farther from the target than the nearest, as far as the errors allow to tell.
-  std::vector<const Point*> as_near(const std::vector<Point>& points, const Point& nearest) const;
-  Json results_of(const std::vector<Point>& points) const;
-  // infer.csv, row by row into the empty table.
-  Table points_table(Table table, const std::vector<Point>& points) const;
+  void describe_targets(Fields& fields);
+  void describe_search(Fields& fields);
+  void check(Fields& fields);
+  void check_corners(Fields& fields) const;
+  std::string made_from() const;
+  std::vector<ScaledTarget> scaled_targets(const RunContext& context) const;
+  std::vector<RunBed> stored_beds() const;
+  std::vector<RunBed> run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
+                               const std::vector<std::vector<double>>& values) const;
+  std::vector<RunBed> design(RunContext& context, const std::vector<ScaledTarget>& targets) const;
+  std::vector<BestBed> best_beds(RunContext& context, const Inference& found) const;
+  std::vector<CalibrationRow> calibrate(RunContext& context, const Inference& found) const;
+  SceneOptions scene_at(const std::vector<double>& values) const;
 
-  SceneOptions bed_;
-  double settle_ = 0, measure_ = 0;
-  std::uint32_t phases_ = 16, replicas_ = 3;
-  double kernel_width_ = 0.5;  // Gaussian [D]
-  double plateau_density_ = 1.10;
-  Target target_;
-  Grid grid_;
+  InferOptions options_;
 };
 
-void Infer::describe(Fields& fields) {
-  bed_.describe(fields);
-  fields.quantity("settle", settle_, dimension::time,
-                  {.help = "time before anything is measured", .range = non_negative});
-  fields.quantity("measure", measure_, dimension::time,
-                  {.help = "time over which each bed is measured", .required = true, .range = positive});
-  fields.integer("phases", phases_,
-                 {.help = "moments of each period that the profile averages over", .range = from_to(1, 4096)});
-  fields.integer(
-      "replicas", replicas_,
-      {.help = "beds at every point, each with a seed of its own; their mean counts, their spread is its error",
-       .range = from_to(1, 1000)});
-  fields.number("kernel_width", kernel_width_,
-                {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
-  fields.number(
-      "plateau_density", plateau_density_,
-      {.help = "phi_0 of the fitted profile", .range = {.low = 0, .high = 1.1547005383792517, .above_low = true}});
-  fields.object<Target>(
-      "target", target_,
-      [](Fields& f, Target& t) {
-        f.quantity("temperature_over_mg", t.temperature_over_mg, dimension::length,
-                   {.help = "fitted T/(m g)", .required = true, .range = positive});
-        f.number("density", t.density,
-                 {.help = "number density of the dense region in 1/D^2", .required = true, .range = positive});
+void Infer::describe_targets(Fields& fields) {
+  struct Targets {};
+  Targets none;
+  options_.targets.resize(observables().size());
+  fields.object<Targets>(
+      "targets", none,
+      [this](Fields& f, Targets&) {
+        for (std::size_t k = 0; k < observables().size(); ++k) {
+          const Observable& observable = observables()[k];
+          f.object<InferTarget>(
+              observable.name, options_.targets[k],
+              [&](Fields& g, InferTarget& target) {
+                for (const auto& [key, number, help] :
+                     {std::tuple{"value", &target.value, "what was measured"},
+                      std::tuple{"std_error", &target.std_error,
+                                 "its standard error, without the scatter between beds"}}) {
+                  if (observable.is_length)
+                    g.quantity(key, *number, dimension::length, {.help = help, .range = non_negative});
+                  else
+                    g.number(key, *number, {.help = help});
+                }
+                g.text("at", target.at, {.help = "or where a stage in \"from\" has it: /fit/temperature_over_mg"});
+                if (!g.decoding()) return;
+                g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
+                g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value", "it must be above 0");
+                g.require(target.std_error >= 0, "std_error", "an error is not negative");
+                if (!target.at.empty()) g.check_result("/at", target.at);
+              },
+              {.help = observable.meaning});
+        }
       },
-      {.help = "what was measured", .required = true});
-  fields.object<Grid>(
-      "grid", grid_,
-      [](Fields& f, Grid& g) {
-        f.numbers("restitution", g.restitution,
-                  {.help = "values of e, of disks, floor and sides alike", .required = true, .range = zero_to_one});
-        f.numbers("friction", g.friction,
-                  {.help = "values of the friction of disks and floor", .required = true, .range = non_negative});
-        f.texts("side_friction", g.side_friction, {.help = "\"none\", \"as disks\", or both"});
-        for (const std::string& side : g.side_friction)
-          f.require(side == "none" || side == "as disks", "side_friction",
-                    "side friction is \"none\" or \"as disks\", not \"" + side + "\"");
-      },
-      {.help = "the search", .required = true});
-  if (!fields.decoding() || fields.problem_count() > 0) return;
-  fields.require(bed_.period() > 0 && measure_ >= bed_.period() * bed_.time_unit(), "measure",
-                 "the bed must be shaken, and measured over at least one period of the floor");
-  bed_.warn(fields, settle_);
+      {.help = "what was measured: numbers with their errors", .required = true});
 }
 
-std::vector<Point> Infer::points() const {
-  std::vector<Point> points;
-  for (const std::string& side : grid_.side_friction) {
-    for (double e : grid_.restitution) {
-      for (double friction : grid_.friction) {
-        const double side_friction = side == "none" ? 0 : friction;
-        // Without friction the two kinds of sides are the same bed.
-        const bool again = std::any_of(points.begin(), points.end(), [&](const Point& p) {
-          return p.restitution == e && p.friction == friction && p.side_friction == side_friction;
-        });
-        if (again) continue;
-        Point point;
-        point.restitution = e;
-        point.friction = friction;
-        point.side_friction = side_friction;
-        points.push_back(point);
+void Infer::describe_search(Fields& fields) {
+  fields.integer("moments", options_.moments,
+                 {.help = "the photographs may show one moment of the shaking in place of its average: so many "
+                          "moments, equally spaced, are possible; 0: they show the average",
+                  .range = from_to(0, 64)});
+  fields.number("average", options_.average,
+                {.help = "with moments: the prior chance that the average is shown", .range = zero_to_one});
+  fields.number(
+      "phase", options_.phase,
+      {.help = "the photographs show this phase of the shaking, 0 to 1 (0: the floor passes its mean height upwards)",
+       .range = {.low = 0, .high = 1, .below_high = true}});
+  fields.integer("first", options_.first, {.help = "beds all over the prior", .range = from_to(8, 100'000)});
+  fields.integer("rounds", options_.rounds,
+                 {.help = "rounds of further beds where the posterior is", .range = from_to(0, 20)});
+  fields.integer("each", options_.each, {.help = "beds of each round", .range = from_to(1, 10'000)});
+  fields.integer("best", options_.best, {.help = "most probable beds that are run again", .range = from_to(0, 20)});
+  fields.integer("best_replicas", options_.replicas,
+                 {.help = "runs of each of them, with seeds of their own", .range = from_to(2, 1000)});
+  fields.quantity("best_measure", options_.best_measure, dimension::time,
+                  {.help = "time over which they are measured; 0: as the others", .range = non_negative});
+  fields.integer("draws", options_.draws, {.help = "rows of posterior.csv", .range = from_to(100, 100'000)});
+  fields.integer("calibration", options_.calibration,
+                 {.help = "beds with parameters drawn from the prior, measured and inferred: how often the intervals "
+                          "hold the truth; 0: none",
+                  .range = from_to(0, 10'000)});
+  fields.object<MapCurve>(
+      "map_curve", options_.curve,
+      [](Fields& f, MapCurve& curve) {
+        f.number("reduced_temperature", curve.reduced_temperature,
+                 {.help = "T/T_c", .required = true, .range = positive});
+        f.text("reading", curve.reading,
+               {.help = "a reading of the map", .required = true, .example = "\"eq6/relative_max/printed\""});
+        f.text("label", curve.label, {.help = "what the picture calls it"});
+      },
+      {.help = "draws Gamma against frequency where a reading of the map gives this T/T_c"});
+  fields.text(
+      "stored", options_.stored,
+      {.help =
+           "beds.json of an earlier run that is part of the program (reference-data), in place of running the beds"});
+}
+
+void Infer::describe(Fields& fields) {
+  options_.written.describe(fields);
+  fields.quantity("settle", options_.bed.settle, dimension::time,
+                  {.help = "time before anything is measured", .range = non_negative});
+  fields.quantity("measure", options_.bed.measure, dimension::time,
+                  {.help = "time over which each bed is measured", .required = true, .range = positive});
+  fields.integer("phases", options_.bed.phases,
+                 {.help = "moments of each period that the average is taken over", .range = from_to(1, 4096)});
+  fields.number("kernel_width", options_.bed.kernel_width,
+                {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
+  fields.number(
+      "plateau_density", options_.bed.plateau_density,
+      {.help = "phi_0 of the fitted profile", .range = {.low = 0, .high = 1.1547005383792517, .above_low = true}});
+  fields.map<UnknownParameter>(
+      "parameters", options_.parameters, [](Fields& f, UnknownParameter& p) { p.describe(f); },
+      {.help = "what is not known: name → where it stands in the scene, and its prior", .required = true});
+  describe_targets(fields);
+  describe_search(fields);
+  if (fields.decoding() && fields.problem_count() == 0) check(fields);
+}
+
+// What depends on several options at once.
+void Infer::check(Fields& fields) {
+  BedOfInference& bed = options_.bed;
+  bed.reduced = fields.reduced(), bed.source = fields.source();
+  bed.scene.kind = JsonNode::Kind::object;
+  for (const char* key : scene_keys) {
+    if (const JsonNode* node = fields.written(key)) bed.scene.members.push_back({key, node->at, *node});
+  }
+  bed.views = views_of(options_.moments, options_.average, options_.phase);
+  fields.require(
+      options_.written.period() > 0 && bed.measure >= options_.written.period() * options_.written.time_unit(),
+      "measure", "the bed must be shaken, and measured over at least one period of the floor");
+  fields.require(!options_.parameters.empty() && options_.parameters.size() <= 12, "parameters",
+                 "from 1 to 12 parameters can be inferred");
+  fields.require(options_.moments == 0 || bed.phases % options_.moments == 0, "moments",
+                 fmt::format("{} phases do not fall on {} equally spaced moments", bed.phases, options_.moments));
+  fields.require(
+      !options_.phase || std::abs(*options_.phase * bed.phases - std::round(*options_.phase * bed.phases)) < 1e-9,
+      "phase", fmt::format("it is none of the {} phases that are looked at", bed.phases));
+  fields.require(
+      std::any_of(options_.targets.begin(), options_.targets.end(), [](const auto& t) { return t.has_value(); }),
+      "targets", "nothing was measured", "Give \"temperature_over_mg\" with its error");
+  const std::size_t fewest = fit::Surrogate::fewest_runs(options_.dimensions());
+  fields.require(options_.first >= fewest, "first",
+                 fmt::format("{} parameters need at least {} beds", options_.dimensions(), fewest));
+  for (const auto& [name, parameter] : options_.parameters) {
+    for (const std::string& pointer : parameter.set) {
+      const std::string where = "/parameters/" + escape_pointer_token(name) + "/set";
+      try {
+        const auto tokens = split_pointer(pointer);
+        if (tokens.empty() || std::find(scene_keys.begin(), scene_keys.end(), tokens.front()) == scene_keys.end())
+          fields.problem(where, "\"" + pointer + "\" leads to nothing of the scene",
+                         "Write for example \"/floor/gamma\"");
+      } catch (const UsageError& error) {
+        fields.problem(where, error.what());
       }
     }
   }
-  return points;
-}
-
-Bed Infer::simulate(const Point& point, std::uint64_t seed, const RunContext& context) const {
-  Bed out;
-  SceneOptions bed = bed_;
-  bed.set_material(point.restitution, point.friction, point.side_friction);
-  const sim::Scene scene = bed.scene(seed);
-  sim::MeasurementSchedule times;
-  times.period = bed.period();
-  times.settle = std::ceil(settle_ / bed.time_unit() / times.period * (1 - 1e-12)) * times.period;
-  times.periods = static_cast<std::uint64_t>(measure_ / bed.time_unit() / times.period * (1 + 1e-12));
-  times.phases = phases_;
-  const double column = scene.count() / scene.box.width;
-  const double lowest = -std::ceil((6 * kernel_width_ + 3) / profile_spacing) * profile_spacing;
-  const HeightGrid grid{lowest, profile_spacing, static_cast<std::size_t>((5 * column + 30) / profile_spacing)};
-  sim::Observing<sim::BedObserver> observer([&](const sim::DiskProperties& disks) {
-    return sim::BedObserver(scene, disks, phases_, grid, {KernelKind::gaussian, kernel_width_});
-  });
-  CollisionCount count;
-  sim::RunControl control;
-  control.stop = [&context] { return context.interrupted(); };
-  if (!sim::measure(scene, times, {&observer, &count}, control).finished) throw Interrupted();
-  const sim::Profile profile = observer->density(false);
-  const auto greatest = static_cast<std::size_t>(
-      std::max_element(profile.number_density.begin(), profile.number_density.end()) - profile.number_density.begin());
-  out.density = {profile.number_density[greatest], profile.std_error[greatest]};
-  out.temperature_x = observer->temperature_x();
-  out.temperature_z = observer->temperature_z();
-  out.temperature_z_local = observer->temperature_z_local();
-  out.rise = observer->centre_of_mass();
-  out.rise.value -= sim::ideal_centre_of_mass(scene.count(), scene.box.width,
-                                              std::holds_alternative<sim::HardSides>(scene.box.sides));
-  out.collisions = count.collisions();
-
-  fit::Profile measured{profile.height, profile.number_density, profile.std_error, {}, 0};
-  fit::FitOptions options;
-  options.plateau_density = plateau_density_;
-  options.column_number = column;
-  options.kernel = {KernelKind::gaussian, kernel_width_};
-  options.interval = options.sweep = options.compare = false;
-  options.curve_points = 0;
-  const fit::FitResult result = fit::fit_profile(measured, options);
-  out.status = result.status;
-  out.temperature = {result.temperature.value, result.temperature.std_error};
-  out.solid_height = result.solid_height.value;
-  return out;
-}
-
-void Infer::average(Point& point, const Bed* beds) const {
-  const auto n = static_cast<double>(replicas_);
-  const auto mean = [&](const auto& value_of) {
-    double sum = 0, squares = 0;
-    for (std::uint32_t r = 0; r < replicas_; ++r) sum += value_of(beds[r]);
-    for (std::uint32_t r = 0; r < replicas_; ++r) squares += std::pow(value_of(beds[r]) - sum / n, 2);
-    return sim::Measured{sum / n, replicas_ > 1 ? std::sqrt(squares / (n - 1) / n) : 0};
-  };
-  const auto mean_of = [&](sim::Measured Bed::*member) {
-    sim::Measured out = mean([&](const Bed& bed) { return (bed.*member).value; });
-    if (replicas_ == 1) out.std_error = (beds[0].*member).std_error;
-    return out;
-  };
-  point.status = beds[0].status;
-  point.all_ok = true;
-  for (std::uint32_t r = 0; r < replicas_; ++r) {
-    const bool ok = beds[r].status == fit::FitStatus::ok;
-    if (!ok && point.all_ok) point.status = beds[r].status;
-    point.all_ok = point.all_ok && ok;
-    point.collisions += beds[r].collisions;
+  if (fields.problem_count() > 0) return;
+  check_corners(fields);
+  if (fields.problem_count() > 0) return;
+  if (!options_.stored.empty()) {
+    try {
+      stored_beds();
+    } catch (const Error& error) {
+      fields.problem("/stored", error.what(), "Leave \"stored\" out: the beds are then run");
+    }
   }
-  point.temperature = mean_of(&Bed::temperature);
-  point.solid_height = mean([](const Bed& bed) { return bed.solid_height; });
-  point.density = mean_of(&Bed::density);
-  point.temperature_x = mean_of(&Bed::temperature_x);
-  point.temperature_z = mean_of(&Bed::temperature_z);
-  point.temperature_z_local = mean_of(&Bed::temperature_z_local);
-  point.rise = mean_of(&Bed::rise);
-  if (!point.all_ok) return;
-  const double target = target_.temperature_over_mg / bed_.length_unit();
-  const double off_t = point.temperature.value / target - 1, off_density = point.density.value / target_.density - 1;
-  point.distance = std::hypot(off_t, off_density);
-  if (point.distance == 0) return;
-  // To first order the distance moves with the replica's offset along the direction to the target.
-  const double along_t = off_t / point.distance, along_density = off_density / point.distance;
-  point.distance_error = replicas_ > 1 ? mean([&](const Bed& bed) {
-                                           return along_t * bed.temperature.value / target +
-                                                  along_density * bed.density.value / target_.density;
-                                         }).std_error
-                                       : std::hypot(along_t * point.temperature.std_error / target,
-                                                    along_density * point.density.std_error / target_.density);
 }
 
-std::vector<const Point*> Infer::as_near(const std::vector<Point>& points, const Point& nearest) const {
-  const double t = student_t(replicas_ > 1 ? static_cast<int>(2 * (replicas_ - 1)) : 1000);
-  std::vector<const Point*> found;
-  for (const Point& p : points) {
-    if (p.distance - nearest.distance <= t * std::hypot(p.distance_error, nearest.distance_error)) found.push_back(&p);
+// Whether there is a bed at every corner of the prior.
+void Infer::check_corners(Fields& fields) const {
+  const std::size_t d = options_.dimensions();
+  for (std::size_t corner = 0; corner < std::min(most_corners, std::size_t{1} << d); ++corner) {
+    std::vector<double> values;
+    std::string at;
+    for (std::size_t k = 0; k < d; ++k) {
+      const auto& [name, parameter] = options_.parameters[k];
+      values.push_back(parameter.value((corner >> k) & 1 ? 1 : 0));
+      at += fmt::format("{}{} = {}", at.empty() ? "" : ", ", name, parameter.written(values.back()).dump());
+    }
+    std::vector<Problem> problems;
+    try {
+      options_.bed.at(options_.parameters, values, problems);
+    } catch (const Error& error) {
+      fields.problem("/parameters", fmt::format("{} (at {})", error.what(), at));
+    }
+    for (const Problem& problem : problems)
+      fields.problem("/parameters", fmt::format("{}: {} (at {})", problem.pointer, problem.what, at),
+                     problem.suggestion);
+    if (fields.problem_count() > 0) return;
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Point* l, const Point* r) { return l->distance < r->distance; });
-  return found;
 }
 
-// A finished bed, kept in the scratch folder until the whole search has finished.
-Json to_json(const Bed& bed) {
-  const auto pair = [](const sim::Measured& m) { return Json::array({m.value, m.std_error}); };
-  return Json{{"status", static_cast<int>(bed.status)},
-              {"temperature", pair(bed.temperature)},
-              {"solid_height", bed.solid_height},
-              {"density", pair(bed.density)},
-              {"temperature_x", pair(bed.temperature_x)},
-              {"temperature_z", pair(bed.temperature_z)},
-              {"temperature_z_local", pair(bed.temperature_z_local)},
-              {"rise", pair(bed.rise)},
-              {"collisions", bed.collisions}};
+// All that the numbers of a bed depend on.
+std::string Infer::made_from() const {
+  Json out{{"scene", options_.bed.scene.to_json()},     {"settle", options_.bed.settle},
+           {"measure", options_.bed.measure},           {"phases", options_.bed.phases},
+           {"kernel_width", options_.bed.kernel_width}, {"plateau_density", options_.bed.plateau_density}};
+  for (const auto& [name, p] : options_.parameters)
+    out["parameters"][name] = Json{{"set", p.set}, {"unit", p.unit}, {"values", p.values}};
+  for (const View& view : options_.bed.views) out["views"].push_back(view.name);
+  for (const Observable& observable : observables()) out["observables"].push_back(observable.name);
+  return dump_canonical(out);
 }
-Bed bed_from(const Json& json) {
-  const auto number = [](const Json& value) { return value.is_null() ? NAN : value.get<double>(); };
-  const auto pair = [&](const char* name) { return sim::Measured{number(json.at(name)[0]), number(json.at(name)[1])}; };
-  Bed bed;
-  bed.status = static_cast<fit::FitStatus>(json.at("status").get<int>());
-  bed.temperature = pair("temperature");
-  bed.solid_height = number(json.at("solid_height"));
-  bed.density = pair("density");
-  bed.temperature_x = pair("temperature_x");
-  bed.temperature_z = pair("temperature_z");
-  bed.temperature_z_local = pair("temperature_z_local");
-  bed.rise = pair("rise");
-  bed.collisions = json.at("collisions").get<std::uint64_t>();
+
+SceneOptions Infer::scene_at(const std::vector<double>& values) const {
+  std::vector<Problem> problems;
+  SceneOptions bed = options_.bed.at(options_.parameters, values, problems);
+  if (!problems.empty()) throw StageError(fmt::format("{}: {}", problems.front().pointer, problems.front().what));
   return bed;
 }
 
-void Infer::run(RunContext& context) const {
-  std::vector<Point> all = points();
-  std::vector<Bed> beds(all.size() * replicas_);
-  const std::filesystem::path& finished = context.scratch();
-  std::atomic<std::size_t> done = 0;
-  sim::each_replica(static_cast<std::uint32_t>(beds.size()), context.jobs(), [&](std::uint32_t i) {
-    const std::filesystem::path kept = finished / fmt::format("bed-{}.json", i);
-    if (std::filesystem::exists(kept)) {
-      beds[i] = bed_from(read_json(kept));
-    } else {
-      beds[i] = simulate(all[i / replicas_], replica_seed(context.seed(), i % replicas_), context);
-      write_file_atomically(kept, dump(to_json(beds[i])));
+std::vector<ScaledTarget> Infer::scaled_targets(const RunContext& context) const {
+  std::vector<ScaledTarget> out;
+  for (std::size_t k = 0; k < options_.targets.size(); ++k) {
+    if (!options_.targets[k]) continue;
+    InferTarget target = *options_.targets[k];
+    if (!target.at.empty()) {
+      const std::string id = split_pointer(target.at).front();
+      const auto input = std::find_if(context.inputs().begin(), context.inputs().end(),
+                                      [&](const Input& one) { return one.id == id; });
+      const Json result = input->result();
+      const Json* found = find_pointer(result, target.at.substr(1 + escape_pointer_token(id).size()));
+      if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
+        throw InputError(fmt::format("{} has no number", target.at));
+      target.value = (*found)["value"].get<double>();
+      if (found->contains("std_error") && (*found)["std_error"].is_number())
+        target.std_error = std::hypot(target.std_error, (*found)["std_error"].get<double>());
     }
-    context.progress(static_cast<double>(++done) / static_cast<double>(beds.size()),
-                     fmt::format("{} beds", beds.size()));
-    return true;
+    const bool logarithmic = observables()[k].logarithmic;
+    if (logarithmic && !(target.value > 0)) throw InputError(fmt::format("{} is not above 0", observables()[k].name));
+    out.push_back({k, to_scale(k, target.value), logarithmic ? target.std_error / target.value : target.std_error});
+  }
+  return out;
+}
+
+std::vector<RunBed> Infer::stored_beds() const {
+  const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
+  if (file == nullptr) throw InputError("there are no stored beds \"" + options_.stored + "\"");
+  const Json json = Json::parse(file->text);
+  if (dump_canonical(json.at("made_from")) != made_from())
+    throw InputError("the beds of \"" + options_.stored +
+                     "\" are of another scene, other parameters or another measurement");
+  std::vector<RunBed> beds;
+  for (const Json& one : json.at("beds")) {
+    RunBed bed{one.at("round").get<std::uint32_t>(), one.at("values").get<std::vector<double>>(), {}};
+    for (const Json& number : one.at("numbers")) bed.numbers.push_back(number.is_null() ? NAN : number.get<double>());
+    beds.push_back(std::move(bed));
+  }
+  return beds;
+}
+
+std::vector<RunBed> Infer::run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
+                                    const std::vector<std::vector<double>>& values) const {
+  std::vector<RunBed> beds(values.size());
+  const std::filesystem::path kept = context.scratch();
+  std::atomic<std::size_t> done = 0;
+  for_each_index(values.size(), context.jobs(), [&](std::size_t i) {
+    context.check_interrupted();
+    const std::size_t number = first_number + i;
+    const std::filesystem::path file = kept / fmt::format("bed-{}.json", number);
+    beds[i] = {round, values[i], {}};
+    if (std::filesystem::exists(file)) {
+      for (const Json& one : read_json(file)) beds[i].numbers.push_back(one.is_null() ? NAN : one.get<double>());
+    } else {
+      beds[i].numbers =
+          options_.bed.run(scene_at(values[i]), replica_seed(context.seed(), number), options_.bed.measure, context);
+      write_file_atomically(file, dump(Json(beds[i].numbers)));
+    }
+    context.progress(static_cast<double>(++done) / static_cast<double>(values.size()),
+                     fmt::format("round {}, {} beds", round, values.size()));
   });
-  for (std::size_t i = 0; i < all.size(); ++i) average(all[i], &beds[i * replicas_]);
-
-  points_table(context.table("infer.csv"), all).write(context.output("infer.csv"));
-  write_file(context.output("infer.json"), dump(results_of(all)));
+  return beds;
 }
 
-Table Infer::points_table(Table table, const std::vector<Point>& points) const {
-  table.note("beds_per_point", replicas_);
-  for (const Point& p : points) {
-    const bool near = std::isfinite(p.distance);
-    table.add({p.restitution, p.friction, p.side_friction, std::string(fit::to_string(p.status)), p.temperature.value,
-               p.temperature.std_error, p.solid_height.value, p.density.value, p.density.std_error,
-               p.temperature_x.value, p.temperature_z.value, p.temperature_z_local.value, p.rise.value,
-               near ? p.distance : no_number, count_cell(p.collisions), near ? p.distance_error : no_number});
-  }
-  return table;
-}
-
-void Infer::results(ResultList& list) const {
-  const std::string length = bed_.length_unit() == 1 ? "D" : "m";
-  list.quantity("/target/temperature_over_mg", length, "measured T/(m g)");
-  list.quantity("/target/density", "1/D^2", "measured density");
-  list.text("/distance_is", "what the distance means");
-  list.text("/profile", "how the profiles are measured");
-  list.text("/as_near_is", "which points are as near as the nearest");
-  list.number("/replicas", "1", "beds at every point");
-  const Given found = given_when("a fit succeeds");
-  for (const std::string row : {"/nearest/", "/points/#/"}) {
-    const Given given = row == "/nearest/" ? found : Given{};
-    list.number(row + "restitution", "1", "restitution of disks, floor and sides", given);
-    list.number(row + "friction", "1", "friction of disks and floor", given);
-    list.number(row + "side_friction", "1", "friction of the sides", given);
-    list.text(row + "fit_status", "whether the fits succeeded", given);
-    list.quantity(row + "temperature_over_mg", length, "fitted T/(m g)", given, true);
-    list.quantity(row + "solid_height", "D", "fitted height of the solid", given, true);
-    list.quantity(row + "density", "1/D^2", "greatest density of the profile", given, true);
-    list.quantity(row + "temperature_x_over_mg", length, "kinetic T/(m g) across", given, true);
-    list.quantity(row + "temperature_z_over_mg", length, "kinetic T/(m g) upwards", given, true);
-    list.quantity(row + "temperature_z_local_over_mg", length, "kinetic T/(m g) upwards, layer by layer", given, true);
-    list.quantity(row + "center_of_mass_rise", "D", "rise of the centre of mass", given, true);
-    list.number(row + "distance", "1", "distance from what was measured", given, true);
-    list.number(row + "distance_error", "1", "its standard error", found, true);
-    list.number(row + "collisions", "1", "contacts of all its beds", given);
-  }
-  for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error"})
-    list.number(std::string("/as_near/#/") + key, "1", "a point that is as near as the nearest", found, true);
-  list.table({"infer.csv",
-              "grid points: means over the beds of a point, with standard errors from the spread between them",
-              {{"restitution", "1", "of the beads"},
-               {"friction", "1", "of the beads"},
-               {"side_friction", "1", "of the sides"},
-               {"status", "", "of the fit"},
-               {"temperature", "m g D", "fitted temperature"},
-               {"temperature_error", "m g D", "standard error of temperature"},
-               {"solid_height", "D", "height of the solid"},
-               {"density", "1/D^2", "greatest density of the profile"},
-               {"density_error", "1/D^2", "standard error of density"},
-               {"temperature_x", "m g D", "kinetic temperature, horizontal"},
-               {"temperature_z", "m g D", "kinetic temperature, vertical"},
-               {"temperature_z_local", "m g D", "the same without the mean velocity of the layer"},
-               {"rise", "D", "rise of the centre of mass"},
-               {"distance", "1", "distance from the target"},
-               {"collisions", "1", "collisions of all beds of the point"},
-               {"distance_error", "1", "standard error of distance"}}});
-}
-
-Json Infer::results_of(const std::vector<Point>& points) const {
-  const double length = bed_.length_unit();
-  const std::string length_name = length == 1 ? "D" : "m";
-  const auto row = [&](const Point& p) {
-    Json out;
-    out["restitution"] = p.restitution;
-    out["friction"] = p.friction;
-    out["side_friction"] = p.side_friction;
-    out["fit_status"] = std::string(fit::to_string(p.status));
-    const auto over_mg = [&](const sim::Measured& t) {
-      return quantity_json(t.value * length, length_name, t.std_error * length);
-    };
-    out["temperature_over_mg"] = over_mg(p.temperature);
-    out["solid_height"] = quantity_json(p.solid_height.value, "D", p.solid_height.std_error);
-    out["density"] = quantity_json(p.density.value, "1/D^2", p.density.std_error);
-    out["temperature_x_over_mg"] = over_mg(p.temperature_x);
-    out["temperature_z_over_mg"] = over_mg(p.temperature_z);
-    out["temperature_z_local_over_mg"] = over_mg(p.temperature_z_local);
-    out["center_of_mass_rise"] = quantity_json(p.rise.value, "D", p.rise.std_error);
-    out["distance"] = std::isfinite(p.distance) ? Json(p.distance) : Json(nullptr);
-    if (std::isfinite(p.distance)) out["distance_error"] = p.distance_error;
-    out["collisions"] = p.collisions;
+fit::LogLikelihood log_likelihood(const BedSurrogate& surrogate, const InferOptions& options,
+                                  const std::vector<ScaledTarget>& targets) {
+  return [&surrogate, &options, &targets](std::span<const double> places) {
+    const BedSurrogate::Fit found = surrogate.fit(places, targets);
+    const std::size_t views = options.bed.views.size();
+    std::vector<double> out(places.size() / options.dimensions(), -INFINITY);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      double sum = 0, greatest = -INFINITY;
+      for (std::size_t v = 0; v < views; ++v) greatest = std::max(greatest, found.log_likelihood[i * views + v]);
+      for (std::size_t v = 0; v < views; ++v)
+        sum += surrogate.view_prior(v) * std::exp(found.log_likelihood[i * views + v] - greatest);
+      if (std::isfinite(greatest)) out[i] = greatest + std::log(sum);
+    }
     return out;
   };
-  const auto nearest = std::min_element(points.begin(), points.end(),
-                                        [](const Point& l, const Point& r) { return l.distance < r.distance; });
-  Json out;
-  out["target"] = {{"temperature_over_mg", quantity_json(target_.temperature_over_mg, length_name)},
-                   {"density", quantity_json(target_.density, "1/D^2")}};
-  out["distance_is"] =
-      "sqrt((T/T_target - 1)^2 + (phi/phi_target - 1)^2), T of the fit with phi_0 fixed, phi the greatest density of "
-      "the profile";
-  out["profile"] = fmt::format("lab frame, average over {} phases, Gaussian window of {} D", phases_, kernel_width_);
-  out["replicas"] = replicas_;
-  out["nearest"] = std::isfinite(nearest->distance) ? row(*nearest) : Json(nullptr);
-  out["as_near_is"] =
-      "points whose distance is not above that of the nearest by more than Student's t (97.5 %) times the error of the "
-      "difference, the nearest first: the data do not tell them apart";
-  out["as_near"] = Json::array();
-  if (std::isfinite(nearest->distance)) {
-    for (const Point* p : as_near(points, *nearest)) {
-      out["as_near"].push_back(Json{{"restitution", p->restitution},
-                                    {"friction", p->friction},
-                                    {"side_friction", p->side_friction},
-                                    {"distance", p->distance},
-                                    {"distance_error", p->distance_error}});
+}
+
+fit::Posterior sampled(const RunContext& context, const InferOptions& options, const BedSurrogate& surrogate,
+                       const std::vector<ScaledTarget>& targets) {
+  fit::SamplingOptions sampling;
+  sampling.seed = mixed(context.seed());
+  sampling.threads = context.jobs();
+  return fit::sample_posterior(options.dimensions(), log_likelihood(surrogate, options, targets), sampling);
+}
+
+// The beds of all rounds.
+std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledTarget>& targets) const {
+  if (!options_.stored.empty()) return stored_beds();
+  const std::size_t d = options_.dimensions();
+  const std::vector<double> places = fit::even_points(d, options_.first, context.seed());
+  std::vector<std::vector<double>> values;
+  for (std::size_t i = 0; i < options_.first; ++i)
+    values.push_back(values_at(options_, std::span<const double>(places).subspan(i * d, d)));
+  std::vector<RunBed> beds = run_beds(context, 0, 1, values);
+  for (std::uint32_t round = 1; round <= options_.rounds; ++round) {
+    const BedSurrogate surrogate(options_, beds, targets, context.jobs());
+    const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
+    const std::vector<std::size_t> draws =
+        fit::equal_draws(posterior.weight, 20 * options_.each, context.seed() + round);
+    std::vector<double> points;
+    for (const std::size_t i : draws) points.insert(points.end(), posterior.point(i).begin(), posterior.point(i).end());
+    values.clear();
+    for (const std::size_t i : fit::spread_out(d, points, options_.each, 0))
+      values.push_back(values_at(options_, std::span<const double>(points).subspan(i * d, d)));
+    const std::vector<RunBed> further = run_beds(context, round, 1 + beds.size(), values);
+    beds.insert(beds.end(), further.begin(), further.end());
+  }
+  return beds;
+}
+
+// Those of greatest likelihood, apart from one another, run several times each.
+std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& found) const {
+  const std::size_t views = options_.bed.views.size(), d = options_.dimensions();
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < found.posterior.size(); ++i) {
+    if (found.posterior.weight[i] > 0) order.emplace_back(-found.posterior.log_likelihood[i], i);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<std::size_t> chosen;
+  for (const auto& [ignored, i] : order) {
+    if (chosen.size() == options_.best) break;
+    const bool apart = std::all_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
+      double square = 0;
+      for (std::size_t k = 0; k < d; ++k)
+        square += std::pow(found.posterior.point(i)[k] - found.posterior.point(other)[k], 2);
+      return square > distance_of_best * distance_of_best;
+    });
+    if (apart) chosen.push_back(i);
+  }
+  std::vector<BestBed> beds;
+  for (const std::size_t i : chosen) {
+    const auto row = found.fit.log_likelihood.begin() + static_cast<std::ptrdiff_t>(i * views);
+    beds.push_back({values_at(options_, found.posterior.point(i)),
+                    static_cast<std::size_t>(std::max_element(row, row + static_cast<std::ptrdiff_t>(views)) - row),
+                    {}});
+    beds.back().runs.resize(options_.replicas);
+  }
+  const std::filesystem::path kept = context.scratch();
+  std::atomic<std::size_t> done = 0;
+  const std::size_t all = beds.size() * options_.replicas;
+  for_each_index(all, context.jobs(), [&](std::size_t i) {
+    context.check_interrupted();
+    BestBed& bed = beds[i / options_.replicas];
+    std::vector<double>& run = bed.runs[i % options_.replicas];
+    const std::filesystem::path file = kept / fmt::format("best-{}.json", i);
+    if (std::filesystem::exists(file)) {
+      for (const Json& one : read_json(file)) run.push_back(one.is_null() ? NAN : one.get<double>());
+    } else {
+      run = options_.bed.run(scene_at(bed.values), replica_seed(context.seed(), best_stream + i),
+                             options_.best_measure > 0 ? options_.best_measure : options_.bed.measure, context);
+      write_file_atomically(file, dump(Json(run)));
+    }
+    context.progress(static_cast<double>(++done) / static_cast<double>(all), fmt::format("{} of the best beds", all));
+  });
+  return beds;
+}
+
+// Beds with known parameters, each inferred from the beds of the first round.
+std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inference& found) const {
+  std::vector<CalibrationRow> rows;
+  if (options_.calibration == 0) return rows;
+  std::vector<RunBed> first;
+  for (const RunBed& bed : found.beds)
+    if (bed.round == 0) first.push_back(bed);
+  const BedSurrogate surrogate(options_, first, found.targets, context.jobs());
+  const std::size_t d = options_.dimensions(), count = observables().size();
+  std::mt19937_64 generator(mixed(context.seed() + calibration_stream));
+  const auto uniform = [&] { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; };
+  std::vector<std::vector<double>> values;
+  for (std::uint32_t i = 0; i < options_.calibration; ++i) {
+    std::vector<double> place(d);
+    for (double& one : place) one = uniform();
+    values.push_back(values_at(options_, place));
+  }
+  const std::vector<RunBed> beds = run_beds(context, 0, calibration_stream, values);
+  for (std::size_t i = 0; i < beds.size(); ++i) {
+    double chance = uniform();
+    std::size_t view = 0;
+    for (; view + 1 < options_.bed.views.size() && chance > surrogate.view_prior(view); ++view)
+      chance -= surrogate.view_prior(view);
+    std::vector<ScaledTarget> targets = found.targets;
+    bool complete = true;
+    for (ScaledTarget& target : targets) {
+      target.value = to_scale(target.observable, beds[i].numbers[view * count + target.observable]) +
+                     target.error * fit::normal_quantile(uniform());
+      complete = complete && std::isfinite(target.value);
+    }
+    if (!complete) continue;  // no fit: such a bed gives no targets
+    const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
+    for (std::size_t k = 0; k < d; ++k) {
+      const double truth = values[i][k];
+      CalibrationRow row{i, k, truth, 0, 0, 0, 0, 0};
+      std::vector<double> of_parameter;
+      for (std::size_t p = 0; p < posterior.size(); ++p) {
+        const double place = std::clamp(posterior.point(p)[k], 0.0, 1.0);
+        of_parameter.push_back(options_.parameters[k].second.value(place));
+        if (of_parameter.back() < truth) row.rank += posterior.weight[p];
+      }
+      row.low_68 = fit::weighted_quantile(of_parameter, posterior.weight, 0.16);
+      row.high_68 = fit::weighted_quantile(of_parameter, posterior.weight, 0.84);
+      row.low_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.025);
+      row.high_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.975);
+      rows.push_back(row);
+    }
+    context.progress(static_cast<double>(i + 1) / static_cast<double>(beds.size()),
+                     "inferring the beds of the calibration");
+  }
+  return rows;
+}
+
+void Infer::run(RunContext& context) const {
+  Inference found;
+  found.targets = scaled_targets(context);
+  found.beds = design(context, found.targets);
+  context.progress(0, "surrogate and posterior");
+  const BedSurrogate surrogate(options_, found.beds, found.targets, context.jobs());
+  found.posterior = sampled(context, options_, surrogate, found.targets);
+  if (!(found.posterior.effective > 0))
+    throw StageError("the targets are so far from every bed that no posterior can be stated");
+  std::vector<double> inside = found.posterior.points;
+  for (double& one : inside) one = std::clamp(one, 0.0, 1.0);
+  found.fit = surrogate.fit(inside, found.targets);
+  const std::size_t views = options_.bed.views.size();
+  found.view_weight.assign(views, 0);
+  std::mt19937_64 generator(mixed(context.seed() + 1));
+  std::vector<std::vector<double>> share(found.posterior.size(), std::vector<double>(views, 0));
+  for (std::size_t i = 0; i < found.posterior.size(); ++i) {
+    if (!(found.posterior.weight[i] > 0)) continue;
+    for (std::size_t v = 0; v < views; ++v) {
+      share[i][v] = surrogate.view_prior(v) *
+                    std::exp(found.fit.log_likelihood[i * views + v] - found.posterior.log_likelihood[i]);
+      found.view_weight[v] += found.posterior.weight[i] * share[i][v];
     }
   }
-  out["points"] = Json::array();
-  for (const Point& p : points) out["points"].push_back(row(p));
-  return out;
+  found.draws = fit::equal_draws(found.posterior.weight, options_.draws, context.seed());
+  for (const std::size_t i : found.draws) {
+    double chance = (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53;
+    std::size_t view = 0;
+    for (; view + 1 < views && chance > share[i][view]; ++view) chance -= share[i][view];
+    found.draw_views.push_back(view);
+  }
+  found.best = best_beds(context, found);
+  found.calibration = calibrate(context, found);
+  Json stored{{"made_from", Json::parse(made_from())}, {"beds", Json::array()}};
+  for (const RunBed& bed : found.beds)
+    stored["beds"].push_back(Json{{"round", bed.round}, {"values", bed.values}, {"numbers", bed.numbers}});
+  write_file(context.output("beds.json"), dump(stored));
+  write_inference(context, options_, surrogate, found);
+  draw_pairs(context, options_, found);
 }
 
 }  // namespace
 
 StageRow infer_stage() {
   return {.name = "infer",
-          .summary = "searches the restitution and friction with which a simulated bed comes nearest to a measured one",
+          .summary =
+              "which parameters of a scene give what was measured: a posterior, by beds all over the prior and a "
+              "surrogate of them",
+          .accepts = {"fit", "extract", "simulate"},
+          .most_inputs = 3,
           .uses_seed = true,
           .result = "infer.json",
+          .pages = infer_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Infer>(); }};
 }
 

@@ -30,7 +30,7 @@ const std::vector<Room> house = {
     {"statistics", {}, {""}},
     {"sim", {"statistics"}, {"scene", "engine", "measure"}},
     {"ingest", {"statistics"}, {"frames", "calibrate", "find", "profile", "synthetic"}},
-    {"fit", {"statistics"}, {"theory", "profile_fit", "map", "audit"}},
+    {"fit", {"statistics"}, {"theory", "profile_fit", "map", "audit", "inference"}},
     {"pipelines", {"statistics", "sim", "ingest", "fit"}, {"formats", "stages", "runner", "report", "cli"}},
 };
 

@@ -1,4 +1,4 @@
-// The numbers of the infer stage: distances and errors done again from the temperatures and densities beside them.
+// The numbers of the infer stage, done again from its tables.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
-#include "pipelines/stages/replica_seed.hpp"
+#include "tests/pipelines/infer_recipe.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -14,128 +14,188 @@ namespace {
 
 using namespace shakebed::tests;
 using shakebed::pipelines::Json;
-using shakebed::pipelines::replica_seed;
 
-constexpr double target_t = 0.8e-3, target_density = 1.05;  // T/(m g) [m]; D = 4 mm
-
-class InferNumbers : public testing::Test {
- protected:
-  InferNumbers() {
-    write_text(folder_ / "r.json", R"({ "name": "t", "stages": [ { "stage": "infer", "id": "search",
-        "disks": { "count": 40, "diameter": "4 mm" }, "gravity": "10 m/s^2", "box": { "width": "32 mm", "sides": "hard" },
-        "floor": { "motion": "sinusoidal", "amplitude": "3.2 mm", "frequency": "17.5 Hz" },
-        "settle": "0.2 s", "measure": "0.6 s", "phases": 8,
-        "target": { "temperature_over_mg": "0.8 mm", "density": 1.05 },
-        "grid": { "restitution": [0.5, 0.6, 0.9], "friction": [0.3], "side_friction": ["none", "as disks"] } } ] })");
-  }
-  Json run(const std::string& out, int replicas, std::uint64_t seed) {
-    const ProgramResult ran = run_shakebed(
-        {"run", "r.json", "--out", out, "--quiet", "--set", "/stages/search/replicas=" + std::to_string(replicas),
-         "--set", "/stages/search/seed=" + std::to_string(seed)},
-        folder_.path());
+struct Found {
+  ScratchFolder folder;
+  Json result;
+  Found() {
+    write_text(folder / "r.json", infer_recipe);
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o", "--quiet"}, folder.path());
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
-    return Json::parse(read_text(folder_ / (out + "/search/infer.json")));
+    result = Json::parse(read_text(folder / "o/search/infer.json"));
   }
-  ScratchFolder folder_;
+  NumberTable table(const std::string& name) const { return NumberTable(folder / ("o/search/" + name)); }
 };
-
-struct Off {
-  double t, density, distance;
-};
-Off off_of(const Json& point) {
-  const double t = value(point["temperature_over_mg"]) / target_t - 1,
-               density = value(point["density"]) / target_density - 1;
-  return {t, density, std::hypot(t, density)};
+const Found& found() {
+  static const Found once;
+  return once;
 }
 
-// One bed a point: its own errors, along the direction to the target.
-TEST_F(InferNumbers, OfOneBedAreItsOwn) {
-  const Json found = run("o", 1, 1);
-  EXPECT_DOUBLE_EQ(value(found["target"]["temperature_over_mg"]), target_t);
-  EXPECT_EQ(found["target"]["temperature_over_mg"]["unit"], "m");
-  EXPECT_EQ(value(found["target"]["density"]), target_density);
-  EXPECT_EQ(found["replicas"], 1);
-  ASSERT_EQ(found["points"].size(), 6U);
-  const NumberTable table(folder_ / "o/search/infer.csv");
-  ASSERT_EQ(table.rows(), 6U);
-  double nearest = INFINITY;
-  for (std::size_t r = 0; r < 6; ++r) {
-    const Json& point = found["points"][r];
-    ASSERT_EQ(point["fit_status"], "ok");
-    const Off off = off_of(point);
-    EXPECT_NEAR(point["distance"].get<double>(), off.distance, 1e-12);
-    EXPECT_NEAR(point["distance_error"].get<double>(),
-                std::hypot(off.t / off.distance * error(point["temperature_over_mg"]) / target_t,
-                           off.density / off.distance * error(point["density"]) / target_density),
-                1e-12);
-    EXPECT_GT(error(point["temperature_over_mg"]), 0);
-    EXPECT_GT(error(point["density"]), 0);
-    EXPECT_GT(error(point["temperature_x_over_mg"]), 0);
-    EXPECT_GT(error(point["temperature_z_over_mg"]), 0);
-    EXPECT_GT(error(point["temperature_z_local_over_mg"]), 0);
-    EXPECT_GT(error(point["center_of_mass_rise"]), 0);
-    nearest = std::min(nearest, off.distance);
-    for (const char* key : {"restitution", "friction", "side_friction", "distance", "distance_error"})
-      EXPECT_DOUBLE_EQ(table(key, r), point[key].get<double>()) << key;
-    EXPECT_EQ(table("collisions", r), point["collisions"].get<double>());
-    EXPECT_EQ(table.text("status", r), "ok");
-    // In the table temperatures are in m g D.
-    EXPECT_DOUBLE_EQ(table("temperature", r), value(point["temperature_over_mg"]) / 0.004);
-    EXPECT_DOUBLE_EQ(table("temperature_error", r), error(point["temperature_over_mg"]) / 0.004);
-    EXPECT_DOUBLE_EQ(table("temperature_x", r), value(point["temperature_x_over_mg"]) / 0.004);
-    EXPECT_DOUBLE_EQ(table("temperature_z", r), value(point["temperature_z_over_mg"]) / 0.004);
-    EXPECT_DOUBLE_EQ(table("temperature_z_local", r), value(point["temperature_z_local_over_mg"]) / 0.004);
-    EXPECT_DOUBLE_EQ(table("solid_height", r), value(point["solid_height"]));
-    EXPECT_DOUBLE_EQ(table("density", r), value(point["density"]));
-    EXPECT_DOUBLE_EQ(table("density_error", r), error(point["density"]));
-    EXPECT_DOUBLE_EQ(table("rise", r), value(point["center_of_mass_rise"]));
+// A quantity, or a plain number in reduced units.
+double number(const Json& json) { return json.is_number() ? json.get<double>() : value(json); }
+
+// The same bed by the simulate stage: what the design's first bed gives, bed by bed.
+TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
+  const NumberTable beds = found().table("beds.csv");
+  ASSERT_EQ(beds.rows(), 30U * 3);
+  EXPECT_EQ(found().result["beds"], 30);
+  const auto first = Json::parse(read_text(found().folder / "o/search/beds.json"))["beds"][0];
+  for (std::size_t r = 0; r < 3; ++r) {
+    EXPECT_EQ(beds("bed", r), 1);
+    EXPECT_EQ(beds("round", r), 0);
+    EXPECT_EQ(beds("gamma", r), first["values"][0].get<double>());
+    EXPECT_EQ(beds("restitution", r), first["values"][1].get<double>());
   }
-  EXPECT_DOUBLE_EQ(found["nearest"]["distance"].get<double>(), nearest);
-  EXPECT_EQ(found["as_near"][0]["distance"], found["nearest"]["distance"]);
-  for (const Json& one : found["as_near"]) {
-    // Of one bed the errors are those of many samples: 1.96, not Student's factor of few.
-    const double reach =
-        1.9623 * std::hypot(one["distance_error"].get<double>(), found["nearest"]["distance_error"].get<double>());
-    EXPECT_LE(one["distance"].get<double>() - nearest, reach * 1.001);
-  }
+  EXPECT_EQ(beds("round", 89), 1);
+  EXPECT_EQ(beds.text("photographs", 0), "average");
+  // Moments average to about the whole; kinetic temperatures and the rise are what the simulate stage measures.
+  write_text(found().folder / "s.json",
+             R"({ "name": "s", "stages": [ { "stage": "simulate", "id": "bed", "units": "reduced", "seed": 3,
+    "disks": { "count": 40, "inertia": "sphere", "restitution": )" +
+                 first["values"][1].dump() + R"(, "friction": 0.3 },
+    "box": { "width": 8.3, "sides": { "kind": "hard", "restitution": )" +
+                 first["values"][1].dump() + R"( }, "lid": "open" },
+    "floor": { "motion": "sinusoidal", "gamma": )" +
+                 first["values"][0].dump() + R"(, "frequency": 0.35, "restitution": )" + first["values"][1].dump() +
+                 R"(, "friction": 0.3 },
+    "settle": 20, "measure": 600, "profile": { "spacing": 0.25, "kernel": { "kind": "gaussian", "width": 0.5 } } },
+    { "stage": "fit", "from": "bed", "plateau_density": 1.10 } ] })");
+  ASSERT_EQ(run_shakebed({"run", "s.json", "--out", "s", "--quiet"}, found().folder.path()).exit_code, 0);
+  const Json bed = Json::parse(read_text(found().folder / "s/bed/observables.json"));
+  // Ten times as long: 15 % holds four errors of the short bed.
+  EXPECT_NEAR(beds("temperature_x_over_mg", 0) / number(bed["temperature_x_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(beds("temperature_z_over_mg", 0) / number(bed["temperature_z_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(beds("temperature_z_local_over_mg", 0) / number(bed["temperature_z_local_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(beds("center_of_mass_rise", 0), number(bed["center_of_mass_rise"]), 0.3);
+  const Json fit = Json::parse(read_text(found().folder / "s/fit/fit.json"));
+  EXPECT_NEAR(beds("temperature_over_mg", 0) / number(fit["temperature"]), 1, 0.2);
+  EXPECT_NEAR(beds("shift", 0), number(fit["shift"]), 1);
+  EXPECT_NEAR(beds("solid_height_by_sum_rule", 0), number(fit["solid_height_by_sum_rule"]), 2);
+  const NumberTable profile(found().folder / "s/bed/profile.csv");
+  double greatest = 0;
+  for (std::size_t r = 0; r < profile.rows(); ++r) greatest = std::max(greatest, profile("number_density", r));
+  EXPECT_NEAR(beds("density", 0), greatest, 0.05);
 }
 
-// Three beds a point: the mean of the three, and Student's t of four degrees of freedom between two points.
-TEST_F(InferNumbers, OfThreeBedsAreTheirMeanAndSpread) {
-  const Json together = run("all", 3, 1);
-  std::vector<Json> single;
-  for (std::uint64_t r = 0; r < 3; ++r) single.push_back(run("one" + std::to_string(r), 1, replica_seed(1, r)));
-  EXPECT_EQ(together["replicas"], 3);
-  for (std::size_t p = 0; p < 6; ++p) {
-    const Json& point = together["points"][p];
-    const Off off = off_of(point);
-    EXPECT_NEAR(point["distance"].get<double>(), off.distance, 1e-9);
-    double sum = 0, squares = 0, collisions = 0;
-    std::vector<double> along;
-    for (const Json& one : single) {
-      const Json& own = one["points"][p];
-      along.push_back(off.t / off.distance * value(own["temperature_over_mg"]) / target_t +
-                      off.density / off.distance * value(own["density"]) / target_density);
-      sum += along.back(), collisions += own["collisions"].get<double>();
+TEST(InferNumbers, PosteriorsAreThatOfTheirDraws) {
+  const Json& result = found().result;
+  const NumberTable draws = found().table("posterior.csv"), marginals = found().table("marginals.csv");
+  ASSERT_EQ(draws.rows(), 400U);
+  EXPECT_GT(result["effective_samples"].get<double>(), 400);
+  for (const char* name : {"gamma", "restitution"}) {
+    double sum = 0, squares = 0, area = 0, mean_by_bins = 0;
+    for (std::size_t r = 0; r < 400; ++r) sum += draws(name, r);
+    for (std::size_t r = 0; r < 400; ++r) squares += std::pow(draws(name, r) - sum / 400, 2);
+    const Json& own = result["parameters"][name];
+    const double deviation = std::sqrt(squares / 399);
+    EXPECT_NEAR(value(own), sum / 400, 4 * deviation / 20);
+    EXPECT_NEAR(error(own), deviation, 0.2 * deviation);
+    const double low = own["prior_low"], high = own["prior_high"], bin = (high - low) / 24;
+    for (std::size_t r = 0; r < marginals.rows(); ++r) {
+      if (marginals.text("parameter", r) != name) continue;
+      area += marginals("density", r) * bin, mean_by_bins += marginals("density", r) * bin * marginals("value", r);
     }
-    for (const double one : along) squares += std::pow(one - sum / 3, 2);
-    EXPECT_NEAR(point["distance_error"].get<double>(), std::sqrt(squares / 6), 1e-9);
-    EXPECT_EQ(point["collisions"].get<double>(), collisions);
-    for (const char* key : {"temperature_x_over_mg", "temperature_z_over_mg", "temperature_z_local_over_mg",
-                            "center_of_mass_rise", "solid_height", "density", "temperature_over_mg"}) {
-      double total = 0, spread = 0;
-      for (const Json& one : single) total += value(one["points"][p][key]);
-      for (const Json& one : single) spread += std::pow(value(one["points"][p][key]) - total / 3, 2);
-      EXPECT_NEAR(value(point[key]), total / 3, 1e-9 * (1 + std::abs(total))) << key;
-      EXPECT_NEAR(error(point[key]), std::sqrt(spread / 6), 1e-9 * (1 + std::abs(total))) << key;
-    }
+    EXPECT_NEAR(area, 1, 1e-9);
+    EXPECT_NEAR(mean_by_bins, value(own), bin / 2);
+    EXPECT_LE(own["low_95"], own["low_68"]);
+    EXPECT_LE(own["low_68"], own["median"]);
+    EXPECT_LE(own["median"], own["high_68"]);
+    EXPECT_LE(own["high_68"], own["high_95"]);
+    EXPECT_NEAR(own["width_over_prior"].get<double>(), error(own) * std::sqrt(12) / (high - low), 0.01);
   }
-  const Json& nearest = together["nearest"];
-  std::size_t within = 0;
-  for (const Json& point : together["points"])
-    within += point["distance"].get<double>() - nearest["distance"].get<double>() <=
-              2.776 * std::hypot(point["distance_error"].get<double>(), nearest["distance_error"].get<double>());
-  EXPECT_EQ(together["as_near"].size(), within) << "t of 2 (3 - 1) degrees of freedom [Abramowitz and Stegun, 26.7]";
+  double prior = 0, posterior = 0;
+  for (const Json& view : result["photographs"])
+    prior += view["prior"].get<double>(), posterior += view["posterior"].get<double>();
+  EXPECT_NEAR(prior, 1, 1e-12);
+  EXPECT_NEAR(posterior, 1, 1e-9);
+  EXPECT_NEAR(result["photographs"][0]["prior"].get<double>(), 0.8, 1e-12);
+  EXPECT_GT(result["log_evidence"]["std_error"].get<double>(), 0);
+  EXPECT_LT(result["log_evidence"]["std_error"].get<double>(), 0.1);
+  EXPECT_TRUE(std::isfinite(value(result["log_evidence"])));
+}
+
+TEST(InferNumbers, AgreementIsThatOfTheNearestBed) {
+  const Json& agreement = found().result["agreement"];
+  const NumberTable draws = found().table("posterior.csv");
+  double least = INFINITY, chances = 0;
+  for (std::size_t r = 0; r < draws.rows(); ++r) {
+    least = std::min(least, draws("chi2", r));
+    chances += std::exp(-draws("chi2", r) / 2) / 400;  // of two degrees of freedom
+  }
+  EXPECT_EQ(agreement["numbers"], 2);
+  EXPECT_LE(agreement["least_chi2"].get<double>(), least);
+  EXPECT_NEAR(agreement["chance"].get<double>(), std::exp(-agreement["least_chi2"].get<double>() / 2), 1e-12);
+  EXPECT_NEAR(agreement["predictive_p"].get<double>(), chances, 0.06);
+  EXPECT_NEAR(std::erfc(agreement["deviations"].get<double>() / std::sqrt(2)), agreement["chance"].get<double>(), 1e-9);
+  EXPECT_EQ(agreement["some_bed_agrees"], agreement["deviations"].get<double>() < 3);
+}
+
+TEST(InferNumbers, BestBedsAreTheMeansOfTheirRuns) {
+  const Json& best = found().result["best"][0];
+  const NumberTable runs = found().table("best.csv");
+  ASSERT_EQ(runs.rows(), 3U);
+  double logarithms = 0, rise = 0, log_squares = 0, rise_squares = 0, most = 0;
+  for (std::size_t r = 0; r < 3; ++r) {
+    EXPECT_EQ(runs("bed", r), 1);
+    EXPECT_EQ(runs("replica", r), static_cast<double>(r));
+    EXPECT_EQ(runs("gamma", r), best["values"]["gamma"].get<double>());
+    logarithms += std::log(runs("temperature_over_mg", r)) / 3, rise += runs("center_of_mass_rise", r) / 3;
+  }
+  for (std::size_t r = 0; r < 3; ++r) {
+    log_squares += std::pow(std::log(runs("temperature_over_mg", r)) - logarithms, 2);
+    rise_squares += std::pow(runs("center_of_mass_rise", r) - rise, 2);
+  }
+  const Json &t = best["targets"]["temperature_over_mg"], &z = best["targets"]["center_of_mass_rise"];
+  EXPECT_NEAR(value(t), std::exp(logarithms), 1e-9);
+  EXPECT_NEAR(error(t), std::exp(logarithms) * std::sqrt(log_squares / 2), 1e-9);
+  EXPECT_NEAR(value(z), rise, 1e-9);
+  EXPECT_NEAR(error(z), std::sqrt(rise_squares / 2), 1e-9);
+  const double off_t = (logarithms - std::log(0.35)) / std::hypot(std::sqrt(log_squares / 2), 0.01 / 0.35);
+  const double off_z = (rise - 1.5) / std::hypot(std::sqrt(rise_squares / 2), 0.05);
+  EXPECT_NEAR(t["difference_in_errors"].get<double>(), off_t, 1e-9);
+  EXPECT_NEAR(z["difference_in_errors"].get<double>(), off_z, 1e-9);
+  most = std::max(std::abs(off_t), std::abs(off_z));
+  EXPECT_NEAR(best["largest_difference_in_errors"].get<double>(), most, 1e-9);
+  EXPECT_NEAR(t["measured"].get<double>(), 0.35, 1e-12);
+  EXPECT_NEAR(t["measured_error"].get<double>(), 0.01, 1e-12);
+}
+
+TEST(InferNumbers, TheSceneAsWrittenIsPredicted) {
+  const Json& assumed = found().result["assumed"];
+  EXPECT_EQ(assumed["values"]["gamma"], 4);
+  EXPECT_EQ(assumed["values"]["restitution"], 0.7);
+  EXPECT_GT(assumed["chi2"].get<double>(), 0);
+  EXPECT_NEAR(std::erfc(assumed["deviations"].get<double>() / std::sqrt(2)),
+              std::exp(-assumed["chi2"].get<double>() / 2), 1e-9);
+}
+
+TEST(InferNumbers, SurrogateNarrowingAndCalibrationAreShares) {
+  const Json& result = found().result;
+  double last = 2;
+  for (const Json& row : result["narrowing"]) {
+    const double reduction = row["reduction"];
+    EXPECT_GE(reduction, 0);
+    EXPECT_LE(reduction, last) << "the best first";
+    last = reduction;
+  }
+  for (const auto& [name, row] : result["surrogate"].items()) {
+    EXPECT_GE(row["beds"], 24) << name;
+    EXPECT_GT(row["scatter"].get<double>(), 0) << name;
+    EXPECT_NEAR(row["within_1"].get<double>(), 0.68, 0.3) << name;
+    EXPECT_GT(row["within_2"].get<double>(), 0.8) << name;
+  }
+  const NumberTable rows = found().table("calibration.csv");
+  double n = 0, in_68 = 0, in_95 = 0;
+  for (std::size_t r = 0; r < rows.rows(); ++r) {
+    n += 1;
+    in_68 += rows("low_68", r) <= rows("truth", r) && rows("truth", r) <= rows("high_68", r);
+    in_95 += rows("low_95", r) <= rows("truth", r) && rows("truth", r) <= rows("high_95", r);
+    EXPECT_EQ(rows("rank", r) > 0.16 && rows("rank", r) < 0.84,
+              rows("low_68", r) < rows("truth", r) && rows("truth", r) < rows("high_68", r));
+  }
+  EXPECT_EQ(result["calibration"]["beds"].get<double>() * 2, n);
+  EXPECT_NEAR(result["calibration"]["within_68"].get<double>(), in_68 / n, 1e-12);
+  EXPECT_NEAR(result["calibration"]["within_95"].get<double>(), in_95 / n, 1e-12);
 }
 
 }  // namespace

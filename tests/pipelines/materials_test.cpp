@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace shakebed::pipelines {

@@ -13,6 +13,8 @@
 namespace {
 
 using namespace shakebed::pipelines;
+using shakebed::Kernel;
+using shakebed::KernelKind;
 using shakebed::tests::ScratchFolder;
 using shakebed::tests::write_text;
 

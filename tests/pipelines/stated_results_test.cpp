@@ -11,6 +11,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/runner/plan.hpp"
+#include "tests/pipelines/infer_recipe.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -248,14 +249,6 @@ TEST(StatedResults, OfAStudyAndWhatIsMadeOfIt) {
         { "name": "a", "x": "bath_T", "y": "T", "where": { "series": "a" } } ] } ] } ] })");
 }
 
-TEST(StatedResults, OfASearch) {
-  compare(R"({ "name": "r", "stages": [
-    { "stage": "infer", "disks": { "count": 60, "diameter": "3 mm" },
-      "box": { "width": "18.9 mm", "sides": { "kind": "hard" } },
-      "floor": { "motion": "sinusoidal", "gamma": 3, "frequency": "20 Hz" },
-      "settle": "0.5 s", "measure": "0.5 s", "replicas": 2,
-      "target": { "temperature_over_mg": "0.5 mm", "density": 1.1 },
-      "grid": { "restitution": [0.7, 0.8], "friction": [0.1], "side_friction": "none" } } ] })");
-}
+TEST(StatedResults, OfASearch) { compare(infer_recipe); }
 
 }  // namespace

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+// A surrogate of a simulation: what the runs at some points of the parameters say of runs at any other point, with its
+// own error. A Gaussian process [RasmussenWilliams2006] with a quadratic trend, a length for each parameter, and the
+// scatter between runs as its noise; its few constants are those that make the runs most probable.
+namespace shakebed::fit {
+
+// Runs and what they gave. Several outputs share the lengths and the ratio of signal to scatter, each has its own
+// scale: the same number at several phases of the shaking, say.
+struct TrainingSet {
+  std::size_t parameters = 0, outputs = 0;
+  std::vector<double> points;  // run by run: the parameters, each scaled to 0 to 1
+  std::vector<double> values;  // run by run: the outputs, finite
+  std::size_t runs() const { return parameters == 0 ? 0 : points.size() / parameters; }
+};
+
+class Surrogate {
+ public:
+  // At least fewest_runs(parameters); throws std::invalid_argument otherwise.
+  static Surrogate train(const TrainingSet& runs);
+  static std::size_t fewest_runs(std::size_t parameters) { return 4 * (parameters + 2); }
+
+  // Of a further run at each point: mean and variance, point by point, output by output. The variance holds the
+  // surrogate's own error and the scatter between runs.
+  struct Prediction {
+    std::vector<double> mean, variance;
+  };
+  Prediction predict(std::span<const double> points) const;
+
+  std::size_t parameters() const { return parameters_; }
+  std::size_t outputs() const { return outputs_; }
+  const std::vector<double>& lengths() const { return lengths_; }
+  // Standard deviation between runs at one point, where the value is in the middle of all.
+  double scatter(std::size_t output) const { return spread_[output]; }
+  // Each run predicted from all others, (value - mean)/standard deviation: run by run, output by output. They are
+  // standard normal where the surrogate is right.
+  const std::vector<double>& left_out() const { return left_out_; }
+
+ private:
+  Surrogate() = default;
+  std::size_t parameters_ = 0, outputs_ = 0, runs_ = 0;
+  std::vector<double> points_;
+  std::vector<double> lengths_;
+  double signal_ = 0, trend_ = 0, growth_ = 0;             // variances, in units of the noise
+  std::vector<double> factor_;                             // Cholesky factor of the covariance, column by column
+  std::vector<double> weights_;                            // covariance^-1 values, a column an output
+  std::vector<double> middle_, unit_, spread_, left_out_;  // by output; left_out_ by run, too
+};
+
+}  // namespace shakebed::fit

@@ -1,0 +1,258 @@
+#include "pipelines/stages/infer_bed.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/inference/posterior.hpp"
+#include "fit/profile_fit/fit_profile.hpp"
+#include "sim/measure/measure.hpp"
+#include "sim/measure/observables.hpp"
+
+namespace shakebed::pipelines {
+
+namespace {
+
+constexpr double profile_spacing = 0.25;  // of the heights [D]; half the kernel's usual width
+
+// A bed that makes more events a disk and period than this is given up: it chatters, frozen between two blows. Beds
+// that are fluid make 30 to 400 contacts (10 layers, e = 0.4 to 0.9); at Gamma = 2 and 15 Hz one went on for ever.
+constexpr double most_events = 1000;
+constexpr std::uint64_t events_between_questions = 200'000;
+
+enum Number : std::size_t { fitted, shift, solid, density, kinetic_x, kinetic_z, kinetic_z_local, rise, number_count };
+
+// Sees the looks at one phase only, as the single phase of a period.
+class AtPhase final : public sim::RunObserver {
+ public:
+  AtPhase(sim::Observing<sim::BedObserver>::Make make, std::uint32_t phase) : bed_(std::move(make)), phase_(phase) {}
+  const sim::BedObserver& bed() const { return *bed_; }
+  void prepare(sim::Simulation& simulation) override { bed_.prepare(simulation); }
+  void look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
+    if (phase == phase_) bed_.look(simulation, at, look, 0);
+  }
+  void save(sim::ArchiveWriter& out) override { bed_.save(out); }
+  void load(sim::ArchiveReader& in) override { bed_.load(in); }
+
+ private:
+  sim::Observing<sim::BedObserver> bed_;
+  std::uint32_t phase_;
+};
+
+}  // namespace
+
+// --- parameters
+
+void UnknownParameter::describe(Fields& f) {
+  f.texts("set", set, {.help = "pointers into this stage that take it: [\"/floor/gamma\"]", .required = true});
+  f.text("unit", unit, {.help = "unit of what is written there; none: a plain number", .example = "\"Hz\""});
+  std::optional<double> from = low == high ? std::nullopt : std::optional(low),
+                        to = low == high ? std::nullopt : std::optional(high);
+  f.number("low", from, {.help = "least value that is possible"});
+  f.number("high", to, {.help = "greatest value that is possible"});
+  f.any("values", values, {.help = "in place of low and high: a list of values, all equally likely"});
+  f.choice("scale", logarithmic, {{false, "linear"}, {true, "logarithmic"}},
+           {.help = "where the prior is even: in the value or in its logarithm"});
+  f.number("mean", mean, {.help = "of a normal prior, cut off at low and high"});
+  f.number("std_error", std_error, {.help = "standard deviation of the normal prior", .range = positive});
+  f.text("why", why, {.help = "why this range: for the report"});
+  if (!f.decoding()) return;
+  low = from.value_or(0), high = to.value_or(0);
+  f.require(!set.empty(), "set", "a parameter needs a pointer into the scene");
+  if (is_choice()) {
+    f.require(values.size() >= 2 && !from && !to && !mean, "values", "a list has two values or more, and no range");
+    return;
+  }
+  f.require(from && to && low < high, "low", "a parameter needs \"low\" below \"high\", or \"values\"");
+  f.require(!logarithmic || low > 0, "low", "a logarithmic scale begins above 0");
+  f.require(mean.has_value() == std_error.has_value() && !(mean && logarithmic), "mean",
+            "a normal prior has \"mean\" and \"std_error\", and a linear scale");
+}
+
+double UnknownParameter::value(double place) const {
+  if (is_choice()) {
+    const auto n = static_cast<double>(values.size());
+    return std::min(std::floor(place * n), n - 1);
+  }
+  if (mean) {
+    const double below = fit::normal_chance((low - *mean) / *std_error);
+    const double above = fit::normal_chance((high - *mean) / *std_error);
+    return std::clamp(*mean + *std_error * fit::normal_quantile(below + place * (above - below)), low, high);
+  }
+  return logarithmic ? low * std::pow(high / low, place) : low + place * (high - low);
+}
+
+double UnknownParameter::place(double value) const {
+  if (is_choice()) return (value + 0.5) / static_cast<double>(values.size());
+  if (mean) {
+    const double below = fit::normal_chance((low - *mean) / *std_error);
+    const double above = fit::normal_chance((high - *mean) / *std_error);
+    return (fit::normal_chance((value - *mean) / *std_error) - below) / (above - below);
+  }
+  return logarithmic ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+}
+
+double UnknownParameter::coordinate(double value) const {
+  if (is_choice()) return value / static_cast<double>(values.size() - 1);
+  return logarithmic ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+}
+
+Json UnknownParameter::written(double value) const {
+  if (is_choice()) return values[static_cast<std::size_t>(value)];
+  return unit.empty() ? Json(value) : Json(number_text(value) + " " + unit);
+}
+
+std::optional<double> UnknownParameter::in_scene(const JsonNode& scene) const {
+  const JsonNode* node = find_pointer(scene, set.front());
+  if (node == nullptr) return std::nullopt;
+  if (is_choice()) {
+    const Json own = node->to_json();
+    const auto found = std::find(values.begin(), values.end(), own);
+    return found == values.end() ? std::nullopt : std::optional(static_cast<double>(found - values.begin()));
+  }
+  double value = node->number;
+  if (!unit.empty()) {
+    if (!node->is_string()) return std::nullopt;
+    try {
+      value = parse_quantity(node->text).value / parse_quantity("1 " + unit).value;
+    } catch (const std::invalid_argument&) {
+      return std::nullopt;
+    }
+  } else if (!node->is_number()) {
+    return std::nullopt;
+  }
+  return value >= low && value <= high ? std::optional(value) : std::nullopt;
+}
+
+// --- what is compared
+
+const std::vector<Observable>& observables() {
+  static const std::vector<Observable> all = {
+      {"temperature_over_mg", true, "m", "fitted T/(m g)", true},
+      {"shift", false, "D", "height at which the fitted tail reaches the plateau density", false},
+      {"solid_height_by_sum_rule", false, "D", "height of the solid that belongs to the fitted T by the column number",
+       false},
+      {"density", false, "1/D^2", "greatest density of the profile", true},
+      {"temperature_x_over_mg", true, "m", "kinetic T/(m g) across", true},
+      {"temperature_z_over_mg", true, "m", "kinetic T/(m g) upwards, without the bed's mean velocity", true},
+      {"temperature_z_local_over_mg", true, "m", "the same without the mean velocity of each layer of 1 D", true},
+      {"center_of_mass_rise", false, "D", "rise of the centre of mass above ideal packing", false},
+  };
+  return all;
+}
+
+std::size_t observable_number(std::string_view name) {
+  const auto& all = observables();
+  return static_cast<std::size_t>(
+      std::find_if(all.begin(), all.end(), [&](const Observable& o) { return o.name == name; }) - all.begin());
+}
+
+std::vector<View> views_of(std::uint32_t moments, double average, std::optional<double> phase) {
+  if (phase) return {{"average", -1, 0}, {number_text(*phase), *phase, 1}};
+  std::vector<View> views{{"average", -1, moments == 0 ? 1 : average}};
+  for (std::uint32_t k = 0; k < moments; ++k) {
+    const double at = static_cast<double>(k) / moments;
+    views.push_back({number_text(at), at, (1 - average) / moments});
+  }
+  return views;
+}
+
+// --- the bed
+
+SceneOptions BedOfInference::at(const Parameters& parameters, const std::vector<double>& values,
+                                std::vector<Problem>& problems) const {
+  JsonNode node = scene;
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    for (const std::string& pointer : parameters[k].second.set)
+      set_pointer(node, pointer, to_node(parameters[k].second.written(values[k])), ValueFrom::file);
+  }
+  Fields::Source own = source;
+  own.problems = &problems, own.warnings = nullptr, own.input_files = nullptr;
+  Fields fields = Fields::decode(node, "", own);
+  fields.set_reduced(reduced);
+  SceneOptions bed;
+  bed.describe(fields);
+  fields.finish();
+  return bed;
+}
+
+namespace {
+
+std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& scene, const BedOfInference& options,
+                               double length) {
+  std::vector<double> out(number_count, NAN);
+  const sim::Profile profile = bed.density(false);
+  fit::FitOptions fit;
+  fit.plateau_density = options.plateau_density;
+  fit.column_number = scene.count() / scene.box.width;
+  fit.kernel = {KernelKind::gaussian, options.kernel_width};
+  fit.interval = fit.sweep = fit.compare = false;
+  fit.curve_points = 0;
+  const fit::FitResult result =
+      fit::fit_profile({profile.height, profile.number_density, profile.std_error, {}, 0}, fit);
+  if (result.status == fit::FitStatus::ok) {
+    out[fitted] = result.temperature.value * length;
+    out[shift] = result.shift.value;
+    out[solid] = result.solid_height_by_sum_rule;
+  }
+  out[density] = *std::max_element(profile.number_density.begin(), profile.number_density.end());
+  out[kinetic_x] = bed.temperature_x().value * length;
+  out[kinetic_z] = bed.temperature_z().value * length;
+  out[kinetic_z_local] = bed.temperature_z_local().value * length;
+  out[rise] =
+      bed.centre_of_mass().value - sim::ideal_centre_of_mass(scene.count(), scene.box.width,
+                                                             std::holds_alternative<sim::HardSides>(scene.box.sides));
+  return out;
+}
+
+}  // namespace
+
+std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t seed, double duration,
+                                        const RunContext& context) const {
+  const sim::Scene scene_at = bed.scene(seed);
+  sim::MeasurementSchedule times;
+  times.period = bed.period();
+  times.settle = std::ceil(settle / bed.time_unit() / times.period * (1 - 1e-12)) * times.period;
+  times.periods =
+      std::max<std::uint64_t>(1, static_cast<std::uint64_t>(duration / bed.time_unit() / times.period * (1 + 1e-12)));
+  times.phases = phases;
+  const double column = scene_at.count() / scene_at.box.width;
+  const double lowest = -std::ceil((6 * kernel_width + 3) / profile_spacing) * profile_spacing;
+  const HeightGrid grid{lowest, profile_spacing, static_cast<std::size_t>((5 * column + 30) / profile_spacing)};
+  const auto observer_of = [&](std::uint32_t looks) {
+    return [&, looks](const sim::DiskProperties& disks) {
+      return sim::BedObserver(scene_at, disks, looks, grid, {KernelKind::gaussian, kernel_width});
+    };
+  };
+  sim::Observing<sim::BedObserver> average(observer_of(phases));
+  std::vector<std::unique_ptr<AtPhase>> moments;
+  std::vector<sim::RunObserver*> observers{&average};
+  for (const View& view : views) {
+    if (view.phase < 0) continue;
+    moments.push_back(std::make_unique<AtPhase>(observer_of(1),
+                                                static_cast<std::uint32_t>(std::lround(view.phase * phases)) % phases));
+    observers.push_back(moments.back().get());
+  }
+  sim::RunControl control;
+  const double periods = times.settle / times.period + static_cast<double>(times.periods);
+  // It is asked at every look, too.
+  const double most_questions = most_events * scene_at.count() * periods / events_between_questions +
+                                2 * static_cast<double>(times.looks()) + 1000;
+  double questions = 0;
+  control.events_between_questions = events_between_questions;
+  control.stop = [&] { return context.interrupted() || ++questions > most_questions; };
+  if (!sim::measure(scene_at, times, observers, control).finished) {
+    context.check_interrupted();
+    return std::vector<double>(number_count * views.size(), NAN);
+  }
+  const double length = bed.length_unit();
+  std::vector<double> out = numbers_of(*average, scene_at, *this, length);
+  for (const auto& moment : moments) {
+    const std::vector<double> own = numbers_of(moment->bed(), scene_at, *this, length);
+    out.insert(out.end(), own.begin(), own.end());
+  }
+  return out;
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,203 @@
+// What the pages show of an inference: pairs of parameters, and tables.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/map/gamma_temperature.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/figure.hpp"
+#include "pipelines/stages/infer.hpp"
+
+namespace shakebed::pipelines {
+
+namespace {
+
+std::string percent(double share) { return fmt::format("{:.0f} %", 100 * share); }
+
+std::string parameter_rows(const Json& parameters) {
+  std::string out;
+  for (const auto& [name, p] : parameters.items()) {
+    const auto number = [&p = p](const char* key) { return fmt::format("{:.3g}", p.at(key).get<double>()); };
+    const std::string unit = p.at("unit") == "1" ? "" : " " + p.at("unit").get<std::string>();
+    out += fmt::format(
+        "<tr><td>{}</td><td>{} to {}{}</td><td>{}{}</td><td>{} to {}{}</td><td>{} to {}{}</td><td>{}</td></tr>\n",
+        escape_markup(words(name)), number("prior_low"), number("prior_high"), unit, number("median"), unit,
+        number("low_68"), number("high_68"), unit, number("low_95"), number("high_95"), unit,
+        prose(p.at("why").get<std::string>()));
+  }
+  return out;
+}
+
+std::string bed_row(const std::string& name, const Json& values, const Json& targets, const std::string& view) {
+  std::string text;
+  for (const auto& [parameter, value] : values.items())
+    text += fmt::format("{}{} {:.3g}", text.empty() ? "" : ", ", words(parameter), value.get<double>());
+  std::string cells;
+  for (const auto& [ignored, target] : targets.items()) {
+    const Json& off = target.at("difference_in_errors");
+    cells += fmt::format("<td>{} ({})</td>", shown(target),
+                         off.is_number() ? fmt::format("{:+.1f}", off.get<double>()) : "no fit");
+  }
+  return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td>{}</tr>\n", name, escape_markup(text),
+                     view == "average" ? "average" : "phase " + view, cells);
+}
+
+std::string beds_table(const Json& result) {
+  if (result.at("best").empty()) return "";
+  std::string head, measured;
+  for (const auto& [name, target] : result.at("best")[0].at("targets").items()) {
+    head += "<th>" + escape_markup(words(name)) + "</th>";
+    measured += "<td>" +
+                shown(quantity_json(target.at("measured").get<double>(), target.at("unit").get<std::string>(),
+                                    target.at("measured_error").get<double>())) +
+                "</td>";
+  }
+  std::string out = "<table><tr><th></th><th>parameters</th><th>photographs show</th>" + head +
+                    "</tr>\n<tr><td>measured</td><td></td><td></td>" + measured + "</tr>\n";
+  int number = 0;
+  for (const Json& bed : result.at("best"))
+    out += bed_row(fmt::format("bed {}, run again", ++number), bed.at("values"), bed.at("targets"),
+                   bed.at("photographs").get<std::string>());
+  if (result.at("assumed").is_object())
+    out += bed_row("as written in the recipe", result.at("assumed").at("values"), result.at("assumed").at("targets"),
+                   "average");
+  return out +
+         "</table>\n<p>In brackets: the difference from what was measured in errors, that of one bed's scatter and of "
+         "the measurement together.</p>\n";
+}
+
+std::string inference_html(const FinishedStage& stage, int& pictures) {
+  const Json& result = stage.result;
+  if (!result.is_object() || !result.contains("agreement")) return "";
+  std::string out =
+      fmt::format("<p>{}.</p>\n", escape_markup(result.at("agreement").at("statement").get<std::string>()));
+  out +=
+      "<table><tr><th>parameter</th><th>prior</th><th>median</th><th>68 %</th><th>95 %</th><th>why this "
+      "prior</th></tr>\n" +
+      parameter_rows(result.at("parameters")) + "</table>\n";
+  std::string views;
+  for (const Json& view : result.at("photographs"))
+    if (view.at("prior").get<double>() > 0)
+      views += fmt::format("{}{}: {} (before: {})", views.empty() ? "" : "; ",
+                           view.at("show") == "average" ? "the average" : "phase " + view.at("show").get<std::string>(),
+                           percent(view.at("posterior").get<double>()), percent(view.at("prior").get<double>()));
+  out += "<p>The photographs show " + views + ".</p>\n" + beds_table(result);
+  const Json& first = result.at("narrowing")[0];
+  out += fmt::format(
+      "<p>Of further measurements, {} would narrow the parameters most: {} of their variance on average would "
+      "go.</p>\n",
+      escape_markup(words(first.at("measurement").get<std::string>())), percent(first.at("reduction").get<double>()));
+  return out + fmt::format(
+                   "<figure>{}<figcaption>The posterior: each parameter by itself and in pairs; points are draws. "
+                   "Crosses: the "
+                   "beds that were run again; circle: the scene as written.</figcaption></figure>\n",
+                   inline_svg(stage.files.directory / "pairs.svg", ++pictures));
+}
+
+std::string inference_terminal(const FinishedStage& stage) {
+  const Json* statement = find_pointer(stage.result, "/agreement/statement");
+  return statement == nullptr ? "" : statement->get<std::string>();
+}
+
+// Gamma against frequency where the reading gives the reduced temperature; rows "frequency gamma".
+std::string map_curve(const InferOptions& options, const UnknownParameter& frequency) {
+  const BedDescription bed = options.written.description();
+  std::string rows;
+  for (int i = 0; i <= 40; ++i) {
+    const double f = frequency.low + (frequency.high - frequency.low) * i / 40;
+    fit::ShakenBed shaken;
+    shaken.acceleration_length = fit::acceleration_length(bed.gravity.value_or(9.81), f, bed.diameter);
+    shaken.column = {bed.column_number(), options.bed.plateau_density};
+    // T/T_c is what is given; T in m g D by the T_c of this column.
+    const double temperature = fit::critical_temperature(fit::enskog(), shaken.column).value;
+    for (const fit::GammaReading& reading :
+         fit::gammas_from_temperature(options.curve->reduced_temperature * temperature, shaken)) {
+      if (reading.name == options.curve->reading && reading.status == fit::ValueStatus::ok)
+        rows += fmt::format("{} {}\n", f, reading.gamma);
+    }
+  }
+  return rows;
+}
+
+}  // namespace
+
+// pairs.gp: marginals on the diagonal, draws below it.
+void draw_pairs(RunContext& context, const InferOptions& options, const Inference& found) {
+  const std::size_t d = options.dimensions();
+  std::string draws, best, marginals;
+  for (const std::size_t i : found.draws) {
+    for (const double value : values_at(options, found.posterior.point(i))) draws += number_text(value) + " ";
+    draws += "\n";
+  }
+  for (const BestBed& bed : found.best) {
+    for (const double value : bed.values) best += number_text(value) + " ";
+    best += "\n";
+  }
+  write_file(context.output("pairs.dat"), draws + "\n\n" + (best.empty() ? "NaN\n" : best));
+  std::string body = fmt::format(
+      "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font ',9'\n",
+      d);
+  for (std::size_t row = 0; row < d; ++row) {
+    for (std::size_t column = 0; column < d; ++column) {
+      const auto& [x_name, x] = options.parameters[column];
+      const auto& [y_name, y] = options.parameters[row];
+      const auto ends = [](const UnknownParameter& p) {
+        return p.is_choice() ? std::pair(-0.5, static_cast<double>(p.values.size()) - 0.5) : std::pair(p.low, p.high);
+      };
+      if (column > row) {
+        body += "set multiplot next\n";
+        continue;
+      }
+      const auto label = [](const std::string& name, const UnknownParameter& p) {
+        return words(name) + (p.unit.empty() ? "" : " (" + p.unit + ")");
+      };
+      body += row + 1 == d ? fmt::format("set xlabel '{}' font ',11'\nset format x '%g'\n", label(x_name, x))
+                           : "unset xlabel\nset format x ''\n";
+      body += column == 0 && row > 0 ? fmt::format("set ylabel '{}' font ',11'\nset format y '%g'\n", label(y_name, y))
+                                     : "unset ylabel\nset format y ''\n";
+      const auto [x_low, x_high] = ends(x);
+      body += fmt::format("set xrange [{}:{}]\n", x_low, x_high);
+      if (row == column) {
+        const double bin = (x_high - x_low) / 24;
+        body += fmt::format(
+            "set yrange [0:*]\nplot 'pairs.dat' index 0 using ({0}+{1}*(floor((${2}-({0}))/{1})+0.5)):(1) smooth "
+            "frequency with boxes fillstyle solid 0.5 noborder lc rgb '#0072B2'\n",
+            x_low, bin, column + 1);
+        continue;
+      }
+      const auto [y_low, y_high] = ends(y);
+      body += fmt::format(
+          "set yrange [{}:{}]\nplot 'pairs.dat' index 0 using {}:{} with points pt 7 ps 0.15 lc rgb '#0072B2', "
+          "'pairs.dat' index 1 using {}:{} with points pt 2 ps 0.8 lw 2 lc rgb '#D55E00'",
+          y_low, y_high, column + 1, row + 1, column + 1, row + 1);
+      const auto a = x.in_scene(options.bed.scene), b = y.in_scene(options.bed.scene);
+      if (a && b)
+        body += fmt::format(", '+' using ({}):({}) every ::0::0 with points pt 6 ps 1 lw 2 lc rgb '#000000'", *a, *b);
+      const bool shaking = x.set.front() == "/floor/frequency" && y.set.front() == "/floor/gamma",
+                 turned = x.set.front() == "/floor/gamma" && y.set.front() == "/floor/frequency";
+      if (options.curve && (shaking || turned)) {
+        write_file(context.output("map-curve.dat"), map_curve(options, shaking ? x : y));
+        body += fmt::format(", 'map-curve.dat' using {} with lines lw 2 lc rgb '#009E73'", shaking ? "1:2" : "2:1");
+      }
+      body += "\n";
+    }
+  }
+  body += "unset multiplot\nunset output\n";
+  run_gnuplot(context.output_directory(), "pairs",
+              "set encoding utf8\nset terminal svg size 860,860 noenhanced font 'Helvetica,14' background "
+              "'#ffffff'\nset output 'pairs.svg'\n" +
+                  body +
+                  "reset\nset terminal pdfcairo size 17.2cm,17.2cm noenhanced font 'Helvetica,9' background "
+                  "'#ffffff'\nset output 'pairs.pdf'\n" +
+                  body);
+}
+
+StagePages infer_pages() {
+  return {.sections = {{ReportPlace::claims, "What the measured numbers say of the bed", inference_html}},
+          .markdown = nullptr,
+          .terminal = inference_terminal};
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,155 @@
+// Surrogates and posteriors against what can be worked out, and their calibration on a stand-in for the simulation.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "fit/inference/posterior.hpp"
+#include "fit/inference/surrogate.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+double even(std::mt19937_64& generator) { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; }
+
+// A stand-in for a bed: two numbers of three parameters, with scatter.
+constexpr double scatter[] = {0.05, 0.1};
+std::vector<double> stand_in(std::span<const double> p) {
+  return {std::sin(2 * p[0]) + p[1] * p[1] + 0.3 * p[2], std::exp(p[0] * p[1]) - 0.8 * p[0] + p[2] * p[0]};
+}
+TrainingSet stand_in_runs(std::size_t runs, std::size_t output, std::uint64_t seed) {
+  TrainingSet set;
+  set.parameters = 3, set.outputs = 1;
+  set.points = even_points(3, runs, 7);
+  std::mt19937_64 generator(seed + output);
+  for (std::size_t i = 0; i < runs; ++i)
+    set.values.push_back(stand_in(std::span<const double>(set.points).subspan(3 * i, 3))[output] +
+                         scatter[output] * normal_quantile(even(generator)));
+  return set;
+}
+
+TEST(Surrogate, PredictsFurtherRunsWithItsStatedError) {
+  const Surrogate surrogate = Surrogate::train(stand_in_runs(100, 0, 1));
+  EXPECT_NEAR(surrogate.scatter(0) / scatter[0], 1, 0.25) << "of 100 runs, 3.5 standard errors";
+  std::mt19937_64 generator(5);
+  double squares = 0;
+  constexpr int further = 400;
+  for (int i = 0; i < further; ++i) {
+    const std::vector<double> point{even(generator), even(generator), even(generator)};
+    const auto found = surrogate.predict(point);
+    const double value = stand_in(point)[0] + scatter[0] * normal_quantile(even(generator));
+    squares += std::pow(value - found.mean[0], 2) / found.variance[0];
+    EXPECT_LT(std::sqrt(found.variance[0]), 2 * scatter[0]);
+  }
+  EXPECT_NEAR(squares / further, 1, 0.35);
+  double left_out = 0;
+  for (const double one : surrogate.left_out()) left_out += one * one;
+  EXPECT_NEAR(left_out / 100, 1, 0.3);
+}
+
+TEST(Surrogate, NeedsRunsEnough) {
+  TrainingSet few = stand_in_runs(10, 0, 1);
+  EXPECT_THROW(Surrogate::train(few), std::invalid_argument);
+}
+
+// A normal likelihood within the cube: mean, deviation and evidence are known.
+TEST(Posterior, OfANormalLikelihoodIsExact) {
+  constexpr double deviation[] = {0.03, 0.01};
+  for (const double narrow : {1.0, 0.02}) {
+    const auto likelihood = [&](std::span<const double> points) {
+      std::vector<double> out;
+      for (std::size_t i = 0; i < points.size(); i += 2) {
+        out.push_back(0);
+        for (std::size_t k = 0; k < 2; ++k)
+          out.back() -= 0.5 * std::pow((points[i + k] - 0.4) / deviation[k] / narrow, 2);
+      }
+      return out;
+    };
+    SamplingOptions options;
+    const Posterior one = sample_posterior(2, likelihood, options);
+    EXPECT_GT(one.effective, narrow == 1 ? 30 : 900);
+    EXPECT_EQ(one.rounds > 1, one.size() == options.further);
+    for (std::size_t k = 0; k < 2; ++k) {
+      std::vector<double> values;
+      for (std::size_t i = 0; i < one.size(); ++i) values.push_back(one.point(i)[k]);
+      const double width = deviation[k] * narrow;
+      EXPECT_NEAR(weighted_quantile(values, one.weight, 0.5), 0.4, 0.15 * width);
+      EXPECT_NEAR(weighted_quantile(values, one.weight, normal_chance(1)) - 0.4, width, 0.15 * width);
+    }
+    const double exact = std::log(2 * M_PI * deviation[0] * deviation[1] * narrow * narrow);
+    EXPECT_NEAR(one.log_evidence, exact, 4 * one.log_evidence_error + 0.02);
+    options.threads = 3;
+    const Posterior again = sample_posterior(2, likelihood, options);
+    EXPECT_EQ(one.points, again.points);
+    EXPECT_EQ(one.weight, again.weight);
+  }
+}
+
+TEST(Posterior, SmallToolsDoWhatTheySay) {
+  const std::vector<double> longer = even_points(2, 64, 3), shorter = even_points(2, 16, 3);
+  EXPECT_TRUE(std::equal(shorter.begin(), shorter.end(), longer.begin()));
+  EXPECT_EQ(weighted_quantile({3, 1, 2}, {0.25, 0.25, 0.5}, 0.5), 2);
+  const std::vector<std::size_t> draws = equal_draws({0.5, 0, 0.25, 0.25}, 8, 1);
+  EXPECT_EQ(std::count(draws.begin(), draws.end(), 0U), 4);
+  EXPECT_EQ(std::count(draws.begin(), draws.end(), 1U), 0);
+  EXPECT_EQ(spread_out(1, std::vector<double>{0.5, 0.4, 0.0, 0.9}, 3, 0), (std::vector<std::size_t>{0, 2, 3}));
+  // Two numbers with correlation r: chi2 by hand.
+  const CorrelatedErrors errors(2, {1, 0.5, 0.5, 1});
+  const std::vector<double> off{1, 2}, deviation{1, 2}, none{0, 0};
+  const double expected = (1 * 1 - 2 * 0.5 * 1 * 1 + 1 * 1) / (1 - 0.25);
+  EXPECT_NEAR(errors(off, deviation, none).chi2, expected, 1e-12);
+  EXPECT_NEAR(errors(off, deviation, none).log_determinant, std::log(4 * 0.75), 1e-12);
+  EXPECT_NEAR(expected_reduction({0, 1}, {0, 2}, {0.5, 0.5}, 1), 0.5, 1e-12) << "variance 1 of 1 + 1 is the signal's";
+  EXPECT_NEAR(chance_of(9, 1), 0.0026998, 1e-6);
+  EXPECT_NEAR(as_deviations(0.0026998), 3, 1e-4);
+  std::mt19937_64 generator(2);
+  std::vector<double> rows;
+  for (int i = 0; i < 4000; ++i) {
+    const double a = normal_quantile(even(generator)), b = normal_quantile(even(generator));
+    rows.push_back(a), rows.push_back(5 * (0.6 * a + 0.8 * b));
+  }
+  EXPECT_NEAR(correlation_of(2, rows)[1], 0.6, 0.04);
+}
+
+// 100 sets of parameters from the prior, each "measured" once and inferred from one set of 80 runs.
+TEST(Calibration, OfAStandInHoldsItsIntervals) {
+  const Surrogate surrogates[] = {Surrogate::train(stand_in_runs(80, 0, 1)), Surrogate::train(stand_in_runs(80, 1, 1))};
+  std::mt19937_64 generator(11);
+  int within_68 = 0, within_95 = 0;
+  std::vector<double> histogram(10, 0);
+  constexpr int truths = 100;
+  for (int i = 0; i < truths; ++i) {
+    const std::vector<double> truth{even(generator), even(generator), even(generator)};
+    std::vector<double> measured = stand_in(truth);
+    for (std::size_t k = 0; k < 2; ++k) measured[k] += scatter[k] * normal_quantile(even(generator));
+    SamplingOptions options;
+    options.first = 2048, options.further = 2048, options.enough = 200;
+    const Posterior found = sample_posterior(
+        3,
+        [&](std::span<const double> points) {
+          std::vector<double> out(points.size() / 3, 0);
+          for (std::size_t k = 0; k < 2; ++k) {
+            const auto at = surrogates[k].predict(points);
+            for (std::size_t p = 0; p < out.size(); ++p)
+              out[p] -= 0.5 * (std::pow(measured[k] - at.mean[p], 2) / at.variance[p] + std::log(at.variance[p]));
+          }
+          return out;
+        },
+        options);
+    for (std::size_t k = 0; k < 3; ++k) {
+      double rank = 0;
+      for (std::size_t p = 0; p < found.size(); ++p) rank += found.point(p)[k] < truth[k] ? found.weight[p] : 0;
+      within_68 += rank > 0.16 && rank < 0.84;
+      within_95 += rank > 0.025 && rank < 0.975;
+      histogram[static_cast<std::size_t>(std::min(9, static_cast<int>(10 * rank)))] += 1;
+    }
+  }
+  EXPECT_NEAR(within_68 / 300.0, 0.68, 0.09);
+  EXPECT_NEAR(within_95 / 300.0, 0.95, 0.04);
+  double chi2 = 0;
+  for (const double count : histogram) chi2 += std::pow(count - 30, 2) / 30;
+  EXPECT_GT(chance_of(chi2, 9), 0.01) << "one run in a hundred may fail";
+}
+
+}  // namespace
+}  // namespace shakebed::fit
