@@ -8,6 +8,7 @@
 
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/results_page.hpp"
 #include "pipelines/cli/run_plan.hpp"
 #include "pipelines/formats/embedded.hpp"
 #include "pipelines/runner/run.hpp"
@@ -20,10 +21,7 @@ namespace {
 
 constexpr const char* first_figure = "clement-rajchenbach";
 
-struct ShippedFigure {
-  std::string name;  // "quinn-hong-fig2" is recipes/quinn-hong-fig2/figure.json
-  const EmbeddedFile* file;
-};
+using ShippedFigure = ShippedRecipe;  // "quinn-hong-fig2" is recipes/quinn-hong-fig2/figure.json
 
 // The main one first.
 std::vector<ShippedFigure> shipped_figures() {
@@ -112,6 +110,7 @@ int run_all(const Call& call, const RunArguments& run, const std::vector<Shipped
 
 struct ReproduceArguments {
   std::string figure;
+  bool list = false, results = false;
   RunArguments run;
 };
 
@@ -120,17 +119,26 @@ struct ReproduceArguments {
 void add_reproduce(Program& program) {
   const auto given = std::make_shared<ReproduceArguments>();
   CLI::App& command =
-      program.add({"reproduce", "run a shipped recipe: a published figure, end to end",
+      program.add({"reproduce", "run a shipped recipe: a published result, end to end",
                    "  shakebed reproduce\n  shakebed reproduce --preset quick\n"
-                   "  shakebed reproduce clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce all"},
+                   "  shakebed reproduce clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce "
+                   "--list\n  shakebed reproduce all --preset quick"},
                   [given](const Call& call) {
+                    if (given->list || given->results) {
+                      print(given->list ? results_list(shipped_figures()) : results_page(shipped_figures()));
+                      return static_cast<int>(exit_ok);
+                    }
                     const std::vector<ShippedFigure> figures = chosen_figures(given->figure);
                     if (given->figure == "all") return run_all(call, given->run, figures);
                     return run_plan_command(call, given->run, plan_of(figures.front(), given->run));
                   });
-  command.add_option("figure", given->figure,
-                     "clement-rajchenbach (the default; also named quinn-hong-fig3), quinn-hong-fig1, quinn-hong-fig2, "
-                     "quinn-hong-eq6, quinn-hong-beyond, quinn-hong-tc, temperature-map, all");
+  command.add_option(
+      "figure", given->figure,
+      "name of a recipe (--list shows them), or all; clement-rajchenbach if left out, which is also named "
+      "quinn-hong-fig3");
+  command.add_flag("--list", given->list, "list the recipes with their verdicts of record, and run nothing");
+  command.add_flag("--results", given->results, "print the page of results of record, and run nothing")
+      ->excludes("--list");
   add_preset(command, given->run);
   add_run_options(command, given->run);
 }

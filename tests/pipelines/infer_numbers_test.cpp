@@ -36,18 +36,18 @@ double number(const Json& json) { return json.is_number() ? json.get<double>() :
 
 // The same bed by the simulate stage: what the design's first bed gives, bed by bed.
 TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
-  const NumberTable beds = found().table("beds.csv");
-  ASSERT_EQ(beds.rows(), 30U * 3);
+  const NumberTable design = found().table("beds.csv");
+  ASSERT_EQ(design.rows(), 30U * 3);
   EXPECT_EQ(found().result["beds"], 30);
   const auto first = Json::parse(read_text(found().folder / "o/search/beds.json"))["beds"][0];
   for (std::size_t r = 0; r < 3; ++r) {
-    EXPECT_EQ(beds("bed", r), 1);
-    EXPECT_EQ(beds("round", r), 0);
-    EXPECT_EQ(beds("gamma", r), first["values"][0].get<double>());
-    EXPECT_EQ(beds("restitution", r), first["values"][1].get<double>());
+    EXPECT_EQ(design("bed", r), 1);
+    EXPECT_EQ(design("round", r), 0);
+    EXPECT_EQ(design("gamma", r), first["values"][0].get<double>());
+    EXPECT_EQ(design("restitution", r), first["values"][1].get<double>());
   }
-  EXPECT_EQ(beds("round", 89), 1);
-  EXPECT_EQ(beds.text("photographs", 0), "average");
+  EXPECT_EQ(design("round", 89), 1);
+  EXPECT_EQ(design.text("photographs", 0), "average");
   // Moments average to about the whole; kinetic temperatures and the rise are what the simulate stage measures.
   write_text(found().folder / "s.json",
              R"({ "name": "s", "stages": [ { "stage": "simulate", "id": "bed", "units": "reduced", "seed": 3,
@@ -63,30 +63,30 @@ TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
   ASSERT_EQ(run_shakebed({"run", "s.json", "--out", "s", "--quiet"}, found().folder.path()).exit_code, 0);
   const Json bed = Json::parse(read_text(found().folder / "s/bed/observables.json"));
   // Ten times as long: 15 % holds four errors of the short bed.
-  EXPECT_NEAR(beds("temperature_x_over_mg", 0) / number(bed["temperature_x_over_mg"]), 1, 0.15);
-  EXPECT_NEAR(beds("temperature_z_over_mg", 0) / number(bed["temperature_z_over_mg"]), 1, 0.15);
-  EXPECT_NEAR(beds("temperature_z_local_over_mg", 0) / number(bed["temperature_z_local_over_mg"]), 1, 0.15);
-  EXPECT_NEAR(beds("center_of_mass_rise", 0), number(bed["center_of_mass_rise"]), 0.3);
+  EXPECT_NEAR(design("temperature_x_over_mg", 0) / number(bed["temperature_x_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(design("temperature_z_over_mg", 0) / number(bed["temperature_z_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(design("temperature_z_local_over_mg", 0) / number(bed["temperature_z_local_over_mg"]), 1, 0.15);
+  EXPECT_NEAR(design("center_of_mass_rise", 0), number(bed["center_of_mass_rise"]), 0.3);
   const Json fit = Json::parse(read_text(found().folder / "s/fit/fit.json"));
-  EXPECT_NEAR(beds("temperature_over_mg", 0) / number(fit["temperature"]), 1, 0.2);
-  EXPECT_NEAR(beds("shift", 0), number(fit["shift"]), 1);
-  EXPECT_NEAR(beds("solid_height_by_sum_rule", 0), number(fit["solid_height_by_sum_rule"]), 2);
+  EXPECT_NEAR(design("temperature_over_mg", 0) / number(fit["temperature"]), 1, 0.2);
+  EXPECT_NEAR(design("shift", 0), number(fit["shift"]), 1);
+  EXPECT_NEAR(design("solid_height_by_sum_rule", 0), number(fit["solid_height_by_sum_rule"]), 2);
   const NumberTable profile(found().folder / "s/bed/profile.csv");
   double greatest = 0;
   for (std::size_t r = 0; r < profile.rows(); ++r) greatest = std::max(greatest, profile("number_density", r));
-  EXPECT_NEAR(beds("density", 0), greatest, 0.05);
+  EXPECT_NEAR(design("density", 0), greatest, 0.05);
 }
 
 TEST(InferNumbers, PosteriorsAreThatOfTheirDraws) {
-  const Json& result = found().result;
+  const Json& inferred = found().result;
   const NumberTable draws = found().table("posterior.csv"), marginals = found().table("marginals.csv");
   ASSERT_EQ(draws.rows(), 400U);
-  EXPECT_GT(result["effective_samples"].get<double>(), 400);
+  EXPECT_GT(inferred["effective_samples"].get<double>(), 400);
   for (const char* name : {"gamma", "restitution"}) {
     double sum = 0, squares = 0, area = 0, mean_by_bins = 0;
     for (std::size_t r = 0; r < 400; ++r) sum += draws(name, r);
     for (std::size_t r = 0; r < 400; ++r) squares += std::pow(draws(name, r) - sum / 400, 2);
-    const Json& own = result["parameters"][name];
+    const Json& own = inferred["parameters"][name];
     const double deviation = std::sqrt(squares / 399);
     EXPECT_NEAR(value(own), sum / 400, 4 * deviation / 20);
     EXPECT_NEAR(error(own), deviation, 0.2 * deviation);
@@ -104,14 +104,14 @@ TEST(InferNumbers, PosteriorsAreThatOfTheirDraws) {
     EXPECT_NEAR(own["width_over_prior"].get<double>(), error(own) * std::sqrt(12) / (high - low), 0.01);
   }
   double prior = 0, posterior = 0;
-  for (const Json& view : result["photographs"])
+  for (const Json& view : inferred["photographs"])
     prior += view["prior"].get<double>(), posterior += view["posterior"].get<double>();
   EXPECT_NEAR(prior, 1, 1e-12);
   EXPECT_NEAR(posterior, 1, 1e-9);
-  EXPECT_NEAR(result["photographs"][0]["prior"].get<double>(), 0.8, 1e-12);
-  EXPECT_GT(result["log_evidence"]["std_error"].get<double>(), 0);
-  EXPECT_LT(result["log_evidence"]["std_error"].get<double>(), 0.1);
-  EXPECT_TRUE(std::isfinite(value(result["log_evidence"])));
+  EXPECT_NEAR(inferred["photographs"][0]["prior"].get<double>(), 0.8, 1e-12);
+  EXPECT_GT(inferred["log_evidence"]["std_error"].get<double>(), 0);
+  EXPECT_LT(inferred["log_evidence"]["std_error"].get<double>(), 0.1);
+  EXPECT_TRUE(std::isfinite(value(inferred["log_evidence"])));
 }
 
 TEST(InferNumbers, AgreementIsThatOfTheNearestBed) {
@@ -170,15 +170,15 @@ TEST(InferNumbers, TheSceneAsWrittenIsPredicted) {
 }
 
 TEST(InferNumbers, SurrogateNarrowingAndCalibrationAreShares) {
-  const Json& result = found().result;
+  const Json& inferred = found().result;
   double last = 2;
-  for (const Json& row : result["narrowing"]) {
+  for (const Json& row : inferred["narrowing"]) {
     const double reduction = row["reduction"];
     EXPECT_GE(reduction, 0);
     EXPECT_LE(reduction, last) << "the best first";
     last = reduction;
   }
-  for (const auto& [name, row] : result["surrogate"].items()) {
+  for (const auto& [name, row] : inferred["surrogate"].items()) {
     EXPECT_GE(row["beds"], 24) << name;
     EXPECT_GT(row["scatter"].get<double>(), 0) << name;
     EXPECT_NEAR(row["within_1"].get<double>(), 0.68, 0.3) << name;
@@ -193,9 +193,9 @@ TEST(InferNumbers, SurrogateNarrowingAndCalibrationAreShares) {
     EXPECT_EQ(rows("rank", r) > 0.16 && rows("rank", r) < 0.84,
               rows("low_68", r) < rows("truth", r) && rows("truth", r) < rows("high_68", r));
   }
-  EXPECT_EQ(result["calibration"]["beds"].get<double>() * 2, n);
-  EXPECT_NEAR(result["calibration"]["within_68"].get<double>(), in_68 / n, 1e-12);
-  EXPECT_NEAR(result["calibration"]["within_95"].get<double>(), in_95 / n, 1e-12);
+  EXPECT_EQ(inferred["calibration"]["beds"].get<double>() * 2, n);
+  EXPECT_NEAR(inferred["calibration"]["within_68"].get<double>(), in_68 / n, 1e-12);
+  EXPECT_NEAR(inferred["calibration"]["within_95"].get<double>(), in_95 / n, 1e-12);
 }
 
 }  // namespace

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""Takes over the results of record: collect_results.py OUT, the folder of `shakebed reproduce all --preset full --out OUT`.
+
+Writes docs/results/<recipe>.json for every recipe that has claims. The claims of Quinn and Hong's recipes are those
+taken over by reference-data/quinn-hong-2000/measured/collect.py. Then write docs/results.md:
+`shakebed reproduce --results > docs/results.md`.
+"""
+import csv
+import json
+import pathlib
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+KEPT = ("claim", "claimed", "measured", "verdict", "place", "measured_as", "note", "main")
+QUINN_HONG = {"quinn-hong-fig1": "fig1", "quinn-hong-fig2": "fig2", "quinn-hong-eq6": "eq6",
+              "quinn-hong-beyond": "beyond", "quinn-hong-tc": "tc"}
+
+
+def write(recipe, source, claims):
+    text = json.dumps({"source": source, "claims": claims}, indent=1, ensure_ascii=False)
+    (HERE / "results" / f"{recipe}.json").write_text(text + "\n")
+
+
+def of_run(folder):
+    claims = json.loads((folder / "claims" / "claims.json").read_text())["claims"]
+    manifest = json.loads((folder / "manifest.json").read_text())
+    resolved = json.loads((folder / "resolved.json").read_text())
+    preset = resolved.get("$preset", "full")
+    return f"preset {preset}, shakebed {manifest['shakebed']} ({manifest['git'][:12]})", \
+        [{key: claim[key] for key in KEPT if key in claim} for claim in claims]
+
+
+def measured_text(value, error):
+    if not value:
+        return "–"
+    if not error and abs(float(value)) < 1e-10:
+        return "below 1e-10"
+    if not error:
+        return f"{float(value):.4g}"
+    return f"{float(value):.4g} ± {float(error):.2g}"
+
+
+def of_table(path, mains):
+    claims = []
+    for row in csv.DictReader(path.open()):
+        claim = {key: row[key] for key in ("claim", "claimed", "verdict", "place", "measured_as") if row.get(key)}
+        claim["measured"] = measured_text(row["measured"], row["std_error"])
+        if len(claims) in mains:
+            claim["main"] = True
+        claims.append(claim)
+    return claims
+
+
+def main():
+    out = pathlib.Path(sys.argv[1])
+    for folder in sorted(out.iterdir()):
+        if folder.name not in QUINN_HONG and (folder / "claims" / "claims.json").exists():
+            write(folder.name, *of_run(folder))
+    measured = HERE.parent / "reference-data" / "quinn-hong-2000" / "measured"
+    for recipe, short in QUINN_HONG.items():
+        figure = json.loads((HERE.parent / "pipelines/recipes" / recipe / "figure.json").read_text())
+        stage = next(stage for stage in figure["stages"] if stage["stage"] == "claims")
+        mains = {i for i, claim in enumerate(stage["claims"]) if claim.get("main")}
+        write(recipe, "preset full (reference-data/quinn-hong-2000/measured)", of_table(measured / f"{short}-claims.csv", mains))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+// The page of results is what the program makes of the results of record, and every recipe can be run.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "pipelines/formats/json.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace shakebed::tests;
+using shakebed::pipelines::Json;
+using testing::HasSubstr;
+
+const fs::path source = SHAKEBED_SOURCE_DIR;
+
+TEST(ResultsOfRecord, AreThePage) {
+  const ProgramResult page = run_shakebed({"reproduce", "--results"}, source);
+  ASSERT_EQ(page.exit_code, 0) << page.err;
+  EXPECT_EQ(page.out, read_text(source / "docs/results.md"))
+      << "write it again: shakebed reproduce --results > docs/results.md";
+}
+
+TEST(ResultsOfRecord, AreOfTheClaimsInTheRecipes) {
+  int records = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source / "docs/results")) {
+    const Json record = Json::parse(read_text(entry.path()));
+    const fs::path recipe = source / "pipelines/recipes" / entry.path().stem() / "figure.json";
+    std::vector<std::string> claimed, recorded;
+    const Json document = Json::parse(read_text(recipe));
+    for (const Json& stage : document["stages"]) {
+      if (stage["stage"] != "claims") continue;
+      for (const Json& claim : stage["claims"])
+        claimed.push_back(claim["claim"].get<std::string>() + claim.value("measured_as", ""));
+    }
+    for (const Json& claim : record["claims"])
+      recorded.push_back(claim["claim"].get<std::string>() + claim.value("measured_as", ""));
+    EXPECT_EQ(recorded, claimed) << entry.path() << ": run the full preset again";
+    ++records;
+  }
+  EXPECT_GE(records, 12);
+}
+
+TEST(ResultsOfRecord, AreListedALineARecipe) {
+  const ProgramResult list = run_shakebed({"reproduce", "--list"}, source);
+  ASSERT_EQ(list.exit_code, 0) << list.err;
+  int lines = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source / "pipelines/recipes")) {
+    if (!fs::exists(entry.path() / "figure.json")) continue;
+    EXPECT_THAT(list.out, HasSubstr(entry.path().filename().string() + " "));
+    ++lines;
+  }
+  EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), lines);
+  EXPECT_EQ(run_shakebed({"reproduce", "--list", "--results"}, source).exit_code, 2);
+}
+
+TEST(ResultsOfRecord, HaveRecipesOfTwoPresets) {
+  const ProgramResult all = run_shakebed({"reproduce", "all", "--preset", "quick", "--dry-run"}, source);
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_EQ(run_shakebed({"reproduce", "all", "--preset", "full", "--dry-run"}, source).exit_code, 0);
+}
+
+}  // namespace
