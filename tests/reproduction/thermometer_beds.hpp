@@ -112,12 +112,13 @@ struct ShakenBed {
   std::uint64_t seed = 1;
 };
 
+// 108 beds of 5 to 15 rows.
 inline std::vector<ShakenBed> shaken_beds() {
   std::vector<ShakenBed> beds;
   for (const double restitution : {0.7, 0.85, 0.95})
     for (const double friction : {0.0, 0.15})
-      for (const double gamma : {2.5, 3.5, 5.0, 8.0})
-        for (const std::uint32_t count : {130U, 390U})
+      for (const double gamma : {2.5, 3.0, 3.5, 4.2, 5.0, 8.0})
+        for (const std::uint32_t count : {130U, 260U, 390U})
           beds.push_back({count, 26.6, restitution, friction, gamma, 0.38, 3000 + beds.size()});
   return beds;
 }
