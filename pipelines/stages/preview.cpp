@@ -76,9 +76,10 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
   std::string text;
   if (candidate.channel != ingest::Channel::automatic)
     text = fmt::format("--channel {} ", ingest::name_of(candidate.channel));
-  return text + fmt::format("--polarity {} --radius {:.2f}",
-                            candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                            candidate.rims.radius_px) +
+  return text +
+         fmt::format("--polarity {} --radius {:.2f}",
+                     candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                     candidate.rims.radius_px) +
          (candidate.not_round ? " --shape any" : "");
 }
 
