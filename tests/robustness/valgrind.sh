@@ -71,7 +71,8 @@ check rerun "0 6" rerun results/bed --out again
 check fit-profile 0 fit-profile results/bed/bed/profile.csv --out profile
 check fit-images 0 fit-images results/bed/render/frames --diameter "3 mm" --out images
 check reproduce "0 6" reproduce --set "/stages/bed/settle=0.1 s" --set "/stages/bed/measure=0.1 s" \
-  --set /stages/bed/frames/count=4 --set /stages/bed/frames/phases=4 --out figure
+  --set /stages/bed/frames/count=4 --set /stages/bed/frames/phases=4 --set "/stages/probable/settle=0.1 s" \
+  --set "/stages/probable/measure=0.2 s" --set /stages/posterior/best=0 --set /stages/posterior/draws=400 --out figure
 check submit 0 submit slurm cluster.json --out cluster --dry-run
 check bench "0 6" bench fit --quick --out bench
 check clean 0 clean results
