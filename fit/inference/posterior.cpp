@@ -27,8 +27,7 @@ constexpr std::size_t mixture_centres = 64;
 constexpr double prior_share = 0.1;
 constexpr double mixture_width = 0.5;  // of a normal distribution, in standard deviations of the weighted points
 
-double uniform(std::mt19937_64& generator) { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; }
-double normal(std::mt19937_64& generator) { return gsl_cdf_ugaussian_Pinv(uniform(generator)); }
+double normal(std::mt19937_64& generator) { return gsl_cdf_ugaussian_Pinv(even_number(generator)); }
 
 std::vector<double> likelihoods(std::size_t dimensions, const std::vector<double>& points,
                                 const LogLikelihood& log_likelihood, int threads) {
@@ -90,11 +89,11 @@ class Mixture {
   // Points outside of the cube are kept: their likelihood is 0.
   void draw(std::mt19937_64& generator, std::vector<double>& out) const {
     const auto d = static_cast<Eigen::Index>(dimensions_);
-    if (uniform(generator) < prior_share) {
-      for (Eigen::Index k = 0; k < d; ++k) out.push_back(uniform(generator));
+    if (even_number(generator) < prior_share) {
+      for (Eigen::Index k = 0; k < d; ++k) out.push_back(even_number(generator));
       return;
     }
-    const auto centre = static_cast<std::size_t>(uniform(generator) * static_cast<double>(centres_.size()));
+    const auto centre = static_cast<std::size_t>(even_number(generator) * static_cast<double>(centres_.size()));
     Vector step(d);
     for (double& one : step) one = normal(generator);
     const Vector point = centres_[centre] + lower_ * step;
@@ -149,13 +148,15 @@ Posterior further_round(const Posterior& before, const LogLikelihood& log_likeli
 
 }  // namespace
 
+double even_number(std::mt19937_64& generator) { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; }
+
 std::vector<double> even_points(std::size_t dimensions, std::size_t count, std::uint64_t seed) {
   const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sequence(
       gsl_qrng_alloc(gsl_qrng_sobol, static_cast<unsigned>(dimensions)), gsl_qrng_free);
   if (!sequence) throw std::invalid_argument("even points have from 1 to 40 dimensions");
   std::mt19937_64 generator(seed);
   std::vector<double> shift(dimensions), point(dimensions), out;
-  for (double& one : shift) one = uniform(generator);
+  for (double& one : shift) one = even_number(generator);
   for (std::size_t i = 0; i < count; ++i) {
     gsl_qrng_get(sequence.get(), point.data());
     for (std::size_t k = 0; k < dimensions; ++k) out.push_back(std::fmod(point[k] + shift[k], 1.0));
@@ -197,7 +198,7 @@ Posterior sample_posterior(std::size_t dimensions, const LogLikelihood& log_like
 
 std::vector<std::size_t> equal_draws(const std::vector<double>& weights, std::size_t count, std::uint64_t seed) {
   std::mt19937_64 generator(seed ^ 0x5851f42d4c957f2dULL);
-  const double offset = uniform(generator);
+  const double offset = even_number(generator);
   std::vector<std::size_t> out;
   double sum = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -290,10 +291,6 @@ double expected_reduction(const std::vector<double>& parameter, const std::vecto
 
 double normal_chance(double value) { return gsl_cdf_ugaussian_P(value); }
 double normal_quantile(double chance) { return gsl_cdf_ugaussian_Pinv(chance); }
-
-double chance_of(double chi2, std::size_t degrees_of_freedom) {
-  return std::isfinite(chi2) ? gsl_cdf_chisq_Q(chi2, static_cast<double>(degrees_of_freedom)) : 0;
-}
 
 double as_deviations(double chance) { return chance >= 1 ? 0 : gsl_cdf_ugaussian_Qinv(std::max(chance, 1e-300) / 2); }
 

@@ -3,12 +3,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <random>
 #include <span>
 #include <vector>
 
 // Sampling of what is known of parameters after a measurement. Every parameter is written so that its prior is uniform
 // from 0 to 1: a point is in the unit cube.
 namespace shakebed::fit {
+
+// Between 0 and 1, without either.
+double even_number(std::mt19937_64& generator);
 
 // Points that fill the unit cube evenly: Sobol's sequence, shifted by a random vector [Sobol1967,
 // CranleyPatterson1976]. The first points of a longer set are the shorter set.
@@ -88,8 +92,6 @@ double expected_reduction(const std::vector<double>& parameter, const std::vecto
 // The normal distribution: chance of a value below, and the value that a chance lies below.
 double normal_chance(double value);
 double normal_quantile(double chance);
-// Chance of a chi2 at least as large.
-double chance_of(double chi2, std::size_t degrees_of_freedom);
 // A two-sided chance as a number of standard deviations; at most 38, where a double ends.
 double as_deviations(double chance);
 

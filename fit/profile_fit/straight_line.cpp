@@ -9,7 +9,10 @@
 
 namespace shakebed::fit {
 
-double chance_of_chi2(double chi2, int dof) { return dof > 0 ? gsl_cdf_chisq_Q(chi2, dof) : 1.0; }
+double chance_of_chi2(double chi2, int dof) {
+  if (dof <= 0) return 1.0;
+  return std::isfinite(chi2) ? gsl_cdf_chisq_Q(chi2, dof) : 0.0;
+}
 
 StraightLine fit_straight_line(std::span<const double> x, std::span<const double> y, std::span<const double> error) {
   StraightLine line;

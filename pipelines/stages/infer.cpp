@@ -1,6 +1,7 @@
 #include "pipelines/stages/infer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -40,6 +41,8 @@ class Infer : public Stage {
   std::string made_from() const;
   std::vector<ScaledTarget> scaled_targets(const RunContext& context) const;
   std::vector<RunBed> stored_beds() const;
+  std::vector<double> numbers_of_run(RunContext& context, const std::string& name, const std::vector<double>& values,
+                                     std::uint64_t stream, double measure) const;
   std::vector<RunBed> run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
                                const std::vector<std::vector<double>>& values) const;
   std::vector<RunBed> design(RunContext& context, const std::vector<ScaledTarget>& targets) const;
@@ -263,6 +266,13 @@ std::vector<ScaledTarget> Infer::scaled_targets(const RunContext& context) const
   return out;
 }
 
+// Numbers that were written down; null stands for one that is missing.
+std::vector<double> numbers_in(const Json& list) {
+  std::vector<double> numbers;
+  for (const Json& one : list) numbers.push_back(one.is_null() ? NAN : one.get<double>());
+  return numbers;
+}
+
 std::vector<RunBed> Infer::stored_beds() const {
   const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
   if (file == nullptr) throw InputError("there are no stored beds \"" + options_.stored + "\"");
@@ -273,29 +283,33 @@ std::vector<RunBed> Infer::stored_beds() const {
   std::vector<RunBed> beds;
   for (const Json& one : json.at("beds")) {
     RunBed bed{one.at("round").get<std::uint32_t>(), one.at("values").get<std::vector<double>>(), {}};
-    for (const Json& number : one.at("numbers")) bed.numbers.push_back(number.is_null() ? NAN : number.get<double>());
+    bed.numbers = numbers_in(one.at("numbers"));
     beds.push_back(std::move(bed));
   }
   return beds;
 }
 
+// Of one bed; of one that was run before the stage was interrupted, as it was kept.
+std::vector<double> Infer::numbers_of_run(RunContext& context, const std::string& name,
+                                          const std::vector<double>& values, std::uint64_t stream,
+                                          double measure) const {
+  const std::filesystem::path file = context.scratch() / name;
+  if (std::filesystem::exists(file)) return numbers_in(read_json(file));
+  const std::vector<double> numbers =
+      options_.bed.run(scene_at(values), replica_seed(context.seed(), stream), measure, context);
+  write_file_atomically(file, dump(Json(numbers)));
+  return numbers;
+}
+
 std::vector<RunBed> Infer::run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
                                     const std::vector<std::vector<double>>& values) const {
   std::vector<RunBed> beds(values.size());
-  const std::filesystem::path kept = context.scratch();
   std::atomic<std::size_t> done = 0;
   for_each_index(values.size(), context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     const std::size_t number = first_number + i;
-    const std::filesystem::path file = kept / fmt::format("bed-{}.json", number);
-    beds[i] = {round, values[i], {}};
-    if (std::filesystem::exists(file)) {
-      for (const Json& one : read_json(file)) beds[i].numbers.push_back(one.is_null() ? NAN : one.get<double>());
-    } else {
-      beds[i].numbers =
-          options_.bed.run(scene_at(values[i]), replica_seed(context.seed(), number), options_.bed.measure, context);
-      write_file_atomically(file, dump(Json(beds[i].numbers)));
-    }
+    beds[i] = {round, values[i],
+               numbers_of_run(context, fmt::format("bed-{}.json", number), values[i], number, options_.bed.measure)};
     context.progress(static_cast<double>(++done) / static_cast<double>(values.size()),
                      fmt::format("round {}, {} beds", round, values.size()));
   });
@@ -379,21 +393,14 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
                     {}});
     beds.back().runs.resize(options_.replicas);
   }
-  const std::filesystem::path kept = context.scratch();
   std::atomic<std::size_t> done = 0;
   const std::size_t all = beds.size() * options_.replicas;
   for_each_index(all, context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     BestBed& bed = beds[i / options_.replicas];
     std::vector<double>& run = bed.runs[i % options_.replicas];
-    const std::filesystem::path file = kept / fmt::format("best-{}.json", i);
-    if (std::filesystem::exists(file)) {
-      for (const Json& one : read_json(file)) run.push_back(one.is_null() ? NAN : one.get<double>());
-    } else {
-      run = options_.bed.run(scene_at(bed.values), replica_seed(context.seed(), best_stream + i),
-                             options_.best_measure > 0 ? options_.best_measure : options_.bed.measure, context);
-      write_file_atomically(file, dump(Json(run)));
-    }
+    run = numbers_of_run(context, fmt::format("best-{}.json", i), bed.values, best_stream + i,
+                         options_.best_measure > 0 ? options_.best_measure : options_.bed.measure);
     context.progress(static_cast<double>(++done) / static_cast<double>(all), fmt::format("{} of the best beds", all));
   });
   return beds;
@@ -409,7 +416,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
   const BedSurrogate surrogate(options_, first, found.targets, context.jobs());
   const std::size_t d = options_.dimensions(), count = observables().size();
   std::mt19937_64 generator(mixed(context.seed() + calibration_stream));
-  const auto uniform = [&] { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; };
+  const auto uniform = [&] { return fit::even_number(generator); };
   std::vector<std::vector<double>> values;
   for (std::uint32_t i = 0; i < options_.calibration; ++i) {
     std::vector<double> place(d);
@@ -452,12 +459,44 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
   return rows;
 }
 
+// What the posterior does without: beds that gave no numbers, moments at which too few gave any.
+std::vector<std::string> missing_numbers(const InferOptions& options, const Inference& found,
+                                         const BedSurrogate& surrogate) {
+  std::vector<std::string> sentences;
+  const auto all = found.beds.size();
+  const auto given_up =
+      static_cast<std::size_t>(std::count_if(found.beds.begin(), found.beds.end(), [](const RunBed& b) {
+        return std::none_of(b.numbers.begin(), b.numbers.end(), [](double x) { return std::isfinite(x); });
+      }));
+  if (given_up > 0)
+    sentences.push_back(
+        fmt::format("{} of {} beds made so many contacts that they were given up. The posterior says nothing of "
+                    "parameters like theirs (beds.csv); a narrower range would leave them out",
+                    given_up, all));
+  for (const ScaledTarget& target : found.targets) {
+    const std::size_t used = surrogate.beds(target.observable);
+    if (used + given_up < all)
+      sentences.push_back(fmt::format("{}: the fit of {} of {} beds failed, and they were left out",
+                                      observables()[target.observable].name, all - given_up - used, all));
+  }
+  std::vector<std::string> left_out;
+  for (std::size_t v = 0; v < options.bed.views.size(); ++v)
+    if (options.bed.views[v].prior > 0 && !(surrogate.view_prior(v) > 0)) left_out.push_back(options.bed.views[v].name);
+  if (!left_out.empty())
+    sentences.push_back(
+        fmt::format("at the phases {} of the shaking too many fits failed: that the photographs show one of these was "
+                    "not considered",
+                    fmt::join(left_out, ", ")));
+  return sentences;
+}
+
 void Infer::run(RunContext& context) const {
   Inference found;
   found.targets = scaled_targets(context);
   found.beds = design(context, found.targets);
   context.progress(0, "surrogate and posterior");
   const BedSurrogate surrogate(options_, found.beds, found.targets, context.jobs());
+  for (const std::string& sentence : missing_numbers(options_, found, surrogate)) context.warning(sentence);
   found.posterior = sampled(context, options_, surrogate, found.targets);
   if (!(found.posterior.effective > 0))
     throw StageError("the targets are so far from every bed that no posterior can be stated");
@@ -478,7 +517,7 @@ void Infer::run(RunContext& context) const {
   }
   found.draws = fit::equal_draws(found.posterior.weight, options_.draws, context.seed());
   for (const std::size_t i : found.draws) {
-    double chance = (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53;
+    double chance = fit::even_number(generator);
     std::size_t view = 0;
     for (; view + 1 < views && chance > share[i][view]; ++view) chance -= share[i][view];
     found.draw_views.push_back(view);

@@ -58,7 +58,6 @@ struct ScaledTarget {
 // The surrogates of all observables that targets and proposals need.
 class BedSurrogate {
  public:
-  // `all_views`: by observable, those that are needed for single moments too.
   BedSurrogate(const InferOptions& options, const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets,
                int threads);
 
@@ -122,7 +121,7 @@ StagePages infer_pages();
 // On the scale of comparison.
 double to_scale(std::size_t observable, double value);
 double from_scale(std::size_t observable, double value);
-// Column of a parameter or view in all tables.
+// The parameters at a point of the unit cube.
 std::vector<double> values_at(const InferOptions& options, std::span<const double> places);
 
 }  // namespace shakebed::pipelines

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "fit/profile_fit/straight_line.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/infer.hpp"
 
@@ -127,10 +128,10 @@ class Report {
         least = std::min(least, chi2);
         const double share = surrogate_.view_prior(v) *
                              std::exp(found_.fit.log_likelihood[i * views + v] - found_.posterior.log_likelihood[i]);
-        if (share > 0) predictive += weight()[i] * share * fit::chance_of(chi2, dof);
+        if (share > 0) predictive += weight()[i] * share * fit::chance_of_chi2(chi2, static_cast<int>(dof));
       }
     }
-    const double chance = fit::chance_of(least, dof), deviations = fit::as_deviations(chance);
+    const double chance = fit::chance_of_chi2(least, static_cast<int>(dof)), deviations = fit::as_deviations(chance);
     const bool some = deviations < enough_deviations;
     Json out{{"least_chi2", least}, {"numbers", dof}, {"chance", chance}, {"deviations", deviations}};
     out["predictive_p"] = predictive;
@@ -179,7 +180,7 @@ class Report {
     for (const ScaledTarget& target : found_.targets) at.push_back(surrogate_.predicted(place, 0, target.observable));
     Json out{{"values", std::move(values)}, {"targets", target_rows(at)}};
     if (surrogate_.view_prior(0) > 0) {
-      const double chance = fit::chance_of(fit.chi2[0], found_.targets.size());
+      const double chance = fit::chance_of_chi2(fit.chi2[0], static_cast<int>(found_.targets.size()));
       out["chi2"] = fit.chi2[0], out["deviations"] = fit::as_deviations(chance);
     }
     return out;
@@ -290,8 +291,9 @@ class Report {
       }
       double chi2 = 0;
       for (const double count : histogram) chi2 += std::pow(count - n / rank_bins, 2) / (n / rank_bins);
-      each[options_.parameters[k].first] = Json{
-          {"within_68", own_68 / n}, {"within_95", own_95 / n}, {"rank_chi2_p", fit::chance_of(chi2, rank_bins - 1)}};
+      each[options_.parameters[k].first] = Json{{"within_68", own_68 / n},
+                                                {"within_95", own_95 / n},
+                                                {"rank_chi2_p", fit::chance_of_chi2(chi2, rank_bins - 1)}};
       all += n, in_68 += own_68, in_95 += own_95;
     }
     for (const CalibrationRow& row : found_.calibration)

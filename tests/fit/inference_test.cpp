@@ -6,11 +6,10 @@
 
 #include "fit/inference/posterior.hpp"
 #include "fit/inference/surrogate.hpp"
+#include "fit/profile_fit/straight_line.hpp"
 
 namespace shakebed::fit {
 namespace {
-
-double even(std::mt19937_64& generator) { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; }
 
 // A stand-in for a bed: two numbers of three parameters, with scatter.
 constexpr double scatter[] = {0.05, 0.1};
@@ -24,7 +23,7 @@ TrainingSet stand_in_runs(std::size_t runs, std::size_t output, std::uint64_t se
   std::mt19937_64 generator(seed + output);
   for (std::size_t i = 0; i < runs; ++i)
     set.values.push_back(stand_in(std::span<const double>(set.points).subspan(3 * i, 3))[output] +
-                         scatter[output] * normal_quantile(even(generator)));
+                         scatter[output] * normal_quantile(even_number(generator)));
   return set;
 }
 
@@ -35,9 +34,9 @@ TEST(Surrogate, PredictsFurtherRunsWithItsStatedError) {
   double squares = 0;
   constexpr int further = 400;
   for (int i = 0; i < further; ++i) {
-    const std::vector<double> point{even(generator), even(generator), even(generator)};
+    const std::vector<double> point{even_number(generator), even_number(generator), even_number(generator)};
     const auto found = surrogate.predict(point);
-    const double value = stand_in(point)[0] + scatter[0] * normal_quantile(even(generator));
+    const double value = stand_in(point)[0] + scatter[0] * normal_quantile(even_number(generator));
     squares += std::pow(value - found.mean[0], 2) / found.variance[0];
     EXPECT_LT(std::sqrt(found.variance[0]), 2 * scatter[0]);
   }
@@ -100,12 +99,12 @@ TEST(Posterior, SmallToolsDoWhatTheySay) {
   EXPECT_NEAR(errors(off, deviation, none).chi2, expected, 1e-12);
   EXPECT_NEAR(errors(off, deviation, none).log_determinant, std::log(4 * 0.75), 1e-12);
   EXPECT_NEAR(expected_reduction({0, 1}, {0, 2}, {0.5, 0.5}, 1), 0.5, 1e-12) << "variance 1 of 1 + 1 is the signal's";
-  EXPECT_NEAR(chance_of(9, 1), 0.0026998, 1e-6);
+  EXPECT_NEAR(chance_of_chi2(9, 1), 0.0026998, 1e-6);
   EXPECT_NEAR(as_deviations(0.0026998), 3, 1e-4);
   std::mt19937_64 generator(2);
   std::vector<double> rows;
   for (int i = 0; i < 4000; ++i) {
-    const double a = normal_quantile(even(generator)), b = normal_quantile(even(generator));
+    const double a = normal_quantile(even_number(generator)), b = normal_quantile(even_number(generator));
     rows.push_back(a), rows.push_back(5 * (0.6 * a + 0.8 * b));
   }
   EXPECT_NEAR(correlation_of(2, rows)[1], 0.6, 0.04);
@@ -119,9 +118,9 @@ TEST(Calibration, OfAStandInHoldsItsIntervals) {
   std::vector<double> histogram(10, 0);
   constexpr int truths = 100;
   for (int i = 0; i < truths; ++i) {
-    const std::vector<double> truth{even(generator), even(generator), even(generator)};
+    const std::vector<double> truth{even_number(generator), even_number(generator), even_number(generator)};
     std::vector<double> measured = stand_in(truth);
-    for (std::size_t k = 0; k < 2; ++k) measured[k] += scatter[k] * normal_quantile(even(generator));
+    for (std::size_t k = 0; k < 2; ++k) measured[k] += scatter[k] * normal_quantile(even_number(generator));
     SamplingOptions options;
     options.first = 2048, options.further = 2048, options.enough = 200;
     const Posterior found = sample_posterior(
@@ -148,7 +147,7 @@ TEST(Calibration, OfAStandInHoldsItsIntervals) {
   EXPECT_NEAR(within_95 / 300.0, 0.95, 0.04);
   double chi2 = 0;
   for (const double count : histogram) chi2 += std::pow(count - 30, 2) / 30;
-  EXPECT_GT(chance_of(chi2, 9), 0.01) << "one run in a hundred may fail";
+  EXPECT_GT(chance_of_chi2(chi2, 9), 0.01) << "one run in a hundred may fail";
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ TEST(PowerLaw, OfAGivenPowerIsDoneByHand) {
 TEST(ChanceOfChi2, IsExponentialForTwoDegrees) {
   EXPECT_NEAR(chance_of_chi2(3, 2), std::exp(-1.5), 1e-14);
   EXPECT_EQ(chance_of_chi2(3, 0), 1);
+  EXPECT_EQ(chance_of_chi2(INFINITY, 3), 0);
 }
 
 }  // namespace

@@ -25,6 +25,21 @@ class Infer : public testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_shakebed(arguments, folder_.path());
   }
+  std::vector<fs::path> finished_beds() const {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "o/.scratch", error))
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
+    return files;
+  }
+  void kill_after_beds(std::size_t beds) {
+    const int process = start_shakebed({"run", "r.json", "--out", "o", "--jobs", "1"}, folder_.path());
+    for (int i = 0; i < 60'000 && finished_beds().size() < beds; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ::kill(process, SIGKILL);
+    ASSERT_EQ(wait_for(process), 128 + SIGKILL) << "it was over before it was killed";
+    ASSERT_GE(finished_beds().size(), beds);
+  }
   ScratchFolder folder_;
 };
 
@@ -37,21 +52,25 @@ TEST_F(Infer, DoesNotDependOnThreads) {
 
 TEST_F(Infer, GoesOnWithTheBedsThatWereFinishedWhenItWasKilled) {
   ASSERT_EQ(run("expected").exit_code, 0);
-  const auto finished_beds = [&] {
-    int count = 0;
-    std::error_code error;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "o/.scratch", error))
-      count += entry.path().extension() == ".json";
-    return count;
-  };
-  const int process = start_shakebed({"run", "r.json", "--out", "o", "--jobs", "1"}, folder_.path());
-  for (int i = 0; i < 60'000 && finished_beds() < 5; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  ::kill(process, SIGKILL);
-  ASSERT_EQ(wait_for(process), 128 + SIGKILL) << "it was over before it was killed";
-  ASSERT_GE(finished_beds(), 5);
+  kill_after_beds(5);
   ASSERT_EQ(run("o").exit_code, 0);
   EXPECT_EQ(read_text(folder_ / "o/search/infer.json"), read_text(folder_ / "expected/search/infer.json"));
   EXPECT_FALSE(fs::exists(folder_ / "o/.scratch"));
+}
+
+// Beds without numbers, as a bed that is given up leaves them, in place of two that were finished.
+TEST_F(Infer, SaysHowManyBedsGaveNoNumbers) {
+  kill_after_beds(5);
+  const std::vector<fs::path> beds = finished_beds();
+  for (std::size_t i = 0; i < 2; ++i) {
+    Json numbers = Json::parse(read_text(beds[i]));
+    for (auto& number : numbers) number = nullptr;
+    write_text(beds[i], numbers.dump());
+  }
+  const ProgramResult result = run("o");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("2 of 30 beds made so many contacts that they were given up"), std::string::npos)
+      << result.err;
 }
 
 TEST_F(Infer, RefusesWhatMakesNoSense) {

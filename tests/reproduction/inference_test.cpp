@@ -13,6 +13,21 @@ using pipelines::read_json;
 
 const std::string source = SHAKEBED_SOURCE_DIR;
 
+// The main recipe and the one of the inference alone ask for the same posterior, but for what is run again.
+TEST(Inference, IsTheSameInBothRecipes) {
+  const auto posterior = [](const std::string& name) {
+    const Json recipe = read_json(source + "/pipelines/recipes/clement-rajchenbach/" + name);
+    for (Json stage : recipe["stages"]) {
+      if (stage["stage"] != "infer") continue;
+      for (const char* key : {"best", "best_replicas"}) stage.erase(key);
+      return stage;
+    }
+    return Json();
+  };
+  ASSERT_TRUE(posterior("infer.json").is_object());
+  EXPECT_EQ(posterior("figure.json"), posterior("infer.json"));
+}
+
 // The stored posterior: which statement the main report makes, with its numbers.
 TEST(Inference, OfTheStoredBedsIsWhatTheRecipeStates) {
   ScratchFolder folder;
