@@ -1,7 +1,9 @@
 # What every target of the project shares: the language, the warnings, the instruction set and the arithmetic.
 #
 # The same seed must give the same bytes on every machine, so floating-point contraction is off everywhere (a fused
-# multiply-add rounds once where two instructions round twice) and -ffast-math is used nowhere.
+# multiply-add rounds once where two instructions round twice) and -ffast-math is used nowhere. g++ 12 fuses a b + c d and
+# a d - c b all the same when it vectorises straight code (vfmaddsub), so that is off too: no scene takes more
+# instructions for it (tests/bench/instructions.sh), and tests/house/contraction.sh looks at the program.
 
 include(CheckCXXCompilerFlag)
 include(CheckCXXSourceRuns)
@@ -33,7 +35,7 @@ add_library(shakebed_options INTERFACE)
 target_compile_features(shakebed_options INTERFACE cxx_std_20)
 target_include_directories(shakebed_options INTERFACE "${PROJECT_SOURCE_DIR}")
 target_compile_options(shakebed_options INTERFACE
-  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off -fno-math-errno -Wno-psabi $<$<BOOL:${SHAKEBED_WERROR}>:-Werror>)
+  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off -fno-tree-slp-vectorize -fno-math-errno -Wno-psabi $<$<BOOL:${SHAKEBED_WERROR}>:-Werror>)
 if(SHAKEBED_ARCH)
   target_compile_options(shakebed_options INTERFACE "-march=${SHAKEBED_ARCH}")
 endif()

@@ -204,7 +204,8 @@ class Engine final : public Simulation {
   void hit_floor(std::uint32_t i, Motion& motion);
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
-  void withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach, const Contact& surface);
+  [[gnu::cold]] void withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach,
+                              const Contact& surface);
   std::optional<double> unusual_restitution(std::uint32_t i, std::uint32_t j, TwoLanes d, TwoLanes dv);
   bool locked();
   void relieve();

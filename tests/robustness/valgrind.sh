@@ -31,6 +31,16 @@ END
 cat >cluster.json <<END
 { "name": "cluster", "stages": [ $bed ], "sweep": { "over": { "/stages/bed/disks/restitution": [0.7, 0.8] } } }
 END
+# Beds of 20 disks over two parameters, and the sampling of their posterior.
+cat >infer.json <<END
+{ "name": "infer", "stages": [ { "stage": "infer", "units": "reduced", "disks": { "count": 20, "restitution": 0.7 },
+  "box": { "width": 5.3, "sides": "periodic" }, "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": 0.35, "restitution": 0.7 },
+  "settle": 10, "measure": 20, "phases": 4,
+  "parameters": { "gamma": { "set": ["/floor/gamma"], "low": 3, "high": 6 },
+                  "restitution": { "set": ["/disks/restitution", "/floor/restitution"], "low": 0.5, "high": 0.9 } },
+  "targets": { "center_of_mass_rise": { "value": 1, "std_error": 0.3 } },
+  "first": 16, "rounds": 0, "best": 1, "best_replicas": 2, "draws": 100 } ] }
+END
 
 failed=0
 # check NAME EXPECTED_CODES ARGUMENTS...: runs it unless others were asked for.
@@ -70,9 +80,8 @@ check verify 0 verify results/bed
 check rerun "0 6" rerun results/bed --out again
 check fit-profile 0 fit-profile results/bed/bed/profile.csv --out profile
 check fit-images 0 fit-images results/bed/render/frames --diameter "3 mm" --out images
-check reproduce "0 6" reproduce --set "/stages/bed/settle=0.1 s" --set "/stages/bed/measure=0.1 s" \
-  --set /stages/bed/frames/count=4 --set /stages/bed/frames/phases=4 --set "/stages/probable/settle=0.1 s" \
-  --set "/stages/probable/measure=0.2 s" --set /stages/posterior/best=0 --set /stages/posterior/draws=400 --out figure
+check infer 0 run infer.json --out results/infer
+check reproduce "0 6" reproduce bouncing-ball --preset quick --out figure
 check submit 0 submit slurm cluster.json --out cluster --dry-run
 check bench "0 6" bench fit --quick --out bench
 check clean 0 clean results
