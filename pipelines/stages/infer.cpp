@@ -424,6 +424,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     values.push_back(values_at(options_, place));
   }
   const std::vector<RunBed> beds = run_beds(context, 0, calibration_stream, values);
+  std::size_t incomplete = 0;
   for (std::size_t i = 0; i < beds.size(); ++i) {
     double chance = uniform();
     std::size_t view = 0;
@@ -436,7 +437,10 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
                      target.error * fit::normal_quantile(uniform());
       complete = complete && std::isfinite(target.value);
     }
-    if (!complete) continue;  // no fit: such a bed gives no targets
+    if (!complete) {  // no fit: such a bed gives no targets
+      ++incomplete;
+      continue;
+    }
     const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
     for (std::size_t k = 0; k < d; ++k) {
       const double truth = values[i][k];
@@ -456,6 +460,10 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     context.progress(static_cast<double>(i + 1) / static_cast<double>(beds.size()),
                      "inferring the beds of the calibration");
   }
+  if (rows.empty()) throw StageError("none of the beds of the calibration gave all the numbers that are targets");
+  if (incomplete > 0)
+    context.warning(fmt::format("{} of the {} beds of the calibration gave no numbers to infer from, and are not in it",
+                                incomplete, beds.size()));
   return rows;
 }
 

@@ -72,7 +72,7 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
   const Json& result = stage.result;
   if (!result.is_object() || !result.contains("agreement")) return "";
   std::string out =
-      fmt::format("<p>{}.</p>\n", escape_markup(result.at("agreement").at("statement").get<std::string>()));
+      fmt::format("<p>{}</p>\n", escape_markup(result.at("agreement").at("statement").get<std::string>()));
   out +=
       "<table><tr><th>parameter</th><th>prior</th><th>median</th><th>68 %</th><th>95 %</th><th>why this "
       "prior</th></tr>\n" +
@@ -98,7 +98,7 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
 
 std::string inference_terminal(const FinishedStage& stage) {
   const Json* statement = find_pointer(stage.result, "/agreement/statement");
-  return statement == nullptr ? "" : statement->get<std::string>();
+  return statement == nullptr ? "" : statement->get<std::string>() + "\n";
 }
 
 // Gamma against frequency where the reading gives the reduced temperature; rows "frequency gamma".

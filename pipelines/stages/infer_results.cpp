@@ -73,9 +73,10 @@ class Report {
         {"value", found_.posterior.log_evidence}, {"std_error", found_.posterior.log_evidence_error}, {"unit", "1"}};
     out["parameters"] = parameters();
     out["photographs"] = photographs();
-    out["agreement"] = agreement();
+    const Json best_beds = best();
+    out["agreement"] = agreement(best_beds);
     out["assumed"] = assumed();
-    out["best"] = best();
+    out["best"] = best_beds;
     out["narrowing"] = narrowing();
     out["surrogate"] = surrogates();
     if (options_.calibration > 0) out["calibration"] = calibration();
@@ -118,7 +119,7 @@ class Report {
   }
 
   // Whether any bed gives what was measured.
-  Json agreement() const {
+  Json agreement(const Json& best_beds) const {
     const std::size_t dof = found_.targets.size(), views = options_.bed.views.size();
     double least = INFINITY, predictive = 0;
     for (std::size_t i = 0; i < weight().size(); ++i) {
@@ -136,15 +137,24 @@ class Report {
     Json out{{"least_chi2", least}, {"numbers", dof}, {"chance", chance}, {"deviations", deviations}};
     out["predictive_p"] = predictive;
     out["some_bed_agrees"] = some;
-    out["statement"] =
-        some ? fmt::format(
-                   "beds within these ranges give all {} numbers: the nearest has chi2 = {:.2g}, which chance "
-                   "exceeds in {:.0f} % of all cases",
-                   dof, least, 100 * chance)
-             : fmt::format(
-                   "no bed within these ranges gives all {} numbers: the nearest has chi2 = {:.3g}, {:.1f} "
-                   "standard deviations off",
-                   dof, least, deviations);
+    out["statement"] = "";
+    const auto agree = std::count_if(best_beds.begin(), best_beds.end(), [](const Json& bed) {
+      const Json& most = bed.at("largest_difference_in_errors");
+      return most.is_number() && most.get<double>() < enough_deviations;
+    });
+    out["beds_run_again_that_agree"] = agree;
+    std::string& statement = out["statement"].get_ref<std::string&>();
+    statement = some ? fmt::format(
+                           "By the surrogate, some beds within these ranges give all {} numbers: the nearest has chi2 "
+                           "= {:.2g}, which chance exceeds in {:.0f} % of all cases.",
+                           dof, least, 100 * chance)
+                     : fmt::format(
+                           "By the surrogate, no bed within these ranges gives all {} numbers: the nearest has chi2 = "
+                           "{:.3g}, {:.1f} standard deviations off.",
+                           dof, least, deviations);
+    if (!best_beds.empty())
+      statement += fmt::format(" Of the {} most probable beds, run again, {} lie within {:g} errors of every number.",
+                               best_beds.size(), agree, enough_deviations);
     return out;
   }
 
@@ -445,6 +455,8 @@ void state_inference(ResultList& list, const InferOptions& options) {
   list.number("/agreement/deviations", "1", "the same as a number of standard deviations");
   list.number("/agreement/predictive_p", "1", "the same on average over the posterior");
   list.truth("/agreement/some_bed_agrees", "whether the nearest bed is within three standard deviations");
+  list.number("/agreement/beds_run_again_that_agree", "1",
+              "most probable beds that, run again, lie within three errors of every number");
   list.text("/agreement/statement", "the same in words");
   const Given inside = given_when("the scene as written lies within the prior");
   for (const auto& [name, parameter] : options.parameters)

@@ -158,6 +158,7 @@ TEST(InferNumbers, BestBedsAreTheMeansOfTheirRuns) {
   EXPECT_NEAR(z["difference_in_errors"].get<double>(), off_z, 1e-9);
   most = std::max(std::abs(off_t), std::abs(off_z));
   EXPECT_NEAR(best["largest_difference_in_errors"].get<double>(), most, 1e-9);
+  EXPECT_EQ(found().result["agreement"]["beds_run_again_that_agree"], most < 3 ? 1 : 0) << "of one bed";
   EXPECT_NEAR(t["measured"].get<double>(), 0.35, 1e-12);
   EXPECT_NEAR(t["measured_error"].get<double>(), 0.01, 1e-12);
 }

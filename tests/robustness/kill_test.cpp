@@ -17,11 +17,11 @@ namespace {
 using namespace shakebed::tests;
 namespace fs = std::filesystem;
 
-constexpr int points = 60;
+constexpr int points = 20;
 
 std::string sweep_recipe() {
   std::string text = small_recipe(
-      R"({ "kind": "grid", "over": { "/stages/bed/disks/restitution": { "from": 0.5, "to": 0.95, "count": 60 } },
+      R"({ "kind": "grid", "over": { "/stages/bed/disks/restitution": { "from": 0.5, "to": 0.95, "count": 20 } },
     "collect": ["/bed/temperature_x", "/fit/temperature"] })");
   text.replace(text.find("\"0.5 s\""), 7, "\"0.1 s\"");
   text.replace(text.find("\"frames\": { \"count\": 8, \"phases\": 8 }"), 37,
