@@ -153,8 +153,8 @@ class Report {
                            "{:.3g}, {:.1f} standard deviations off.",
                            dof, least, deviations);
     if (!best_beds.empty())
-      statement += fmt::format(" Of the {} most probable beds, run again, {} lie within {:g} errors of every number.",
-                               best_beds.size(), agree, enough_deviations);
+      statement += fmt::format(" Most probable beds that were run again: {}; within {:g} errors of every number: {}.",
+                               best_beds.size(), enough_deviations, agree);
     return out;
   }
 
