@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/plot_data_name.hpp"
 
 namespace shakebed::pipelines {
 
@@ -89,6 +90,47 @@ std::string inline_svg(const std::filesystem::path& path, int number) {
   replace_all(svg, "url(#", "url(#" + prefix);
   svg.replace(0, 4, "<svg class=\"plot\"");
   return svg;
+}
+
+std::string script_text(std::string json) {
+  replace_all(json, "<", "\\u003c");
+  return json;
+}
+
+std::string figure_html(const std::filesystem::path& svg, int number, std::string_view caption) {
+  const std::string drawing = inline_svg(svg, number);
+  if (drawing.empty()) return "";
+  std::filesystem::path data = svg, pdf = svg;
+  data.replace_extension().concat(plot_data_suffix), pdf.replace_extension(".pdf");
+  const bool asked = std::filesystem::exists(data);
+  const std::string name = escape_markup(svg.stem().string());
+  std::string out = fmt::format("<figure class=\"plot\" data-name=\"{}\">\n<div class=\"drawn{}\">{}</div>\n", name,
+                                asked ? "" : " small", drawing);
+  if (asked)
+    out +=
+        fmt::format("<div class=\"asked\"></div>\n<script type=\"application/json\" class=\"plot-data\">{}</script>\n",
+                    script_text(read_file(data)));
+  out += asked ? "<div class=\"tools\">" : "<div class=\"tools always\">";
+  if (std::filesystem::exists(pdf))
+    out += fmt::format("<a download=\"{}.pdf\" href=\"data:application/pdf;base64,{}\">PDF</a>", name,
+                       base64(read_file(pdf)));
+  out += "</div>\n";
+  if (!caption.empty()) out += fmt::format("<figcaption>{}</figcaption>\n", caption);
+  return out + "</figure>\n";
+}
+
+std::string table_head(const std::vector<std::string>& header) {
+  std::string out = "<tr>";
+  for (const std::string& name : header) out += "<th scope=\"col\">" + name + "</th>";
+  return out + "</tr>\n";
+}
+
+std::string table_row(const std::vector<std::string>& header, const std::vector<TableCell>& cells) {
+  std::string out = "<tr>";
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    out += fmt::format("<td data-label=\"{}\"{}>{}</td>", i < header.size() ? header[i] : "",
+                       cells[i].css.empty() ? "" : fmt::format(" class=\"{}\"", cells[i].css), cells[i].html);
+  return out + "</tr>\n";
 }
 
 std::string shown(const Json& quantity) {

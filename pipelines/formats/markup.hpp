@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pipelines/formats/json.hpp"
 
@@ -28,6 +29,21 @@ std::string size_text(std::uint64_t bytes);
 
 // An SVG file as part of a page: without its prolog, its ids made its own by the number. "" when it is none.
 std::string inline_svg(const std::filesystem::path& path, int number);
+
+// A drawn figure: the SVG for paper, print and browsers without scripts; its numbers, where NAME.plot.json is beside
+// it, for the script that draws them again; NAME.pdf to download, where there is one. The caption is HTML. "" where
+// there is no SVG.
+std::string figure_html(const std::filesystem::path& svg, int number, std::string_view caption);
+
+// A row of a table that stacks on a narrow screen: cells (HTML) with the names of their columns.
+struct TableCell {
+  std::string html, css{};
+};
+std::string table_row(const std::vector<std::string>& header, const std::vector<TableCell>& cells);
+std::string table_head(const std::vector<std::string>& header);
+
+// JSON that may stand inside <script>: no end tag and no comment can begin in it.
+std::string script_text(std::string json);
 
 std::string base64(std::string_view bytes);
 

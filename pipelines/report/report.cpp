@@ -1,13 +1,18 @@
 #include "pipelines/report/report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
+#include "pipelines/formats/plot_data_name.hpp"
+#include "pipelines/report/crate.hpp"
+#include "pipelines/report/page.hpp"
 #include "pipelines/report/sweep_report.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/stages/theory.hpp"
@@ -17,58 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view style = R"css(
-:root { color-scheme: light dark; --text: #1b1f24; --soft: #57606a; --page: #ffffff; --card: #f6f8fa; --line: #d0d7de;
-  --accent: #0b62a8; --good: #116b3c; --bad: #a8290b; --warn: #fff3d6; --warn-text: #5c4000; }
-@media (prefers-color-scheme: dark) { :root { --text: #e6e9ed; --soft: #a5adb7; --page: #14171b; --card: #1f242a; --line: #3b434d;
-  --accent: #6cb6f2; --good: #5fce95; --bad: #ff9a7a; --warn: #3d3010; --warn-text: #ffdf94; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--page); color: var(--text); font: 16px/1.55 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; }
-main { max-width: 1060px; margin: 0 auto; padding: 20px 18px 60px; }
-h1 { font-size: 1.7rem; line-height: 1.25; margin: 0.4em 0 0.2em; } h2 { font-size: 1.2rem; margin: 2em 0 0.5em; }
-p { margin: 0.5em 0; max-width: 75ch; } .soft { color: var(--soft); } code { font-size: 0.88em; overflow-wrap: anywhere; }
-.scroll { overflow-x: auto; border: 1px solid var(--line); border-radius: 6px; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 0.93rem; }
-th, td { text-align: left; padding: 6px 10px; border-top: 1px solid var(--line); vertical-align: top; }
-tr:first-child th { border-top: 0; background: var(--card); } td.number { white-space: nowrap; }
-.warnings, .banner { background: var(--warn); color: var(--warn-text); border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
-.warnings ul { margin: 0; padding-left: 1.2em; } .banner strong { display: block; }
-.answer, .lead { border: 1px solid currentColor; border-radius: 6px; padding: 10px 14px; margin: 14px 0; }
-.lead p { font-size: 1.08rem; margin: 0.35em 0; max-width: none; }
-.good { color: var(--good); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
-.tag { display: inline-block; border: 1px solid currentColor; border-radius: 4px; padding: 0 6px; font-size: 0.8rem; color: var(--bad); }
-figure { margin: 14px 0; } figure > svg, figure img { max-width: 100%; height: auto; display: block; border-radius: 6px; }
-figure > svg.plot { background: #ffffff; width: 100%; } figcaption { color: var(--soft); font-size: 0.9rem; margin-top: 4px; }
-figure.wide { overflow-x: auto; } figure.wide > svg.plot { min-width: 620px; }
-details { margin: 10px 0; } summary { cursor: pointer; color: var(--accent); } pre { overflow-x: auto; background: var(--card); padding: 12px; border-radius: 6px; font-size: 0.82rem; }
-#bed-in-motion { --disk-a: #2f7fb8; --disk-b: #c98a2b; } #bed-in-motion canvas { display: none; width: 100%; max-width: 720px; }
-#bed-in-motion .still { max-width: 720px; } #bed-in-motion .controls { display: none; gap: 10px; align-items: center; flex-wrap: wrap; max-width: 720px; margin-top: 6px; }
-#bed-in-motion.plays canvas { display: block; } #bed-in-motion.plays .controls { display: flex; } #bed-in-motion.plays .still { display: none; }
-.controls input { flex: 1 1 120px; min-width: 0; accent-color: var(--accent); } .controls output { color: var(--soft); font-size: 0.9rem; font-variant-numeric: tabular-nums; }
-button { font: inherit; color: var(--text); background: var(--card); border: 1px solid var(--line); border-radius: 6px; padding: 3px 14px; cursor: pointer; }
-a { color: var(--accent); } ul.files { margin: 8px 0; padding-left: 1.2em; columns: 18rem; font-size: 0.93rem; overflow-wrap: anywhere; }
-.graph text { fill: var(--text); font-size: 13px; } .graph .small { fill: var(--soft); font-size: 11px; }
-.graph rect { fill: var(--card); stroke: var(--line); } .graph rect.failed { stroke: var(--bad); stroke-width: 2; } .graph path { fill: none; stroke: var(--soft); }
-)css";
-
 std::string html(std::string_view text) { return escape_markup(text); }
-
-}  // namespace
-
-std::string page_head(const std::string& title) {
-  return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\">\n"
-      // The page asks nobody for anything: a browser would refuse.
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
-      "script-src "
-      "'unsafe-inline'; img-src data:\">\n"
-      "<meta name=\"generator\" content=\"shakebed {}\">\n<link rel=\"icon\" "
-      "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n",
-      program_version(), html(title), style, prose(title));
-}
-
-namespace {
 
 class Report {
  public:
@@ -85,21 +39,24 @@ class Report {
     }
   }
 
+  // The answer, the figure that shows it, the bed; then what speaks against the answer, then the rest; prose last.
   std::string page() {
-    const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
-    std::string out = page_head(title);
-    out += sections(ReportPlace::lead) + sections(ReportPlace::lead_picture) + verdict_line();
-    for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
-    if (plan_.report.text.empty() && !plan_.description.empty())
-      out += fmt::format("<p>{}</p>\n", html(plan_.description));
+    std::string out = page_head(plan_.report.title.empty() ? plan_.name : plan_.report.title);
+    // One figure shows the answer; those that other stages would lead with stand before the rest.
+    std::vector<std::string> leading = parts(ReportPlace::lead_picture);
+    out += state_line() + sections(ReportPlace::lead) + published_facts();
+    if (!leading.empty()) {
+      out += leading.front();
+      leading.erase(leading.begin());
+    }
     out += sections(ReportPlace::banner) + warnings();
+    out += sections(ReportPlace::motion) + sections(ReportPlace::film);
     out += sections(ReportPlace::claims);
-    out += sections(ReportPlace::figures) + published();
-    for (const ReportPlace place :
-         {ReportPlace::checks, ReportPlace::motion, ReportPlace::frames, ReportPlace::fits, ReportPlace::maps})
+    out += fmt::format("{}", fmt::join(leading, "")) + sections(ReportPlace::figures) + published();
+    for (const ReportPlace place : {ReportPlace::checks, ReportPlace::fits, ReportPlace::maps, ReportPlace::frames})
       out += sections(place);
-    out += audit() + assumed() + graph() + downloads() + provenance();
-    return out + "</main>\n</body>\n</html>\n";
+    out += audit() + assumed() + about() + graph() + downloads() + provenance();
+    return out + page_tail();
   }
 
   // What the stages say in summary.md, and on stdout.
@@ -127,20 +84,21 @@ class Report {
     return out;
   }
 
-  // What the stages show at a place of the page.
-  std::string sections(ReportPlace place) {
-    std::string out;
+  // What the stages show at a place of the page, each stage's own.
+  std::vector<std::string> parts(ReportPlace place) {
+    std::vector<std::string> out;
     for (std::size_t i = 0; i < finished_.size(); ++i) {
       for (const ReportSection& section : pages_[i]->sections) {
         if (section.place != place || (section.once && !out.empty())) continue;
-        const std::string own = section.html(finished_[i], pictures_);
+        std::string own = section.html(finished_[i], pictures_);
         if (own.empty()) continue;
-        if (out.empty() && !section.heading.empty()) out += fmt::format("<h2>{}</h2>\n", section.heading);
-        out += own;
+        if (out.empty() && !section.heading.empty()) own.insert(0, fmt::format("<h2>{}</h2>\n", section.heading));
+        out.push_back(std::move(own));
       }
     }
     return out;
   }
+  std::string sections(ReportPlace place) { return fmt::format("{}", fmt::join(parts(place), "")); }
 
   // The number of a stage at "/<id>/<pointer into its result>".
   const Json* number_at(const std::string& pointer) const {
@@ -185,39 +143,119 @@ class Report {
     return row;
   }
 
-  std::string verdict_line() const {
+  // Whether the run came to its end: a line only where there is something to say.
+  std::string state_line() const {
     const bool fine = outcome_.code == exit_ok;
-    std::string text = fine                                 ? "finished"
-                       : outcome_.code == exit_check_failed ? "finished, but a check failed"
-                       : outcome_.code == exit_interrupted  ? "interrupted"
-                                                            : "stopped";
-    std::string out = fmt::format("<p class=\"{}\">{}</p>\n", fine ? "good" : "bad", text);
+    const std::string text = fine                                 ? "finished"
+                             : outcome_.code == exit_check_failed ? "finished, but a check failed"
+                             : outcome_.code == exit_interrupted  ? "interrupted"
+                                                                  : "stopped";
+    std::string out = fmt::format("<p class=\"{}\">{}</p>\n", fine ? "soft" : "bad", text);
     if (!outcome_.error.empty())
       out += fmt::format("<div class=\"banner\"><strong>What stopped it</strong>{}</div>\n", html(outcome_.error));
     return out;
   }
 
+  // A warning as the page groups it.
+  struct Shown {
+    std::string stage, text, todo;
+    WarningEffect effect = WarningEffect::rest;
+  };
+  Shown shown_warning(const std::string& warning) const {
+    Shown out{"", warning, "", WarningEffect::recipe};
+    for (const PlannedStage& stage : plan_.stages) {
+      if (!warning.starts_with(stage.id + ": ")) continue;
+      out = {stage.id, warning.substr(stage.id.size() + 2), "", WarningEffect::rest};
+      for (const WarningAdvice& advice : stage.row->pages.warnings) {
+        if (out.text.find(advice.about) == std::string::npos) continue;
+        out.effect = advice.effect, out.todo = advice.todo;
+        break;
+      }
+      break;
+    }
+    return out;
+  }
+
+  // Grouped by what they do to the answer; each folded, with what to do.
   std::string warnings() const {
     if (outcome_.warnings.empty()) return "";
-    std::string out = "<div class=\"warnings\"><strong>Warnings</strong><ul>\n";
-    for (const std::string& warning : outcome_.warnings) out += fmt::format("<li>{}</li>\n", html(warning));
-    return out + "</ul></div>\n";
+    constexpr std::array groups = {
+        std::pair(WarningEffect::answer, "They change the answer or its error"),
+        std::pair(WarningEffect::measurement, "They change what was measured"),
+        std::pair(WarningEffect::recipe, "About the recipe: the bed may not be the one you mean"),
+        std::pair(WarningEffect::rest, "They do not change the answer")};
+    std::vector<Shown> all;
+    for (const std::string& warning : outcome_.warnings) all.push_back(shown_warning(warning));
+    std::string out = fmt::format("<section class=\"warnings\" aria-label=\"warnings\">\n<h2>{} warning{}</h2>\n",
+                                  all.size(), all.size() == 1 ? "" : "s");
+    for (const auto& [effect, heading] : groups) {
+      std::string own;
+      for (const Shown& one : all) {
+        if (one.effect == effect) own += warning_html(one);
+      }
+      if (!own.empty()) out += fmt::format("<h3>{}</h3>\n{}", heading, own);
+    }
+    return out + "</section>\n";
+  }
+
+  static std::string warning_html(const Shown& one) {
+    const std::string stage = one.stage.empty() ? "" : fmt::format("<span class=\"soft\">{}:</span> ", html(one.stage));
+    std::string rest;
+    const std::string first = first_sentence(one.text, rest);
+    if (rest.empty() && one.todo.empty()) return fmt::format("<p>{}{}</p>\n", stage, prose(first));
+    return fmt::format(
+        "<details><summary>{}{}</summary>{}{}</details>\n", stage, prose(first),
+        rest.empty() ? "" : fmt::format("<p>{}</p>", prose(rest)),
+        one.todo.empty() ? "" : fmt::format("<p class=\"todo\"><strong>What to do:</strong> {}</p>", prose(one.todo)));
+  }
+
+  // What ends with ". " or ": " and is long enough to stand alone; the rest of the text goes to `rest`.
+  static std::string first_sentence(const std::string& text, std::string& rest) {
+    constexpr std::size_t shortest = 24;
+    for (std::size_t i = shortest; i + 2 < text.size(); ++i) {
+      if ((text[i] != '.' && text[i] != ':' && text[i] != ';') || text[i + 1] != ' ') continue;
+      rest = text.substr(i + 2);
+      return text.substr(0, text[i] == '.' ? i + 1 : i);
+    }
+    return text;
+  }
+
+  // The published numbers beside the answer, in short; the table with their places is below.
+  std::string published_facts() const {
+    const std::vector<Row> rows = published_rows();
+    if (rows.empty()) return "";
+    std::string out = "<section class=\"answer\" aria-label=\"published numbers\"><dl class=\"facts\">\n";
+    for (const Row& row : rows)
+      out += fmt::format(
+          "<div><dt>{}</dt><dd>{} <span class=\"tag computed\">computed</span><br>{} <span class=\"tag "
+          "published\">published</span><br><span class=\"verdict {}\">{}</span></dd></div>\n",
+          prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad", html(row.verdict));
+    return out + "</dl></section>\n";
+  }
+
+  std::string about() const {
+    std::string out;
+    for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
+    if (plan_.report.text.empty() && !plan_.description.empty())
+      out += fmt::format("<p>{}</p>\n", html(plan_.description));
+    return out.empty() ? out : "<h2>What was done</h2>\n" + out;
   }
 
   std::string published() const {
     const std::vector<Row> rows = published_rows();
     if (rows.empty()) return "";
+    const std::vector<std::string> head{"number", "ours", "published", "verdict", "where"};
     std::string out =
-        "<h2>Our numbers beside the published ones</h2>\n<div "
-        "class=\"scroll\"><table>\n<tr><th>number</th><th>ours</th><th>published</th><th>verdict</th><th>where</th></"
-        "tr>\n";
-    for (const Row& row : rows) {
-      out += fmt::format(
-          "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td "
-          "class=\"{}\">{}</td><td>{}</td></tr>\n",
-          html(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad", html(row.verdict),
-          html(row.place));
-    }
+        "<h2>Our numbers beside the published ones</h2>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>number"
+        "</th><th class=\"computed\">ours <span class=\"tag computed\">computed</span></th><th "
+        "class=\"published\">theirs "
+        "<span class=\"tag published\">published</span></th><th>verdict</th><th>where</th></tr>\n";
+    for (const Row& row : rows)
+      out += table_row(head, {{prose(row.label)},
+                              {html(row.ours), "number"},
+                              {html(row.published), "number"},
+                              {html(row.verdict), row.agrees ? "good" : "bad"},
+                              {html(row.place)}});
     return out + "</table></div>\n";
   }
 
@@ -244,6 +282,7 @@ class Report {
       std::size_t listed = 0;
       for (const Fingerprint& file : stage.record->outputs) {
         const std::string extension = fs::path(file.file).extension().string();
+        if (file.file.ends_with(plot_data_suffix)) continue;  // inside the figure itself
         const bool text = extension == ".csv" || extension == ".json" || extension == ".svg" || extension == ".dat" ||
                           extension == ".gp" || extension == ".xml";
         const fs::path path = outcome_.out / stage.id / file.file;
@@ -273,22 +312,27 @@ class Report {
   std::string audit() const {
     if (!plan_.report.audit) return "";
     const Json audit = audit_json();
+    const std::vector<std::string> head{"number", "printed", "recomputed", "difference", "status", "explanation"};
     std::string out = fmt::format(
         "<h2>The paper's numbers, recomputed</h2>\n<p class=\"soft\">{}: what it prints, and the same from its own "
-        "formulas.</p>\n<div class=\"scroll\"><table>\n<tr><th>number</th><th>printed</th><th>recomputed</th><th>"
-        "difference</th><th>status</th><th>explanation</th></tr>\n",
+        "formulas.</p>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>number</th><th "
+        "class=\"published\">printed "
+        "<span class=\"tag published\">published</span></th><th class=\"computed\">recomputed <span class=\"tag "
+        "computed\">computed</span></th><th>difference</th><th>status</th><th>explanation</th></tr>\n",
         html(audit["paper"].get<std::string>()));
     for (const Json& row : audit["rows"]) {
       const std::string status = row["status"].get<std::string>();
       const std::string difference = row.contains("relative_difference")
                                          ? fmt::format("{:+.3g} %", 100 * row["relative_difference"].get<double>())
                                          : std::string("–");
-      out += fmt::format(
-          "<tr><td>{}<br><span class=\"soft\">{}</span></td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td "
-          "class=\"{}\">{}</td><td>{}</td></tr>\n",
-          prose(row["quantity"].get<std::string>()), html(row["place"].get<std::string>()),
-          prose(row["printed_text"].get<std::string>()), prose(row["recomputed_text"].get<std::string>()), difference,
-          status == "open" ? "bad" : "good", html(status), prose(row["explanation"].get<std::string>()));
+      out += table_row(head,
+                       {{fmt::format("{}<br><span class=\"soft\">{}</span>", prose(row["quantity"].get<std::string>()),
+                                     html(row["place"].get<std::string>()))},
+                        {prose(row["printed_text"].get<std::string>())},
+                        {prose(row["recomputed_text"].get<std::string>())},
+                        {difference, "number"},
+                        {html(status), status == "open" ? "bad" : "good"},
+                        {prose(row["explanation"].get<std::string>())}});
     }
     return out + "</table></div>\n";
   }
@@ -297,15 +341,17 @@ class Report {
     if (plan_.report.assumed.empty()) return "";
     std::string out =
         "<h2>Assumed inputs</h2>\n<p class=\"soft\">The source does not give these; other values give other "
-        "results.</p>\n<div class=\"scroll\"><table>\n<tr><th>input</th><th>value</th><th></th><th>why</th></tr>\n";
+        "results.</p>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>input</th><th class=\"assumed\">value "
+        "<span "
+        "class=\"tag assumed\">assumed</span></th><th>why</th></tr>\n";
     for (const AssumedInput& input : plan_.report.assumed) {
       std::string value = "–";
       const JsonNode* node = find_pointer(plan_.document, input.pointer);
       if (node != nullptr) value = node->is_string() ? node->text : dump_canonical(node->to_json());
-      out += fmt::format(
-          "<tr><td><code>{}</code></td><td class=\"number\">{}</td><td><span "
-          "class=\"tag\">assumed</span></td><td>{}</td></tr>\n",
-          html(input.pointer), html(value), html(input.why));
+      out +=
+          table_row({"input", "value", "why"}, {{"<code>" + html(input.pointer) + "</code>"},
+                                                {html(value) + " <span class=\"tag assumed\">assumed</span>", "number"},
+                                                {html(input.why)}});
     }
     return out + "</table></div>\n";
   }
@@ -448,6 +494,7 @@ class ReportPages : public Pages {
   void write(const Plan& plan, const RunOutcome& outcome) const override {
     write_file_atomically(outcome.out / "report.html", report_html(plan, outcome));
     write_file_atomically(outcome.out / "summary.md", summary_markdown(plan, outcome));
+    write_file_atomically(outcome.out / crate_name, dump(crate_json(plan, outcome)));
   }
   void write(const Plan& plan, const SweepOutcome& outcome) const override { write_sweep_pages(plan, outcome); }
 };

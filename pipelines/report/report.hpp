@@ -1,5 +1,6 @@
-// report.html: one file that shows everything, without a network: warnings first, the figures, the bed, the numbers
-// beside the published ones, what was assumed, the stages with their times, and where it all came from. What it shows
+// report.html: one file that shows everything, without a network: the answer first, the figure that shows it, the
+// warnings, the bed and its film, the figures, the numbers beside the published ones, what was assumed, the stages with
+// their times, and where it all came from. What it shows
 // of a stage is the stage's own (StagePages).
 //
 // What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md: without these
@@ -18,8 +19,5 @@ const Pages& report_pages();
 // For the terminal: the table of our numbers beside the published ones, or, where the recipe names none, what the
 // stages say.
 std::string terminal_text(const Plan& plan, const RunOutcome& outcome);
-
-// For other pages of ours. The page up to and with its headline; it ends with "</main>\n</body>\n</html>\n".
-std::string page_head(const std::string& title);
 
 }  // namespace shakebed::pipelines

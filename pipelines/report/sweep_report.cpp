@@ -3,15 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/quantity.hpp"
-#include "pipelines/report/report.hpp"
+#include "pipelines/report/page.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 #include "pipelines/runner/sweep_table.hpp"
 #include "pipelines/stages/answer.hpp"
@@ -24,6 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_html_rows = 500, most_markdown_rows = 50;  // all are in sweep.csv
 constexpr std::size_t most_series = 6;                                // of one figure: as many colours are told apart
+constexpr std::size_t longest_label = 60;                             // of an axis of a figure, in characters
+constexpr std::size_t most_columns_of_map = 40;
 
 std::optional<double> number_of(const std::string& text) {
   double value = 0;
@@ -32,15 +37,63 @@ std::optional<double> number_of(const std::string& text) {
   return value;
 }
 
-// "/stages/bed/floor/amplitude" → "bed floor amplitude"; or only its last word.
+// "/stages/bed/floor/amplitude" → "floor amplitude"; or only its last word. The strength of the shaking by its symbol.
 std::string words_of(const std::string& pointer, bool only_last) {
+  std::vector<std::string> tokens = split_pointer(pointer);
+  if (tokens.size() > 2 && tokens[0] == "stages") tokens.erase(tokens.begin(), tokens.begin() + 2);
+  if (tokens.empty()) return "seed";
+  if (tokens.back() == "gamma") return "Γ";
+  if (only_last) return words(tokens.back());
   std::string text;
-  for (const std::string& token : split_pointer(pointer)) {
-    if (token == "stages" && text.empty()) continue;
-    text = only_last || text.empty() ? token : text + " " + token;
-  }
-  std::replace(text.begin(), text.end(), '_', ' ');
+  for (const std::string& token : tokens) text += (text.empty() ? "" : " ") + words(token);
   return text;
+}
+
+// An axis as people wrote it: in the unit of the recipe.
+struct AxisScale {
+  std::string unit{};
+  double factor = 1;  // SI in one of it
+};
+
+// What a collected number is, in the words of its stage, with the stage's id where several have it; its unit for
+// people.
+struct NumberWords {
+  std::string name, unit;
+  double factor = 1;  // from the unit in the table
+};
+NumberWords words_of_number(const Plan& plan, const std::string& pointer) {
+  const std::vector<std::string> tokens = split_pointer(pointer);
+  const PlannedStage* stage = tokens.empty() ? nullptr : plan.find(tokens.front());
+  NumberWords out{words_of(pointer, false), unit_of_result(plan, pointer)};
+  if (stage != nullptr && stage->results) {
+    const std::string own = pointer.substr(1 + escape_pointer_token(tokens.front()).size());
+    if (const StatedResult* stated = stage->results->find(own);
+        stated != nullptr && !stated->meaning.empty() && stated->meaning.size() <= longest_label)
+      out.name = stated->meaning;
+  }
+  if (out.unit == "m") out.unit = "mm", out.factor = 1e3;
+  if (out.unit == "1") out.unit.clear();
+  return out;
+}
+
+std::string with_unit(const std::string& name, const std::string& unit) {
+  return unit.empty() ? name : name + "  [" + unit + "]";
+}
+
+// Dark blue to yellow, lightness rising [cividis; Nunez, Anderton and Renslow 2018], with text that stands out from it.
+std::string map_colour(double share) {
+  constexpr std::array<std::array<double, 3>, 5> stops = {
+      {{0, 34, 78}, {59, 73, 108}, {123, 123, 120}, {188, 174, 108}, {254, 232, 56}}};
+  const double at = std::clamp(share, 0.0, 1.0) * (stops.size() - 1);
+  const std::size_t k = std::min<std::size_t>(stops.size() - 2, static_cast<std::size_t>(at));
+  std::array<double, 3> colour{};
+  for (std::size_t c = 0; c < 3; ++c)
+    colour[c] = stops[k][c] + (at - static_cast<double>(k)) * (stops[k + 1][c] - stops[k][c]);
+  // Relative luminance of 0.18: black and white text have the same contrast, 4.6, there.
+  const auto linear = [](double v) { return std::pow(v / 255, 2.2); };
+  const double light = 0.2126 * linear(colour[0]) + 0.7152 * linear(colour[1]) + 0.0722 * linear(colour[2]);
+  return fmt::format("background:rgb({:.0f} {:.0f} {:.0f});color:{}", colour[0], colour[1], colour[2],
+                     light > 0.18 ? "#000" : "#fff");
 }
 
 // The figures of a sweep: every gathered number against the first axis that has numbers, one series for each
@@ -49,9 +102,64 @@ class SweepFigures {
  public:
   SweepFigures(const Plan& plan, const SweepOutcome& sweep)
       : plan_(plan), sweep_(sweep), axes_(plan.sweep->axes), random_(plan.sweep->kind == SweepKind::random) {
-    for (along_ = 0; along_ < axes_.size(); ++along_) {
-      if (position(sweep.points.front(), true)) break;
+    for (std::size_t a = 0; a < axes_.size(); ++a) scales_.push_back(scale_of(a));
+    while (along_ < axes_.size() && !place(sweep.points.front(), along_)) ++along_;
+  }
+
+  // "floor amplitude  [mm]".
+  std::string axis_label(std::size_t axis) const {
+    return with_unit(words_of(axes_[axis].pointer, false), scales_[axis].unit);
+  }
+
+  // A number over two parameters, replicas averaged; "" where it is not a grid of two.
+  std::string map_html(std::size_t k) const {
+    if (random_ || axes_.size() != 2 || !place(sweep_.points.front(), 0) || !place(sweep_.points.front(), 1)) return "";
+    struct Cell {
+      double sum = 0;
+      int count = 0;
+      bool hollow = false;
+    };
+    std::map<double, std::map<double, Cell>> rows;  // by the second axis, then by the first
+    std::set<double> columns;
+    const std::size_t column = 3 + axes_.size() + 2 * k;
+    for (std::size_t i = 0; i < sweep_.points.size(); ++i) {
+      const auto x = place(sweep_.points[i], 0), y = place(sweep_.points[i], 1),
+                 value = number_of(sweep_.table[i + 1][column]);
+      if (!x || !y) continue;
+      columns.insert(*x);
+      Cell& cell = rows[*y][*x];
+      if (value) cell.sum += *value, ++cell.count;
+      cell.hollow = cell.hollow || hollow(i);
     }
+    if (columns.size() < 2 || rows.size() < 2 || columns.size() > most_columns_of_map) return "";
+    double low = INFINITY, high = -INFINITY;
+    for (const auto& [ignored, row] : rows) {
+      for (const auto& [ignored_too, cell] : row) {
+        if (cell.count > 0) low = std::min(low, cell.sum / cell.count), high = std::max(high, cell.sum / cell.count);
+      }
+    }
+    const NumberWords number = words_of_number(plan_, sweep_.collected[k]);
+    std::string out =
+        fmt::format("<h3>{}</h3>\n<div class=\"scroll\"><table class=\"map\">\n<tr><th>{} ↓ {} →</th>",
+                    prose(with_unit(number.name, number.unit)), prose(axis_label(1)), prose(axis_label(0)));
+    for (const double x : columns) out += fmt::format("<th scope=\"col\">{:.4g}</th>", x);
+    out += "</tr>\n";
+    for (const auto& [y, row] : rows) {
+      out += fmt::format("<tr><th scope=\"row\">{:.4g}</th>", y);
+      for (const double x : columns) {
+        const auto cell = row.find(x);
+        if (cell == row.end() || cell->second.count == 0) {
+          out += "<td>–</td>";
+          continue;
+        }
+        const double value = cell->second.sum / cell->second.count,
+                     share = high > low ? (value - low) / (high - low) : 0.5;
+        out += fmt::format("<td style=\"{}\">{:.3g}{}</td>", map_colour(share), number.factor * value,
+                           cell->second.hollow ? " ○" : "");
+      }
+      out += "</tr>\n";
+    }
+    return out + "</table></div>\n";
   }
 
   std::vector<fs::path> operator()(const fs::path& folder) {
@@ -69,19 +177,28 @@ class SweepFigures {
   }
 
  private:
-  // Where a point lies along the axis; the axis itself must have numbers or quantities with a unit.
-  std::optional<double> position(const SweepPoint& point, bool first = false) {
-    const Json& at = point.values[along_];
+  // Where a point lies along an axis, in the unit of the recipe; nothing where the value is no number.
+  std::optional<double> place(const SweepPoint& point, std::size_t axis) const {
+    const Json& at = point.values[axis];
     try {
-      if (at.is_number()) return at.get<double>();
-      if (!at.is_string()) return std::nullopt;
-      const Quantity quantity = parse_quantity(at.get<std::string>());
-      if (first && !quantity.has_unit) return std::nullopt;
-      if (first) unit_ = si_unit(quantity.dimension);
-      return quantity.value;
-    } catch (const std::invalid_argument&) {
-      return std::nullopt;
+      if (at.is_number()) return at.get<double>() / scales_[axis].factor;
+      if (at.is_string()) return parse_quantity(at.get<std::string>()).value / scales_[axis].factor;
+    } catch (const std::invalid_argument&) {}
+    return std::nullopt;
+  }
+
+  // The unit of the first value that has one.
+  AxisScale scale_of(std::size_t axis) const {
+    for (const SweepPoint& point : sweep_.points) {
+      if (!point.values[axis].is_string()) continue;
+      const std::string text = point.values[axis].get<std::string>();
+      const std::size_t unit = text.find_first_not_of("+-0123456789.eE ");
+      try {
+        if (unit != std::string::npos && parse_quantity(text).has_unit)
+          return {text.substr(unit), parse_quantity("1 " + text.substr(unit)).value};
+      } catch (const std::invalid_argument&) {}
     }
+    return {};
   }
 
   // The values of the other axes.
@@ -94,12 +211,6 @@ class SweepFigures {
                            value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : value_text(value));
     }
     return label.empty() ? "points" : label;
-  }
-
-  // "  [m g D]" of the number that is drawn.
-  std::string unit_text(std::size_t k) const {
-    const std::string unit = unit_of_result(plan_, sweep_.collected[k]);
-    return unit == "1" ? "" : "  [" + unit + "]";
   }
 
   // Points without one temperature are hollow.
@@ -122,18 +233,19 @@ class SweepFigures {
   }
 
   Picture picture_of(std::size_t k) {
-    Picture picture{.x_label = words_of(axes_[along_].pointer, false) + (unit_.empty() ? "" : "  [" + unit_ + "]"),
-                    .y_label = words_of(sweep_.collected[k], false) + unit_text(k)};
+    const NumberWords number = words_of_number(plan_, sweep_.collected[k]);
+    Picture picture{.x_label = axis_label(along_), .y_label = with_unit(number.name, number.unit)};
     const std::size_t column = 3 + axes_.size() + 2 * k;
     std::map<std::string, std::size_t> groups;
     for (std::size_t i = 0; i < sweep_.points.size(); ++i) {
       const std::vector<std::string>& row = sweep_.table[i + 1];
-      const std::optional<double> x = position(sweep_.points[i]), y = number_of(row[column]);
+      const std::optional<double> x = place(sweep_.points[i], along_), y = number_of(row[column]);
       if (!x || !y) continue;
       Series* series = series_of(picture, groups, i);
       if (series == nullptr) continue;
-      series->x.push_back(*x), series->y.push_back(*y);
-      if (const std::optional<double> error = number_of(row[column + 1])) series->error.push_back(*error);
+      series->x.push_back(*x), series->y.push_back(number.factor * *y);
+      if (const std::optional<double> error = number_of(row[column + 1]))
+        series->error.push_back(number.factor * *error);
     }
     for (Series& series : picture.series) {
       if (series.error.size() != series.x.size()) series.error.clear();
@@ -145,53 +257,130 @@ class SweepFigures {
   const SweepOutcome& sweep_;
   const std::vector<SweepAxis>& axes_;
   bool random_;
+  std::vector<AxisScale> scales_;
   std::size_t along_ = 0;
-  std::string unit_;
 };
 
 std::string title_of(const Plan& plan) { return plan.report.title.empty() ? plan.name : plan.report.title; }
 
-std::string html_of(const Plan& plan, const SweepOutcome& sweep, const std::vector<fs::path>& figures) {
-  std::string out = page_head(title_of(plan));
-  for (const std::string& paragraph : plan.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
-  if (!sweep.problems.empty()) {
-    out += "<div class=\"warnings\"><strong>Points that failed</strong><ul>\n";
-    for (const std::string& problem : sweep.problems) out += fmt::format("<li>{}</li>\n", escape_markup(problem));
-    out += "</ul></div>\n";
+// The page of a sweep: what the points say, figures, maps, the table of points.
+class SweepPage {
+ public:
+  SweepPage(const Plan& plan, const SweepOutcome& sweep) : plan_(plan), sweep_(sweep), figures_(plan, sweep) {}
+
+  std::string operator()() {
+    std::string out = page_head(title_of(plan_)) + answer();
+    int number = 0;
+    std::size_t k = 0;
+    for (const fs::path& figure : figures_(sweep_.out / "figures"))
+      out += figure_html(figure, ++number,
+                         ++k == 1 ? "Each number against the first parameter; error bars: one standard error." : "");
+    out += warnings() + maps() + points();
+    for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
+    if (plan_.report.text.empty() && !plan_.description.empty())
+      out += fmt::format("<p>{}</p>\n", escape_markup(plan_.description));
+    return out + page_tail();
   }
-  if (!sweep.verdicts.empty()) {
-    out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep.verdicts)));
-    if (sweep.verdicts.size() > 1 || !is_one_temperature(sweep.verdicts.begin()->first))
-      out += " Points without one temperature are drawn hollow.";
-    out += "</p>\n";
+
+ private:
+  std::string answer() const {
+    const std::size_t points = sweep_.table.size() - 1;
+    const auto good = static_cast<std::size_t>(
+        std::count_if(sweep_.table.begin() + 1, sweep_.table.end(), [](const auto& row) { return row[2] == "ok"; }));
+    std::string out = fmt::format(
+        "<section class=\"answer {}\" aria-label=\"the answer\">\n<p class=\"headline\">{} of {} points are done</p>\n",
+        good == points ? "good-answer" : "bad-answer", good, points);
+    if (!sweep_.verdicts.empty()) {
+      out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep_.verdicts)));
+      if (sweep_.verdicts.size() > 1 || !is_one_temperature(sweep_.verdicts.begin()->first))
+        out += " Points without one temperature are drawn hollow (○ in maps).";
+      out += "</p>\n";
+    }
+    return out + "</section>\n";
   }
-  if (!sweep.warnings.empty()) {
-    out += "<div class=\"warnings\"><strong>Warnings of points</strong><ul>\n";
-    for (const std::string& warning : sweep.warnings) out += fmt::format("<li>{}</li>\n", escape_markup(warning));
-    out += "</ul></div>\n";
+
+  std::string warnings() const {
+    std::string out;
+    const auto group = [&](const char* heading, const std::vector<std::string>& sentences) {
+      if (sentences.empty()) return;
+      out += fmt::format("<details{}><summary>{}: {}</summary>", out.empty() ? " open" : "", heading, sentences.size());
+      for (const std::string& sentence : sentences) out += fmt::format("<p>{}</p>\n", escape_markup(sentence));
+      out += "</details>\n";
+    };
+    std::vector<std::string> of_recipe;
+    for (const Warning& warning : plan_.warnings)
+      of_recipe.push_back(
+          fmt::format("{}: {}. {}", warning.problem.pointer, warning.problem.what, warning.problem.suggestion));
+    group("Points that failed", sweep_.problems);
+    group("Warnings of points", sweep_.warnings);
+    group("Warnings of the recipe", of_recipe);
+    return out.empty() ? out : "<section class=\"warnings\" aria-label=\"warnings\">\n" + out + "</section>\n";
   }
-  if (!plan.warnings.empty()) {
-    out += "<div class=\"warnings\"><strong>Warnings</strong><ul>\n";
-    for (const Warning& warning : plan.warnings)
-      out += fmt::format("<li>{}: {}. {}</li>\n", escape_markup(warning.problem.pointer),
-                         escape_markup(warning.problem.what), escape_markup(warning.problem.suggestion));
-    out += "</ul></div>\n";
+
+  std::string maps() const {
+    std::string out;
+    for (std::size_t k = 0; k < sweep_.collected.size(); ++k) out += figures_.map_html(k);
+    return out.empty() ? out : "<h2>Maps over both parameters</h2>\n" + out;
   }
-  int number = 0;
-  for (const fs::path& figure : figures) out += fmt::format("<figure>{}</figure>\n", inline_svg(figure, ++number));
-  const std::vector<std::vector<std::string>>& table = sweep.table;
-  out += fmt::format("<h2>{} points</h2>\n<div class=\"scroll\"><table>\n", table.size() - 1);
-  for (std::size_t i = 0; i < table.size() && i <= most_html_rows; ++i) {
-    out += "<tr>";
-    for (const std::string& cell : table[i])
-      out += (i == 0 ? "<th>" : "<td class=\"number\">") + escape_markup(cell) + (i == 0 ? "</th>" : "</td>");
-    out += "</tr>\n";
+
+  bool has_verdicts() const { return sweep_.table.front().back() == verdict_column; }
+  bool has_replicas() const {
+    return std::any_of(sweep_.points.begin(), sweep_.points.end(), [](const SweepPoint& p) { return p.replica > 0; });
   }
-  out += "</table></div>\n";
-  if (table.size() > most_html_rows + 1)
-    out += fmt::format("<p>The first {} of them; all are in sweep.csv.</p>\n", most_html_rows);
-  return out + "</main>\n</body>\n</html>\n";
-}
+
+  std::vector<std::string> header() const {
+    std::vector<std::string> out{"point"};
+    if (has_replicas()) out.emplace_back("replica");
+    out.emplace_back("status");
+    for (std::size_t a = 0; a < plan_.sweep->axes.size(); ++a)
+      out.push_back(prose(words_of(plan_.sweep->axes[a].pointer, false)));
+    for (const std::string& pointer : sweep_.collected) {
+      const NumberWords number = words_of_number(plan_, pointer);
+      out.push_back(prose(with_unit(number.name, number.unit)));
+    }
+    if (has_verdicts()) out.emplace_back("verdict");
+    return out;
+  }
+
+  // A point, with the page of its own where it has one.
+  std::string row(std::size_t i, const std::vector<std::string>& head) const {
+    const std::vector<std::string>& cells = sweep_.table[i + 1];
+    const std::string own = "points/" + cells[0] + "/report.html";
+    std::vector<TableCell> out;
+    out.push_back(
+        {fs::exists(sweep_.out / own) ? fmt::format("<a href=\"{}\">{}</a>", own, cells[0]) : escape_markup(cells[0])});
+    if (has_replicas()) out.push_back({cells[1], "number"});
+    out.push_back({escape_markup(cells[2]), cells[2] == "ok" ? "good" : "bad"});
+    std::size_t c = 3;
+    for (; c < 3 + plan_.sweep->axes.size(); ++c) out.push_back({escape_markup(cells[c]), "number"});
+    for (const std::string& pointer : sweep_.collected) {
+      const double factor = words_of_number(plan_, pointer).factor;
+      const auto value = number_of(cells[c]), error = number_of(cells[c + 1]);
+      out.push_back({!value ? "–" : quantity_cell(factor * *value, factor * error.value_or(0)), "number"});
+      c += 2;
+    }
+    if (has_verdicts()) out.push_back({escape_markup(cells[c]), is_one_temperature(cells[c]) ? "good" : "caution"});
+    return table_row(head, out);
+  }
+
+  static std::string quantity_cell(double value, double error) { return shown(quantity_json(value, "1", error)); }
+
+  std::string points() const {
+    const std::vector<std::string> head = header();
+    const std::size_t points = sweep_.table.size() - 1;
+    std::string out = fmt::format("<h2>{} points</h2>\n<div class=\"scroll\"><table class=\"sortable\">\n", points) +
+                      table_head(head);
+    for (std::size_t i = 0; i < points && i < most_html_rows; ++i) out += row(i, head);
+    out += "</table></div>\n";
+    if (points > most_html_rows)
+      out += fmt::format("<p>The first {} of them; all are in sweep.csv.</p>\n", most_html_rows);
+    return out;
+  }
+
+  const Plan& plan_;
+  const SweepOutcome& sweep_;
+  SweepFigures figures_;
+};
 
 std::string markdown_of(const Plan& plan, const SweepOutcome& sweep) {
   const std::vector<std::vector<std::string>>& table = sweep.table;
@@ -225,8 +414,7 @@ std::string markdown_of(const Plan& plan, const SweepOutcome& sweep) {
 void write_sweep_pages(const Plan& plan, const SweepOutcome& sweep) {
   write_file_atomically(sweep.out / "summary.md", markdown_of(plan, sweep));
   if (!sweep.complete) return;  // a shard alone has nothing to show yet
-  const std::vector<fs::path> figures = SweepFigures(plan, sweep)(sweep.out / "figures");
-  write_file_atomically(sweep.out / "report.html", html_of(plan, sweep, figures));
+  write_file_atomically(sweep.out / "report.html", SweepPage(plan, sweep)());
 }
 
 }  // namespace shakebed::pipelines

@@ -26,7 +26,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t most_failures = 20;  // that are listed one by one
+constexpr std::size_t most_failures = 20;      // that are listed one by one
+constexpr std::size_t most_point_pages = 200;  // a page is 0.1 to 3 MB; points of larger sweeps have none
 
 struct Shard {
   std::uint64_t number = 1, of = 1;  // 1 to of
@@ -201,8 +202,19 @@ class SweepRun {
     record["cells"] = gather_cells(at, alone.out, pointers_);
     record["pointers"] = pointers_;
     record["verdict"] = verdict_of(at, alone.out);
+    write_page(at, outcome);
     write_file_atomically(alone.out / point_record, dump(record));
     return PointEnd::finished;
+  }
+
+  // A point's own page, which the table of the sweep links. Its numbers are there without it.
+  void write_page(const Plan& at, const RunOutcome& outcome) {
+    if (all_.size() > most_point_pages) return;
+    try {
+      pages_.write(at, outcome);
+    } catch (const Error& error) {
+      console_.warning(fmt::format("{}: its page could not be written: {}", outcome.out.string(), error.what()));
+    }
   }
 
   void count(const SweepPoint& point, const RunOutcome& outcome) {

@@ -10,68 +10,15 @@
 
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/frame_profiles.hpp"
 
 namespace shakebed::pipelines {
 
 namespace {
 
 // What a page can carry: 200,000 positions are 0.8 MB, 1.1 MB in base64.
+// The player is pipelines/report/page/bed.js.
 constexpr std::size_t most_disks = 5000, most_frames = 96, most_positions = 200'000;
-
-// Plays what `scene` describes on the canvas in `figure`. Positions are 16-bit fractions of the drawn width and height.
-// Colours follow the page's; who asked for less motion gets a bed at rest and a button.
-constexpr std::string_view player = R"js(
-(() => {
-  const figure = document.getElementById("bed-in-motion"), scene = JSON.parse(figure.dataset.scene);
-  const bytes = Uint8Array.from(atob(figure.dataset.positions), c => c.charCodeAt(0));
-  const at = new Uint16Array(bytes.buffer), n = scene.radius.length, frames = scene.floor.length;
-  const canvas = figure.querySelector("canvas"), context = canvas.getContext("2d");
-  const button = figure.querySelector("button"), slider = figure.querySelector("input"), text = figure.querySelector("output");
-  figure.classList.add("plays");
-  let shown = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, since = 0;
-  const draw = () => {
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, margin = 0.6;
-    const unit = width / (scene.width + 2 * margin), height = Math.round(unit * (scene.high - scene.low));
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); canvas.style.height = height + "px";
-    }
-    const css = getComputedStyle(figure), colors = [css.getPropertyValue("--disk-a"), css.getPropertyValue("--disk-b")];
-    const x = v => (v + margin) * unit, y = v => (scene.high - v) * unit;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    for (const tone of [0, 1]) {
-      context.beginPath();
-      for (let i = 0; i < n; ++i) {
-        if (scene.tone[i] !== tone) continue;
-        const k = 2 * (shown * n + i), r = Math.max(0.5, scene.radius[i] * unit - 0.4);
-        const cx = x(at[k] / 65535 * scene.width), cy = y(scene.low + at[k + 1] / 65535 * (scene.high - scene.low));
-        context.moveTo(cx + r, cy); context.arc(cx, cy, r, 0, 2 * Math.PI);
-      }
-      context.fillStyle = colors[tone]; context.fill();
-    }
-    context.strokeStyle = css.color; context.lineWidth = Math.max(1, 0.12 * unit); context.beginPath();
-    const floor = y(scene.floor[shown]);
-    if (scene.walls) { context.moveTo(x(0), 0); context.lineTo(x(0), floor); context.lineTo(x(scene.width), floor); context.lineTo(x(scene.width), 0); }
-    else { context.moveTo(x(0), floor); context.lineTo(x(scene.width), floor); }
-    context.stroke();
-    slider.value = shown; text.textContent = scene.label[shown];
-    figure.dataset.drawn = Number(figure.dataset.drawn || 0) + 1;
-  };
-  const step = now => {
-    if (playing) {
-      if (now - since >= 50) { since = now; shown = (shown + 1) % frames; draw(); }
-      requestAnimationFrame(step);
-    }
-  };
-  const set = on => { playing = on && frames > 1; button.textContent = playing ? "Pause" : "Play"; if (playing) requestAnimationFrame(step); };
-  button.onclick = () => set(!playing);
-  slider.max = frames - 1;
-  slider.oninput = () => { set(false); shown = Number(slider.value); draw(); };
-  new ResizeObserver(draw).observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  draw(); set(playing);
-})();
-)js";
 
 std::string numbers(const std::vector<double>& values) {
   std::string out = "[";
@@ -166,6 +113,13 @@ std::string position_bytes(const std::vector<TrajectoryFrame>& frames, const Ext
   return bytes;
 }
 
+// The density of every frame shown, up to where the picture ends.
+std::string densities_json(const std::vector<TrajectoryFrame>& frames, const Extent& extent) {
+  std::vector<std::vector<double>> heights;
+  for (const TrajectoryFrame& frame : frames) heights.push_back(frame.z);
+  return dump_canonical(frame_profiles(heights, frames.front().width, extent.low, extent.high));
+}
+
 // What the player must know besides the positions.
 std::string scene_json(const std::vector<TrajectoryFrame>& frames, const Extent& extent, bool has_phase) {
   const TrajectoryFrame& first = frames.front();
@@ -181,10 +135,10 @@ std::string scene_json(const std::vector<TrajectoryFrame>& frames, const Extent&
     tones += fmt::format("{}{}", k == 0 ? "" : ",", static_cast<long>(std::floor(std::max(0.0, first.z[k]) / 2)) % 2);
   return fmt::format(
       "{{\"width\":{:.6g},\"low\":{:.6g},\"high\":{:.6g},\"walls\":{},\"radius\":{},\"floor\":{},\"tone\":[{}],"
-      "\"label\":[{}]}}",
+      "\"label\":[{}],\"profile\":{}}}",
       first.width, extent.low, extent.high, first.periodic ? "false" : "true",
       numbers(first.radius.empty() ? std::vector<double>(first.size(), 0.5) : first.radius), numbers(floor), tones,
-      labels);
+      labels, densities_json(frames, extent));
 }
 
 std::string attribute_text(std::string_view text) {
@@ -202,19 +156,18 @@ std::string animation_html(const std::filesystem::path& trajectory, double perio
   if (strobe) frames = by_phase(frames);
   const Extent extent = extent_of(frames);
   return fmt::format(
-      "<figure id=\"bed-in-motion\" data-scene=\"{}\" data-positions=\"{}\">\n<canvas role=\"img\" aria-label=\"the "
-      "bed in "
-      "motion\"></canvas>\n<div class=\"still\">{}</div>\n<div class=\"controls\"><button "
-      "type=\"button\">Play</button><input "
-      "type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame\"><output></output></div>\n<figcaption>{} disks, {} "
-      "frames of "
-      "the trajectory{}. Two tones by the height at the beginning show how the bed mixes.</figcaption></figure>\n"
-      "<script>{}</script>\n",
+      "<figure id=\"bed-in-motion\" class=\"bed\" data-scene=\"{}\" data-positions=\"{}\">\n<div class=\"stage\"><div "
+      "class=\"views\"><div class=\"picture\"><canvas role=\"img\" aria-label=\"the bed in "
+      "motion\"></canvas></div>\n<div "
+      "class=\"side\"></div></div>\n<div class=\"controls\"><button type=\"button\">Play</button><input "
+      "type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the bed\"><output></output></div></div>\n<div "
+      "class=\"still\">{}</div>\n<figcaption>{} disks, {} frames of the trajectory{}. Two tones by the height at the "
+      "beginning show how the bed mixes. Profile: this frame (orange) beside the mean of all (blue); dashed: the "
+      "floor.</figcaption></figure>\n",
       attribute_text(scene_json(frames, extent, period > 0)), base64(position_bytes(frames, extent)),
       still_picture(frames.front(), extent.low, extent.high), frames.front().size(), frames.size(),
       strobe ? ", in the order of the floor's phase: each is from another cycle, as under a stroboscope"
-             : " as time went",
-      player);
+             : " as time went");
 }
 
 }  // namespace shakebed::pipelines

@@ -27,18 +27,6 @@ std::string sentence(std::string text) {
   return text;
 }
 
-// A number for people: T/(m g) in mm where the diameter is known, else T in m g D.
-struct Scale {
-  const char *name, *unit;
-  double factor;  // from m g D
-};
-Scale scale_of(const Json& answer) {
-  const Json *length = find_pointer(answer, "/temperature_over_mg/value"),
-             *plain = find_pointer(answer, "/temperature/value");
-  if (length == nullptr || plain == nullptr || !(plain->get<double>() > 0)) return {"T", "m g D", 1};
-  return {"T/(m g)", "mm", 1e3 * length->get<double>() / plain->get<double>()};
-}
-
 }  // namespace
 
 KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter) {
@@ -99,11 +87,18 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   return out;
 }
 
+AnswerScale answer_scale(const Json& answer) {
+  const Json *length = find_pointer(answer, "/temperature_over_mg/value"),
+             *plain = find_pointer(answer, "/temperature/value");
+  if (length == nullptr || plain == nullptr || !(plain->get<double>() > 0)) return {"T", "m g D", 1};
+  return {"T/(m g)", "mm", 1e3 * length->get<double>() / plain->get<double>()};
+}
+
 std::string answer_text(const Json& answer) {
   const Json* value = find_pointer(answer, "/temperature/value");
   const std::string verdict = sentence(answer.value("verdict", "")) + ": " + answer.value("why", "");
   if (value == nullptr) return "no temperature. " + verdict;
-  const Scale scale = scale_of(answer);
+  const AnswerScale scale = answer_scale(answer);
   const auto number = [&](const char* pointer) {
     const Json* found = find_pointer(answer, pointer);
     return found != nullptr && found->is_number() ? scale.factor * found->get<double>() : 0;

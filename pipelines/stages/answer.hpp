@@ -27,6 +27,13 @@ bool is_one_temperature(std::string_view verdict);
 // Temperatures in m g D and, with the diameter [m], as T/(m g) in m.
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter);
 
+// How people read the temperatures of an answer: T/(m g) in mm where the diameter is known, else T in m g D.
+struct AnswerScale {
+  const char *name, *unit;
+  double factor;  // from m g D
+};
+AnswerScale answer_scale(const Json& answer);
+
 // "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why." Ends without a line break.
 std::string answer_text(const Json& answer);
 

@@ -8,19 +8,17 @@ namespace shakebed::pipelines {
 namespace {
 
 std::string checks_html(const FinishedStage& stage, int&) {
-  std::string out = fmt::format(
-      "<h2>Checks ({})</h2>\n<div "
-      "class=\"scroll\"><table>\n<tr><th>verdict</th><th>result</th><th>expected</th><th>found</th><th></th></"
-      "tr>\n",
-      escape_markup(stage.files.id));
+  const std::vector<std::string> head{"verdict", "result", "expected", "found", ""};
+  std::string out = fmt::format("<h2>Checks ({})</h2>\n<div class=\"scroll\"><table class=\"stack\">\n",
+                                escape_markup(stage.files.id)) +
+                    table_head({"verdict", "result", "expected", "found", "note"});
   for (const Json& row : stage.result.value("checks", Json::array())) {
     const bool passed = row.value("passed", false);
-    out += fmt::format(
-        "<tr><td class=\"{}\">{}</td><td><code>{}</code></td><td>{}</td><td "
-        "class=\"number\">{}</td><td>{}</td></tr>\n",
-        passed ? "good" : "bad", passed ? "passed" : "failed", escape_markup(row.value("pointer", "")),
-        escape_markup(row.value("expected", "")), escape_markup(row.value("found", "")),
-        escape_markup(row.value("why", row.value("note", ""))));
+    out += table_row(head, {{passed ? "passed" : "failed", passed ? "good" : "bad"},
+                            {"<code>" + escape_markup(row.value("pointer", "")) + "</code>"},
+                            {escape_markup(row.value("expected", ""))},
+                            {escape_markup(row.value("found", "")), "number"},
+                            {escape_markup(row.value("why", row.value("note", "")))}});
   }
   return out + "</table></div>\n";
 }

@@ -44,7 +44,7 @@ void DisksOnTheWay::take(const ingest::FrameReport& frame, const std::vector<ing
                  [](const ingest::MeasuredDisk& disk) { return disk.species == 1; });
     meter_->add(first);
   }
-  if (truth_ != nullptr) compare(frame.index * options_.stride, disks);
+  if (truth_ != nullptr) compare(frame.index, disks);
   keep_for_drawing(frame, disks);
 }
 
@@ -152,8 +152,9 @@ DisksOnTheWay::Centres DisksOnTheWay::truth_of(std::size_t frame) {
 }
 
 // Nearest true centre of each disk found, each true centre used once.
-void DisksOnTheWay::compare(std::size_t frame, const std::vector<ingest::MeasuredDisk>& disks) {
-  Centres truth = truth_of(frame);
+void DisksOnTheWay::compare(std::size_t index, const std::vector<ingest::MeasuredDisk>& disks) {
+  Centres truth = truth_of(index * options_.stride);
+  Marks marks;
   std::sort(truth.begin(), truth.end());
   real_ += truth.size(), reported_ += disks.size();
   std::vector<bool> used(truth.size(), false);
@@ -167,11 +168,23 @@ void DisksOnTheWay::compare(std::size_t frame, const std::vector<ingest::Measure
       if (dx * dx + dy * dy < best_distance && !used[static_cast<std::size_t>(at - truth.begin())])
         best_distance = dx * dx + dy * dy, best = at - truth.begin();
     }
-    if (best < 0) continue;
+    if (best < 0) {
+      marks.wrong.push_back(static_cast<std::size_t>(&disk - disks.data()));
+      continue;
+    }
     used[static_cast<std::size_t>(best)] = true;
     ++matched_;
     squares_ += best_distance;
   }
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    if (!used[k]) marks.missed.push_back(truth[k]);
+  }
+  if (!marks.missed.empty() || !marks.wrong.empty()) marks_.emplace(index, std::move(marks));
+}
+
+const DisksOnTheWay::Marks* DisksOnTheWay::marks(std::size_t frame) const {
+  const auto found = marks_.find(frame);
+  return found == marks_.end() ? nullptr : &found->second;
 }
 
 }  // namespace shakebed::pipelines

@@ -21,6 +21,12 @@ class DisksOnTheWay {
  public:
   using Frames = std::map<std::size_t, std::vector<ingest::MeasuredDisk>>;
 
+  // Where the truth is known: centres of disks that were not found [px], numbers of those found where there is none.
+  struct Marks {
+    std::vector<std::pair<double, double>> missed{};
+    std::vector<std::size_t> wrong{};
+  };
+
   // `truth`: a table of true centres, where it is known.
   DisksOnTheWay(RunContext& context, const ExtractOptions& options, std::istream* truth);
   void take(const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks);
@@ -39,11 +45,13 @@ class DisksOnTheWay {
   [[nodiscard]] std::string quality_figure() const;
   // Where the truth is known, how near the disks came.
   [[nodiscard]] std::optional<Json> truth() const;
+  // nullptr where every disk of the frame was found, and no other.
+  [[nodiscard]] const Marks* marks(std::size_t frame) const;
 
  private:
   using Centres = std::vector<std::pair<double, double>>;
   Centres truth_of(std::size_t frame);
-  void compare(std::size_t frame, const std::vector<ingest::MeasuredDisk>& disks);
+  void compare(std::size_t index, const std::vector<ingest::MeasuredDisk>& disks);
   void keep_for_drawing(const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks);
 
   const ExtractOptions& options_;
@@ -57,6 +65,7 @@ class DisksOnTheWay {
   std::size_t all_ = 0;
   std::size_t every_ = 1;
   Frames to_draw_;
+  std::map<std::size_t, Marks> marks_;
 };
 
 }  // namespace shakebed::pipelines

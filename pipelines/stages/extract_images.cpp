@@ -13,6 +13,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
+#include "pipelines/stages/film.hpp"
 #include "pipelines/stages/preview.hpp"
 
 namespace shakebed::pipelines {
@@ -248,7 +249,9 @@ class Extraction {
     bead_table(context_.table("bead.csv"), found.finder).write(context_.output("bead.csv"));
     ingest::write_png(context_.output("bead.png"), ingest::bead_picture(found.finder, 8));
     write_file(context_.output("count.svg"), count_figure(found.frames));
-    if (options_.overlays > 0) draw_overlays(context_, film_, found, on_the_way);
+    if (options_.overlays == 0) return;
+    draw_overlays(context_, film_, found, on_the_way);
+    write_film(context_, film_, found, on_the_way);
   }
 
   void add_velocities(DisksOnTheWay& on_the_way, Json& result) {

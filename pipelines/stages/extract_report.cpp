@@ -7,6 +7,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/extract.hpp"
+#include "pipelines/stages/film_viewer.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -28,10 +29,22 @@ std::vector<fs::path> overlays_of(const fs::path& directory) {
   return files;
 }
 
+// The film with the disks found, one still picture where scripts do not run.
+std::string film_html(const FinishedStage& stage, int&) {
+  const std::vector<fs::path> overlays = overlays_of(stage.files.directory);
+  std::string still;
+  if (!overlays.empty())
+    still = fmt::format("<img alt=\"disks found in frame {}\" src=\"data:image/png;base64,{}\">",
+                        escape_markup(overlays.front().stem().string().substr(8)), base64(read_file(overlays.front())));
+  return film_viewer(stage, still);
+}
+
 std::string pictures_html(const fs::path& directory) {
   std::string out;
   const std::vector<fs::path> overlays = overlays_of(directory);
-  for (const fs::path& path : overlays) {
+  // The first stands in for the film.
+  for (std::size_t i = fs::exists(directory / "film.json") ? 1 : 0; i < overlays.size(); ++i) {
+    const fs::path& path = overlays[i];
     out += fmt::format(
         "<figure><img alt=\"disks found\" src=\"data:image/png;base64,{}\"><figcaption>Disks found in frame {}: "
         "green circles; orange, those cut or half hidden; blue, floor and walls.</figcaption></figure>\n",
@@ -56,8 +69,7 @@ std::string curves_html(const fs::path& directory, int& pictures) {
   for (const auto& [name, caption] :
        {std::pair{"count.svg", "Disks against time: beads do not vanish, so a dip is a miss."},
         std::pair{"quality.svg", "Quality of the disks found."}}) {
-    if (const fs::path path = directory / name; fs::exists(path))
-      out += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", inline_svg(path, ++pictures), caption);
+    if (const fs::path path = directory / name; fs::exists(path)) out += figure_html(path, ++pictures, caption);
   }
   return out;
 }
@@ -84,6 +96,32 @@ std::string frames_html(const FinishedStage& stage, int& pictures) {
 
 }  // namespace
 
-StagePages extract_pages() { return {.sections = {{ReportPlace::frames, "Disks in the frames", frames_html}}}; }
+StagePages extract_pages() {
+  using enum WarningEffect;
+  return {
+      .sections = {{ReportPlace::film, "The film", film_html},
+                   {ReportPlace::frames, "Disks in the frames", frames_html}},
+      .warnings = {
+          {"may be wrong", measurement,
+           "Look through the film with the colours by quality: what is marked and is no bead?"},
+          {"missed or out of view", measurement,
+           "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone, or "
+           "more even light."},
+          {"passes for a bead", measurement,
+           "Look through the film for circles that are no beads; give a region (\"roi\") that holds the bed alone."},
+          {"outlines are not those", measurement,
+           "Check in the film that the circles are your beads; densities hold for disks alone."},
+          {"covered area", measurement, "Look through the film for beads that were missed or found twice."},
+          {"varies by", measurement, "Use a wider view, or a region (\"roi\") that beads do not leave."},
+          {"lower border", measurement, "Give the floor's row (\"floor\"): heights begin there."},
+          {"tilted", measurement, "Level the camera; heights are corrected for it."},
+          {"flickers", rest, "Nothing: it was taken out frame by frame. A steadier light gives smaller errors."},
+          {"no profiles by phase", rest, "Give \"frequency\" if the bed is shaken."},
+          {"frame_rate", rest, "Give \"frame_rate\" if the film was recorded faster than it plays."},
+          {"velocities", measurement, "Record faster: disks must move less than half a diameter between frames."},
+          {"T is too low", measurement, "Record faster, so that fast disks are followed too."},
+          {"finite-time", measurement, "Record faster, so that velocities hardly change between frames."},
+          {"", measurement, "Look through the film and the figures of the frames below."}}};
+}
 
 }  // namespace shakebed::pipelines

@@ -13,6 +13,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/process.hpp"
 #include "pipelines/formats/profile_csv.hpp"
+#include "pipelines/stages/plot_data.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -280,6 +281,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   std::erase_if(drawn.lower, is_empty);
   if (drawn.series.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
   write_file(directory / (name + ".dat"), data_blocks(drawn.series) + data_blocks(drawn.lower));
+  write_file(directory / (name + std::string(plot_data_suffix)), dump_canonical(plot_data(drawn)) + "\n");
 
   std::string body = frame_script(drawn);
   body += "set key above vertical maxrows key_rows Left reverse font keyfont spacing 1.2 samplen 1.5 width key_width\n";

@@ -1,7 +1,7 @@
 // figure: profiles, fits and published curves in one picture, by gnuplot.
 //
-// Files: profile.svg and profile.pdf with their profile.dat and profile.gp; windows.* (temperature against window,
-// where a fit is among the inputs); figure.json (how far the curves are from one another).
+// Files: profile.svg and profile.pdf with their profile.dat, profile.gp and profile.plot.json; windows.* (temperature
+// against window, where a fit is among the inputs); figure.json (how far the curves are from one another).
 #pragma once
 
 #include "pipelines/stages/stage.hpp"
@@ -40,7 +40,8 @@ struct DiskPicture {
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
 // Writes the script as NAME.gp and runs it; it must make NAME.svg and NAME.pdf. Throws StageError when it does not.
 void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script);
-// Writes NAME.dat, NAME.gp, NAME.svg and NAME.pdf into the folder. Throws StageError when gnuplot is missing or fails.
+// Writes NAME.dat, NAME.gp, NAME.svg, NAME.pdf and NAME.plot.json (what the page draws again, to be asked) into the
+// folder. Throws StageError when gnuplot is missing or fails.
 void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name);
 
 }  // namespace shakebed::pipelines

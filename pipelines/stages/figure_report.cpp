@@ -27,7 +27,9 @@ std::vector<fs::path> pictures_of(const FinishedStage& stage) {
   return files;
 }
 
+// What the recipe says, else the density profile.
 bool leads(const FinishedStage& stage, const std::string& name) {
+  if (stage.files.result_name == "figure.json") return name == "profile";
   const Json* lead = find_pointer(stage.result, "/" + escape_pointer_token(name) + "/lead");
   return lead != nullptr && lead->is_boolean() && lead->get<bool>();
 }
@@ -44,8 +46,7 @@ std::string pictures_html(const FinishedStage& stage, int& pictures, bool leadin
                               "allowed for."
         : name == "windows" ? "The fitted temperature against the lower edge of the window it is fitted in."
                             : words(name);
-    out +=
-        fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", inline_svg(path, ++pictures), prose(caption));
+    out += figure_html(path, ++pictures, prose(caption));
   }
   return out;
 }

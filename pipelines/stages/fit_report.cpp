@@ -2,6 +2,10 @@
 // reading a temperature from it.
 #include <fmt/format.h>
 
+#include <cctype>
+#include <optional>
+#include <utility>
+
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/fit.hpp"
@@ -9,12 +13,77 @@
 namespace shakebed::pipelines {
 namespace {
 
-// The answer first, then what to do about it.
-std::string answer_html(const FinishedStage& stage, int&) {
+std::string capitalised(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+// A number of the answer in its scale, nothing where there is none.
+std::optional<double> in_scale(const Json& answer, const std::string& pointer, double factor) {
+  const Json* found = find_pointer(answer, pointer);
+  return found != nullptr && found->is_number() ? std::optional(factor * found->get<double>()) : std::nullopt;
+}
+
+std::string fact(const std::string& name, const std::string& value) {
+  return "<div><dt>" + prose(name) + "</dt><dd>" + value + "</dd></div>\n";
+}
+
+// "0.281 ± 0.004 mm" at a pointer to a temperature; "" where there is none.
+std::string temperature_text(const Json& answer, const std::string& pointer, const AnswerScale& scale) {
+  const auto value = in_scale(answer, pointer + "/value", scale.factor),
+             error = in_scale(answer, pointer + "/std_error", scale.factor);
+  if (!value) return "";
+  return fmt::format("{:.4g}{} {}", *value, error && *error > 0 ? fmt::format(" ± {:.2g}", *error) : "", scale.unit);
+}
+
+// "T/(m g) = <data>0.6076</data> ± 0.028 mm", or the range where the bed has no single temperature.
+std::string number_html(const Json& answer, const AnswerScale& scale) {
+  const auto low = in_scale(answer, "/interval/low/value", scale.factor),
+             high = in_scale(answer, "/interval/high/value", scale.factor);
+  if (answer.value("verdict", "") == fit::to_string(fit::Verdict::no_single_temperature) && low && high)
+    return fmt::format("{} between <data value=\"{}\">{:.3g}</data> and <data value=\"{}\">{:.3g}</data> {}",
+                       prose(scale.name), number_text(*low), *low, number_text(*high), *high, scale.unit);
+  const auto value = in_scale(answer, "/temperature/value", scale.factor),
+             error = in_scale(answer, "/temperature/std_error", scale.factor);
+  if (!value) return "no temperature";
+  return fmt::format("{} = <data value=\"{}\">{:.4g}</data> ± {:.2g} {}", prose(scale.name), number_text(*value),
+                     *value, error.value_or(0), scale.unit);
+}
+
+// A headline with number, verdict and reason; then T_x, T_z, the solid's height as facts, and the advice.
+std::string answer_html(const Json& answer) {
+  const AnswerScale scale = answer_scale(answer);
+  const std::string verdict = answer.value("verdict", "");
+  const bool one = is_one_temperature(verdict);
+  std::string out = fmt::format(
+      "<section class=\"answer {}\" aria-label=\"the answer\">\n<p class=\"headline\"><span class=\"number\">{}</span> "
+      "<span "
+      "class=\"verdict {}\">{}</span></p>\n<p>{}</p>\n",
+      one ? "good-answer" : "bad-answer", number_html(answer, scale), one ? "good" : "bad",
+      escape_markup(capitalised(verdict)), prose(capitalised(answer.value("why", ""))));
+  std::string facts;
+  const auto low = in_scale(answer, "/interval/low/value", scale.factor),
+             high = in_scale(answer, "/interval/high/value", scale.factor);
+  if (low && high && verdict != fit::to_string(fit::Verdict::no_single_temperature))
+    facts += fact("95 % interval", fmt::format("{:.3g} to {:.3g} {}", *low, *high, scale.unit));
+  for (const auto& [pointer, label] :
+       {std::pair("/temperature_x", "kinetic T_x"), std::pair("/temperature_z", "kinetic T_z")}) {
+    if (const std::string text = temperature_text(answer, pointer, scale); !text.empty())
+      facts += fact(std::string(label) + (scale.factor == 1 ? "" : " /(m g)"), text);
+  }
+  if (const Json* solid = find_pointer(answer, "/solid_height"); solid != nullptr && solid->is_object())
+    facts += fact("height of the solid", shown(*solid));
+  if (const std::string model = answer.value("model", ""); !model.empty()) facts += fact("model", escape_markup(model));
+  if (!facts.empty()) out += "<dl class=\"facts\">\n" + facts + "</dl>\n";
+  if (const std::string advice = answer.value("advice", ""); !advice.empty())
+    out += "<p class=\"soft\">" + prose(advice) + "</p>\n";
+  return out + "</section>\n";
+}
+
+// The first fit of the recipe gives the answer of the page; those after it show theirs with their numbers.
+std::string fit_lead_html(const FinishedStage& stage, int&) {
   const Json* answer = find_pointer(stage.result, "/answer");
-  if (answer == nullptr) return "";
-  return fmt::format("<div class=\"answer\"><strong>{}: {}</strong><br>{}</div>\n", escape_markup(stage.files.id),
-                     escape_markup(answer_text(*answer)), escape_markup(answer->value("advice", "")));
+  return answer == nullptr ? "" : answer_html(*answer);
 }
 
 std::string answer_markdown(const FinishedStage& stage) {
@@ -51,10 +120,12 @@ std::string models_html(const Json& models) {
 
 std::string fit_html(const FinishedStage& stage, int&) {
   const Json& fit = stage.result;
-  std::string out = fmt::format(
-      "<h2>Fit ({})</h2>\n<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n<div class=\"scroll\"><table>\n",
-      escape_markup(stage.files.id), escape_markup(fit.value("model", "")), shown(fit["window"]["low"]),
-      shown(fit["window"]["high"]), fit["window"].value("bins", 0), escape_markup(fit["window"].value("rule", "")));
+  std::string out = fmt::format("<h2>Fit ({})</h2>\n", escape_markup(stage.files.id));
+  if (const Json* answer = find_pointer(fit, "/answer"); answer != nullptr)
+    out += fmt::format("<p><strong>{}</strong></p>\n", prose(answer_text(*answer)));
+  out += fmt::format("<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n<div class=\"scroll\"><table>\n",
+                     escape_markup(fit.value("model", "")), shown(fit["window"]["low"]), shown(fit["window"]["high"]),
+                     fit["window"].value("bins", 0), escape_markup(fit["window"].value("rule", "")));
   out += "<tr><th>number</th><th></th></tr>\n";
   for (const char* key : {"temperature_over_mg", "temperature", "solid_height", "solid_height_by_sum_rule", "shift",
                           "plateau_density", "column_number", "critical_temperature_over_mg", "critical_temperature",
@@ -94,12 +165,43 @@ std::string numbers_text(const FinishedStage& stage) {
   return text;
 }
 
+std::vector<WarningAdvice> fit_warnings() {
+  using enum WarningEffect;
+  return {{"does not describe", answer,
+           "Do not quote T from this fit. Look at the residuals, and try another model or window."},
+          {"model does not fit", answer,
+           "Look at the residuals in the figure: where the fit misses, the model is wrong or a bias was measured. "
+           "Quote T with the answer's whole uncertainty, not with the fit's own error."},
+          {"changes with the window", answer,
+           "Quote the range of the answer. A single T needs a bed with one temperature: shake faster with a smaller "
+           "amplitude, or take less dissipative beads."},
+          {"outlier", answer, "Look at this height in the figure; set \"robust\" if it is an outlier."},
+          {"positive definite", answer, "Measure longer: the correlations between heights are poorly known."},
+          {"too few to weigh", answer,
+           "Measure longer, or in more independent runs, to use the correlations between heights."},
+          {"window rule", answer, "Give \"window\" yourself, or measure the profile at finer heights."},
+          {"sum rule", answer, "The plateau density may be off: try it free, and compare the models below."},
+          {"no solid", answer, "T is above T_c in this model: quote T, and no height of the solid."},
+          {"plateau density", answer,
+           "Give \"plateau_density\", or begin the window lower so that it holds part of the plateau."},
+          {"heights span", answer, "Heights must be in disk diameters, not in metres."},
+          {"close packing", answer, "Check the diameter D and that the density is n D^2."},
+          {"standard error", answer, "Give a column std_error: the error of T follows from it."},
+          {"repeat the height", answer, "Remove the doubled rows if they are not measurements of their own."},
+          {"through which kernel", answer,
+           "Name the kernel (\"kernel\": \"gaussian:0.5\", say): without it T is too high by the kernel's width."},
+          {"library", answer, "Run beds nearer to this one for the library."},
+          {"ascending order", rest, "Nothing: the bins were sorted."},
+          {"", answer, "See the figure of the profile and the table of models."}};
+}
+
 }  // namespace
 
 StagePages fit_pages() {
-  return {.sections = {{ReportPlace::banner, "", answer_html},
+  return {.sections = {{.place = ReportPlace::lead, .html = fit_lead_html, .once = true},
                        {ReportPlace::banner, "", banner_html},
                        {ReportPlace::fits, "", fit_html}},
+          .warnings = fit_warnings(),
           .markdown = answer_markdown,
           .terminal = numbers_text};
 }

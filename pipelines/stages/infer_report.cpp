@@ -16,16 +16,22 @@ namespace {
 
 std::string percent(double share) { return fmt::format("{:.0f} %", 100 * share); }
 
+const std::vector<std::string> columns_of_posterior{"parameter", "prior", "median", "68 %", "95 %", "why this prior"};
+
 std::string parameter_rows(const Json& parameters) {
   std::string out;
   for (const auto& [name, p] : parameters.items()) {
     const auto number = [&p = p](const char* key) { return fmt::format("{:.3g}", p.at(key).get<double>()); };
     const std::string unit = p.at("unit") == "1" ? "" : " " + p.at("unit").get<std::string>();
-    out += fmt::format(
-        "<tr><td>{}</td><td>{} to {}{}</td><td>{}{}</td><td>{} to {}{}</td><td>{} to {}{}</td><td>{}</td></tr>\n",
-        escape_markup(words(name)), number("prior_low"), number("prior_high"), unit, number("median"), unit,
-        number("low_68"), number("high_68"), unit, number("low_95"), number("high_95"), unit,
-        prose(p.at("why").get<std::string>()));
+    const auto range = [&](const char* low, const char* high) {
+      return fmt::format("{} to {}{}", number(low), number(high), unit);
+    };
+    out += table_row(columns_of_posterior, {{escape_markup(words(name))},
+                                            {range("prior_low", "prior_high")},
+                                            {number("median") + unit},
+                                            {range("low_68", "high_68")},
+                                            {range("low_95", "high_95")},
+                                            {prose(p.at("why").get<std::string>())}});
   }
   return out;
 }
@@ -54,7 +60,7 @@ std::string beds_table(const Json& result) {
                                     target.at("measured_error").get<double>())) +
                 "</td>";
   }
-  std::string out = "<table><tr><th></th><th>parameters</th><th>photographs show</th>" + head +
+  std::string out = "<div class=\"scroll\"><table><tr><th></th><th>parameters</th><th>photographs show</th>" + head +
                     "</tr>\n<tr><td>measured</td><td></td><td></td>" + measured + "</tr>\n";
   int number = 0;
   for (const Json& bed : result.at("best"))
@@ -64,7 +70,8 @@ std::string beds_table(const Json& result) {
     out += bed_row("as written in the recipe", result.at("assumed").at("values"), result.at("assumed").at("targets"),
                    "average");
   return out +
-         "</table>\n<p>In brackets: the difference from what was measured in errors, that of one bed's scatter and of "
+         "</table></div>\n<p>In brackets: the difference from what was measured in errors, that of one bed's scatter "
+         "and of "
          "the measurement together.</p>\n";
 }
 
@@ -73,10 +80,8 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
   if (!result.is_object() || !result.contains("agreement")) return "";
   std::string out =
       fmt::format("<p>{}</p>\n", escape_markup(result.at("agreement").at("statement").get<std::string>()));
-  out +=
-      "<table><tr><th>parameter</th><th>prior</th><th>median</th><th>68 %</th><th>95 %</th><th>why this "
-      "prior</th></tr>\n" +
-      parameter_rows(result.at("parameters")) + "</table>\n";
+  out += "<div class=\"scroll\"><table class=\"stack\">" + table_head(columns_of_posterior) +
+         parameter_rows(result.at("parameters")) + "</table></div>\n";
   std::string views;
   for (const Json& view : result.at("photographs"))
     if (view.at("prior").get<double>() > 0)
@@ -89,11 +94,10 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
       "<p>Of further measurements, {} would narrow the parameters most: {} of their variance on average would "
       "go.</p>\n",
       escape_markup(words(first.at("measurement").get<std::string>())), percent(first.at("reduction").get<double>()));
-  return out + fmt::format(
-                   "<figure>{}<figcaption>The posterior: each parameter by itself and in pairs; points are draws. "
-                   "Crosses: the "
-                   "beds that were run again; circle: the scene as written.</figcaption></figure>\n",
-                   inline_svg(stage.files.directory / "pairs.svg", ++pictures));
+  return out +
+         figure_html(stage.files.directory / "pairs.svg", ++pictures,
+                     "The posterior: each parameter by itself and in pairs; points are draws. Crosses: the beds that "
+                     "were run again; circle: the scene as written.");
 }
 
 std::string inference_terminal(const FinishedStage& stage) {

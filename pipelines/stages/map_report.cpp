@@ -53,6 +53,12 @@ std::string readings_html(const FinishedStage& stage, int&) {
 
 }  // namespace
 
-StagePages map_pages() { return {.sections = {{ReportPlace::maps, "", readings_html}}}; }
+StagePages map_pages() {
+  return {
+      .sections = {{ReportPlace::maps, "", readings_html}},
+      .warnings = {
+          {"formulas", WarningEffect::rest, "Use the formulas that are marked as in range in the table of the map."},
+          {"", WarningEffect::rest, "Run beds nearer to this one, and give them as the table of simulated beds."}}};
+}
 
 }  // namespace shakebed::pipelines

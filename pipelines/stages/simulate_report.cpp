@@ -24,7 +24,12 @@ std::string motion_html(const FinishedStage& stage, int&) {
 }  // namespace
 
 StagePages simulate_pages() {
-  return {.sections = {{.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}}};
+  return {.sections = {{.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
+          .warnings = {
+              {"contact duration", WarningEffect::measurement, "Give a shorter \"contact_duration\", and compare T."},
+              {"above the highest bin", WarningEffect::measurement, "Let the profile reach higher (\"profile\")."},
+              {"checkpoint", WarningEffect::rest, "Nothing: the run began anew."},
+              {"", WarningEffect::measurement, "Measure longer, or from more beds (\"replicas\")."}}};
 }
 
 }  // namespace shakebed::pipelines

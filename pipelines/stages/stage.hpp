@@ -181,7 +181,7 @@ struct FinishedStage {
   Json result;
 };
 // Where on the page; in this order, with the sections of the page itself between them.
-enum class ReportPlace { lead, lead_picture, banner, claims, figures, checks, motion, frames, fits, maps };
+enum class ReportPlace { lead, lead_picture, banner, motion, film, claims, figures, checks, fits, maps, frames };
 struct ReportSection {
   ReportPlace place;
   std::string_view heading = {};  // once above all sections of this place; none: the section has its own
@@ -189,8 +189,17 @@ struct ReportSection {
   std::string (*html)(const FinishedStage& stage, int& pictures) = nullptr;
   bool once = false;  // of all sections of this place only the first is shown
 };
+// What a stage's warning does to the answer of the run, and what to do about it. `recipe`: the bed may not be the one
+// that is meant.
+enum class WarningEffect { answer, measurement, recipe, rest };
+struct WarningAdvice {
+  std::string_view about;  // words of the warning; "": of every one
+  WarningEffect effect = WarningEffect::rest;
+  std::string_view todo{};
+};
 struct StagePages {
   std::vector<ReportSection> sections{};                          // of report.html
+  std::vector<WarningAdvice> warnings{};                          // the first whose words are in a warning counts
   std::string (*markdown)(const FinishedStage& stage) = nullptr;  // of summary.md
   std::string (*terminal)(const FinishedStage& stage) = nullptr;  // a line on stdout
 };

@@ -10,6 +10,7 @@
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "pipelines/stages/study.hpp"
 #include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
@@ -654,6 +655,7 @@ StageRow study_stage() {
           .summary = "runs a chain of stages over a parameter, for several kinds of beds, with replicas",
           .uses_seed = true,
           .result = "study.json",
+          .pages = study_pages(),
           .make = []() -> std::unique_ptr<Stage> { return std::make_unique<Study>(); }};
 }
 

@@ -7,6 +7,7 @@ set -eu
 browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
 [ -n "$browser" ] || { echo "SKIPPED: Chromium is not installed (Debian: chromium)"; exit 77; }
 shakebed=$(realpath "$1")
+here=$(cd "$(dirname "$0")" && pwd)
 pictures=${2:-}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -100,5 +101,19 @@ for file in extract/profile.csv fit/fit.json; do
   grep -o "download=\"${file/\//-}\" href=\"data:[^\"]*" o/report.html | sed 's/.*base64,//' | base64 -d | cmp - "o/$file" ||
     complain "$file: its download is not the file"
 done
+# As people use them: pointer, keyboard, print, without scripts.
+node=$(command -v node || command -v nodejs || true)
+if [ -z "$node" ]; then
+  echo "SKIPPED in part: node is not installed (Debian: nodejs); nothing was clicked"
+else
+  axe=
+  if command -v npm >/dev/null && timeout 60 npm install --prefix "$folder/npm" --no-audit --no-fund --ignore-scripts \
+      axe-core@4.10.2 >/dev/null 2>&1; then
+    axe="$folder/npm/node_modules/axe-core/axe.min.js"
+  else
+    echo "SKIPPED in part: axe-core cannot be had from npm; contrast was looked at by this script alone"
+  fi
+  timeout 200 "$node" "$here/browser/report.mjs" "$browser" o s $axe || complain "the pages do not do what they should"
+fi
 [ "$bad" = 0 ] && echo "both reports are whole, alone, move, and fit"
 exit "$bad"

@@ -14,7 +14,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/process.hpp"
-#include "pipelines/report/report.hpp"
+#include "pipelines/report/page.hpp"
 #include "pipelines/runner/manifest.hpp"
 
 namespace shakebed::pipelines::bench {
@@ -463,7 +463,7 @@ std::string document_html(const Document& document, const fs::path& directory) {
   }
   if (!document.digits.is_null())
     out += "<h2 id=\"digits\">Numerical stability</h2>\n" + html_table(digits_table(document.digits));
-  return out + "</main>\n</body>\n</html>\n";
+  return out + page_tail();
 }
 
 }  // namespace shakebed::pipelines::bench

@@ -1,0 +1,181 @@
+#include "pipelines/report/crate.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "pipelines/formats/files.hpp"
+#include "pipelines/runner/manifest.hpp"
+#include "pipelines/version.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Files of the user's own that are named one by one; manifest.json names all.
+constexpr std::size_t most_inputs = 100;
+
+std::string format_of(const std::string& file) {
+  constexpr std::array formats = {std::pair(".csv", "text/csv"),         std::pair(".json", "application/json"),
+                                  std::pair(".svg", "image/svg+xml"),    std::pair(".pdf", "application/pdf"),
+                                  std::pair(".png", "image/png"),        std::pair(".html", "text/html"),
+                                  std::pair(".md", "text/markdown"),     std::pair(".xml", "application/xml"),
+                                  std::pair(".zst", "application/zstd"), std::pair(".txt", "text/plain"),
+                                  std::pair(".dat", "text/plain"),       std::pair(".gp", "text/plain"),
+                                  std::pair(".extxyz", "chemical/x-xyz")};
+  const std::string extension = fs::path(file).extension().string();
+  for (const auto& [name, type] : formats) {
+    if (extension == name) return type;
+  }
+  return "application/octet-stream";
+}
+
+Json reference(const std::string& id) { return Json{{"@id", id}}; }
+
+// A file's place in the crate: blanks and signs as a URI writes them.
+std::string uri_of(const std::string& path) {
+  std::string out;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain =
+        byte > 0x20 && byte < 0x7F && std::string_view("\"<>\\^`{|}%#?[]").find(c) == std::string_view::npos;
+    out += plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
+  }
+  return out;
+}
+
+class Crate {
+ public:
+  Crate(const Plan& plan, const RunOutcome& outcome) : plan_(plan), outcome_(outcome) {}
+
+  Json operator()() {
+    graph_.push_back(Json{{"@id", "ro-crate-metadata.json"},
+                          {"@type", "CreativeWork"},
+                          {"about", reference("./")},
+                          {"conformsTo", reference("https://w3id.org/ro/crate/1.1")}});
+    graph_.push_back(Json::object());  // the root, once its parts are known
+    add_pages();
+    add_software();
+    for (std::size_t i = 0; i < outcome_.stages.size() && i < plan_.stages.size(); ++i) add_stage(i);
+    graph_[1] = root();
+    return Json{{"@context",
+                 Json::array({"https://w3id.org/ro/crate/1.1/context", Json{{"sha256", "https://schema.org/sha256"}}})},
+                {"@graph", std::move(graph_)}};
+  }
+
+ private:
+  Json root() const {
+    const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
+    Json out{{"@id", "./"},
+             {"@type", "Dataset"},
+             {"name", title},
+             {"description", plan_.description.empty()
+                                 ? fmt::format("Results of the shakebed recipe \"{}\": see report.html.", plan_.name)
+                                 : plan_.description},
+             {"datePublished", SHAKEBED_SOURCE_DATE},
+             {"license", reference("#licence")},
+             {"hasPart", parts_},
+             {"mentions", actions_}};
+    if (fs::exists(outcome_.out / "report.html")) out["mainEntity"] = reference("report.html");
+    return out;
+  }
+
+  void add_file(const std::string& path, Json more) {
+    Json file{{"@id", uri_of(path)}, {"@type", "File"}, {"name", path}, {"encodingFormat", format_of(path)}};
+    file.update(more);
+    graph_.push_back(std::move(file));
+  }
+
+  void add_pages() {
+    const auto page = [&](const char* name, const char* description) {
+      if (!fs::exists(outcome_.out / name)) return;
+      add_file(name, Json{{"description", description}});
+      parts_.push_back(reference(name));
+    };
+    page("report.html", "everything on one page, without a network");
+    page("summary.md", "the same in short");
+    page("summary.json", "the numbers of every stage; it begins with the answer");
+    page("resolved.json", "the recipe with every option written out; a recipe itself");
+    // It is written after this file.
+    add_file("manifest.json",
+             Json{{"description", "versions, seeds, times, and the SHA-256 of every input and output"}});
+    parts_.push_back(reference("manifest.json"));
+  }
+
+  void add_software() {
+    graph_.push_back(Json{{"@id", "#shakebed"},
+                          {"@type", "SoftwareApplication"},
+                          {"name", "shakebed"},
+                          {"version", program_version()},
+                          {"softwareVersion", source_revision()},
+                          {"description", "shaken beds of disks under gravity: simulate, photograph, measure, fit"}});
+    graph_.push_back(Json{{"@id", "#licence"},
+                          {"@type", "CreativeWork"},
+                          {"name", "No licence is stated"},
+                          {"description", "The program states no licence for results: whoever publishes them does."}});
+  }
+
+  void add_stage(std::size_t i) {
+    const StageOutcome& stage = outcome_.stages[i];
+    const PlannedStage& planned = plan_.stages[i];
+    if (!stage.record) return;
+    const std::string folder = uri_of(stage.id) + "/";
+    Json files = Json::array();
+    for (const Fingerprint& file : stage.record->outputs) {
+      const std::string path = stage.id + "/" + file.file;
+      add_file(path, Json{{"contentSize", std::to_string(file.bytes)}, {"sha256", file.sha256}});
+      files.push_back(reference(uri_of(path)));
+    }
+    graph_.push_back(Json{{"@id", folder},
+                          {"@type", "Dataset"},
+                          {"name", stage.id},
+                          {"description", fmt::format("results of the stage \"{}\" ({}: {})", stage.id, stage.kind,
+                                                      planned.row->summary)},
+                          {"hasPart", files}});
+    parts_.push_back(reference(folder));
+    Json action{{"@id", "#run-" + uri_of(stage.id)},
+                {"@type", "CreateAction"},
+                {"name", fmt::format("{} ({})", stage.id, stage.kind)},
+                {"instrument", reference("#shakebed")},
+                {"object", objects_of(planned)},
+                {"result", reference(folder)}};
+    if (planned.row->uses_seed) action["description"] = fmt::format("seed {}", planned.seed);
+    actions_.push_back(reference(action["@id"].get<std::string>()));
+    graph_.push_back(std::move(action));
+  }
+
+  // What a stage was made from: the recipe, the stages before it, files of the user's own.
+  Json objects_of(const PlannedStage& planned) {
+    Json objects = Json::array({reference("resolved.json")});
+    for (const std::size_t k : planned.from) objects.push_back(reference(uri_of(plan_.stages[k].id) + "/"));
+    std::size_t named = 0;
+    for (const auto& [pointer, path] : planned.input_files) {
+      if (++named > most_inputs) break;
+      const auto [known, fresh] = inputs_.emplace(
+          path, fmt::format("#input-{}-{}", inputs_.size() + 1, uri_of(fs::path(path).filename().string())));
+      const std::string& id = known->second;
+      if (fresh)
+        graph_.push_back(Json{{"@id", id},
+                              {"@type", "CreativeWork"},
+                              {"name", fs::path(path).filename().string()},
+                              {"description", "a file from outside; its path and SHA-256 are in manifest.json"}});
+      objects.push_back(reference(id));
+    }
+    return objects;
+  }
+
+  const Plan& plan_;
+  const RunOutcome& outcome_;
+  Json graph_ = Json::array(), parts_ = Json::array(), actions_ = Json::array();
+  std::map<std::string, std::string> inputs_;  // path, its name here
+};
+
+}  // namespace
+
+Json crate_json(const Plan& plan, const RunOutcome& outcome) { return Crate(plan, outcome)(); }
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,14 @@
+// What every page of ours begins and ends with. Style and scripts are the files of report/page/, part of the program: a
+// page is one file and asks nobody for anything.
+#pragma once
+
+#include <string>
+
+namespace shakebed::pipelines {
+
+// The page up to and with its headline.
+std::string page_head(const std::string& title);
+// The scripts, and the end of the page. Without scripts answer, figures and tables are there all the same.
+std::string page_tail();
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,206 @@
+#include "pipelines/stages/film_viewer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/frame_profiles.hpp"
+#include "sim/measure/order.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+// Farther than that two centres of following frames are not taken for one disk [D].
+constexpr double longest_step = 0.5;
+// Of the disks that could be followed, as extract.json states; below, steps are those of other disks.
+constexpr double least_linked = 0.5;
+
+struct FilmDisks {
+  std::vector<double> x_px, y_px, radius_px, x, z, quality;
+};
+
+// The frames wanted from disks.csv.
+std::map<std::size_t, FilmDisks> read_disks(const std::filesystem::path& path, const std::set<std::size_t>& wanted) {
+  std::map<std::size_t, FilmDisks> frames;
+  const std::string text = read_file(path);
+  std::vector<std::size_t> columns;
+  for (std::size_t begin = 0, end; begin < text.size(); begin = end + 1) {
+    end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line(text.data() + begin, end - begin);
+    if (columns.empty()) {
+      const std::vector<std::string> header = split_csv_line(line);
+      for (const char* name : {"frame", "x_px", "y_px", "radius_px", "x", "z", "quality"})
+        columns.push_back(csv_column(header, name, path.string()));
+      continue;
+    }
+    // Most lines are of other frames: their first cell alone is looked at.
+    std::size_t frame = 0;
+    std::from_chars(line.data(), line.data() + line.size(), frame);
+    if (line.empty() || !wanted.contains(frame)) continue;
+    const std::vector<std::string> cells = split_csv_line(line);
+    FilmDisks& disks = frames[frame];
+    std::size_t k = 1;
+    for (std::vector<double>* to : {&disks.x_px, &disks.y_px, &disks.radius_px, &disks.x, &disks.z, &disks.quality}) {
+      const std::optional<double> value = columns[k] < cells.size() ? number_in(cells[columns[k]]) : std::nullopt;
+      if (!value)
+        throw InputError(fmt::format("{}: a row of frame {} has a cell that is no number", path.string(), frame));
+      to->push_back(*value), ++k;
+    }
+  }
+  return frames;
+}
+
+// |psi_6| of every disk.
+std::vector<double> order_of(const FilmDisks& disks) {
+  sim::Snapshot at;
+  at.x = disks.x, at.z = disks.z;
+  sim::DiskProperties properties;
+  properties.radius.assign(disks.x.size(), 0.5), properties.mass.assign(disks.x.size(), 1);
+  const sim::BondOrder order = sim::bond_order(at, properties, 0, 0);
+  std::vector<double> out;
+  for (std::size_t i = 0; i < disks.x.size(); ++i) out.push_back(std::hypot(order.psi6_re[i], order.psi6_im[i]));
+  return out;
+}
+
+// The nearest of `to` for every disk of `from`, by its number; none beyond longest_step.
+std::vector<std::optional<std::size_t>> nearest_disks(const FilmDisks& from, const FilmDisks& to) {
+  std::vector<std::size_t> by_x(to.x.size());
+  for (std::size_t i = 0; i < by_x.size(); ++i) by_x[i] = i;
+  std::sort(by_x.begin(), by_x.end(), [&](std::size_t a, std::size_t b) { return to.x[a] < to.x[b]; });
+  std::vector<std::optional<std::size_t>> out(from.x.size());
+  for (std::size_t i = 0; i < from.x.size(); ++i) {
+    double closest = longest_step * longest_step;
+    auto at = std::lower_bound(by_x.begin(), by_x.end(), from.x[i] - longest_step,
+                               [&](std::size_t k, double x) { return to.x[k] < x; });
+    for (; at != by_x.end() && to.x[*at] <= from.x[i] + longest_step; ++at) {
+      const double dx = to.x[*at] - from.x[i], dz = to.z[*at] - from.z[i];
+      if (dx * dx + dz * dz < closest) closest = dx * dx + dz * dz, out[i] = *at;
+    }
+  }
+  return out;
+}
+
+// How far each disk is in the next frame [D]; nothing where it was not followed, or others are as near.
+std::vector<std::optional<double>> steps_of(const FilmDisks& now, const FilmDisks& next) {
+  const auto forward = nearest_disks(now, next), back = nearest_disks(next, now);
+  std::vector<std::optional<double>> out(now.x.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (forward[i] && back[*forward[i]] == i)
+      out[i] = std::hypot(next.x[*forward[i]] - now.x[i], next.z[*forward[i]] - now.z[i]);
+  }
+  return out;
+}
+
+// What the viewer reads, frame by frame.
+class FilmData {
+ public:
+  FilmData(const FinishedStage& stage, Json film) : film_(std::move(film)) {
+    const Json* linked = find_pointer(stage.result, "/velocities/linked_share");
+    follows_ = linked != nullptr && linked->is_number() && linked->get<double>() >= least_linked;
+    std::set<std::size_t> wanted;
+    for (const Json& frame : film_.at("frames")) {
+      wanted.insert(frame.get<std::size_t>());
+      if (follows_) wanted.insert(frame.get<std::size_t>() + 1);
+    }
+    frames_ = read_disks(stage.files.file("disks.csv"), wanted);
+    if (const Json* width = find_pointer(stage.result, "/width/value"); width != nullptr && width->is_number())
+      width_ = width->get<double>();
+  }
+
+  Json json() {
+    for (const auto& [ignored, disks] : frames_)
+      for (const double radius : disks.radius_px) largest_radius_ = std::max(largest_radius_, radius);
+    Json out = film_;
+    std::string bytes;
+    std::vector<std::vector<double>> heights;
+    double highest = 1, lowest = 0;
+    for (const Json& number : film_.at("frames")) {
+      const std::size_t frame = number.get<std::size_t>();
+      const FilmDisks& disks = frames_[frame];
+      out["counts"].push_back(disks.x.size());
+      add_disks(disks,
+                follows_ && frames_.contains(frame + 1) ? steps_of(disks, frames_[frame + 1])
+                                                        : std::vector<std::optional<double>>(disks.x.size()),
+                bytes);
+      heights.push_back(disks.z);
+      for (const double z : disks.z) highest = std::max(highest, z), lowest = std::min(lowest, z);
+    }
+    out["disks"] = base64(bytes);
+    out["radius"] = largest_radius_, out["step"] = longest_step, out["follows"] = follows_;
+    out["profile"] = frame_profiles(heights, width_, std::floor(lowest), std::ceil(highest + 1));
+    return out;
+  }
+
+ private:
+  // 8 bytes a disk: place (two 16-bit fractions of the frame), radius, quality, order, step.
+  void add_disks(const FilmDisks& disks, const std::vector<std::optional<double>>& steps, std::string& bytes) const {
+    const double width = film_.at("width"), height = film_.at("height");
+    const std::vector<double> order = order_of(disks);
+    const auto byte = [&](double share, double most) {
+      bytes += static_cast<char>(std::lround(most * std::clamp(share, 0.0, 1.0)));
+    };
+    const auto two = [&](double share) {
+      const auto value = static_cast<std::uint16_t>(std::lround(65535 * std::clamp(share, 0.0, 1.0)));
+      bytes += static_cast<char>(value & 0xFF), bytes += static_cast<char>(value >> 8);
+    };
+    for (std::size_t i = 0; i < disks.x.size(); ++i) {
+      two(disks.x_px[i] / width), two(disks.y_px[i] / height);
+      byte(disks.radius_px[i] / largest_radius_, 255), byte(disks.quality[i], 254), byte(order[i], 254);
+      if (steps[i])
+        byte(*steps[i] / longest_step, 254);
+      else
+        bytes += static_cast<char>(255);  // not known
+    }
+  }
+
+  Json film_;
+  std::map<std::size_t, FilmDisks> frames_;
+  double width_ = 0, largest_radius_ = 1;
+  bool follows_ = false;
+};
+
+}  // namespace
+
+std::string film_viewer(const FinishedStage& stage, const std::string& still) {
+  if (!stage.files.has("film.json") || !stage.files.has("disks.csv")) return "";
+  const Json film = FilmData(stage, read_json(stage.files.file("film.json"))).json();
+  const std::size_t shown = film.at("frames").size(), of = film.at("of");
+  std::string choices =
+      "<option value=\"outline\">outlines</option><option value=\"quality\" selected>quality</option><option "
+      "value=\"order\">crystalline order |ψ6|</option>";
+  if (film.at("follows").get<bool>()) choices += "<option value=\"step\">step to the next frame</option>";
+  if (film.contains("marks")) choices += "<option value=\"truth\">missed and false</option>";
+  choices += "<option value=\"none\">picture alone</option>";
+  const std::string thinned = shown == of
+                                  ? fmt::format("All {} good frames", of)
+                                  : fmt::format("{} of {} good frames (one in {}), so that the page stays small", shown,
+                                                of, film.at("every").get<int>());
+  return fmt::format(
+      "<figure class=\"film\">\n<script type=\"application/json\" class=\"film-data\">{}</script>\n<div "
+      "class=\"stage\"><div "
+      "class=\"views\"><div class=\"picture\"><canvas tabindex=\"0\" role=\"application\" aria-roledescription=\"film "
+      "frame\" "
+      "aria-label=\"frame with the disks found: arrow keys go from disk to disk\"></canvas><div class=\"says\" "
+      "role=\"status\" "
+      "hidden></div></div>\n<div class=\"side\"></div></div>\n<div class=\"controls\"><button "
+      "type=\"button\">Play</button><input type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the "
+      "film\"><output></output>"
+      "<label>colour <select>{}</select></label><span class=\"legend\"></span></div></div>\n<div "
+      "class=\"still\">{}</div>\n"
+      "<figcaption>{}; pictures {} px wide, compressed. Profile: this frame (orange) beside the mean of those shown "
+      "(blue). "
+      "Blue dashes: the floor.</figcaption></figure>\n",
+      script_text(dump_canonical(film)), choices, still, thinned, film.at("picture_width").get<int>());
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,215 @@
+// What the scripts of the pages are given, against the files it comes from; the metadata for repositories.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pipelines/formats/json.hpp"
+#include "pipelines/formats/markup.hpp"
+#include "pipelines/stages/film_viewer.hpp"
+#include "pipelines/stages/frame_profiles.hpp"
+#include "pipelines/stages/plot_data.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::tests;
+using namespace shakebed::pipelines;
+using testing::HasSubstr;
+using testing::Not;
+
+std::vector<unsigned> bytes_of(const std::string& base64_text) {
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::vector<unsigned> bytes;
+  unsigned held = 0;
+  int bits = 0;
+  for (const char c : base64_text) {
+    if (c == '=') break;
+    held = (held << 6U) | static_cast<unsigned>(digits.find(c));
+    bits += 6;
+    if (bits >= 8) bits -= 8, bytes.push_back((held >> static_cast<unsigned>(bits)) & 0xFFU);
+  }
+  return bytes;
+}
+
+TEST(PlotData, HoldsAxesBandsAndSeriesOfThePicture) {
+  Picture picture{.x_label = "height z/D", .y_label = "φ", .x_low = 0.0, .bands = {{2, 5}}, .logarithmic_y = true};
+  picture.series.push_back({"T_c", Series::Style::points, 2, {1, 2.5}, {3, 4}, {0.5, 0.25}, false, true});
+  picture.series.push_back({"curve", Series::Style::dashed, 1, {0, 1}, {1, NAN}, {}});
+  picture.lower.push_back({"T_c", Series::Style::points, 2, {1}, {-0.125}, {}});
+  const Json data = plot_data(picture);
+  EXPECT_EQ(data["xlim"], Json::parse("[0.0, null]"));
+  EXPECT_EQ(data["ylim"], Json::parse("[null, null]"));
+  EXPECT_EQ(data["log"], Json::parse("[false, true]"));
+  EXPECT_EQ(data["bands"], Json::parse("[[2.0, 5.0]]"));
+  ASSERT_EQ(data["series"].size(), 2U);
+  EXPECT_EQ(data["series"][0]["e"], Json::parse("[0.5, 0.25]"));
+  EXPECT_EQ(data["series"][0]["markup"], true);
+  EXPECT_EQ(data["series"][1]["style"], "dashed");
+  EXPECT_EQ(data["series"][1]["y"], Json::parse("[1.0, null]")) << "what is no number is none in JSON";
+  EXPECT_FALSE(data["series"][1].contains("e"));
+  EXPECT_EQ(data["lower"][0]["y"], Json::parse("[-0.125]"));
+}
+
+// The integral of a density over the height, times the width, is the number of disks.
+TEST(FrameProfiles, HoldEveryDiskOfEachFrame) {
+  const std::vector<std::vector<double>> heights{{5, 6, 7.3}, {8, 8.1}, {}};
+  const Json profile = frame_profiles(heights, 4, 0, 14);
+  const auto n = profile["n"].get<std::size_t>();
+  const double step = profile["step"], largest = profile["largest"];
+  const std::vector<unsigned> now = bytes_of(profile["now"]);
+  ASSERT_EQ(now.size(), 3 * n);
+  double mean = 0;
+  for (std::size_t frame = 0; frame < 3; ++frame) {
+    double disks = 0;
+    for (std::size_t i = 0; i < n; ++i) disks += now[frame * n + i] / 255.0 * largest * step * 4;
+    EXPECT_NEAR(disks, static_cast<double>(heights[frame].size()), 0.06) << "frame " << frame;  // bytes round
+  }
+  for (const Json& value : profile["mean"]) mean += value.get<double>() * step * 4;
+  EXPECT_NEAR(mean, 5.0 / 3, 1e-3);
+  EXPECT_TRUE(frame_profiles({}, 4, 0, 14).is_null());
+  EXPECT_TRUE(frame_profiles(heights, 0, 0, 14).is_null());
+}
+
+// A stage's folder with a film of two frames: a hexagon about a disk, and a lone disk.
+class FilmPage : public testing::Test {
+ protected:
+  FilmPage() {
+    std::filesystem::create_directories(folder_ / "extract");
+    std::string rows = "frame,x_px,y_px,radius_px,x,z,quality\n3,100,120,10,5,5,0.5\n";
+    for (int k = 0; k < 6; ++k) {
+      const double x = 5 + std::cos(M_PI / 3 * k), z = 5 + std::sin(M_PI / 3 * k);
+      rows += "3," + std::to_string(20 * x) + "," + std::to_string(220 - 20 * z) + ",10," + std::to_string(x) + "," +
+              std::to_string(z) + ",1\n";
+    }
+    rows += "4,0,0,5,5.1,5,0\n5,400,220,8,1,2,0.25\n";
+    write_text(folder_ / "extract/disks.csv", rows);
+    stage_.files = {"extract", "extract", folder_ / "extract", "extract.json"};
+    stage_.result = Json{{"width", {{"value", 20.0}}}};
+  }
+  void film(const std::string& more = "") {
+    write_text(folder_ / "extract/film.json",
+               R"({"kind": "webp", "width": 400, "height": 220, "picture_width": 200, "every": 2, "of": 5, "floor": 210,
+                   "frames": [3, 5], "pictures": ["AA==", "AAAA"])" +
+                   more + "}");
+  }
+  Json data() const {
+    const std::string page = film_viewer(stage_, "<img>");
+    const std::string open = "class=\"film-data\">";
+    const std::size_t begin = page.find(open) + open.size();
+    return Json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  }
+  ScratchFolder folder_;
+  FinishedStage stage_;
+};
+
+TEST_F(FilmPage, HasEveryDiskOfItsFrames) {
+  film();
+  const Json found = data();
+  EXPECT_EQ(found["counts"], Json::parse("[7, 1]")) << "frame 4 is not among those shown";
+  const std::vector<unsigned> disks = bytes_of(found["disks"]);
+  ASSERT_EQ(disks.size(), 8U * 8U);
+  const auto x = [&](std::size_t i) { return (disks[8 * i] + 256 * disks[8 * i + 1]) / 65535.0 * 400; };
+  const auto y = [&](std::size_t i) { return (disks[8 * i + 2] + 256 * disks[8 * i + 3]) / 65535.0 * 220; };
+  EXPECT_NEAR(x(0), 100, 0.01);
+  EXPECT_NEAR(y(0), 120, 0.01);
+  EXPECT_NEAR(x(7), 400, 0.01);
+  EXPECT_DOUBLE_EQ(found["radius"].get<double>(), 10);
+  EXPECT_NEAR(disks[8 * 7 + 4] / 255.0 * 10, 8, 0.03);
+  EXPECT_NEAR(disks[5] / 254.0, 0.5, 0.003);
+  EXPECT_EQ(disks[6], 254U) << "the middle of a hexagon: |psi_6| = 1";
+  EXPECT_EQ(disks[8 * 7 + 6], 0U) << "a disk without neighbours: |psi_6| = 0";
+  EXPECT_EQ(disks[7], 255U) << "no steps without velocities";
+  EXPECT_THAT(film_viewer(stage_, "<img>"), HasSubstr("2 of 5 good frames (one in 2)"));
+}
+
+TEST_F(FilmPage, HasTheStepsOfDisksThatWereFollowed) {
+  film();
+  stage_.result["velocities"] = Json{{"linked_share", 0.9}};
+  const std::vector<unsigned> disks = bytes_of(data()["disks"]);
+  EXPECT_NEAR(disks[7] / 254.0 * 0.5, 0.1, 0.002) << "from (5, 5) to (5.1, 5)";
+  EXPECT_EQ(disks[8 + 7], 255U) << "a disk with none near it in the next frame";
+  stage_.result["velocities"] = Json{{"linked_share", 0.2}};
+  EXPECT_EQ(bytes_of(data()["disks"])[7], 255U) << "most of such steps would be those of other disks";
+}
+
+TEST_F(FilmPage, OffersTheTruthWhereItIsKnown) {
+  film();
+  EXPECT_THAT(film_viewer(stage_, ""), Not(HasSubstr("missed and false")));
+  film(R"(, "marks": [{"missed": [1.5, 2.5], "false": [3]}, {"missed": [], "false": []}])");
+  EXPECT_THAT(film_viewer(stage_, ""), HasSubstr("missed and false"));
+  EXPECT_EQ(data()["marks"][0]["missed"], Json::parse("[1.5, 2.5]"));
+}
+
+TEST_F(FilmPage, IsLeftOutWhereTheStageKeptNoPictures) { EXPECT_EQ(film_viewer(stage_, "<img>"), ""); }
+
+TEST(FigureHtml, CannotBeEndedByWhatItHolds) {
+  const ScratchFolder folder;
+  write_text(folder / "a.svg", "<?xml version='1.0'?>\n<svg viewBox='0 0 1 1'></svg>");
+  EXPECT_THAT(figure_html(folder / "a.svg", 1, "words"), Not(HasSubstr("plot-data")));
+  write_text(folder / "a.plot.json", R"({"series": [{"label": "</script><b>"}]})");
+  const std::string page = figure_html(folder / "a.svg", 1, "words");
+  EXPECT_THAT(page, Not(HasSubstr("</script><b>")));
+  EXPECT_THAT(page, HasSubstr(R"("\u003c/script>\u003cb>")"));
+}
+
+// RO-Crate 1.1: the descriptor, one root, every name resolved, every file there.
+class Crate : public testing::Test {
+ protected:
+  Json crate(const std::string& out) {
+    write_text(folder_ / "r.json", small_recipe());
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", out}, folder_.path());
+    EXPECT_TRUE(ran.exit_code == 0 || ran.exit_code == 6) << ran.err;
+    return Json::parse(read_text(folder_ / (out + "/ro-crate-metadata.json")));
+  }
+  static void references(const Json& node, std::set<std::string>& found) {
+    if (node.is_object() && node.size() == 1 && node.contains("@id")) found.insert(node["@id"].get<std::string>());
+    if (node.is_structured())
+      for (const Json& child : node) references(child, found);
+  }
+  ScratchFolder folder_;
+};
+
+TEST_F(Crate, SaysWhatWasMadeFromWhat) {
+  const Json found = crate("o");
+  EXPECT_EQ(found["@context"][0], "https://w3id.org/ro/crate/1.1/context");
+  std::map<std::string, Json> entities;
+  for (const Json& entity : found["@graph"]) {
+    EXPECT_TRUE(entity.contains("@type")) << entity;
+    EXPECT_TRUE(entities.emplace(entity["@id"].get<std::string>(), entity).second) << "twice: " << entity["@id"];
+  }
+  const Json& descriptor = entities.at("ro-crate-metadata.json");
+  EXPECT_EQ(descriptor["@type"], "CreativeWork");
+  EXPECT_EQ(descriptor["about"]["@id"], "./");
+  EXPECT_EQ(descriptor["conformsTo"]["@id"], "https://w3id.org/ro/crate/1.1");
+  const Json& root = entities.at("./");
+  EXPECT_EQ(root["@type"], "Dataset");
+  for (const char* key : {"name", "description", "datePublished", "license", "hasPart"})
+    EXPECT_TRUE(root.contains(key)) << key;
+  EXPECT_THAT(root["datePublished"].get<std::string>(), testing::MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2}"));
+  std::set<std::string> named;
+  for (const auto& [id, entity] : entities)
+    for (const auto& [key, value] : entity.items()) references(value, named);
+  for (const std::string& id : named)
+    EXPECT_TRUE(entities.contains(id) || id.starts_with("https://")) << id << " is named and not described";
+  std::size_t files = 0, actions = 0;
+  for (const auto& [id, entity] : entities) {
+    actions += entity["@type"] == "CreateAction";
+    if (entity["@type"] != "File") continue;
+    ++files;
+    ASSERT_TRUE(std::filesystem::is_regular_file(folder_ / ("o/" + id))) << id;
+    if (entity.contains("contentSize"))
+      EXPECT_EQ(entity["contentSize"], std::to_string(std::filesystem::file_size(folder_ / ("o/" + id)))) << id;
+  }
+  EXPECT_GE(files, 8U);
+  EXPECT_EQ(actions, Json::parse(read_text(folder_ / "o/manifest.json"))["stages"].size());
+}
+
+TEST_F(Crate, HasTheSameBytesForTheSameRun) {
+  crate("o"), crate("again");
+  EXPECT_EQ(read_text(folder_ / "o/ro-crate-metadata.json"), read_text(folder_ / "again/ro-crate-metadata.json"));
+}
+
+}  // namespace
