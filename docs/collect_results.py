@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
 """Takes over the results of record: collect_results.py OUT, the folder of `shakebed reproduce all --preset full --out OUT`.
 
-Writes docs/results/<recipe>.json for every recipe that has claims. The claims of Quinn and Hong's recipes are those
-taken over by reference-data/quinn-hong-2000/measured/collect.py. Then write docs/results.md:
-`shakebed reproduce --results > docs/results.md`.
+Writes docs/results/<recipe>.json, and the leading figure as docs/results/<recipe>.svg, for every recipe that has claims.
+The claims of Quinn and Hong's recipes are those taken over by reference-data/quinn-hong-2000/measured/collect.py.
+Then build, since these files are part of the program, and write the pages: docs/collect_results.py --pages PROGRAM,
+where PROGRAM is build/release/pipelines/shakebed. A test compares them.
 """
 import csv
 import json
 import pathlib
+import shutil
+import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -16,9 +19,27 @@ QUINN_HONG = {"quinn-hong-fig1": "fig1", "quinn-hong-fig2": "fig2", "quinn-hong-
               "quinn-hong-beyond": "beyond", "quinn-hong-tc": "tc"}
 
 
-def write(recipe, source, claims):
-    text = json.dumps({"source": source, "claims": claims}, indent=1, ensure_ascii=False)
+def write(recipe, source, claims, figure=None):
+    record = {"source": source, "figure": figure, "claims": claims} if figure else {"source": source, "claims": claims}
+    text = json.dumps(record, indent=1, ensure_ascii=False)
     (HERE / "results" / f"{recipe}.json").write_text(text + "\n")
+
+
+def leading_figure(folder):
+    """Copies the picture that the report begins with; its caption."""
+    for results in sorted(folder.glob("*/chart.json")):
+        for name, chart in json.loads(results.read_text()).items():
+            if isinstance(chart, dict) and chart.get("lead"):
+                shutil.copy(results.parent / f"{name}.svg", HERE / "results" / f"{folder.name}.svg")
+                return {"file": f"{folder.name}.svg", "caption": chart.get("caption", "")}
+    return None
+
+
+def write_pages(program):
+    recipes = sorted(path.parent.name for path in (HERE.parent / "pipelines/recipes").glob("*/figure.json"))
+    for arguments, page in [([], "results.md")] + [([recipe], f"results/{recipe}.md") for recipe in recipes]:
+        text = subprocess.run([program, "reproduce", *arguments, "--results"], check=True, capture_output=True).stdout
+        (HERE / page).write_bytes(text)
 
 
 def of_run(folder):
@@ -52,10 +73,12 @@ def of_table(path, mains):
 
 
 def main():
+    if sys.argv[1] == "--pages":
+        return write_pages(sys.argv[2])
     out = pathlib.Path(sys.argv[1])
     for folder in sorted(out.iterdir()):
         if folder.name not in QUINN_HONG and (folder / "claims" / "claims.json").exists():
-            write(folder.name, *of_run(folder))
+            write(folder.name, *of_run(folder), leading_figure(folder))
     measured = HERE.parent / "reference-data" / "quinn-hong-2000" / "measured"
     for recipe, short in QUINN_HONG.items():
         figure = json.loads((HERE.parent / "pipelines/recipes" / recipe / "figure.json").read_text())

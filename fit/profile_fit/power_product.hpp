@@ -9,20 +9,23 @@ namespace shakebed::fit {
 struct PowerProduct {
   bool ok = false;
   std::vector<double> exponents, exponent_errors;
-  double log_amplitude = 0, log_amplitude_error = 0;  // natural logarithm
+  double log_amplitude = 0, log_amplitude_error = 0;  // natural logarithm; with groups, of the first one
+  std::vector<double> group_log_amplitude;            // of each group
   double chi2 = 0, p_value = 1;
   int dof = 0;
   double rms_log_ratio = 0;  // of the points to the fit
 
-  // The fit at one place.
-  [[nodiscard]] double at(std::span<const double> x) const;
+  // The fit at one place, of a point of this group.
+  [[nodiscard]] double at(std::span<const double> x, std::size_t group = 0) const;
 };
 
 // Weighted least squares of ln y against the ln x_k, the error of ln y being error/y [Press et al., Numerical Recipes,
 // 15.4]. Where the points scatter more than their errors say (chi2 > dof), the errors of the exponents are widened by
-// sqrt(chi2/dof) [Particle Data Group, Review, 5.2.2]. x[k] holds the values of x_k at the points. Not ok with fewer
-// points than unknowns plus one, with a number or error that is not positive, or where the ln x_k are not independent.
+// sqrt(chi2/dof) [Particle Data Group, Review, 5.2.2]. x[k] holds the values of x_k at the points. `group`: a number
+// from 0 for every point, with no gap; each group has an amplitude of its own. Empty: all points have one amplitude.
+// Not ok with fewer points than unknowns plus one, with a number or error that is not positive, or where the ln x_k are
+// not independent of one another and of the groups.
 [[nodiscard]] PowerProduct fit_power_product(const std::vector<std::vector<double>>& x, std::span<const double> y,
-                                             std::span<const double> error);
+                                             std::span<const double> error, std::span<const std::size_t> group = {});
 
 }  // namespace shakebed::fit

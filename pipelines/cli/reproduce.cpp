@@ -122,10 +122,12 @@ void add_reproduce(Program& program) {
       program.add({"reproduce", "run a shipped recipe: a published result, end to end",
                    "  shakebed reproduce\n  shakebed reproduce --preset quick\n"
                    "  shakebed reproduce clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce "
-                   "--list\n  shakebed reproduce all --preset quick"},
+                   "--list\n  shakebed reproduce lee-1995 --results\n  shakebed reproduce all --preset quick"},
                   [given](const Call& call) {
                     if (given->list || given->results) {
-                      print(given->list ? results_list(shipped_figures()) : results_page(shipped_figures()));
+                      print(given->list             ? results_list(shipped_figures())
+                            : given->figure.empty() ? results_page(shipped_figures())
+                                                    : recipe_page(chosen_figures(given->figure).front()));
                       return static_cast<int>(exit_ok);
                     }
                     const std::vector<ShippedFigure> figures = chosen_figures(given->figure);
@@ -137,7 +139,9 @@ void add_reproduce(Program& program) {
       "name of a recipe (--list shows them), or all; clement-rajchenbach if left out, which is also named "
       "quinn-hong-fig3");
   command.add_flag("--list", given->list, "list the recipes with their verdicts of record, and run nothing");
-  command.add_flag("--results", given->results, "print the page of results of record, and run nothing")
+  command
+      .add_flag("--results", given->results,
+                "print the page of results of record, or that of one recipe, and run nothing")
       ->excludes("--list");
   add_preset(command, given->run);
   add_run_options(command, given->run);

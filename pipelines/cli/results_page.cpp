@@ -64,14 +64,13 @@ std::string counted(const std::vector<Json>& claims) {
   return out;
 }
 
-std::string recipe_section(const ShownRecipe& recipe) {
-  std::string out = fmt::format("\n## {}\n`shakebed reproduce {} --preset full`\n", recipe.title, recipe.name);
-  for (const std::string& paragraph : recipe.text) out += "\n" + paragraph + "\n";
-  const std::vector<Json> claims = claims_of(recipe, false);
-  if (claims.empty()) return out + "\nNo claims with verdicts: its report compares number by number.\n";
-  out += "\n| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
-  for (const Json& claim : claims) out += claim_row(claim, "") + " " + table_cell(claim.value("place", "")) + " |\n";
-  return out + fmt::format("\n{}; measured with {}.\n", counted(claims), recipe.record.value("source", ""));
+// "Claim: ..." begins with its word in bold.
+std::string paragraph(const std::string& text) {
+  for (const char* word : {"Claim", "Scene", "What we find", "What differs and why", "What was chosen, and when"}) {
+    const std::string start = std::string(word) + ": ";
+    if (text.starts_with(start)) return "**" + std::string(word) + ".** " + text.substr(start.size());
+  }
+  return text;
 }
 
 }  // namespace
@@ -95,21 +94,46 @@ std::string results_list(const std::vector<ShippedRecipe>& recipes) {
 std::string results_page(const std::vector<ShippedRecipe>& recipes) {
   std::string out =
       "# Published results, reproduced\n\nWritten by `shakebed reproduce --results`; a test compares. The numbers are "
-      "those of the full presets (`docs/results/<recipe>.json`).\n\nA claim holds where the whole interval of the "
-      "measured number lies within what is claimed, and does not hold where all of it lies outside; else it is open. "
-      "The "
-      "interval is 3 standard errors wide to each side, 1.96 in the recipes of Quinn and Hong. Standard errors are "
-      "those "
-      "over replicas. A published number that nobody here has read in print gives no verdict. Where a paper states no "
-      "error, the tolerance is ours and said to be.\n\n| recipe | main claim | claimed | measured | verdict |\n"
-      "|---|---|---|---|---|\n";
-  std::string sections;
+      "those of the full presets (`docs/results/<recipe>.json`). Each recipe has a page of its own, with its scene, "
+      "its "
+      "figure, all its claims and what differs.\n\nA claim holds where the whole interval of the measured number lies "
+      "within what is claimed, and does not hold where all of it lies outside; else it is open. The interval is 3 "
+      "standard errors wide to each side, 1.96 in the recipes of Quinn and Hong. Standard errors are those over "
+      "replicas. A published number that nobody here has read in print gives no verdict. Where a paper states no "
+      "error, "
+      "the tolerance is ours and said to be.\n\n| recipe | main claim | claimed | measured | verdict | all claims "
+      "|\n|---|---|---|---|---|---|\n";
   for (const ShippedRecipe& recipe : recipes) {
     const ShownRecipe one = shown(recipe);
-    for (const Json& claim : claims_of(one, true)) out += claim_row(claim, "`" + one.name + "` | ") + "\n";
-    sections += recipe_section(one);
+    const std::string link = fmt::format("[{0}](results/{0}.md)", one.name), all = counted(claims_of(one, false));
+    std::string first = link + " | ", last = " " + all + " |";
+    for (const Json& claim : claims_of(one, true)) {
+      out += claim_row(claim, first) + last + "\n";
+      first = " | ", last = " |";
+    }
   }
-  return out + sections;
+  return out;
+}
+
+std::string recipe_page(const ShippedRecipe& recipe) {
+  const ShownRecipe one = shown(recipe);
+  std::string out = fmt::format(
+      "# {}\n\n`shakebed reproduce {} --preset full`; [all results](../results.md)\n\nWritten by `shakebed reproduce "
+      "{} "
+      "--results`.\n",
+      one.title, one.name, one.name);
+  const std::vector<Json> main = claims_of(one, true), all = claims_of(one, false);
+  if (!main.empty()) out += "\n| claim | claimed | measured | verdict |\n|---|---|---|---|\n";
+  for (const Json& claim : main) out += claim_row(claim, "") + "\n";
+  if (const Json* figure = one.record.is_null() ? nullptr : find_pointer(one.record, "/figure"))
+    out += fmt::format("\n![{0}]({1})\n\n{0}\n", figure->value("caption", ""), figure->value("file", ""));
+  for (const std::string& text : one.text) out += "\n" + paragraph(text) + "\n";
+  if (all.empty()) return out + "\nNo result is on record.\n";
+  out +=
+      "\n## Claim by claim\n\n| claim | claimed | measured | verdict | where it stands, and what was read |\n"
+      "|---|---|---|---|---|\n";
+  for (const Json& claim : all) out += claim_row(claim, "") + " " + table_cell(claim.value("place", "")) + " |\n";
+  return out + fmt::format("\n{}; measured with {}.\n", counted(all), one.record.value("source", ""));
 }
 
 }  // namespace shakebed::pipelines

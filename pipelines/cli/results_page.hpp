@@ -15,7 +15,9 @@ struct ShippedRecipe {
 
 // A line a recipe: name, title, verdicts of its main claims.
 std::string results_list(const std::vector<ShippedRecipe>& recipes);
-// docs/results.md.
+// docs/results.md: the main claims of all.
 std::string results_page(const std::vector<ShippedRecipe>& recipes);
+// docs/results/<recipe>.md: what was claimed, the figure, scene and findings, all claims.
+std::string recipe_page(const ShippedRecipe& recipe);
 
 }  // namespace shakebed::pipelines

@@ -9,13 +9,13 @@
 namespace shakebed::pipelines {
 
 const std::vector<std::string>& ObserveOptions::names() {
-  static const std::vector<std::string> all{"order", "velocities", "displacement", "pressure", "phases"};
+  static const std::vector<std::string> all{"order", "velocities", "displacement", "pressure", "phases", "species"};
   return all;
 }
 
 ObserveOptions ObserveOptions::from(const std::vector<std::string>& wanted) {
   const auto has = [&](const char* name) { return std::find(wanted.begin(), wanted.end(), name) != wanted.end(); };
-  return {has("order"), has("velocities"), has("displacement"), has("pressure"), has("phases")};
+  return {has("order"), has("velocities"), has("displacement"), has("pressure"), has("phases"), has("species")};
 }
 
 Rows filled_rows(const sim::Profile& profile) {
@@ -124,6 +124,25 @@ Table pressure_table(Table table, const sim::FlightObserver& flights) {
   return table;
 }
 
+Table species_table(Table table, const sim::SpeciesObserver& species) {
+  constexpr std::size_t first = sim::SpeciesObserver::first, second = sim::SpeciesObserver::second;
+  for (std::size_t k = 0; k < species.grid().count; ++k) {
+    if (species.cell(k, first).count + species.cell(k, second).count == 0) continue;
+    std::vector<Cell> row{species.height(k)};
+    for (const std::size_t s : {first, second}) {
+      const bool any = species.cell(k, s).count > 0;
+      row.emplace_back(species.number_density(k, s));
+      row.emplace_back(any ? species.cell(k, s).temperature_x() : no_number);
+      row.emplace_back(any ? species.cell(k, s).temperature_z() : no_number);
+      row.push_back(count_cell(species.cell(k, s).count));
+    }
+    const double one = species.layer_temperature(k, first), two = species.layer_temperature(k, second);
+    row.emplace_back(one > 0 && two > 0 ? two / one : no_number);
+    table.add(std::move(row));
+  }
+  return table;
+}
+
 // Layers of 1 D, and those of the pressure: at most 4,000.
 sim::LayerGrid coarse_layers(const HeightGrid& grid) {
   const double height = static_cast<double>(grid.points) * grid.spacing;
@@ -150,6 +169,7 @@ BedMeasurement::BedMeasurement(const sim::Scene& scene, const sim::DiskPropertie
   if (plan.observe.phases && floor_frame_) floor_.emplace(scene, disks, plan.phases, layers, true);
   if (plan.observe.displacement) displacement_.emplace(scene, disks.mass.size());
   if (plan.observe.pressure) flights_.emplace(scene, disks, fine_layers(plan.grid));
+  if (plan.observe.species) species_.emplace(scene, disks, layers);
 }
 
 void BedMeasurement::begin(sim::Simulation& simulation) {
@@ -184,6 +204,7 @@ void BedMeasurement::look(const sim::Simulation& simulation, const sim::Snapshot
   if (lab_) lab_->observe(at, phase);
   if (floor_) floor_->observe(at, phase);
   if (displacement_) displacement_->observe(at);
+  if (species_) species_->observe(at);
 }
 
 void BedMeasurement::end(const sim::Simulation& simulation) {
@@ -235,6 +256,15 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
           {1 + virial_rate_.mean() / (2 * n * kinetic), virial_rate_.std_error() / (2 * n * kinetic)}, "1");
     out["number_density"] = quantity_json(n / (scene.box.width * top->height), "1/D^2");
   }
+  observed_results(energy_name, out);
+  if (options.period() > 0) out["center_of_mass_by_phase"] = bed_.centre_of_mass_by_phase();
+}
+
+// What "observe" names.
+void BedMeasurement::observed_results(const std::string& energy_name, Json& out) const {
+  const auto plain = [&](const char* name, const sim::Measured& m, const std::string& unit) {
+    out[name] = quantity_json(m.value, unit, m.std_error);
+  };
   if (order_) {
     plain("psi6_local", order_->psi6_local(), "1");
     plain("psi6_global", order_->psi6_global(), "1");
@@ -255,7 +285,12 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
     out["a2_local"] = quantity_json(lab_->fourth_cumulant_local(), "1");
   }
   if (flights_) plain("floor_pressure", flights_->floor_pressure(), "m g/D");
-  if (options.period() > 0) out["center_of_mass_by_phase"] = bed_.centre_of_mass_by_phase();
+  if (species_) {
+    plain("temperature_first", species_->temperature(sim::SpeciesObserver::first), energy_name);
+    plain("temperature_second", species_->temperature(sim::SpeciesObserver::second), energy_name);
+    const sim::Measured ratio = species_->temperature_ratio();
+    out["temperature_ratio"] = std::isfinite(ratio.value) ? quantity_json(ratio.value, "1", ratio.std_error) : Json();
+  }
 }
 
 void BedMeasurement::write_profile(RunContext& context, const char* file, const sim::Profile& density,
@@ -300,6 +335,7 @@ void BedMeasurement::write(RunContext& context, bool frames) const {
   }
   if (displacement_) write("displacement.csv", displacement_table, *displacement_, plan_.period / plan_.phases);
   if (flights_) write("pressure.csv", pressure_table, *flights_);
+  if (species_) write("species.csv", species_table, *species_);
 }
 
 }  // namespace shakebed::pipelines

@@ -18,13 +18,14 @@
 #include "sim/measure/flights.hpp"
 #include "sim/measure/observables.hpp"
 #include "sim/measure/order.hpp"
+#include "sim/measure/species.hpp"
 #include "sim/measure/velocities.hpp"
 
 namespace shakebed::pipelines {
 
 // Measured only when asked for: "observe": ["order", "pressure"].
 struct ObserveOptions {
-  bool order = false, velocities = false, displacement = false, pressure = false, phases = false;
+  bool order = false, velocities = false, displacement = false, pressure = false, phases = false, species = false;
   static const std::vector<std::string>& names();
   static ObserveOptions from(const std::vector<std::string>& wanted);
 };
@@ -74,10 +75,12 @@ class BedMeasurement {
     if (floor_) archive(*floor_);
     if (displacement_) archive(*displacement_);
     if (flights_) archive(*flights_);
+    if (species_) archive(*species_);
   }
 
  private:
   void end_period(const sim::Simulation& simulation);
+  void observed_results(const std::string& energy_name, Json& out) const;
   void write_profile(RunContext& context, const char* file, const sim::Profile& density,
                      const std::string& origin) const;
   double width_, disk_count_;
@@ -95,6 +98,7 @@ class BedMeasurement {
   std::optional<sim::VelocityObserver> lab_, floor_;
   std::optional<sim::DisplacementObserver> displacement_;
   std::optional<sim::FlightObserver> flights_;
+  std::optional<sim::SpeciesObserver> species_;
 };
 
 }  // namespace shakebed::pipelines

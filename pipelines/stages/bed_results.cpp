@@ -79,6 +79,13 @@ class BedStatement {
     const Given velocities = observed(bed_.observe.velocities, "velocities");
     list_.quantity("/a2", "1", "fourth cumulant of the velocities; 0 for a Maxwellian", velocities, true);
     list_.quantity("/a2_local", "1", "fourth cumulant of the velocities, layer by layer", velocities, true);
+    const Given species = observed(bed_.observe.species, "species");
+    list_.quantity("/temperature_first", energy_,
+                   "kinetic temperature of the first species, half the sum of both directions, without the species' "
+                   "mean vertical velocity at each moment",
+                   species, true);
+    list_.quantity("/temperature_second", energy_, "the same of the second species", species, true);
+    list_.quantity("/temperature_ratio", "1", "temperature_second over temperature_first", species, true);
     list_.quantity("/floor_pressure", "m g/D", "pressure on the floor", observed(bed_.observe.pressure, "pressure"),
                    true);
   }
@@ -146,6 +153,7 @@ class BedStatement {
                   {"origins", "1", "pairs of looks"}},
                  observed(bed_.observe.displacement, "displacement")});
     pressure_table();
+    species_table();
     list_.table({"schedule.csv",
                  "annealing: means over the second half of each hold",
                  {{"step", "1", "number of the step, from 0"},
@@ -229,6 +237,22 @@ class BedStatement {
     }
     list_.table({"pressure.csv", "exact averages over time along the trajectories, lab frame", columns,
                  observed(bed_.observe.pressure, "pressure")});
+  }
+
+  void species_table() {
+    std::vector<StatedColumn> columns{layer_height_};
+    for (const std::string name : {"first", "second"}) {
+      columns.push_back({"number_density_" + name, "1/D^2", "disks of the " + name + " species per area"});
+      columns.push_back({"temperature_x_" + name, energy_, "m <v_x^2> without the mean of species and layer"});
+      columns.push_back({"temperature_z_" + name, energy_, "m <v_z^2> without the mean of species and layer"});
+      columns.push_back({"samples_" + name, "1", "disks of the " + name + " species seen in the layer"});
+    }
+    columns.push_back(
+        {"ratio", "1", "temperature of the second species over that of the first, both directions together"});
+    list_.table(
+        {"species.csv",
+         "temperatures of the two species in layers of 1 D above the floor's mean position, all phases together",
+         columns, observed(bed_.observe.species, "species")});
   }
 
   void replicas() {

@@ -10,6 +10,7 @@
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/trajectory.hpp"
+#include "pipelines/stages/chart_map.hpp"
 #include "pipelines/stages/figure.hpp"
 #include "pipelines/stages/stage.hpp"
 #include "sim/measure/order.hpp"
@@ -25,7 +26,7 @@ struct PointsOptions {
   std::string x, y, error;
   Look look = Look::points;
   int color = -1;
-  double times = 1, plus = 0, x_times = 1, x_plus = 0;
+  double times = 1, plus = 0, x_times = 1, x_plus = 0, power_of_x = 0;
   bool logarithm = false;
   std::optional<double> x_least, x_most;  // of those drawn and used
   bool line_fit = false, power_fit = false;
@@ -114,6 +115,11 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
     if (options.x_most && place > *options.x_most) return;
     const auto spread = data.has_errors ? number_in(cell(error)) : std::nullopt;
     Row row{place, options.plus + options.times * *value, spread ? std::abs(options.times) * *spread : 0};
+    if (options.power_of_x != 0) {
+      const double factor = std::pow(place, options.power_of_x);
+      if (!std::isfinite(factor)) return;
+      row.y *= factor, row.error *= factor;
+    }
     if (options.logarithm) {
       if (!(row.y > 0)) return;
       row.error /= row.y, row.y = std::log(row.y);
@@ -327,15 +333,9 @@ class Chart : public Stage {
   Json draw(const RunContext& context, const ChartOptions& chart) const;
   Json snapshot(const RunContext& context, const SnapshotOptions& snapshot) const;
   std::vector<ChartOptions> charts_;
+  std::vector<MapOptions> maps_;
   std::vector<SnapshotOptions> snapshots_;
 };
-
-const Input& input_named(const RunContext& context, const std::string& id) {
-  for (const Input& input : context.inputs()) {
-    if (input.id == id || (id.empty() && context.inputs().size() == 1)) return input;
-  }
-  throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
-}
 
 // The table, its columns and the rows wanted must be what the stage writes.
 void check_points(Fields& fields, const PointsOptions& p) {
@@ -394,6 +394,8 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.integer("color", p.color, {.help = "of the palette, 0 to 6; left out, one after the other"});
   fields.number("times", p.times, {.help = "factor of y"});
   fields.number("plus", p.plus, {.help = "added to y after the factor"});
+  fields.number("power_of_x", p.power_of_x,
+                {.help = "y is multiplied by x to this power: flat where y follows the inverse power"});
   fields.boolean(
       "logarithm", p.logarithm,
       {.help = "take the natural logarithm of y, after factor and sum; where y is not positive it has none"});
@@ -508,6 +510,7 @@ void Chart::results(ResultList& list) const {
     for (const PointsOptions& points : chart.points)
       PointsStatement(list, pointer_join(at, points.name), points).state();
   }
+  for (const MapOptions& map : maps_) state_map(list, map);
   for (const SnapshotOptions& one : snapshots_) {
     const std::string at = pointer_join("", one.name);
     list.text(at + "/caption", "text below the picture", given_if(!one.caption.empty(), "there is a \"caption\""));
@@ -559,6 +562,7 @@ void Chart::describe(Fields& fields) {
         }
       },
       {.help = "pictures of tables"});
+  fields.array<MapOptions>("maps", maps_, describe_map, {.help = "a number in the plane of two parameters"});
   fields.array<SnapshotOptions>("snapshots", snapshots_,
                                 [](Fields& f, SnapshotOptions& s) {
                                   f.text("name", s.name, {.help = "of its files", .required = true});
@@ -569,7 +573,8 @@ void Chart::describe(Fields& fields) {
                                 },
                                 {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
   if (fields.decoding())
-    fields.require(!charts_.empty() || !snapshots_.empty(), "", "there is nothing to draw: no charts, no snapshots");
+    fields.require(!charts_.empty() || !maps_.empty() || !snapshots_.empty(), "",
+                   "there is nothing to draw: no charts, no maps, no snapshots");
 }
 
 Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
@@ -636,15 +641,25 @@ Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) 
 void Chart::run(RunContext& context) const {
   Json out = Json::object();
   for (const ChartOptions& chart : charts_) out[chart.name] = draw(context, chart);
+  for (const MapOptions& map : maps_) out[map.name] = draw_map(context, map);
   for (const SnapshotOptions& one : snapshots_) out[one.name] = snapshot(context, one);
   write_file(context.output("chart.json"), dump(out));
 }
 
 }  // namespace
 
+const Input& input_named(const RunContext& context, const std::string& id) {
+  for (const Input& input : context.inputs()) {
+    if (input.id == id || (id.empty() && context.inputs().size() == 1)) return input;
+  }
+  throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
+}
+
 StageRow chart_stage() {
   return {.name = "chart",
-          .summary = "draws tables with fitted lines, residuals and comparisons, and snapshots of the disks",
+          .summary =
+              "draws tables with fitted lines, residuals and comparisons, maps of two parameters, and snapshots of the "
+              "disks",
           .accepts = {"study", "scaling", "simulate", "fit", "extract", "map"},
           .fewest_inputs = 1,
           .most_inputs = 64,

@@ -15,7 +15,7 @@ namespace {
 constexpr double interval_95 = 1.96;
 
 struct Claim {
-  std::string claim, place, pointer, note, measured_as, published;
+  std::string claim, place, pointer, over, note, measured_as, published;
   std::optional<double> value, least, most;
   double tolerance = 0;
   bool main = false;
@@ -45,16 +45,14 @@ struct Measured {
   double value = NAN, error = 0;
   std::string unit;
 };
-Measured read_number(const Claim& claim, const std::vector<Input>& inputs) {
-  const auto input =
-      std::find_if(inputs.begin(), inputs.end(),
-                   [id = split_pointer(claim.pointer).front()](const Input& one) { return one.id == id; });
-  if (input == inputs.end()) throw InputError(fmt::format("{}: \"from\" names no such stage", claim.pointer));
+Measured read_number(const std::string& pointer, const std::vector<Input>& inputs) {
+  const auto input = std::find_if(inputs.begin(), inputs.end(),
+                                  [id = split_pointer(pointer).front()](const Input& one) { return one.id == id; });
+  if (input == inputs.end()) throw InputError(fmt::format("{}: \"from\" names no such stage", pointer));
   const Json result = input->result();
   const Json* found =
-      find_pointer(result, std::string_view(claim.pointer).substr(1 + escape_pointer_token(input->id).size()));
-  if (found == nullptr)
-    throw InputError(fmt::format("{}: there is no such number in {}", claim.pointer, input->result_name));
+      find_pointer(result, std::string_view(pointer).substr(1 + escape_pointer_token(input->id).size()));
+  if (found == nullptr) throw InputError(fmt::format("{}: there is no such number in {}", pointer, input->result_name));
   Measured measured;
   if (found->is_object() && found->contains("value")) {
     if ((*found)["value"].is_number()) measured.value = (*found)["value"].get<double>();
@@ -67,6 +65,16 @@ Measured read_number(const Claim& claim, const std::vector<Input>& inputs) {
     measured.value = found->get<bool>() ? 1 : 0;
   }
   return measured;
+}
+
+// The number of a claim, over the one it is divided by; their errors are taken as independent.
+Measured read_claimed(const Claim& claim, const std::vector<Input>& inputs) {
+  Measured number = read_number(claim.pointer, inputs);
+  if (claim.over.empty()) return number;
+  const Measured over = read_number(claim.over, inputs);
+  if (over.value == 0) return {NAN, 0, "1"};
+  const double ratio = number.value / over.value;
+  return {ratio, std::hypot(number.error, ratio * over.error) / std::abs(over.value), "1"};
 }
 
 ClaimVerdict verdict_of(const Claim& claim, const Measured& measured, double half_width) {
@@ -120,6 +128,7 @@ Json claim_json(const Claim& c, const Measured& number, const Judged& judged) {
   if (!c.measured_as.empty()) row["measured_as"] = c.measured_as;
   if (!c.note.empty()) row["note"] = c.note;
   row["number"] = c.pointer;
+  if (!c.over.empty()) row["over"] = c.over;
   if (!c.published.empty()) row["published"] = c.published;
   if (c.main) row["main"] = true;
   return row;
@@ -158,6 +167,8 @@ void describe_claim(Fields& f, Claim& c) {
   f.text("claim", c.claim, {.help = "what is said", .required = true});
   f.text("place", c.place, {.help = "where it stands"});
   f.text("number", c.pointer, {.help = "/<stage id>/<name in its result>", .required = true});
+  f.text("over", c.over,
+         {.help = "/<stage id>/<name in its result>: the number is divided by this one, whose error is independent"});
   f.text("measured_as", c.measured_as, {.help = "what the number is, in words"});
   f.text("published", c.published,
          {.help = "<paper>/<name>: the number of reference-data/<paper>/numbers.json is claimed"});
@@ -173,6 +184,7 @@ void describe_claim(Fields& f, Claim& c) {
             "nothing is claimed: neither a published number, nor value, least or most");
   f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
   if (f.has("number")) f.check_result("/number", c.pointer);
+  if (!c.over.empty()) f.check_result("/over", c.over);
 }
 
 class Claims : public Stage {
@@ -198,6 +210,7 @@ class Claims : public Stage {
     const Given written = given_when("the claim says so");
     list.text(row + "place", "where the claim stands", written);
     list.text(row + "measured_as", "what the number is", written);
+    list.text(row + "over", "where the number is that it is divided by", written);
     list.text(row + "note", "what else there is to say", written);
     list.text(row + "published", "the published number: paper and name", written);
     list.truth(row + "main", "whether the report begins with it", written);
@@ -217,7 +230,7 @@ class Claims : public Stage {
     Table verdicts = context.table("claims.csv");
     std::string markdown = "| claim | claimed | measured | verdict | where |\n|---|---|---|---|---|\n";
     for (const Claim& claim : claims_) {
-      const Measured number = read_number(claim, context.inputs());
+      const Measured number = read_claimed(claim, context.inputs());
       const Judged judged{claimed_text(claim), measured_text(claim, number),
                           verdict_of(claim, number, standard_errors_)};
       rows.push_back(claim_json(claim, number, judged));

@@ -292,6 +292,39 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   run_gnuplot(directory, name, twice(name, sheets.svg, sheets.pdf, body));
 }
 
+namespace {
+// Dark blue to yellow: rises in lightness alone [cividis; Nunez, Anderton and Renslow 2018].
+constexpr const char* lightness_palette =
+    "set palette defined (0 '#00224e', 0.25 '#3b496c', 0.5 '#7b7b78', 0.75 '#bcae6c', 1 '#fee838')\n";
+}  // namespace
+
+void draw_cells(const MapPicture& picture, const std::filesystem::path& directory) {
+  const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
+  const std::string file = gnuplot_text(picture.name + ".dat");
+  write_file(directory / (picture.name + ".dat"), picture.data);
+  std::string body = fmt::format(
+      "set xlabel {}\nset ylabel {}\nset cblabel {}\nset border lc rgb '#404040'\nset tics nomirror out\nset cbrange "
+      "[{}:{}]\nset autoscale xfix\nset autoscale yfix\nset style fill solid 1 noborder\nset key above font keyfont\n",
+      gnuplot_text(picture.x_label), gnuplot_text(picture.y_label), gnuplot_text(picture.value_label),
+      bound(picture.value_low), bound(picture.value_high));
+  body += lightness_palette;
+  if (picture.logarithmic_x) body += "set logscale x\n";
+  if (picture.logarithmic_y) body += "set logscale y\n";
+  body += fmt::format("plot {} index 0 using 1:2:3:4:5:6:7 with boxxyerror lc palette notitle", file);
+  constexpr std::array symbols = {7, 2, 8, 4, 12};
+  for (std::size_t k = 0; k < picture.marks.size(); ++k) {
+    // White below, so that a symbol is seen on dark and on light cells.
+    const auto& [label, number] = picture.marks[k];
+    const int symbol = symbols[number % symbols.size()];
+    body += fmt::format(
+        ", {0} index {1} using 1:2 with points pt {2} ps 1.0*scale lw 4 lc rgb '#ffffff' notitle, {0} index {1} using "
+        "1:2 "
+        "with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}",
+        file, k + 1, symbol, gnuplot_text(plain(label)));
+  }
+  run_gnuplot(directory, picture.name, twice(picture.name, {560, ""}, {170, ""}, body + "\n"));
+}
+
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
   if (picture.x.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
   std::string data = "# disks: x y radius color\n";
@@ -308,11 +341,9 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
   std::string body = fmt::format(
       "set xlabel {}\nset ylabel {}\nset cblabel {}\nset xrange [0:{}]\nset yrange [0:{}]\nset size ratio -1\nset "
       "border lc rgb '#404040'\nset tics nomirror out\nset cbrange [{}:{}]\n"
-      // Dark blue to yellow: rises in lightness alone [cividis; Nunez, Anderton and Renslow 2018].
-      "set palette defined (0 '#00224e', 0.25 '#3b496c', 0.5 '#7b7b78', 0.75 '#bcae6c', 1 '#fee838')\nset style fill "
-      "solid 1 border lc rgb '#303030'\nset key above\n",
+      "{}set style fill solid 1 border lc rgb '#303030'\nset key above\n",
       gnuplot_text(picture.x_label), gnuplot_text(picture.y_label), gnuplot_text(picture.color_label), picture.width,
-      std::ceil(top + 0.5), picture.color_low, picture.color_high);
+      std::ceil(top + 0.5), picture.color_low, picture.color_high, lightness_palette);
   body +=
       fmt::format("plot {} index 0 using 1:2:3:4 with circles lc palette lw 0.5 notitle", gnuplot_text(name + ".dat"));
   if (!picture.cross_x.empty())

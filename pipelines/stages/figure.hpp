@@ -37,6 +37,16 @@ struct DiskPicture {
   std::string x_label{}, y_label{}, color_label{}, cross_label{};
   double color_low = 0, color_high = 1;
 };
+// Coloured cells, with symbols on some of them. `data`: block 0 of rows "x y x_low x_high y_low y_high value", then a
+// block of rows "x y" for each mark.
+struct MapPicture {
+  std::string name, data;
+  std::string x_label{}, y_label{}, value_label{};
+  std::optional<double> value_low{}, value_high{};
+  bool logarithmic_x = false, logarithmic_y = false;
+  std::vector<std::pair<std::string, std::size_t>> marks{};  // label, number of the symbol
+};
+void draw_cells(const MapPicture& picture, const std::filesystem::path& directory);
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
 // Writes the script as NAME.gp and runs it; it must make NAME.svg and NAME.pdf. Throws StageError when it does not.
 void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script);

@@ -1,4 +1,5 @@
-// scaling: products of powers through the points of studies, y = amplitude x_1^a_1 x_2^a_2 ..., with their errors.
+// scaling: products of powers through the points of studies, y = amplitude x_1^a_1 x_2^a_2 ..., with their errors. The
+// amplitude is one number, or free at every value of other columns ("each"): then y may depend on these in any way.
 //
 // Files: scaling.json (exponents) and, for every fit, NAME.csv: its points, the fit at them and their ratio, from which
 // a chart draws the fitted line, or all points against the fit.
@@ -22,7 +23,7 @@ struct ColumnLimits {
 };
 struct ScalingFit {
   std::string name, from, y;
-  std::vector<std::string> powers, series;
+  std::vector<std::string> powers, each, series;
   std::vector<std::pair<std::string, ColumnLimits>> within;
   bool common_error = false;
 };
@@ -32,6 +33,14 @@ struct ScalingPoints {
   std::vector<std::string> series;
   std::vector<std::vector<double>> x;  // of each power, at the points
   std::vector<double> y, error;
+  std::vector<std::vector<double>> places;  // group → its values of "each"
+  std::vector<std::size_t> group;           // of the points; empty without "each"
+
+  void join_group(const std::vector<double>& place) {
+    const auto found = std::find(places.begin(), places.end(), place);
+    group.push_back(static_cast<std::size_t>(found - places.begin()));
+    if (found == places.end()) places.push_back(place);
+  }
 };
 
 bool lies_within(const ScalingFit& fit, const StudyTable& table, std::size_t row) {
@@ -51,8 +60,14 @@ ScalingPoints points_of(const ScalingFit& fit, const StudyTable& table) {
     for (const std::string& power : fit.powers) {
       if (const auto value = table.number(row, table.column(power))) x.push_back(*value);
     }
-    if (!y || !error || x.size() < fit.powers.size() || !lies_within(fit, table, row)) continue;
+    std::vector<double> place;
+    for (const std::string& column : fit.each) {
+      if (const auto value = table.number(row, table.column(column))) place.push_back(*value);
+    }
+    if (!y || !error || x.size() < fit.powers.size() || place.size() < fit.each.size()) continue;
+    if (!lies_within(fit, table, row)) continue;
     for (std::size_t k = 0; k < x.size(); ++k) points.x[k].push_back(x[k]);
+    if (!fit.each.empty()) points.join_group(place);
     points.y.push_back(*y), points.error.push_back(*error), points.series.push_back(table.series(row));
   }
   return points;
@@ -76,7 +91,7 @@ Json scaling_json(const ScalingFit& options, const fit::PowerProduct& found, std
         found.ok ? quantity_json(found.exponents[k], "1", found.exponent_errors[k]) : Json();
   if (!found.ok) return out;
   const double amplitude = std::exp(found.log_amplitude);
-  out["amplitude"] = quantity_json(amplitude, "1", amplitude * found.log_amplitude_error);
+  if (options.each.empty()) out["amplitude"] = quantity_json(amplitude, "1", amplitude * found.log_amplitude_error);
   out["chi2"] = found.chi2, out["dof"] = found.dof, out["p_value"] = found.p_value;
   out["rms_log_ratio"] = found.rms_log_ratio;
   return out;
@@ -87,6 +102,8 @@ void describe_fit(Fields& fields, ScalingFit& fit) {
   fields.text("from", fit.from, {.help = "id of the study; may be left out when there is one"});
   fields.text("y", fit.y, {.help = "column, with its errors beside it", .required = true});
   fields.texts("powers", fit.powers, {.help = "columns whose powers are multiplied", .required = true});
+  fields.texts("each", fit.each,
+               {.help = "columns at every value of which the amplitude is free: only what the powers do there counts"});
   fields.texts("series", fit.series, {.help = "series of the study that are used; none: all"});
   fields.map<ColumnLimits>("within", fit.within,
                            [](Fields& f, ColumnLimits& limits) {
@@ -118,6 +135,7 @@ void check_fit(Fields& fields, const ScalingFit& fit) {
   check("/y", fit.y);
   if (!misfit_of_column(*table, fit.y)) check("/y", fit.y + "_error");
   for (std::size_t k = 0; k < fit.powers.size(); ++k) check("/powers/" + std::to_string(k), fit.powers[k]);
+  for (std::size_t k = 0; k < fit.each.size(); ++k) check("/each/" + std::to_string(k), fit.each[k]);
   for (const auto& [column, limits] : fit.within) check("/within/" + escape_pointer_token(column), column);
   const std::vector<std::string>& names = table->columns.front().values;
   for (std::size_t k = 0; k < fit.series.size(); ++k) {
@@ -154,13 +172,16 @@ class Scaling : public Stage {
       list.text(at + "/status", "ok, or why there is no fit");
       for (const std::string& power : fit.powers)
         list.quantity(pointer_join(at + "/exponents", power), "1", "exponent of " + power, {}, true);
-      list.quantity(at + "/amplitude", "1", "factor of the powers, in the units of the columns", found);
+      list.quantity(at + "/amplitude", "1", "factor of the powers, in the units of the columns",
+                    both(found, given_if(fit.each.empty(), "\"each\" names no column")));
       list.number(at + "/chi2", "1", "sum of the squared residuals of ln y over their errors", found);
       list.number(at + "/dof", "1", "degrees of freedom", found);
       list.number(at + "/p_value", "1", "chance of so large a chi2", found);
       list.number(at + "/rms_log_ratio", "1", "rms of ln(y/fit)", found);
       std::vector<StatedColumn> columns{{"series", "", "kind of bed"}};
-      for (const std::string& power : fit.powers) columns.push_back({power, "1", "as in the study"});
+      for (const std::vector<std::string>* names : {&fit.powers, &fit.each}) {
+        for (const std::string& name : *names) columns.push_back({name, "1", "as in the study"});
+      }
       for (const char* name : {"y", "y_error", "fitted", "ratio", "ratio_error"}) columns.push_back(column_named(name));
       list.table({fit.name + ".csv", "the points of " + fit.name + ", and the fit at them", columns, found});
     }
@@ -175,7 +196,7 @@ class Scaling : public Stage {
       });
       ScalingPoints points = points_of(options, read_study_table(input->file("table.csv")));
       if (options.common_error) share_error(points);
-      const fit::PowerProduct found = fit::fit_power_product(points.x, points.y, points.error);
+      const fit::PowerProduct found = fit::fit_power_product(points.x, points.y, points.error, points.group);
       out[options.name] = scaling_json(options, found, points.y.size());
       if (found.ok)
         write_points(context, options, points, found);
@@ -202,7 +223,11 @@ class Scaling : public Stage {
       for (const std::vector<double>& column : points.x) place.push_back(column[i]);
       std::vector<Cell> row{points.series[i]};
       row.insert(row.end(), place.begin(), place.end());
-      const double fitted = found.at(place);
+      if (!points.group.empty()) {
+        const std::vector<double>& own = points.places[points.group[i]];
+        row.insert(row.end(), own.begin(), own.end());
+      }
+      const double fitted = found.at(place, points.group.empty() ? 0 : points.group[i]);
       for (const double number : {points.y[i], points.error[i], fitted, points.y[i] / fitted, points.error[i] / fitted})
         row.emplace_back(number);
       table.add(row);

@@ -437,6 +437,11 @@ bool SceneOptions::may_be_filled_at_random() const {
          std::holds_alternative<HexagonalStartOptions>(start_);
 }
 
+bool SceneOptions::two_species() const {
+  return disks_.second && (disks_.second->diameter != disks_.diameter ||
+                           disks_.second->density.value_or(disks_.density) != disks_.density);
+}
+
 double SceneOptions::bath_temperature() const {
   double temperature = 0;
   if (const auto* b = std::get_if<LangevinOptions>(&bath_)) temperature = b->temperature;

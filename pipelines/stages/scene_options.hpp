@@ -136,6 +136,7 @@ class SceneOptions {
   double length_unit() const { return disks_.diameter; }  // D
   double time_unit() const;                               // sqrt(D/g)
   bool weightless() const { return !gravity_; }
+  bool two_species() const;  // that can be known apart, by diameter or mass
   bool periodic_upwards() const { return std::holds_alternative<PeriodicLidOptions>(box_.lid); }
   // The floor's period in reduced units; 0 when it stands still.
   double period() const;

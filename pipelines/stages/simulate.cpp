@@ -135,7 +135,7 @@ void Simulate::describe(Fields& fields) {
   fields.texts("observe", observe_,
                {.help = "measured only when named: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
                         "displacement, pressure (by height, with exact averages over time), phases (means by height "
-                        "and phase)"});
+                        "and phase), species (temperatures of two species)"});
   fields.integer(
       "replicas", replicas_,
       {.help = "beds that are run, each with a seed of its own; results are means, errors hold for the next bed. 4 by "
@@ -157,7 +157,7 @@ void Simulate::check(Fields& fields) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string nearest = nearest_name(name, known);
     fields.problem("/observe", "\"" + name + "\" is nothing that can be observed",
-                   nearest.empty() ? "One of: order, velocities, displacement, pressure, phases"
+                   nearest.empty() ? "One of: order, velocities, displacement, pressure, phases, species"
                                    : "Did you mean \"" + nearest + "\"?");
   }
   if (fields.problem_count() > 0) return;
@@ -167,6 +167,9 @@ void Simulate::check(Fields& fields) {
   for (std::size_t k = 0; k < annealing_.size(); ++k)
     fields.require(annealing_[k].ramp + annealing_[k].hold > 0, "schedule/" + std::to_string(k),
                    "the step lasts no time", "Give \"ramp\" or \"hold\"");
+  fields.require(!ObserveOptions::from(observe_).species || bed_.two_species(), "observe",
+                 "the disks are of one species, or of two that are alike",
+                 "Give \"disks\" a \"second\" species of another diameter or density");
   fields.require(!ObserveOptions::from(observe_).pressure || !bed_.periodic_upwards(), "observe",
                  "the pressure by height needs a height, but the box is periodic upwards",
                  "compressibility_factor is measured anyway");

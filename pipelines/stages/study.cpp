@@ -36,7 +36,7 @@ struct Kind {
   std::optional<double> second;
 };
 // What is taken of a column of a table.
-enum class Take { largest, smallest, place_of_largest, place_of_smallest };
+enum class Take { largest, smallest, place_of_largest, place_of_smallest, mean };
 struct Collected {
   std::string at;  // "/fit/temperature", or a table "/bed/profile.csv" with the options below
   std::string column, by = "height";
@@ -134,7 +134,8 @@ class Study : public Stage {
 const std::vector<Choice<Take>> takes{{Take::largest, "largest"},
                                       {Take::smallest, "smallest"},
                                       {Take::place_of_largest, "place_of_largest"},
-                                      {Take::place_of_smallest, "place_of_smallest"}};
+                                      {Take::place_of_smallest, "place_of_smallest"},
+                                      {Take::mean, "mean"}};
 bool takes_place(Take take) { return take == Take::place_of_largest || take == Take::place_of_smallest; }
 
 // The table of the chain that a pointer "/bed/profile.csv" leads to; nullptr where it leads to none.
@@ -150,14 +151,16 @@ Number taken(const Collected& c, const fs::path& path) {
   const std::size_t y = csv_column(rows.header, c.column, path.string()),
                     x = csv_column(rows.header, c.by, path.string());
   const bool largest = c.take == Take::largest || c.take == Take::place_of_largest;
-  double best = NAN, place = NAN;
+  double best = NAN, place = NAN, sum = 0, used = 0;
   for (const std::vector<std::string>& cells : rows.rows) {
     const auto value = number_in(cells[y]), at = number_in(cells[x]);
     if (!value || !at || *at < c.least.value_or(-INFINITY) || *at > c.most.value_or(INFINITY)) continue;
+    sum += *value, used += 1;
     if (std::isnan(best) || (largest ? *value > best : *value < best)) best = *value, place = *at;
   }
   Number number;
-  number.value = c.plus + c.times * (takes_place(c.take) ? place : best);
+  const double one = takes_place(c.take) ? place : c.take == Take::mean && used > 0 ? sum / used : best;
+  number.value = c.plus + c.times * one;
   return number;
 }
 
@@ -202,9 +205,10 @@ void Study::describe(Fields& fields) {
         f.text("at", c.at,
                {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv with a column", .required = true});
         f.text("column", c.column, {.help = "column of the table of which one number is taken"});
-        f.choice("take", c.take, takes,
-                 {.help = "which: the largest or smallest number, or where it stands; noise makes "
-                          "the largest too large and the smallest too small"});
+        f.choice(
+            "take", c.take, takes,
+            {.help = "which: the largest or smallest number, or where it stands (noise makes the largest too large and "
+                     "the smallest too small); or the mean of the rows"});
         f.text("by", c.by, {.help = "column that says where"});
         f.number("least", c.least, {.help = "smallest place that is looked at"});
         f.number("most", c.most, {.help = "largest place that is looked at"});

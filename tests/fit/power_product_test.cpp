@@ -76,5 +76,25 @@ TEST(PowerProduct, StatesItsErrors) {
   EXPECT_GT(squares / samples, 0.6);
 }
 
+// y = a(g) n^0.3 with a = 5 at n = 1, 2 and a = 700 at n = 4, 16: groups whose amplitudes would pass for a power of n.
+// The error of the exponent is that of the scatter within groups, ln 2 and ln 4 wide: s/sqrt(ln^2 2/2 + ln^2 4/2).
+TEST(PowerProduct, LeavesTheAmplitudeOfEachGroupFree) {
+  const std::vector<std::vector<double>> x{{1, 2, 4, 16}};
+  const std::vector<std::size_t> group{0, 0, 1, 1};
+  std::vector<double> y, error;
+  for (std::size_t i = 0; i < 4; ++i)
+    y.push_back((group[i] == 0 ? 5 : 700) * std::pow(x[0][i], 0.3)), error.push_back(0.02 * y.back());
+  const PowerProduct fit = fit_power_product(x, y, error, group);
+  ASSERT_TRUE(fit.ok);
+  EXPECT_EQ(fit.dof, 1);
+  EXPECT_NEAR(fit.exponents[0], 0.3, 1e-12);
+  EXPECT_NEAR(fit.exponent_errors[0], 0.02 / std::sqrt(2.5) / std::log(2), 1e-12);
+  ASSERT_EQ(fit.group_log_amplitude.size(), 2U);
+  EXPECT_NEAR(fit.group_log_amplitude[1], std::log(700), 1e-12);
+  EXPECT_NEAR(fit.at(std::vector<double>{8}, 1), 700 * std::pow(8, 0.3), 1e-9);
+  EXPECT_GT(fit_power_product(x, y, error).exponents[0], 1.5) << "one amplitude";
+  EXPECT_FALSE(fit_power_product({{1, 1, 2, 2}}, y, error, group).ok) << "no spread within a group";
+}
+
 }  // namespace
 }  // namespace shakebed::fit

@@ -410,6 +410,80 @@ const std::string replicated = R"({ "name": "t", "stages": [ { "stage": "simulat
     "bath": { "kind": "langevin", "temperature": 0.3, "rate": 0.5, "interval": 0.2 },
     "settle": 5, "measure": 30, "observe": ["order", "velocities", "pressure"] } ] })";
 
+// 40 light and 40 heavy (three times the mass) elastic disks above a floor at rest: in equilibrium both species have
+// one temperature, and their densities fall as exp(-m g z/T), so that their ratio falls as exp(-2 z/T). Limits at 4
+// errors.
+TEST(TwoSpecies, ShareTheirEnergyInEquilibrium) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 3,
+      "units": "reduced", "disks": { "count": 40, "density": 1, "second": { "count": 40, "diameter": 1, "density": 3 } },
+      "box": { "width": 60, "sides": "hard" }, "start_temperature": 10, "settle": 100, "measure": 1000,
+      "observe": ["species"] } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json numbers = Json::parse(read_text(folder / "o/bed/observables.json"));
+  const double light = value(numbers["temperature_first"]), heavy = value(numbers["temperature_second"]);
+  EXPECT_EQ(numbers["temperature_first"]["unit"], "m g D");
+  EXPECT_NEAR(value(numbers["temperature_ratio"]), heavy / light, 1e-12);
+  EXPECT_NEAR(heavy / light, 1, 4 * error(numbers["temperature_ratio"]));
+  EXPECT_LT(error(numbers["temperature_ratio"]), 0.03);
+  const double all = (value(numbers["temperature_x"]) + value(numbers["temperature_z"])) / 2;
+  EXPECT_NEAR(light, all, 4 * std::hypot(error(numbers["temperature_first"]), error(numbers["temperature_x"])));
+  EXPECT_NEAR(heavy, all, 4 * std::hypot(error(numbers["temperature_second"]), error(numbers["temperature_x"])));
+
+  const NumberTable layers(folder / "o/bed/species.csv");
+  double disks_seen[2] = {}, looks = 0, slope_top = 0, slope_bottom = 0, mean_z = 0, mean_log = 0, weight = 0;
+  for (const char* name : {"first", "second"}) {
+    for (std::size_t r = 0; r < layers.rows(); ++r)
+      disks_seen[name[0] == 's'] += layers(std::string("number_density_") + name, r) * 60;
+  }
+  EXPECT_NEAR(disks_seen[0], 40, 1e-9);
+  EXPECT_NEAR(disks_seen[1], 40, 1e-9);
+  for (std::size_t r = 0; r < layers.rows(); ++r) looks += layers("samples_first", r) / 40;
+  for (std::size_t r = 0; r < layers.rows(); ++r) {
+    for (const std::string name : {"_first", "_second"}) {
+      const double samples = layers("samples" + name, r);
+      EXPECT_NEAR(samples, layers("number_density" + name, r) * 60 * looks, 1e-6 * (1 + samples));
+    }
+    const double z = layers("height", r), one = layers("samples_first", r), two = layers("samples_second", r);
+    if (z < 0 || z > 12 || two < 300) continue;
+    const double w = 1 / (1 / one + 1 / two), log_ratio = std::log(two / one);
+    weight += w, mean_z += w * z, mean_log += w * log_ratio;
+  }
+  mean_z /= weight, mean_log /= weight;
+  for (std::size_t r = 0; r < layers.rows(); ++r) {
+    const double z = layers("height", r), one = layers("samples_first", r), two = layers("samples_second", r);
+    if (z < 0 || z > 12 || two < 300) continue;
+    const double w = 1 / (1 / one + 1 / two);
+    slope_top += w * (z - mean_z) * (std::log(two / one) - mean_log), slope_bottom += w * (z - mean_z) * (z - mean_z);
+    // A layer sees disks for some looks one after the other: about 50 velocities are independent in 300 samples.
+    for (const std::string name : {"_first", "_second"}) {
+      EXPECT_NEAR(layers("temperature_x" + name, r) / all, 1, 0.35) << z << name;
+      EXPECT_NEAR(layers("temperature_z" + name, r) / all, 1, 0.35) << z << name;
+    }
+    const double both = (layers("temperature_x_second", r) + layers("temperature_z_second", r)) /
+                        (layers("temperature_x_first", r) + layers("temperature_z_first", r));
+    EXPECT_NEAR(layers("ratio", r), both, 1e-12);
+  }
+  EXPECT_NEAR(slope_top / slope_bottom, -2 / all, 0.2 * 2 / all) << "barometric: the heavy ones lie below";
+}
+
+// One species, or two that are alike, have no second temperature.
+TEST(TwoSpecies, MustBeKnownApart) {
+  const ScratchFolder folder;
+  const std::string recipe = R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "units": "reduced",
+      "disks": { "count": 40 SECOND }, "box": { "width": 20 }, "measure": 1, "observe": ["species"] } ] })";
+  for (const std::string second : {"", R"(, "second": { "count": 4, "diameter": 1 })"}) {
+    std::string text = recipe;
+    text.replace(text.find("SECOND"), 6, second);
+    write_text(folder / "r.json", text);
+    const ProgramResult ran = run_shakebed({"validate", "r.json"}, folder.path());
+    EXPECT_EQ(ran.exit_code, 3);
+    EXPECT_NE(ran.err.find("/stages/0/observe"), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("another diameter or density"), std::string::npos) << ran.err;
+  }
+}
+
 // Four beds together are the mean of the four one by one. Their standard deviation over two, times Student's t for
 // three degrees of freedom, 3.182446, over the normal 1.959964, is the error, or what the beds state where that is
 // more.

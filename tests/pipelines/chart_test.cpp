@@ -132,4 +132,33 @@ TEST(ChartNumbers, PooledErrorsAreTheirRootMeanSquare) {
   EXPECT_NEAR(error(found["slope"]), std::sqrt(17.0 / 2), 1e-13);
 }
 
+// y x^2 = 12, 12: a compensated plot is flat, its errors grow alike.
+TEST(ChartNumbers, APowerOfXMultipliesPointsAndErrors) {
+  const Json found = numbers_of("x,y,y_error\n1,12,1\n2,3,0.5\n", R"("y": "y", "power_of_x": 2, "against": "flat")",
+                                R"({"name": "flat", "polynomial": [10]})")["against"];
+  EXPECT_NEAR(value(found["mean_difference"]), 2, 1e-14);
+  EXPECT_NEAR(found["chi2"].get<double>(), 4 + 1, 1e-14) << "errors 1 and 2";
+}
+
+// A map of 2 x 3 settings; marked where "b" is at least 4 and "a" at most 5: the settings with b = 4 and 5.
+TEST(ChartMap, CountsItsCellsAndMarks) {
+  LoneStage chart(*find_stage("chart"));
+  chart.add_input("beds", *find_stage("study"));
+  write_text(chart.file("table.csv"),
+             "series,v,n,a,b\nall,1,10,1,1\nall,1,20,2,2\nall,1,30,3,3\nall,2,10,4,4\nall,2,20,"
+             "5,5\nall,2,30,6,6\n");
+  const Json found = chart.run(R"({"maps": [{"name": "plane", "x": "v", "y": "n", "value": "a", "x_label": "V",
+      "y_label": "N", "value_label": "a", "logarithmic_x": true,
+      "marks": [{"label": "floats", "where": {"b": {"least": 4}, "a": {"most": 5}}}, {"label": "never", "where": {"a":
+      {"least": 7}}}]}]})")["plane"];
+  EXPECT_EQ(found["cells"], 6);
+  EXPECT_EQ(found["marked"]["floats"], 2);
+  EXPECT_EQ(found["marked"]["never"], 0);
+  const std::string data = read_text(chart.output("plane.dat"));
+  // Cells end half way in the logarithm, sqrt(1 x 2), and as far out: 1/sqrt(2).
+  EXPECT_NE(data.find("1 10 0.7071067811865476 1.414213562373095 5 15 1"), std::string::npos) << data;
+  EXPECT_NE(data.find("# floats: x y\n2 10\n2 20\n"), std::string::npos) << data;
+  EXPECT_EQ(data.find("never"), std::string::npos);
+}
+
 }  // namespace

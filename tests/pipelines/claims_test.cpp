@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 
 #include "pipelines/formats/csv.hpp"
@@ -42,6 +43,17 @@ TEST_F(ClaimsVerdicts, AValueAndItsTolerance) {
   EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.31)"), "open");
   EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.3)"), "does not hold");
   EXPECT_EQ(verdict("/bed/t", R"("value": 0.5, "tolerance": 0.3)"), "does not hold");
+}
+
+// 1.0 +- 0.1 over 0.25 without an error: 4 +- 0.4; over itself: 1 +- 0.1 sqrt(2), its errors taken as independent.
+TEST_F(ClaimsVerdicts, OfOneNumberOverAnother) {
+  const Json quarter = one("/bed/t", R"("over": "/bed/plain", "value": 4, "tolerance": 0.8)");
+  EXPECT_NEAR(quarter["value"].get<double>(), 4, 1e-14);
+  EXPECT_NEAR(quarter["std_error"].get<double>(), 0.4, 1e-14);
+  EXPECT_EQ(quarter["verdict"], "holds");
+  EXPECT_EQ(quarter["over"], "/bed/plain");
+  EXPECT_NEAR(one("/bed/t", R"("over": "/bed/t", "value": 1)")["std_error"].get<double>(), 0.1 * std::sqrt(2), 1e-14);
+  EXPECT_EQ(verdict("/bed/t", R"("over": "/bed/no", "value": 1)"), "not measured") << "over zero";
 }
 
 TEST_F(ClaimsVerdicts, Bounds) {

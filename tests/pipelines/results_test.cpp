@@ -23,9 +23,28 @@ TEST(ResultsOfRecord, AreThePage) {
       << "write it again: shakebed reproduce --results > docs/results.md";
 }
 
+// One page a recipe, and no page without one.
+TEST(ResultsOfRecord, HaveAPageARecipe) {
+  int pages = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source / "docs/results")) {
+    if (entry.path().extension() != ".md") continue;
+    const std::string recipe = entry.path().stem();
+    const ProgramResult page = run_shakebed({"reproduce", recipe, "--results"}, source);
+    EXPECT_EQ(page.exit_code, 0) << page.err;
+    EXPECT_EQ(page.out, read_text(entry.path()))
+        << "write it again: shakebed reproduce " << recipe << " --results > docs/results/" << recipe << ".md";
+    ++pages;
+  }
+  int recipes = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source / "pipelines/recipes"))
+    recipes += fs::exists(entry.path() / "figure.json");
+  EXPECT_EQ(pages, recipes);
+}
+
 TEST(ResultsOfRecord, AreOfTheClaimsInTheRecipes) {
   int records = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(source / "docs/results")) {
+    if (entry.path().extension() != ".json") continue;
     const Json record = Json::parse(read_text(entry.path()));
     const fs::path recipe = source / "pipelines/recipes" / entry.path().stem() / "figure.json";
     std::vector<std::string> claimed, recorded;

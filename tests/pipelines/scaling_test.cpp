@@ -67,6 +67,20 @@ TEST_F(ScalingOfAGrid, HasTheExponentsOfItsLaw) {
   }
 }
 
+// With the amplitude free at each N only the power of V is left, with the same error as on the whole grid.
+TEST_F(ScalingOfAGrid, LeavesTheAmplitudeFreeAtEachValue) {
+  const Json found = scaling_.run(
+      R"({"fits": [{"name": "law", "y": "T", "powers": ["V"], "each": ["N"], "series": ["all"]}]})")["law"];
+  EXPECT_EQ(found["dof"], 3);
+  EXPECT_NEAR(found["exponents"]["V"]["value"].get<double>(), 2, 1e-5);
+  EXPECT_NEAR(found["exponents"]["V"]["std_error"].get<double>(), 0.01 / (2 * std::log(2)), 1e-6);
+  EXPECT_FALSE(found.contains("amplitude"));
+  const NumberTable points(scaling_.output("law.csv"));
+  ASSERT_EQ(points.rows(), 6U);
+  for (std::size_t r = 0; r < 6; ++r)
+    EXPECT_NEAR(points("fitted", r), 3 * points("V", r) * points("V", r) / points("N", r), 1e-4);
+}
+
 TEST_F(ScalingOfAGrid, UsesThePointsAskedFor) {
   const Json found = scaling_.run(R"({"fits": [{"name": "law", "y": "T", "powers": ["V"], "series": ["all"],
                                                 "within": {"N": {"most": 20}}, "common_error": true}]})")["law"];
