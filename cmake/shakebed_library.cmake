@@ -14,6 +14,15 @@ endif()
 set(shakebed_package_directory "${CMAKE_INSTALL_LIBDIR}/cmake/shakebed")
 set(shakebed_install_headers "")
 
+# Where TARGET, installed into DESTINATION below the prefix, finds shared libraries of ours: relative to itself, so that
+# the prefix may be moved.
+function(shakebed_finds_libraries target destination)
+  if(SHAKEBED_SHARED)
+    file(RELATIVE_PATH libraries "/${destination}" "/${CMAKE_INSTALL_LIBDIR}")
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/${libraries}" BUILD_RPATH "$ORIGIN/${libraries}")
+  endif()
+endfunction()
+
 # shakebed_public_library(ROOM HEADERS headers... [REQUIRES rooms...] [PRIVATE_PACKAGES names...])
 # Makes shakebed_<room> a library for others. HEADERS: as they stand in the tree. REQUIRES: rooms whose headers its
 # headers include. PRIVATE_PACKAGES: what pkg-config must add to link the static library.
@@ -22,7 +31,7 @@ function(shakebed_public_library room)
   set(target shakebed_${room})
   add_library(shakebed::${room} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${room} VERSION ${PROJECT_VERSION}
-                        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+                        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} DEFINE_SYMBOL "")
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:shakebed_options>)
   target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
@@ -33,11 +42,12 @@ function(shakebed_public_library room)
   add_dependencies(${target} shakebed_public_headers)
   set_property(GLOBAL APPEND PROPERTY SHAKEBED_PUBLIC_HEADERS ${ARG_HEADERS})
   set_property(GLOBAL APPEND PROPERTY SHAKEBED_PUBLIC_ROOMS ${room})
+  shakebed_finds_libraries(${target} "${CMAKE_INSTALL_LIBDIR}")
   if(NOT SHAKEBED_INSTALL)
     return()
   endif()
   install(TARGETS ${target} EXPORT shakebed_${room}
-          LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT development
+          LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT program NAMELINK_COMPONENT development
           ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT development)
   install(EXPORT shakebed_${room} FILE shakebed-${room}-targets.cmake NAMESPACE shakebed::
           DESTINATION "${shakebed_package_directory}" COMPONENT development)

@@ -13,6 +13,14 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENTS_ALL program development)
 
+# Debian wants the licence of each package in share/doc/<package>.
+function(shakebed_copyright component package)
+  install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${package}" RENAME copyright
+          COMPONENT ${component})
+endfunction()
+shakebed_copyright(program shakebed)
+shakebed_copyright(development libshakebed-dev)
+
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME shakebed)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "gnuplot-nox")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The program, its images module, recipes, manual pages and completions.")
@@ -26,6 +34,7 @@ set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 if(TARGET shakebed_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  shakebed_copyright(python python3-shakebed)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-shakebed)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS

@@ -14,7 +14,7 @@
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/read_recipe.hpp"
-#include "pipelines/stages/kernel_options.hpp"
+#include "pipelines/stages/measure_options.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/theory.hpp"
 #include "python/module.hpp"
@@ -87,26 +87,11 @@ SceneOfRecipe read_scene(const std::string& text, const std::string& file, const
   pipelines::Fields fields = pipelines::Fields::decode(*node, stage.pointer, source);
   fields.set_reduced(stage.reduced);
   out.bed.describe(fields);
-  double settle = 0, measure = 0;
-  fields.quantity("settle", settle, pipelines::dimension::time);
-  fields.quantity("measure", measure, pipelines::dimension::time);
-  struct Frames {
-    std::uint32_t count = 0, phases = 32;
-  } frames;
-  fields.object<Frames>("frames", frames, [](pipelines::Fields& f, Frames& one) {
-    f.integer("count", one.count);
-    f.integer("phases", one.phases);
-  });
-  fields.object<sim::MeasureOptions>("profile", out.options, [](pipelines::Fields& f, sim::MeasureOptions& options) {
-    f.number("spacing", options.spacing);
-    f.object<Kernel>("kernel", options.kernel, pipelines::describe_measuring_kernel);
-  });
+  pipelines::BedMeasureOptions measure;
+  measure.describe(fields);
   if (!problems.empty()) throw pipelines::ConfigError(problems);
   out.scene = out.bed.scene(stage.seed);
-  out.options.settle = settle / out.bed.time_unit();
-  out.options.duration = measure / out.bed.time_unit();
-  out.options.phases = frames.phases;
-  out.options.frames = frames.count;
+  out.options = measure.reduced(out.bed.time_unit());
   return out;
 }
 

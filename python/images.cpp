@@ -68,7 +68,6 @@ ingest::MeasureOptions measure_options(const py::dict& wanted) {
     if (wanted.contains(name) && !wanted[name].is_none()) value = wanted[name].cast<Value>();
   };
   out.find = find_options(wanted);
-  out.kernel = {KernelKind::gaussian, 0.5};  // as in the stage `extract`
   take("diameter", out.bead_diameter_m);
   take("scale", out.scale_m_per_px);
   take("floor", out.floor_px);
@@ -174,13 +173,12 @@ ingest::BedFound measured(const std::function<ingest::BedFound(const ingest::Mea
   return found;
 }
 
+// The arrays are read where they lie; `images` keeps them alive.
 ingest::BedFound measure_arrays(const std::vector<py::array>& images, const py::dict& wanted, py::object progress) {
-  std::vector<ingest::GrayFrame> frames;
-  for (const py::array& image : images) frames.push_back(ingest::frame_of(view_of(image)));
-  const std::size_t count = frames.size();
-  return measured(
-      [&](const ingest::MeasureOptions& options) { return ingest::measure_bed(std::move(frames), options); }, wanted,
-      std::move(progress), count);
+  std::vector<ingest::ImageView> frames;
+  for (const py::array& image : images) frames.push_back(view_of(image));
+  return measured([&](const ingest::MeasureOptions& options) { return ingest::measure_bed(frames, options); }, wanted,
+                  std::move(progress), frames.size());
 }
 
 ingest::BedFound measure_files(const std::vector<std::string>& paths, const py::dict& wanted, py::object progress) {

@@ -1,5 +1,7 @@
 // How well the mean of a series, or of many that are sampled together, is known whose values remember those before
 // them. What takes a series takes it from its mean, so that its values add up to 0, but from_mean() and mean_of().
+//
+// Any number of threads may call; values own what they hold.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,7 @@
 // The window through which a density is seen: every measured profile is the true one convolved with a kernel, and a
 // model is put through the same kernel before the two are compared. Lengths in D.
+//
+// Any number of threads may call; values own what they hold.
 #pragma once
 
 #include <cstddef>
@@ -27,6 +29,11 @@ struct Kernel {
   bool operator==(const Kernel&) const = default;
 };
 
+// The window and the distance of heights [D] with which every part measures a profile unless others are asked for. A
+// Gaussian does not alias with the rows of a crystal.
+inline constexpr Kernel measuring_kernel{KernelKind::gaussian, 0.5};
+inline constexpr double measuring_spacing = 0.25;
+
 // Whether the width is finite and not negative; a width of 0 is a point.
 bool kernel_is_valid(const Kernel& kernel);
 // Half the extent beyond which it is nothing: 6.5 standard deviations of a Gaussian hold all but 1e-10 of it. [D]
@@ -46,7 +53,7 @@ std::string to_string(const Kernel& kernel);
 
 // Heights lowest + i spacing.
 struct HeightGrid {
-  double lowest = 0, spacing = 0.25;  // [D]
+  double lowest = 0, spacing = measuring_spacing;  // [D]
   std::size_t points = 0;
   double height(std::size_t i) const { return lowest + static_cast<double>(i) * spacing; }
 };

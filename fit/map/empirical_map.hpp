@@ -8,6 +8,8 @@
 
 // The map that simulated beds make: a table of T at points (Gamma, f, e, friction, ...), interpolated, beside the
 // theory's.
+//
+// A map owns its table; any number of threads may ask one.
 namespace shakebed::fit {
 
 struct MapPoint {

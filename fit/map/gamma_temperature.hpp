@@ -8,6 +8,8 @@
 
 // Gamma -> temperature: the single-ball jump equated to the rise of the bed's centre of mass, in every reading the
 // paper allows, and none of them claimed. [QuinnHong2000]
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 enum class ExpansionReading {

@@ -11,6 +11,8 @@
 // How high a single ball jumps on a vibrated floor: the length that the Gamma -> temperature map equates to the rise of
 // the bed. Lengths are in g/w^2, velocities in g/w, phases in radians. The paper does not say which height it means, so
 // all candidates are offered by name.
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 // A periodic floor motion z(theta) = Gamma s(theta) [g/w^2], as a Fourier series. s is scaled so that the largest |s''|

@@ -11,6 +11,8 @@
 // Every thermometer of thermometers.hpp reads the profile; known biases are taken off; the one that scatters least from
 // bed to bed at this temperature gives T; the others check it. On beds whose temperature is known, 95 % intervals hold
 // it in 92 to 98 % (docs/thermometer.md).
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 struct AnswerInput {

@@ -17,6 +17,8 @@
 // result.
 //
 // Nothing here throws on data. Whatever is wrong with the profile comes back as a status and a sentence.
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 // A measured profile. Heights in D above the floor's mean position, densities n D^2.

@@ -18,6 +18,10 @@
 //     f(phi) = ln phi + K + g(phi),   g(phi) = Z - 1 + integral_0^phi (Z - 1)/phi' dphi',
 // where g is positive and vanishes with phi, and the constant K is that of the printed Enskog f (K = c3 + c4) and 0 for
 // the other rows. Only differences of f mean anything. [QuinnHong2000]
+//
+// Any number of threads may use one row: its tables are made once, behind a lock, and do not change afterwards. The
+// rows of this library live as long as the program; one of your own must outlive the profiles and fits that refer to
+// it.
 namespace shakebed::fit {
 
 // 2/sqrt(3): the number density of close packing.

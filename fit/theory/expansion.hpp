@@ -7,6 +7,8 @@
 // mu is the height in diameters of the close-packed rectangle at T = 0; the sum rule is
 //     integral phi dzeta = phi_0 mu = N D/W.
 // Nothing here takes a bare mu without the plateau density phi_0 beside it. [QuinnHong2000]
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 // All of an equation of state's constants at one plateau density. Each is evaluated without cancellation:

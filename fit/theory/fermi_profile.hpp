@@ -6,6 +6,8 @@
 #include "statistics/kernel.hpp"
 
 // The Fermi profile of Hayakawa and Hong, for comparison. [HayakawaHong1997]
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 struct FermiProfile {

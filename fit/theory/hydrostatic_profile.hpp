@@ -7,6 +7,8 @@
 #include "statistics/kernel.hpp"
 
 // Density profiles in hydrostatic balance, heights in D above the floor's mean position.
+//
+// Any number of threads may use one profile. It refers to its equation of state, which must outlive it.
 namespace shakebed::fit {
 
 // A hydrostatic tail phi(zeta) = f^-1(f(phi_top) - (zeta - top)/T) above a rectangle of density phi_0 (or above

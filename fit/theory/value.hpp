@@ -4,6 +4,8 @@
 
 // A number that may not exist. Poles, ranges and failed iterations are ordinary answers in this room: they come back
 // as a status beside the number, never as an exception, a NaN or a silent value.
+//
+// Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
 enum class ValueStatus {

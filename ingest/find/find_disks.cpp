@@ -14,6 +14,7 @@
 #include "ingest/find/joint_fit.hpp"
 #include "ingest/find/learned_beads.hpp"
 #include "ingest/find/nearby.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
@@ -285,6 +286,18 @@ class FrameFinder {
 };
 
 }  // namespace
+
+std::vector<std::string> FindOptions::validate() const {
+  std::vector<std::string> problems;
+  if (radius_px && !(*radius_px > 0 && std::isfinite(*radius_px)))
+    problems.push_back(formatted("radius_px is %g; it must be above 0", *radius_px));
+  if (hold_radius && !radius_px) problems.emplace_back("hold_radius holds radius_px, which is not given");
+  if (roi && (roi->width <= 0 || roi->height <= 0))
+    problems.push_back(formatted("roi is %d px wide and %d px high; it must hold pixels", roi->width, roi->height));
+  if (joint_fit_sweeps < 0)
+    problems.push_back(formatted("joint_fit_sweeps is %d; it must be 0 or more", joint_fit_sweeps));
+  return problems;
+}
 
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
   require_consistent(frame);

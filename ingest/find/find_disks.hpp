@@ -3,6 +3,8 @@
 //
 // Flatten -> chi-squared map of an ideal disk -> interior test -> joint least squares over touching neighbours with the
 // bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
+//
+// Any number of threads may call; values own what they hold.
 
 #include <cstddef>
 #include <cstdint>
@@ -49,6 +51,9 @@ struct FindOptions {
   bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge
   bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
   bool learn_rim = false;         // fill FindResult::profile
+
+  // Why nothing can be found with these options, one sentence each; empty when it can.
+  [[nodiscard]] std::vector<std::string> validate() const;
 };
 
 // What is common to all frames of a film, learned from its first frames.

@@ -1,5 +1,7 @@
 #pragma once
 // What a picture shows, before anything is measured: beads of which radius, polarity and channel, or none.
+//
+// Any number of threads may call; values own what they hold.
 
 #include <optional>
 #include <string>

@@ -3,6 +3,9 @@
 //
 // Pixel-centre convention, everywhere in ingest: the centre of the top-left pixel is (0, 0), x_px grows to the right
 // and y_px grows downwards; the frame covers -0.5 .. width - 0.5 by -0.5 .. height - 0.5.
+//
+// A frame owns its levels. A stream belongs to one thread at a time; what decode() does of its items may run in
+// several.
 
 #include <cstddef>
 #include <filesystem>

@@ -1,5 +1,7 @@
 #pragma once
 // Density against height, from disk centres or from covered area, with honest errors.
+//
+// Any number of threads may call; values own what they hold.
 
 #include <cstddef>
 #include <filesystem>

@@ -1,5 +1,7 @@
 #pragma once
 // Pixels that are not square and lenses that bend: frames made such that a bead is a circle of one size everywhere.
+//
+// Any number of threads may call; values own what they hold.
 
 #include <string>
 #include <vector>

@@ -20,6 +20,7 @@
 #include "ingest/profile/reduced_bed.hpp"
 #include "ingest/profile/shaking.hpp"
 #include "statistics/parallel.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
@@ -30,23 +31,6 @@ constexpr std::size_t most_expected_frames = 100000;
 // What deserves a warning: rms of n D^2 between coverage and centres; relative scatter of the contrast and of the bead
 // number from frame to frame; degrees of the floor's tilt.
 constexpr double coverage_differs = 0.03, light_flickers = 0.02, number_varies = 0.01, floor_tilts = 0.5;
-
-void check(const MeasureOptions& options) {
-  const auto require = [](bool condition, const std::string& what) {
-    if (!condition) throw std::invalid_argument("measure_bed: " + what);
-  };
-  require(std::isfinite(options.bead_diameter_m) && options.bead_diameter_m > 0, "bead_diameter_m must be positive");
-  require(!options.scale_m_per_px || *options.scale_m_per_px > 0, "scale_m_per_px must be positive");
-  require(!options.second_diameter_m || (std::isfinite(*options.second_diameter_m) && *options.second_diameter_m > 0),
-          "second_diameter_m must be positive");
-  require(options.bin_width > 0 && options.kernel.width > 0, "bin_width and kernel.width must be positive");
-  require(!options.left_wall_px || !options.right_wall_px || *options.left_wall_px < *options.right_wall_px,
-          "the left wall must lie left of the right wall");
-  require(options.shaking_frequency_hz.has_value() <= options.frame_rate_hz.has_value(),
-          "phases need the frame rate beside the shaking frequency");
-  require(options.geometry_frames > 0, "geometry_frames must be positive");
-  require(options.phase_bins > 0, "phase_bins must be positive");
-}
 
 // Frames are examined as threads come by them, and taken up in their order; nobody runs far ahead of the slowest.
 class OrderedFrames {
@@ -218,6 +202,8 @@ class BedMeasurer {
     for (const FoundDisk& disk : frame.disks) add(disk, 1);
     for (const FoundDisk& disk : frame.second) add(disk, 2);
     result_.disk_total += disks.size();
+    for (const MeasuredDisk& disk : disks) wrong_ += 1 - disk.probability;
+    result_.expected_wrong = result_.disk_total > 0 ? wrong_ / static_cast<double>(result_.disk_total) : 0;
     if (status != FrameStatus::unreadable && status != FrameStatus::size_changed) {
       densities_.add(density_of_frame(heights, bed_.width, bins_, options_.kernel), expected_frames_);
       if (film_.second)
@@ -373,12 +359,35 @@ class BedMeasurer {
   std::vector<double> counts_;
   double highest_ = 0;  // D
   std::size_t good_ = 0, cut_below_ = 0;
+  double wrong_ = 0;  // disks that are none, by their probabilities
 };
 
 }  // namespace
 
+std::vector<std::string> MeasureOptions::validate() const {
+  std::vector<std::string> problems = find.validate();
+  const auto require = [&](bool holds, const std::string& problem) {
+    if (!holds) problems.push_back(problem);
+  };
+  const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
+  require(positive(bead_diameter_m),
+          formatted("bead_diameter_m is %g; the diameter of a bead is needed, in m", bead_diameter_m));
+  require(positive(scale_m_per_px.value_or(1)), "scale_m_per_px must be above 0");
+  require(positive(second_diameter_m.value_or(1)), "second_diameter_m must be above 0");
+  require(positive(bin_width), formatted("bin_width is %g; it must be above 0", bin_width));
+  require(kernel.kind != KernelKind::none && positive(kernel.width),
+          "the kernel must have a shape and a finite width above 0: density is measured through a window");
+  require(!left_wall_px || !right_wall_px || *left_wall_px < *right_wall_px,
+          "the left wall must lie left of the right wall");
+  require(!shaking_frequency_hz || frame_rate_hz, "phases need the frame rate beside the shaking frequency");
+  require(geometry_frames > 0, "geometry_frames must be above 0");
+  require(phase_bins > 0, "phase_bins must be above 0");
+  return problems;
+}
+
 Measurement measure_bed(FrameSource& source, const MeasureOptions& asked) {
-  check(asked);
+  if (const auto problems = asked.validate(); !problems.empty())
+    throw std::invalid_argument("measure_bed: " + problems.front());
   if (asked.reduction > 1) return measure_reduced_bed(source, asked);
   return BedMeasurer(source, asked).measure();
 }

@@ -1,5 +1,8 @@
 #pragma once
 // A film of a bed in, its density profile out.
+//
+// The result owns all it holds; the stream belongs to the caller and is at its end afterwards. Any number of threads
+// may measure, each its own stream; `threads` more are used within.
 
 #include <cstddef>
 #include <functional>
@@ -56,8 +59,8 @@ struct MeasureOptions {
   std::optional<double> pixel_aspect{};
   std::optional<double> lens_radial{};
   FindOptions find{};                            // polarity, radius, roi, ...
-  Kernel kernel{KernelKind::top_hat, 0.25};      // widths in D
-  double bin_width = 0.25;                       // D
+  Kernel kernel = measuring_kernel;              // widths in D
+  double bin_width = measuring_spacing;          // D
   std::optional<double> highest{};               // D; else just above the highest centre
   std::optional<double> lowest{};                // D; else 0
   std::optional<double> shaking_frequency_hz{};  // needs frame_rate_hz; found from the film if left out and it shakes
@@ -75,6 +78,9 @@ struct MeasureOptions {
   // frames of the film (rim_frames at least, which tell the radius) instead of from all.
   std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink{};
   std::size_t geometry_frames = 100;
+
+  // Why nothing can be measured with these options, one sentence each; empty when it can.
+  [[nodiscard]] std::vector<std::string> validate() const;
 };
 
 // Places are those of the true frame (see lens.hpp), which is the recorded one unless pixels or lens say otherwise.
@@ -124,6 +130,7 @@ struct Measurement {
   BedCalibration calibration;
   std::vector<MeasuredDisk> disks;   // frame after frame; empty with a disk_sink
   std::size_t disk_total = 0;        // over all frames, with a disk_sink or without
+  double expected_wrong = 0;         // share of these disks that are no beads, by their probabilities
   std::size_t most_frames_held = 0;  // frames whose disks were in memory at once, at most
   std::vector<FrameReport> frames;   // one a frame of the stream
   DensityProfile profile;            // from centres

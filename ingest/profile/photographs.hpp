@@ -9,6 +9,7 @@
 // call only. Method: [ShattuckChiSquared] and find_disks.hpp.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,13 +29,14 @@ struct ImageView {
   PixelType type = PixelType::u8;
   std::size_t row_bytes = 0;  // from one row to the next; 0: rows follow one another
 };
-// Its levels scaled to 0 .. 255. Throws std::invalid_argument for an empty image and for levels that are not finite.
+// Its levels scaled to 0 .. 255, in floating point as the finder needs them. Throws std::invalid_argument for an empty
+// image and for levels that are not finite.
 GrayFrame frame_of(const ImageView& image);
 
 enum class FindStatus {
   ok,
   no_beads,   // nothing that is a bead by the survey, or by the finder
-  doubtful,   // more than a fifth of the disks found may be wrong
+  doubtful,   // too many of the disks found may be wrong (doubt_of())
   bad_input,  // the image is empty, or the options make no sense
 };
 std::string_view to_string(FindStatus status);
@@ -49,27 +51,34 @@ struct DisksFound {
   [[nodiscard]] std::string brief() const;  // one line
   [[nodiscard]] std::string full() const;   // a line a number, then the warnings
 };
-// Does not throw for what is wrong with the image: see the status.
+// Does not throw for what is wrong with the image or the options: see the status.
 DisksFound find_disks(const ImageView& image, const FindOptions& options = {});
 
-// The kind of beads in a first frame that `options` does not contradict; options.seen, if given, is taken as it is.
-struct FirstSurvey {
-  bool found = false;
-  std::string why_not;  // a sentence unless found
-  Channel channel = Channel::automatic;
-  BeadsSeen seen;
-  int reduction = 1;  // by which frames of this size may be averaged: a radius of 12 to 24 px is enough
+// The first picture that can be read, surveyed. Beads that are too small once it is reduced to six million pixels are
+// too small for rims.
+struct FirstLook {
+  std::string path;
+  int width = 0, height = 0;  // of the picture itself
+  Survey survey;
 };
-FirstSurvey survey_first(const ChannelFrames& first, const FindOptions& options);
+// The first `most_tried` of `pictures` are tried; nothing when none of them can be read.
+inline constexpr std::size_t most_tried = 10;
+std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
+                                       const FrameSourceOptions& source = {});
 
-// Why nothing can be measured with these options, one sentence each; empty when it can.
-std::vector<std::string> validate(const MeasureOptions& options);
+// By which factor frames of this size may be averaged (FrameSourceOptions::reduction): large beads need not be seen by
+// every pixel, a radius of 12 to 24 px is enough. 1 below two million pixels.
+int reduction_for(int width, int height, double radius_px);
+
+// What the share of disks that may be wrong means for a measurement: `some` above 2 %, worth a warning; `too_many`
+// above 20 %, nothing is measured.
+enum class Doubt { little, some, too_many };
+Doubt doubt_of(double expected_wrong);
 
 struct BedFound {
   FindStatus status = FindStatus::bad_input;
   std::string message;  // one sentence, unless ok
   Measurement measurement;
-  double expected_wrong = 0;  // share of the disks that are no beads, by their probabilities
   [[nodiscard]] bool ok() const { return status == FindStatus::ok; }
   [[nodiscard]] std::string brief() const;
   [[nodiscard]] std::string full() const;
@@ -80,7 +89,7 @@ struct BedFound {
 // read.
 BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions& options,
                      const FrameSourceOptions& source_options = {});
-// Frames in memory, all of one size.
-BedFound measure_bed(std::vector<GrayFrame> frames, const MeasureOptions& options);
+// Images in memory, all of one size. They are read where they lie, one by one: no second copy of the film is made.
+BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions& options);
 
 }  // namespace shakebed::ingest

@@ -5,6 +5,8 @@
 // -> optical blur (Gaussian) -> integral over each square pixel -> illumination (gradient, vignette) -> shot and read
 // noise -> JPEG -> rounding to 8 bits. Pixel integrals are exact for sharp disks and by Gauss-Legendre quadrature for
 // blurred ones: centres drawn without noise are true to 1e-3 px.
+//
+// A value owns what it holds. Any number of threads may draw, also with one renderer.
 
 #include <cstdint>
 #include <memory>

@@ -18,18 +18,11 @@ ObserveOptions ObserveOptions::from(const std::vector<std::string>& wanted) {
   return {has("order"), has("velocities"), has("displacement"), has("pressure"), has("phases"), has("species")};
 }
 
-Rows filled_rows(const sim::Profile& profile) {
-  Rows rows{0, profile.height.size()};
-  while (rows.first < rows.last && profile.number_density[rows.first] < 1e-12) ++rows.first;
-  while (rows.last > rows.first && profile.number_density[rows.last - 1] < 1e-12) --rows.last;
-  return rows;
-}
-
 namespace {
 
 ProfileTable table_of(const sim::Profile& profile, double width, double spacing) {
   ProfileTable table;
-  const Rows rows = filled_rows(profile);
+  const sim::FilledHeights rows = sim::filled_heights(profile);
   for (std::size_t i = rows.first; i < rows.last; ++i) {
     const double phi = profile.number_density[i];
     table.height.push_back(profile.height[i]);
@@ -44,7 +37,7 @@ ProfileTable table_of(const sim::Profile& profile, double width, double spacing)
 // Of the lab profile; `covariance` is that of its filled rows.
 void write_covariance(RunContext& context, const sim::Profile& profile, const std::vector<double>& covariance,
                       std::size_t independent_blocks) {
-  const Rows rows = filled_rows(profile);
+  const sim::FilledHeights rows = sim::filled_heights(profile);
   const std::vector<double> heights(profile.height.begin() + static_cast<std::ptrdiff_t>(rows.first),
                                     profile.height.begin() + static_cast<std::ptrdiff_t>(rows.last));
   write_covariance_csv(context.output("covariance.csv"), heights, covariance, independent_blocks);
@@ -214,7 +207,6 @@ void BedMeasurement::end(const sim::Simulation& simulation) {
 }
 
 void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scene, Json& out) const {
-  const bool hard = std::holds_alternative<sim::HardSides>(scene.box.sides);
   const bool weightless = options.weightless();
   const double length = options.length_unit();
   const BedDescription description = options.description();
@@ -229,7 +221,7 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
   };
   if (!weightless) {
     const sim::Measured centre = bed_.centre_of_mass();
-    const double ideal = sim::ideal_centre_of_mass(scene.count(), scene.box.width, hard);
+    const double ideal = sim::ideal_centre_of_mass(scene);
     plain("center_of_mass", centre, "D");
     plain("center_of_mass_rise", {centre.value - ideal, centre.std_error}, "D");
     out["ideal_center_of_mass"] = quantity_json(ideal, "D");
@@ -249,12 +241,8 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
   plain("collision_rate", {collision_rate_.mean(), collision_rate_.std_error()},
         weightless ? "sqrt(T0/m)/D" : "sqrt(g/D)");
   if (const auto* top = std::get_if<sim::PeriodicTop>(&scene.box.top)) {
-    // P V = N T + virial rate/2 with T from the kinetic energy of the N - 1 free momenta.
-    const double n = disk_count_, t = bed_.temperature_x().value + bed_.temperature_z().value;
-    const double kinetic = t * n / (2 * (n - 1));
-    plain("compressibility_factor",
-          {1 + virial_rate_.mean() / (2 * n * kinetic), virial_rate_.std_error() / (2 * n * kinetic)}, "1");
-    out["number_density"] = quantity_json(n / (scene.box.width * top->height), "1/D^2");
+    plain("compressibility_factor", bed_.compressibility_factor({virial_rate_.mean(), virial_rate_.std_error()}), "1");
+    out["number_density"] = quantity_json(disk_count_ / (scene.box.width * top->height), "1/D^2");
   }
   observed_results(energy_name, out);
   if (options.period() > 0) out["center_of_mass_by_phase"] = bed_.centre_of_mass_by_phase();
@@ -311,7 +299,7 @@ void BedMeasurement::write_densities(RunContext& context, const sim::Profile& la
 
 void BedMeasurement::write(RunContext& context, bool frames) const {
   const sim::Profile lab = bed_.density(false);
-  const Rows rows = filled_rows(lab);
+  const sim::FilledHeights rows = sim::filled_heights(lab);
   write_densities(context, lab, bed_.density(true), bed_.density_covariance(rows.first, rows.last),
                   bed_.covariance_blocks());
   if (frames)

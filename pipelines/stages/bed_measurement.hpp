@@ -16,6 +16,7 @@
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/contact_duration.hpp"
 #include "sim/measure/flights.hpp"
+#include "sim/measure/measured_bed.hpp"
 #include "sim/measure/observables.hpp"
 #include "sim/measure/order.hpp"
 #include "sim/measure/species.hpp"
@@ -37,12 +38,6 @@ struct MeasurementPlan {
   Kernel kernel;
   ObserveOptions observe;
 };
-
-// The rows of a profile from the lowest to the highest that holds anything: first to last - 1.
-struct Rows {
-  std::size_t first, last;
-};
-Rows filled_rows(const sim::Profile& profile);
 
 class BedMeasurement {
  public:

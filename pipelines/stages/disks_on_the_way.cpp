@@ -36,7 +36,6 @@ void DisksOnTheWay::take(const ingest::FrameReport& frame, const std::vector<ing
     ++quality_[std::min<std::size_t>(quality_.size() - 1,
                                      static_cast<std::size_t>(disk.quality * static_cast<double>(quality_.size())))];
     cut_ += disk.cut, half_hidden_ += disk.half_hidden;
-    wrong_ += 1 - disk.probability, ++all_;
   }
   if (meter_) {
     std::vector<ingest::MeasuredDisk> first;

@@ -34,7 +34,6 @@ class DisksOnTheWay {
 
   // `options.overlays` of the frames kept, spread evenly.
   [[nodiscard]] Frames to_draw() const;
-  [[nodiscard]] double expected_wrong_share() const { return all_ > 0 ? wrong_ / static_cast<double>(all_) : 0; }
   [[nodiscard]] std::size_t cut() const { return cut_; }
   [[nodiscard]] std::size_t half_hidden() const { return half_hidden_; }
   [[nodiscard]] std::optional<ingest::VelocityMeasurement> velocities();
@@ -61,8 +60,7 @@ class DisksOnTheWay {
   std::optional<ingest::VelocityMeter> meter_;
   std::array<std::size_t, 50> quality_{};
   std::size_t cut_ = 0, half_hidden_ = 0, matched_ = 0, reported_ = 0, real_ = 0;
-  double squares_ = 0, wrong_ = 0;  // wrong_: the disks' doubts, summed
-  std::size_t all_ = 0;
+  double squares_ = 0;
   std::size_t every_ = 1;
   Frames to_draw_;
   std::map<std::size_t, Marks> marks_;

@@ -10,6 +10,7 @@
 
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/overlay.hpp"
+#include "ingest/profile/photographs.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
@@ -70,25 +71,22 @@ void use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};
-  // Large beads need not be seen by every pixel: a radius of 12 to 24 px is enough.
-  constexpr double enough_px = 12, large_frame = 2e6;
-  if (static_cast<double>(look->width) * look->height > large_frame)
-    source.reduction = measure.reduction = std::max(1, static_cast<int>(chosen->rims.radius_px / enough_px));
+  source.reduction = measure.reduction = ingest::reduction_for(look->width, look->height, chosen->rims.radius_px);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
                           options_for(*chosen), chosen->disks.size()));
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
-void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found,
-                 const DisksOnTheWay& on_the_way) {
-  constexpr double most_wrong = 0.2, worth_a_word = 0.02, far_off = 0.2;
-  const double wrong = on_the_way.expected_wrong_share();
-  if (wrong > most_wrong)
+void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
+  constexpr double far_off = 0.2;
+  const double wrong = found.expected_wrong;
+  const ingest::Doubt doubt = ingest::doubt_of(wrong);
+  if (doubt == ingest::Doubt::too_many)
     throw StageError(
         fmt::format("{:.0f} % of the {} disks found may be wrong: too many to measure anything. Look at "
                     "fit-images --preview, and give --radius, --polarity, --channel or --roi",
                     100 * wrong, found.disk_total));
-  if (wrong > worth_a_word)
+  if (doubt == ingest::Doubt::some)
     context.warning(
         fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
                     "numbers.",
@@ -164,7 +162,7 @@ class Extraction {
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
     DisksOnTheWay on_the_way(context_, options_, truth_file ? &*truth_file : nullptr);
     const ingest::Measurement found = measure(on_the_way);
-    if (rendered_ == nullptr) judge_disks(options_, context_, found, on_the_way);
+    if (rendered_ == nullptr) judge_disks(options_, context_, found);
     warn(found);
     write(found, on_the_way);
   }

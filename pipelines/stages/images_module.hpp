@@ -55,8 +55,8 @@ struct ExtractOptions {
   BeadShape shape = BeadShape::round;
   std::optional<double> radius;  // first value [px]
   bool keep_half_hidden = false;
-  Kernel kernel{KernelKind::gaussian, 0.5};
-  double spacing = 0.25;                        // of the profile's heights [D]
+  Kernel kernel = measuring_kernel;
+  double spacing = measuring_spacing;           // of the profile's heights [D]
   std::optional<double> lowest, highest;        // of the profile [D]
   std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles; the first is found
   std::optional<std::uint64_t> bead_number;     // how many beads there are in view, if known

@@ -17,8 +17,7 @@ namespace {
 std::string preview_images(const PreviewRequest& request) {
   ingest::FrameSource source = ingest::FrameSource::open(request.files, {});
   std::vector<std::string> paths;
-  constexpr std::size_t enough = 5;
-  for (auto item = source.next_item(); item && paths.size() < enough; item = source.next_item())
+  for (auto item = source.next_item(); item && paths.size() < ingest::most_tried; item = source.next_item())
     if (paths.empty() || paths.back() != item->origin.path) paths.push_back(item->origin.path);
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));

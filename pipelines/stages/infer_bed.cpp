@@ -200,9 +200,7 @@ std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& sc
   out[kinetic_x] = bed.temperature_x().value * length;
   out[kinetic_z] = bed.temperature_z().value * length;
   out[kinetic_z_local] = bed.temperature_z_local().value * length;
-  out[rise] =
-      bed.centre_of_mass().value - sim::ideal_centre_of_mass(scene.count(), scene.box.width,
-                                                             std::holds_alternative<sim::HardSides>(scene.box.sides));
+  out[rise] = bed.centre_of_mass().value - sim::ideal_centre_of_mass(scene);
   return out;
 }
 

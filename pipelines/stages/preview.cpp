@@ -8,7 +8,6 @@
 namespace shakebed::pipelines {
 namespace {
 
-constexpr std::size_t most_tried = 5;  // files, until one can be read
 constexpr std::size_t most_shown = 3;  // candidates
 
 std::string escaped(std::string_view text) {
@@ -59,17 +58,9 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
                                        static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
-  constexpr std::size_t most_pixels =
-      6'000'000;  // beads that are too small after reduction to it are too small for rims
-  for (std::size_t k = 0; k < std::min(paths.size(), most_tried); ++k) {
-    try {
-      const ingest::ChannelFrames frames = ingest::read_channels(paths[k], 0, most_pixels, source);
-      return FirstLook{paths[k], frames.width, frames.height, ingest::take_survey(frames, asked)};
-    } catch (const ingest::InputError&) {
-      continue;  // measure_bed() names the files that cannot be read
-    }
-  }
-  return std::nullopt;
+  std::vector<ingest::FrameOrigin> pictures;
+  for (const std::string& path : paths) pictures.push_back({path, 0});
+  return ingest::look_at_first(pictures, asked, source);
 }
 
 std::string options_for(const ingest::SurveyCandidate& candidate) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ingest/find/survey.hpp"
+#include "ingest/profile/photographs.hpp"
 #include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
@@ -22,12 +22,8 @@ inline ingest::Channel channel_of(BeadChannel channel) {
   return static_cast<ingest::Channel>(static_cast<int>(channel) - 1);
 }
 
-// The first readable picture of `paths`, surveyed.
-struct FirstLook {
-  std::string path;
-  int width = 0, height = 0;
-  ingest::Survey survey;
-};
+// The first readable picture of `paths`, surveyed as the options ask.
+using ingest::FirstLook;
 std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options);
 
 // preview.html and preview_1.png .. preview_3.png in `folder`. `files` and `diameter` are those of the command line.

@@ -210,7 +210,7 @@ sim::Profile joined_density(const std::vector<const BedMeasurement*>& measuremen
 // replicas differ by more than that (beds are not all built alike), so much more of it.
 std::vector<double> joined_covariance(const std::vector<const BedMeasurement*>& measurements,
                                       const sim::Profile& joined, std::size_t& independent_blocks) {
-  const Rows rows = filled_rows(joined);
+  const sim::FilledHeights rows = sim::filled_heights(joined);
   const std::size_t n = rows.last - rows.first;
   const auto replicas = static_cast<double>(measurements.size());
   std::vector<double> covariance(n * n, 0.0);

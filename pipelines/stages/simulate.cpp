@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,7 +17,7 @@
 #include "pipelines/stages/annealing.hpp"
 #include "pipelines/stages/bed_measurement.hpp"
 #include "pipelines/stages/bed_results.hpp"
-#include "pipelines/stages/kernel_options.hpp"
+#include "pipelines/stages/measure_options.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/replicas.hpp"
 #include "pipelines/stages/scene_options.hpp"
@@ -31,22 +30,11 @@ namespace shakebed::pipelines {
 
 namespace {
 
-// Looks at a bed whose floor stands still: so many a time unit, within these bounds.
-constexpr double looks_a_time = 4, fewest_looks = 100, most_looks = 20'000;
 // A shaken bed that dissipates may keep for long how it was filled. Four beds, two of them filled at random, give
 // errors that hold the mean of further beds: the study is in docs/thermometer.md.
 constexpr std::uint32_t replicas_of_shaken = 4;
 // Of T: so much error by the contact duration is left without a word.
 constexpr double allowed_contact_effect = 0.02;
-
-struct FrameOptions {
-  std::uint32_t count = 0;
-  std::uint32_t phases = 32;
-};
-struct ProfileOptions {
-  double spacing = 0.25;  // [D]
-  Kernel kernel{KernelKind::gaussian, 0.5};
-};
 
 class Simulate : public Stage {
  public:
@@ -58,7 +46,7 @@ class Simulate : public Stage {
                              .contact_duration = bed_.contact_duration() > 0,
                              .material = bed_.hertz_contact_time().has_value(),
                              .shaken = bed_.period() > 0,
-                             .frames = frames_.count > 0,
+                             .frames = measure_.keeps_frames(),
                              .annealed = !annealing_.empty(),
                              .replicas = replicas(),
                              .observe = ObserveOptions::from(observe_)});
@@ -69,10 +57,9 @@ class Simulate : public Stage {
 
  private:
   void check(Fields& fields);
-  // Reduced time. A shaken bed is looked at `phases` times a period, and every frame is one of those moments; a bed on
-  // a still floor at equal intervals.
-  sim::MeasurementSchedule schedule() const;
-  FramePlan frame_plan(const sim::MeasurementSchedule& times) const;
+  sim::MeasureOptions measure_options() const;  // reduced; the bed settles after the annealing
+  sim::LookPlan looks() const { return sim::plan_looks(bed_.period(), measure_options()); }
+  FramePlan frame_plan() const;
   double annealing_time() const;
   std::uint32_t replicas() const { return replicas_.value_or(1); }  // once check() has chosen
   sim::Scene scene(const RunContext& context, std::uint64_t seed) const;
@@ -83,9 +70,7 @@ class Simulate : public Stage {
   void write_joined(RunContext& context, const std::vector<std::unique_ptr<BedRun>>& runs) const;
 
   SceneOptions bed_;
-  double settle_ = 0, measure_ = 0;
-  FrameOptions frames_;
-  ProfileOptions profile_;
+  BedMeasureOptions measure_;
   std::vector<AnnealingStep> annealing_;
   std::vector<std::string> observe_;
   std::optional<std::uint32_t> replicas_;
@@ -96,28 +81,7 @@ class Simulate : public Stage {
 
 void Simulate::describe(Fields& fields) {
   bed_.describe(fields);
-  fields.quantity("settle", settle_, dimension::time,
-                  {.help = "time before anything is measured", .range = non_negative, .example = "\"10 s\""});
-  fields.quantity(
-      "measure", measure_, dimension::time,
-      {.help = "time over which the bed is measured", .required = true, .range = positive, .example = "\"20 s\""});
-  fields.object<FrameOptions>(
-      "frames", frames_,
-      [](Fields& f, FrameOptions& frames) {
-        f.integer("count", frames.count, {.help = "frames of the trajectory to keep; 0 for none"});
-        f.integer("phases", frames.phases,
-                  {.help = "moments of each period at which the bed is looked at; the frames visit all of them in turn",
-                   .range = from_to(1, 4096)});
-      },
-      {.help = "the trajectory"});
-  fields.object<ProfileOptions>(
-      "profile", profile_,
-      [](Fields& f, ProfileOptions& p) {
-        f.number("spacing", p.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
-        f.object<Kernel>("kernel", p.kernel, describe_measuring_kernel,
-                         {.help = "the window through which density is measured"});
-      },
-      {.help = "the density profile"});
+  measure_.describe(fields);
   fields.array<AnnealingStep>(
       "schedule", annealing_,
       [](Fields& f, AnnealingStep& step) {
@@ -173,56 +137,27 @@ void Simulate::check(Fields& fields) {
   fields.require(!ObserveOptions::from(observe_).pressure || !bed_.periodic_upwards(), "observe",
                  "the pressure by height needs a height, but the box is periodic upwards",
                  "compressibility_factor is measured anyway");
-  const double period = bed_.period() * bed_.time_unit();
-  fields.require(period == 0 || measure_ >= period, "measure",
-                 "the bed must be measured over at least one period of the floor",
-                 "Give " + quantity_text(period, dimension::time) + " or more");
-  const bool countable = period == 0 || measure_ / period <= 1e12;
-  fields.require(countable, "measure", "the floor would shake more than 1e12 times, which no run lives to see",
-                 "Measure shorter, or shake more slowly");
-  if (frames_.count > 0 && countable) {
-    const sim::MeasurementSchedule times = schedule();
-    fields.require(frame_plan(times).stride > 0, "frames/count",
-                   std::to_string(frames_.count) + " frames do not fit into the " + std::to_string(times.looks()) +
-                       " moments at which the bed is looked at",
-                   "Measure longer, or ask for fewer frames");
-  }
+  measure_.check(fields, bed_.period(), bed_.time_unit());
   if (!replicas_)
     replicas_ = bed_.period() > 0 && bed_.contact_duration() > 0 && bed_.may_be_filled_at_random() &&
                         !fields.has_upstream("simulate")
                     ? replicas_of_shaken
                     : 1;
-  bed_.warn(fields, settle_);
+  bed_.warn(fields, measure_.settle());
 }
 
-sim::MeasurementSchedule Simulate::schedule() const {
-  sim::MeasurementSchedule times;
-  times.settle = annealing_time() + settle_ / bed_.time_unit();
-  const double measure = measure_ / bed_.time_unit();
-  times.period = bed_.period();
-  times.phases = frames_.phases;
-  if (times.period > 0) {
-    times.periods = static_cast<std::uint64_t>(measure / times.period * (1 + 1e-12));
-    // Begin at phase 0.
-    times.settle = std::ceil(times.settle / times.period * (1 - 1e-12)) * times.period;
-  } else {
-    const double wanted = std::clamp(measure * looks_a_time, fewest_looks, most_looks);
-    times.phases = 1;
-    times.periods = std::max<std::uint64_t>(static_cast<std::uint64_t>(wanted), frames_.count);
-    times.period = measure / static_cast<double>(times.periods);
-  }
-  return times;
+sim::MeasureOptions Simulate::measure_options() const {
+  sim::MeasureOptions options = measure_.reduced(bed_.time_unit());
+  options.settle = annealing_time() + options.settle;
+  return options;
 }
 
-// The stride has no factor in common with the phases, so that the frames visit all of them; 0 where they do not fit.
-FramePlan Simulate::frame_plan(const sim::MeasurementSchedule& times) const {
+FramePlan Simulate::frame_plan() const {
+  const sim::LookPlan looks_at = looks();
   FramePlan plan;
   plan.file = compress_ ? "trajectory.extxyz.zst" : "trajectory.extxyz";
-  plan.phases = bed_.period() > 0;
-  plan.count = frames_.count;
-  if (plan.count == 0) return plan;
-  plan.stride = times.looks() / plan.count;
-  while (plan.stride > 1 && std::gcd(plan.stride, std::uint64_t{times.phases}) > 1) --plan.stride;
+  plan.phases = looks_at.shaken;
+  plan.count = looks_at.frames, plan.stride = looks_at.frame_stride;
   return plan;
 }
 
@@ -241,22 +176,14 @@ sim::Scene Simulate::scene(const RunContext& context, std::uint64_t seed) const 
 }
 
 MeasurementPlan Simulate::measurement_plan(const sim::Scene& scene) const {
-  double amplitude = 0;
-  if (const auto* sine = std::get_if<sim::SinusoidalFloor>(&scene.box.floor)) amplitude = sine->amplitude;
-  if (const auto* table = std::get_if<sim::TabulatedFloor>(&scene.box.floor))
-    for (double h : table->heights) amplitude = std::max(amplitude, std::abs(h));
-  double temperature = bed_.bath_temperature();
-  if (!annealing_.empty()) temperature = std::max(temperature, annealing_.back().temperature / bed_.length_unit());
-  const sim::MeasurementSchedule times = schedule();
+  const double hottest = annealing_.empty() ? 0 : annealing_.back().temperature / bed_.length_unit();
+  const sim::MeasureOptions options = measure_options();
+  const sim::MeasurementSchedule times = looks().schedule;
   MeasurementPlan plan;
   plan.phases = times.phases;
   plan.period = times.period;
-  plan.grid.spacing = profile_.spacing;
-  plan.grid.lowest = -std::ceil((amplitude + 6 * profile_.kernel.width + 1) / plan.grid.spacing) * plan.grid.spacing;
-  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * temperature;
-  plan.grid.points =
-      static_cast<std::size_t>(std::min((loose_height - plan.grid.lowest) / plan.grid.spacing, 200'000.0));
-  plan.kernel = profile_.kernel;
+  plan.grid = sim::profile_heights(scene, options, hottest);
+  plan.kernel = options.kernel;
   plan.observe = ObserveOptions::from(observe_);
   return plan;
 }
@@ -297,13 +224,13 @@ RunPlan Simulate::run_plan(RunContext& context, std::uint32_t replica) const {
   if (replica > 0) permute_velocities(plan.scene);
   if (starts_of_replicas(context) == ReplicaStarts::alternate && replica % 2 == 1)
     plan.scene.start = sim::RandomStart{};
-  plan.schedule = schedule();
+  plan.schedule = looks().schedule;
   for (const AnnealingStep& step : annealing_)
     plan.annealing.push_back(
         {step.temperature / bed_.length_unit(), step.ramp / bed_.time_unit(), step.hold / bed_.time_unit()});
   plan.bath_temperature = bed_.bath_temperature();
   plan.measurement = measurement_plan(plan.scene);
-  plan.frames = frame_plan(plan.schedule);
+  plan.frames = frame_plan();
   plan.checkpoint_seconds = checkpoint_seconds_;
   plan.folder = context.scratch() / (replicas() > 1 ? "replica-" + std::to_string(replica) : std::string("run"));
   plan.lead = replica == 0;

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
 from . import _core
 from .errors import UsageError
 from .quantities import Number, Quantity, in_diameters, in_si, table_html
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 #: 2/sqrt(3): number density n D^2 of close packing.
 close_packing_density = 2 / math.sqrt(3)
@@ -19,7 +24,7 @@ close_packing_density = 2 / math.sqrt(3)
 class Fit:
     """The result of `fit_profile`. Temperatures in m g D, lengths in D."""
 
-    def __init__(self, fit: Any) -> None:
+    def __init__(self, fit: _core.Fit) -> None:
         self._fit = fit
 
     @cached_property
@@ -82,9 +87,9 @@ class Fit:
 
     @property
     def chi2_per_dof(self) -> float:
-        return self._numbers["chi2_per_dof"]
+        return float(self._numbers["chi2_per_dof"])
 
-    def curve(self) -> dict[str, np.ndarray]:
+    def curve(self) -> dict[str, Array]:
         """height, density (the bare model) and smoothed_density (what is compared with the data)."""
         return self._fit.curve()
 
@@ -112,7 +117,7 @@ class Fit:
         return table_html(f"fit: {self._numbers.get('model', '')}", rows, self.warnings)
 
 
-def _arrays(height: Any, density: Any, error: Any, covariance: Any) -> tuple:
+def _arrays(height: Any, density: Any, error: Any, covariance: Any) -> tuple[Array, Array, Optional[Array], Optional[Array]]:
     height, density = np.atleast_1d(np.asarray(height, float)), np.atleast_1d(np.asarray(density, float))
     if height.ndim != 1 or height.shape != density.shape:
         raise UsageError(f"height has shape {height.shape} and density {density.shape}; they must be equal, (heights,)")
@@ -278,9 +283,11 @@ def gamma_to_temperature(
     g = in_si(gravity, "acceleration", "gravity")
     length = in_si(diameter, "length", "diameter")
     height = in_diameters(initial_height, length, "initial_height")
-    if (gamma is None) == (amplitude is None):
+    if gamma is not None and amplitude is not None:
         raise UsageError("give gamma or amplitude, one of the two")
     if gamma is None:
+        if amplitude is None:
+            raise UsageError("give gamma or amplitude, one of the two")
         gamma = in_si(amplitude, "length", "amplitude") * (2 * math.pi * f) * (2 * math.pi * f) / g
     values = {"frequency": f, "gravity": g, "diameter": length, "initial_height": height, "gamma": gamma}
     for name, value in values.items():

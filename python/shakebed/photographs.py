@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Sequence, Union
 
 import numpy as np
 
 from .errors import StageError, UsageError
 from .quantities import Number, Progress, in_si, reporter, table_html
 from .scenes import Profile, profile_from
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from . import _images
+
+    Array = NDArray[np.float64]
 
 _find_options = {"polarity", "radius", "roi", "keep_half_hidden"}
 _measure_options = _find_options | {"scale", "floor", "floor_slope", "left_wall", "right_wall", "pixel_aspect",
@@ -25,31 +32,31 @@ def _checked(options: dict[str, Any], known: set[str], function: str) -> dict[st
 class Disks:
     """Disks found in one image. Pixels: the centre of the top-left one is (0, 0), x to the right, y downwards."""
 
-    def __init__(self, found: Any) -> None:
+    def __init__(self, found: _images.Disks) -> None:
         self._found = found
         self._columns = found.columns()
 
     @property
-    def x(self) -> np.ndarray:
+    def x(self) -> Array:
         """Of the centres, in px: shape (disks,)."""
         return self._columns["x"]
 
     @property
-    def y(self) -> np.ndarray:
+    def y(self) -> Array:
         return self._columns["y"]
 
     @property
-    def std_error(self) -> np.ndarray:
+    def std_error(self) -> Array:
         """Of the centres, in px, along x and y: shape (disks, 2)."""
         return np.sqrt(np.column_stack([self._columns["variance_x"], self._columns["variance_y"]]))
 
     @property
-    def quality(self) -> np.ndarray:
+    def quality(self) -> Array:
         """0 to 1; 1 is a bead like all the others."""
         return self._columns["quality"]
 
     @property
-    def probability(self) -> np.ndarray:
+    def probability(self) -> Array:
         """That it is a bead."""
         return self._columns["probability"]
 
@@ -95,8 +102,13 @@ class Disks:
     def __repr__(self) -> str:
         return f"<shakebed.Disks: {self.brief()}>"
 
+    def _repr_html_(self) -> str:
+        rows = {"disks": len(self), "radius": f"{self.radius:.3f} +- {self.radius_std_error:.2g} px",
+                "expected wrong": f"{100 * self.expected_wrong:.2g} %"} if len(self) else {}
+        return table_html("disks in an image", rows, self.warnings if len(self) else [self.message])
 
-def find_disks(image: np.ndarray, **options: Any) -> Disks:
+
+def find_disks(image: NDArray[Any], **options: Any) -> Disks:
     """Find the disks of one image, with nothing to guess.
 
     Parameters
@@ -124,7 +136,7 @@ def find_disks(image: np.ndarray, **options: Any) -> Disks:
 class MeasuredBed:
     """A bed measured in photographs."""
 
-    def __init__(self, bed: Any) -> None:
+    def __init__(self, bed: _images.Bed) -> None:
         self._bed = bed
 
     @property
@@ -133,9 +145,9 @@ class MeasuredBed:
         return profile_from(self._bed.profile())
 
     @property
-    def disks(self) -> dict[str, np.ndarray]:
+    def disks(self) -> dict[str, NDArray[Any]]:
         """Columns of disks.csv: frame, x_px, y_px, radius_px, x, z (D), quality."""
-        columns = self._bed.disks()
+        columns: dict[str, NDArray[Any]] = dict(self._bed.disks())
         columns["frame"] = columns["frame"].astype(np.int64)
         return columns
 
@@ -188,7 +200,7 @@ class MeasuredBed:
         return table_html("bed in photographs", rows, self.warnings)
 
 
-Frames = Union[str, "os.PathLike[str]", Sequence[Any], np.ndarray]
+Frames = Union[str, "os.PathLike[str]", Sequence[Any], "NDArray[Any]"]
 
 
 def measure_bed(

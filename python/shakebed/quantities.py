@@ -60,7 +60,7 @@ def reporter(progress: Progress, what: str) -> tuple[Optional[Callable[[float], 
     if callable(progress):
         return progress, lambda: None
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import]
     except ImportError:
         return None, lambda: None
     bar = tqdm(total=100, desc=what, unit="%")

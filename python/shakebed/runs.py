@@ -10,7 +10,7 @@ import shutil
 import signal
 import subprocess
 from pathlib import Path
-from typing import Any, Mapping, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, KeysView, Mapping, Optional, Union
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ._place import program as _program_place
 from .errors import CheckFailed, InputError, StageError, error_of_code
 from .quantities import Progress, Quantity, reporter, table_html
 from .scenes import Trajectory, read_trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _percent = re.compile(r"^(\S+?):.*?(\d+) ?%")
 
@@ -50,9 +53,9 @@ class Table:
         self.units: dict[str, str] = {}
         with open(path, encoding="utf-8", newline="") as file:
             lines = csv.reader(line for line in file if not line.startswith("#"))
-            names = next(lines, [])
+            names: list[str] = next(lines, [])
             rows = list(lines)
-        self.columns: dict[str, np.ndarray] = {}
+        self.columns: dict[str, NDArray[Any]] = {}
         for index, name in enumerate(names):
             cells = [row[index] for row in rows]
             try:
@@ -64,15 +67,15 @@ class Table:
             for column in json.loads(about.read_text(encoding="utf-8"))["tableSchema"]["columns"]:
                 self.units[column["name"]] = column.get("schema:unitText", "1")
 
-    def __getitem__(self, name: str) -> np.ndarray:
+    def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]
 
-    def __getattr__(self, name: str) -> np.ndarray:
+    def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_") or name == "columns" or name not in self.columns:
             raise AttributeError(f"the table has no column {name!r}")
         return self.columns[name]
 
-    def keys(self) -> Any:
+    def keys(self) -> KeysView[str]:
         return self.columns.keys()
 
     def __len__(self) -> int:
@@ -142,7 +145,8 @@ class Results:
     def _read(self, name: str) -> dict[str, Any]:
         path = self.folder / name
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
+            content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            return content
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}; is it a folder of results?") from None
         except ValueError as error:
@@ -151,7 +155,8 @@ class Results:
     @property
     def answer(self) -> Optional[dict[str, Any]]:
         """Temperature with its whole uncertainty, and the verdict; None where the recipe asks for none."""
-        return _with_quantities(self.summary.get("answer"))
+        answer: Optional[dict[str, Any]] = _with_quantities(self.summary.get("answer"))
+        return answer
 
     @property
     def report(self) -> Path:
@@ -257,7 +262,7 @@ def run(
     raise error
 
 
-def _follow(command: list[str], progress: Any) -> tuple[int, list[str]]:
+def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> tuple[int, list[str]]:
     """Runs the program to its end: its exit code and what it says of errors. Ctrl-C ends it first."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
                                start_new_session=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, NamedTuple, Optional, Union
+from typing import TYPE_CHECKING, Any, Dict, NamedTuple, Optional, Union
 
 import numpy as np
 
@@ -13,7 +13,12 @@ from . import _core
 from .errors import InputError, RecipeError, UsageError
 from .quantities import Progress, Quantity, reporter, table_html
 
-Scene = Union[dict, str, "os.PathLike[str]"]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+Scene = Union[Dict[str, Any], str, "os.PathLike[str]"]
 
 _stage_pointer = "/stages/0"
 
@@ -37,10 +42,10 @@ class Profile(NamedTuple):
         The window through which the density was measured, "gaussian:0.5" (width in D).
     """
 
-    height: np.ndarray
-    number_density: np.ndarray
-    std_error: np.ndarray
-    covariance: Optional[np.ndarray]
+    height: Array
+    number_density: Array
+    std_error: Array
+    covariance: Optional[Array]
     covariance_samples: int
     samples: int
     kernel: str
@@ -72,19 +77,19 @@ class Trajectory(NamedTuple):
         Phase of the floor's cycle, 0 to 1; height of the floor.
     """
 
-    array: np.ndarray
-    time: np.ndarray
-    phase: np.ndarray
-    floor: np.ndarray
-    floor_velocity: np.ndarray
+    array: Array
+    time: Array
+    phase: Array
+    floor: Array
+    floor_velocity: Array
 
     @property
-    def positions(self) -> np.ndarray:
+    def positions(self) -> Array:
         """x and z: shape (frames, disks, 2)."""
         return self.array[:, :, 0:2]
 
     @property
-    def velocities(self) -> np.ndarray:
+    def velocities(self) -> Array:
         """vx and vz: shape (frames, disks, 2)."""
         return self.array[:, :, 2:4]
 
@@ -196,7 +201,7 @@ def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
 class Bed:
     """A bed that was simulated and measured. Reduced units: D, m, g (weightless: D, m and the initial T)."""
 
-    def __init__(self, bed: Any) -> None:
+    def __init__(self, bed: _core.Bed) -> None:
         self._bed = bed
 
     @property
@@ -267,7 +272,7 @@ class Bed:
         return self._bed.periods
 
     @property
-    def radius(self) -> np.ndarray:
+    def radius(self) -> Array:
         """Of each disk, in D: shape (disks,)."""
         return self._bed.radius
 
@@ -383,7 +388,7 @@ class Simulation:
         return self._stepper.width
 
     @property
-    def radius(self) -> np.ndarray:
+    def radius(self) -> Array:
         """Of each disk, in D: shape (disks,)."""
         return self._stepper.radius
 
@@ -392,13 +397,13 @@ class Simulation:
         return self._stepper.snapshot()
 
     @property
-    def positions(self) -> np.ndarray:
+    def positions(self) -> Array:
         """x and z: shape (disks, 2)."""
         now = self.snapshot()
         return np.column_stack([now["x"], now["z"]])
 
     @property
-    def velocities(self) -> np.ndarray:
+    def velocities(self) -> Array:
         """vx and vz: shape (disks, 2)."""
         now = self.snapshot()
         return np.column_stack([now["vx"], now["vz"]])

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -113,6 +114,35 @@ def test_control_c_ends_a_measurement_on_several_threads():
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()
+
+
+def test_frames_in_memory_are_read_where_they_lie():
+    code = (
+        "import resource, sys, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
+        "peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024\n"
+        "image = drawn_image()[0]\n"
+        "shakebed.measure_bed([image] * 3, '3 mm')\n"
+        "before = peak()\n"
+        "def enough(fraction): raise StopIteration\n"
+        "try:\n    shakebed.measure_bed([image] * 4000, '3 mm', progress=enough)\n"
+        "except StopIteration:\n    print(peak() - before)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, os.path.dirname(__file__)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 60  # MiB; 4,000 frames of 220 x 180 levels in floating point would be 604
+
+
+def test_memory_does_not_grow_with_images():
+    image, _ = drawn_image(shape=(70, 80), radius=7, count=5)
+
+    def loop(times):
+        for _ in range(times):
+            found = shakebed.find_disks(image)
+            found.std_error, found.full()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB
+
+    before = loop(50)
+    assert loop(200) - before < 2048  # a leak of one image in floating point a call would be 4.3 MiB
 
 
 def test_twelve_lines_go_from_photographs_to_a_plot(frames, tmp_path):

@@ -1,4 +1,7 @@
 // A running simulation, whatever its engine: the interface between the physics and those who watch it. Reduced units.
+//
+// A simulation owns its disks and keeps nothing of the scene it was made from; what it is given to fill belongs to the
+// caller, and so does a watcher. One thread at a time may use one; different ones share nothing.
 #pragma once
 
 #include <cstdint>

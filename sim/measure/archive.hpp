@@ -4,6 +4,8 @@
 //
 // and the same function writes and reads them. Members may be numbers, plain structs, vectors and classes with a
 // visit() of their own. The bytes are those of this kind of machine.
+//
+// A writer owns its bytes, a reader reads those of the caller. One thread at a time may use one.
 #pragma once
 
 #include <cstddef>

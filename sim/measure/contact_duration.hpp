@@ -3,6 +3,8 @@
 // A contact is made elastic where one of its partners was hit less than t_c before. The energy that the first of each
 // chain of such contacts would have dissipated stays in the bed and may heat it. Its share of what is dissipated is
 // counted as the run goes on; the temperature follows it (tests/physics/test_contact_duration.cpp).
+//
+// Any number of threads may call; values own what they hold.
 #pragma once
 
 #include "sim/engine/simulation.hpp"

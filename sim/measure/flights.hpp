@@ -1,5 +1,7 @@
 // Exact averages over time along the disks' trajectories, and the pressure by height: what snapshots cannot give. Costs
 // about as much as the run itself; a run without this watcher pays nothing. Reduced units, lab frame, gravity.
+//
+// The watcher owns its sums and belongs to the thread that runs the simulation; it must outlive the run.
 #pragma once
 
 #include <cstdint>

@@ -6,6 +6,9 @@
 //
 // A run may be stopped between any two events and go on from its latest kept state to the same bytes; replicas are runs
 // of the same bed with seeds of their own, and their results do not depend on the number of threads. Reduced units.
+//
+// Observers belong to the caller, each to one run at a time, and are called from the thread that called measure(). The
+// result owns its simulation. Any number of threads may measure, each with observers of its own.
 #pragma once
 
 #include <cstdint>

@@ -2,31 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
+#include "statistics/text.hpp"
+
 namespace shakebed::sim {
 
 namespace {
 
-// A still bed: looks a unit of time sqrt(D/g), and the fewest and the most of them, as in the stage `simulate`.
+// A still bed: looks a unit of time sqrt(D/g), and the fewest and the most of them.
 constexpr double looks_a_time = 4, fewest_looks = 100, most_looks = 20'000;
 constexpr double most_periods = 1e12;    // more are a mistake in the units
+constexpr double rounding = 1e-12;       // a duration of n periods holds n of them, whatever the division rounds to
 constexpr double longest_profile = 2e5;  // heights
-constexpr double empty_density = 1e-12;  // [1/D^2], below it a height is left out, as in the stage `simulate`
-
-std::string text_of(const char* format, ...) {
-  char buffer[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
+constexpr double empty_density = 1e-12;  // [1/D^2], below it a height is left out
 
 double floor_amplitude(const Floor& floor) {
   double amplitude = 0;
@@ -76,12 +68,12 @@ class Observer final : public RunObserver {
     out_.temperature_z = bed_->temperature_z();
     out_.spin_temperature = bed_->spin_temperature();
     if (std::holds_alternative<UniformGravity>(scene_.gravity)) {
-      const bool hard = std::holds_alternative<HardSides>(scene_.box.sides);
-      const double ideal = ideal_centre_of_mass(scene_.count(), scene_.box.width, hard);
       out_.centre_of_mass = bed_->centre_of_mass();
-      out_.centre_of_mass_rise = {out_.centre_of_mass.value - ideal, out_.centre_of_mass.std_error};
+      out_.centre_of_mass_rise = {out_.centre_of_mass.value - ideal_centre_of_mass(scene_),
+                                  out_.centre_of_mass.std_error};
     }
-    if (std::holds_alternative<PeriodicTop>(scene_.box.top)) compressibility();
+    if (std::holds_alternative<PeriodicTop>(scene_.box.top))
+      out_.compressibility_factor = bed_->compressibility_factor({virial_rate_.mean(), virial_rate_.std_error()});
   }
 
  private:
@@ -89,13 +81,6 @@ class Observer final : public RunObserver {
     const double virial = simulation.counters().virial;
     virial_rate_.add((virial - virial_) / plan_.schedule.period);
     virial_ = virial;
-  }
-  // P V = N T + virial rate/2, with T from the kinetic energy of the N - 1 free momenta.
-  void compressibility() const {
-    const double n = scene_.count();
-    const double kinetic = (out_.temperature_x.value + out_.temperature_z.value) * n / (2 * (n - 1));
-    out_.compressibility_factor = {1 + virial_rate_.mean() / (2 * n * kinetic),
-                                   virial_rate_.std_error() / (2 * n * kinetic)};
   }
   void covariance() const {
     const FilledHeights filled = filled_heights(out_.profile);
@@ -121,6 +106,32 @@ MeasuredBed bad_input(std::string message) {
   return out;
 }
 
+std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& options, double floor_period) {
+  using Problem = MeasureOptions::Problem;
+  switch (problem) {
+    case Problem::settle:
+      return formatted("settle is %g; it must be 0 or more", options.settle);
+    case Problem::duration:
+      return formatted("duration is %g; it must be above 0", options.duration);
+    case Problem::phases:
+      return "phases is 0; the bed must be looked at once a period at least";
+    case Problem::spacing:
+      return formatted("spacing is %g; it must be above 0", options.spacing);
+    case Problem::kernel:
+      return "kernel must have a shape and a finite width: density is measured through a window";
+    case Problem::shorter_than_a_period:
+      return formatted("duration is %g, shorter than one period of the floor, %g", options.duration, floor_period);
+    case Problem::too_many_periods:
+      return formatted("the floor would shake %g times; measure at most %g periods", options.duration / floor_period,
+                       most_periods);
+    case Problem::too_many_frames:
+      return formatted("%llu frames do not fit into %llu looks; measure longer or keep fewer",
+                       static_cast<unsigned long long>(options.frames),
+                       static_cast<unsigned long long>(plan_looks(floor_period, options).schedule.looks()));
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string_view to_string(MeasureStatus status) {
@@ -144,15 +155,19 @@ double floor_period(const Scene& scene) {
 }
 
 LookPlan plan_looks(const Scene& scene, const MeasureOptions& options) {
+  return plan_looks(floor_period(scene), options);
+}
+
+LookPlan plan_looks(double period, const MeasureOptions& options) {
   LookPlan plan;
   MeasurementSchedule& schedule = plan.schedule;
   schedule.settle = options.settle;
-  schedule.period = floor_period(scene);
-  plan.shaken = schedule.period > 0;
+  schedule.period = period;
+  plan.shaken = period > 0;
   if (plan.shaken) {
     schedule.phases = options.phases;
-    schedule.periods = static_cast<std::uint64_t>(options.duration / schedule.period * (1 + 1e-12));
-    schedule.settle = std::ceil(schedule.settle / schedule.period * (1 - 1e-12)) * schedule.period;  // at phase 0
+    schedule.periods = static_cast<std::uint64_t>(options.duration / period * (1 + rounding));
+    schedule.settle = std::ceil(schedule.settle / period * (1 - rounding)) * period;  // at phase 0
   } else {
     schedule.phases = 1;
     const double wanted = std::clamp(options.duration * looks_a_time, fewest_looks, most_looks);
@@ -168,37 +183,40 @@ LookPlan plan_looks(const Scene& scene, const MeasureOptions& options) {
   return plan;
 }
 
-HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options) {
+HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options, double hottest_bath) {
   HeightGrid grid;
   grid.spacing = options.spacing;
   const double below = floor_amplitude(scene.box.floor) + 6 * options.kernel.width + 1;
   grid.lowest = -std::ceil(below / grid.spacing) * grid.spacing;
-  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * bath_temperature(scene.bath);
+  const double temperature = std::max(bath_temperature(scene.bath), hottest_bath);
+  const double loose_height = 6 * scene.count() / scene.box.width + 30 + 25 * temperature;
   grid.points = static_cast<std::size_t>(std::min((loose_height - grid.lowest) / grid.spacing, longest_profile));
   return grid;
 }
 
+std::vector<MeasureOptions::Problem> MeasureOptions::problems(double floor_period) const {
+  std::vector<Problem> out;
+  const auto require = [&](bool holds, Problem problem) {
+    if (!holds) out.push_back(problem);
+  };
+  require(settle >= 0 && std::isfinite(settle), Problem::settle);
+  require(duration > 0 && std::isfinite(duration), Problem::duration);
+  require(phases >= 1, Problem::phases);
+  require(spacing > 0 && std::isfinite(spacing), Problem::spacing);
+  require(kernel_is_valid(kernel) && kernel.kind != KernelKind::none, Problem::kernel);
+  if (floor_period > 0) {
+    require(duration / floor_period * (1 + rounding) >= 1, Problem::shorter_than_a_period);
+    require(duration / floor_period <= most_periods, Problem::too_many_periods);
+  }
+  if (out.empty() && frames > 0) require(plan_looks(floor_period, *this).frame_stride > 0, Problem::too_many_frames);
+  return out;
+}
+
 std::vector<std::string> MeasureOptions::validate(const Scene& scene) const {
-  std::vector<std::string> problems;
-  if (!(settle >= 0) || !std::isfinite(settle))
-    problems.push_back(text_of("settle is %g; it must be 0 or more", settle));
-  if (!(duration > 0) || !std::isfinite(duration))
-    problems.push_back(text_of("duration is %g; it must be above 0", duration));
-  if (phases < 1) problems.push_back("phases is 0; the bed must be looked at once a period at least");
-  if (!(spacing > 0) || !std::isfinite(spacing))
-    problems.push_back(text_of("spacing is %g; it must be above 0", spacing));
-  if (!kernel_is_valid(kernel) || kernel.kind == KernelKind::none)
-    problems.push_back("kernel must have a shape and a finite width: density is measured through a window");
   const double period = floor_period(scene);
-  if (period > 0 && duration / period * (1 + 1e-12) < 1)
-    problems.push_back(text_of("duration is %g, shorter than one period of the floor, %g", duration, period));
-  if (period > 0 && duration / period > most_periods)
-    problems.push_back(text_of("the floor would shake %g times; measure at most 1e12 periods", duration / period));
-  if (problems.empty() && frames > 0 && plan_looks(scene, *this).frame_stride == 0)
-    problems.push_back(text_of("%llu frames do not fit into %llu looks; measure longer or keep fewer",
-                               static_cast<unsigned long long>(frames),
-                               static_cast<unsigned long long>(plan_looks(scene, *this).schedule.looks())));
-  return problems;
+  std::vector<std::string> out;
+  for (const Problem problem : problems(period)) out.push_back(sentence_of(problem, *this, period));
+  return out;
 }
 
 FilledHeights filled_heights(const Profile& profile) {
@@ -235,21 +253,21 @@ MeasuredBed measure(const Scene& scene, const MeasureOptions& options) {
 
 std::string MeasuredBed::brief() const {
   if (!ok()) return std::string(to_string(status)) + ": " + message;
-  return text_of("%llu disks, %llu periods: T_x = %.4g +- %.2g, T_z = %.4g +- %.2g, centre of mass %.5g +- %.2g D",
-                 static_cast<unsigned long long>(disks.mass.size()), static_cast<unsigned long long>(periods),
-                 temperature_x.value, temperature_x.std_error, temperature_z.value, temperature_z.std_error,
-                 centre_of_mass.value, centre_of_mass.std_error);
+  return formatted("%llu disks, %llu periods: T_x = %.4g +- %.2g, T_z = %.4g +- %.2g, centre of mass %.5g +- %.2g D",
+                   static_cast<unsigned long long>(disks.mass.size()), static_cast<unsigned long long>(periods),
+                   temperature_x.value, temperature_x.std_error, temperature_z.value, temperature_z.std_error,
+                   centre_of_mass.value, centre_of_mass.std_error);
 }
 
 std::string MeasuredBed::full() const {
-  std::string out = text_of("status                  %s\n", std::string(to_string(status)).c_str());
+  std::string out = formatted("status                  %s\n", std::string(to_string(status)).c_str());
   if (!message.empty()) out += "message                 " + message + "\n";
   if (periods == 0) return out;
   const auto line = [&](const char* name, const Measured& m, const char* unit) {
-    out += text_of("%-23s %.6g +- %.2g %s\n", name, m.value, m.std_error, unit);
+    out += formatted("%-23s %.6g +- %.2g %s\n", name, m.value, m.std_error, unit);
   };
-  out += text_of("disks                   %zu\n", disks.mass.size());
-  out += text_of("periods                 %llu\n", static_cast<unsigned long long>(periods));
+  out += formatted("disks                   %zu\n", disks.mass.size());
+  out += formatted("periods                 %llu\n", static_cast<unsigned long long>(periods));
   const bool weight = centre_of_mass.value != 0;
   const char* const energy_unit = weight ? "m g D" : "T0";
   line("temperature_x", temperature_x, energy_unit);
@@ -260,10 +278,10 @@ std::string MeasuredBed::full() const {
     line("centre_of_mass_rise", centre_of_mass_rise, "D");
   }
   if (compressibility_factor.value != 0) line("compressibility_factor", compressibility_factor, "");
-  out += text_of("collisions              %llu\n", static_cast<unsigned long long>(counters.collisions()));
-  out += text_of("energy imbalance        %.2g\n", energy.imbalance());
-  out += text_of("largest overlap         %.2g D\n", largest_overlap);
-  out += text_of("frames                  %zu\n", frames.size());
+  out += formatted("collisions              %llu\n", static_cast<unsigned long long>(counters.collisions()));
+  out += formatted("energy imbalance        %.2g\n", energy.imbalance());
+  out += formatted("largest overlap         %.2g D\n", largest_overlap);
+  out += formatted("frames                  %zu\n", frames.size());
   return out;
 }
 

@@ -27,16 +27,29 @@ struct MeasureOptions {
   double settle = 0;          // time before the first look; a shaken bed begins at the next start of a period
   double duration = 100;      // time over which the bed is measured; whole periods of a shaken floor
   std::uint32_t phases = 32;  // looks a period of a shaken floor; others are looked at 4 times a unit of time or so
-  double spacing = 0.25;      // of the profile's heights [D]
-  Kernel kernel{KernelKind::gaussian, 0.5};  // the window through which density is measured
-  std::uint64_t frames = 0;                  // snapshots that are kept, equally spaced over the looks
-  std::function<bool()> stop{};              // asked every 0.1 s or so; true ends the run
-  std::function<void(double)> progress{};    // the fraction of the run that is over
+  double spacing = measuring_spacing;      // of the profile's heights [D]
+  Kernel kernel = measuring_kernel;        // the window through which density is measured
+  std::uint64_t frames = 0;                // snapshots that are kept, equally spaced over the looks
+  std::function<bool()> stop{};            // asked every 0.1 s or so; true ends the run
+  std::function<void(double)> progress{};  // the fraction of the run that is over
   std::function<void(const Snapshot&, double phase)>
       frame_sink{};  // receives the frames; MeasuredBed::frames stays empty
 
   // Why this scene cannot be measured so, one sentence each; empty when it can.
   [[nodiscard]] std::vector<std::string> validate(const Scene& scene) const;
+
+  // The same for a caller with words of its own. too_many_periods: above 1e12, a mistake in the units.
+  enum class Problem {
+    settle,
+    duration,
+    phases,
+    spacing,
+    kernel,
+    shorter_than_a_period,
+    too_many_periods,
+    too_many_frames,
+  };
+  [[nodiscard]] std::vector<Problem> problems(double floor_period) const;
 };
 
 // When the bed is looked at, and which of the looks are kept as frames.
@@ -47,10 +60,12 @@ struct LookPlan {
   bool shaken = false;
 };
 LookPlan plan_looks(const Scene& scene, const MeasureOptions& options);
+LookPlan plan_looks(double floor_period, const MeasureOptions& options);  // 0: the floor stands still
 // The period of the floor's motion; 0 when it stands still.
 double floor_period(const Scene& scene);
-// Heights from below the lowest place of the floor to above the loosest bed.
-HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options);
+// Heights from below the lowest place of the floor to above the loosest bed. hottest_bath: the highest temperature that
+// the scene's bath will be given, where that is above its own.
+HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options, double hottest_bath = 0);
 
 // The heights of a profile from the lowest to the highest that holds anything: first to last - 1. Below 1e-12/D^2 there
 // is only the tail of the kernel.

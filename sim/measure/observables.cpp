@@ -21,6 +21,10 @@ double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides) 
   return count > 0 ? sum / count : 0;
 }
 
+double ideal_centre_of_mass(const Scene& scene) {
+  return ideal_centre_of_mass(scene.count(), scene.box.width, std::holds_alternative<HardSides>(scene.box.sides));
+}
+
 std::string precision_lost(const Simulation& simulation) {
   std::ostringstream out;
   out.precision(3);
@@ -160,6 +164,12 @@ Measured BedObserver::temperature_x() const {
 Measured BedObserver::spin_temperature() const {
   const std::size_t i = 2 * grid_.points + spin_t;
   return {means_.mean(i), means_.std_error(i)};
+}
+
+Measured BedObserver::compressibility_factor(const Measured& virial_rate) const {
+  const auto n = static_cast<double>(masses_.size());
+  const double kinetic = (temperature_x().value + temperature_z().value) * n / (2 * (n - 1));
+  return {1 + virial_rate.value / (2 * n * kinetic), virial_rate.std_error / (2 * n * kinetic)};
 }
 
 Measured BedObserver::drift_of_centre() const { return drift_of(centre_series_); }

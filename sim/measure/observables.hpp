@@ -1,4 +1,7 @@
 // What is measured of a running bed, from snapshots at equally spaced phases of the shaking. Reduced units.
+//
+// An observer owns its sums and keeps nothing of the scene. One thread at a time may use one; different ones share
+// nothing.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +24,7 @@ struct Profile {
 // Height of the centre of mass of count equal disks packed hexagonally on a floor at 0: rows of floor(width), in a hard
 // box alternately one less where half a diameter is missing.
 double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
+double ideal_centre_of_mass(const Scene& scene);
 
 // Why the run can no longer be trusted, "two disks overlap by 3e-7 D ..."; empty when it can: every number finite, no
 // overlap above 1e-9 D, the energy ledger closed to 1e-6 of what has been turned over.
@@ -47,6 +51,9 @@ class BedObserver {
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
   Measured temperature_z_local() const;  // without the mean velocity of each layer of 1 D at each phase
   Measured spin_temperature() const;     // I <w^2>; 0 for smooth disks
+  // P V/(N T) = 1 + virial rate/(2 N T) of a box that is periodic both ways, T from the kinetic energy of the N - 1
+  // free momenta. virial_rate: of the contacts, per unit of time.
+  Measured compressibility_factor(const Measured& virial_rate) const;
   // The second half of the periods less the first: what still changes while the bed is measured. The error is not a
   // number with fewer than four periods.
   Measured drift_of_centre() const;

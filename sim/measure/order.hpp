@@ -1,4 +1,7 @@
 // Crystalline order of a bed, from snapshots: bond-orientational order, neighbours, empty sites.
+//
+// An observer owns its sums and keeps nothing of the scene. One thread at a time may use one; different ones share
+// nothing.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,6 @@
 // Means of correlated samples with honest errors: blocking [FlyvbjergPetersen1989], as the samples stream past.
+//
+// An accumulator owns its sums. One thread at a time may use one; different ones share nothing.
 #pragma once
 
 #include <cstddef>

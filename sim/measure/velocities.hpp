@@ -1,5 +1,8 @@
 // Distribution of the velocities, from snapshots: means and temperatures by height and phase, fourth cumulants, and a
 // histogram. Reduced units.
+//
+// An observer owns its sums and keeps nothing of the scene. One thread at a time may use one; different ones share
+// nothing.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,7 @@
 // The floor: a horizontal wall that stands still, shakes sinusoidally, or follows a table from a real shaker. Reduced
 // units.
+//
+// Plain data: a value owns what it holds, and copies are independent. Any number of threads may read one.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,8 @@
 // What can be simulated: a plain description, every physical choice a variant. Reduced units: lengths in D (the
 // diameter of species 0), masses in m (its mass), accelerations in g; a weightless scene has T = 1 at the start
 // instead.
+//
+// Plain data: a scene owns what it holds, and copies are independent. Any number of threads may read one.
 #pragma once
 
 #include <cstdint>

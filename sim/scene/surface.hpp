@@ -1,4 +1,6 @@
 // What two bodies are to each other when they touch.
+//
+// Plain data, without pointers: copies are independent. Any number of threads may read one.
 #pragma once
 
 namespace shakebed::sim {

@@ -1,5 +1,5 @@
 #!/bin/sh
-# usage: install_test.sh TREE BUILD CMAKE COMPILER prefix|package|pkg_config|symbols|subproject
+# usage: install_test.sh TREE BUILD CMAKE COMPILER prefix|package|pkg_config|symbols|subproject|shared|clang
 # Works in BUILD/tests/install; the consumer project is copied out of the tree, so that it finds nothing of ours by chance.
 set -eu
 tree=$1 build=$2 cmake=$3 compiler=$4 case=$5
@@ -14,15 +14,36 @@ consumer() {
   rm -rf "$folder"
   mkdir -p "$folder"
   cp "$tree"/tests/install/consumer/* "$folder"
+  begin=$(date +%s)
   "$cmake" -S "$folder" -B "$folder/build" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release \
     "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror" "$@"
   "$cmake" --build "$folder/build" --target with_sim
-  if [ "$case" = package ]; then "$cmake" --build "$folder/build"; fi
+  case $case in package | shared | clang) "$cmake" --build "$folder/build" ;; esac
   for program in "$folder"/build/with_*; do
     [ -x "$program" ] && [ -f "$program" ] || continue
     echo "== $program"
     "$program" || fail "$program failed"
   done
+  echo "configured, built and run in $(($(date +%s) - begin)) s"
+}
+
+# Builds the libraries alone with the further arguments of cmake and installs them into $work/NAME-prefix.
+built_alone() {
+  name=$1
+  shift
+  rm -rf "$work/$name-prefix"
+  "$cmake" -S "$tree" -B "$work/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSHAKEBED_PIPELINES=OFF -DSHAKEBED_TESTS=OFF \
+    -DSHAKEBED_BENCH=OFF "$@"
+  "$cmake" --build "$work/$name"
+  "$cmake" --install "$work/$name" --prefix "$work/$name-prefix" >/dev/null
+}
+
+# Strong symbols of ours, in the lines of nm: all in namespace shakebed.
+no_symbols_outside() {
+  outside=$(grep -E '^[0-9a-f]+ [TDBRGS] ' |
+    grep -vE '^[0-9a-f]+ [A-Z] ((typeinfo|typeinfo name|vtable|guard variable|construction vtable|VTT) for |(non-)?virtual thunk to )?shakebed::' |
+    grep -vE ' (_init|_fini)$' || true)
+  [ -z "$outside" ] || fail "$1 has symbols outside namespace shakebed: $outside"
 }
 
 # No flag that changes what a user's code means or warns of.
@@ -49,6 +70,11 @@ case $case in
       fi
     done
     if grep -rnE '#include "' "$prefix/include"; then fail "a public header includes a header of the tree"; fi
+    # Each says what may be used by several threads and who owns what.
+    for header in $(cd "$prefix/include" && find . -name '*.hpp' ! -path '*/detail/*'); do
+      grep -q '^//.*thread' "$prefix/include/$header" && grep -qE '^//.*(own|[Pp]lain data|refers to)' "$prefix/include/$header" ||
+        fail "$header does not say what may be used by several threads, or who owns what"
+    done
     "$prefix/bin/shakebed" theory --json >/dev/null || fail "the installed program does not run"
     bash -n "$prefix/share/bash-completion/completions/shakebed" || fail "the completion for bash is no shell script"
     ;;
@@ -79,21 +105,43 @@ case $case in
     done
     ;;
   symbols)
-    # Strong symbols of ours: all in namespace shakebed.
     for library in "$build"/*/libshakebed_statistics.a "$build"/*/libshakebed_sim.a "$build"/*/libshakebed_ingest.a \
       "$build"/*/libshakebed_fit.a; do
       [ -f "$library" ] || continue
-      outside=$(nm --defined-only --extern-only -C "$library" 2>/dev/null | grep -E '^[0-9a-f]+ [TDBRGS] ' |
-        grep -vE '^[0-9a-f]+ [A-Z] ((typeinfo|typeinfo name|vtable|guard variable|construction vtable) for )?shakebed::' || true)
-      [ -z "$outside" ] || fail "$library has symbols outside namespace shakebed: $outside"
+      nm --defined-only --extern-only -C "$library" 2>/dev/null | no_symbols_outside "$library"
       # A library does not print and does not end the program.
-      ends=$(nm --undefined-only -C "$library" 2>/dev/null | grep -E ' (exit|_exit|abort|puts|printf|std::cout|std::cerr)$' || true)
+      ends=$(nm --undefined-only -C "$library" 2>/dev/null | grep -E \
+        ' (exit|_exit|_Exit|quick_exit|abort|puts|putchar|printf|vprintf|stdout|stderr|std::(cout|cerr|clog))(@|$)' || true)
       [ -z "$ends" ] || fail "$library prints or ends the program: $ends"
     done
     ;;
   subproject)
     consumer "-DSHAKEBED_TREE=$tree"
     no_flags_leak
+    ;;
+  shared)
+    built_alone shared -DCMAKE_CXX_COMPILER="$compiler" -DSHAKEBED_SHARED=ON
+    rm -rf "$work/shared-moved"
+    mv "$work/shared-prefix" "$work/shared-moved"
+    consumer "-DCMAKE_PREFIX_PATH=$work/shared-moved" "-DCOMPONENTS=sim;ingest;fit" -DCMAKE_DISABLE_FIND_PACKAGE_OpenCV=ON \
+      -DCMAKE_DISABLE_FIND_PACKAGE_GSL=ON
+    no_flags_leak
+    for room in sim ingest fit; do
+      readelf -d "$folder/build/with_$room" | grep -q "libshakebed_$room.so.0.1" || fail "with_$room does not use the shared library"
+    done
+    for library in $(find "$work/shared-moved" -name 'libshakebed_*.so'); do
+      nm --dynamic --defined-only -C "$library" | no_symbols_outside "$library"
+    done
+    ;;
+  clang)
+    clang=$(command -v clang++ || command -v clang++-14) || { echo "skipped: there is no clang++"; exit 77; }
+    compiler=$clang
+    # Its user's compiler, with libraries of ours by g++ ...
+    consumer "-DCMAKE_PREFIX_PATH=$prefix" "-DCOMPONENTS=sim;ingest;fit"
+    # ... and ours, with a user's g++.
+    built_alone clang -DCMAKE_CXX_COMPILER="$clang" -DSHAKEBED_INGEST=OFF -DSHAKEBED_FIT=OFF -DSHAKEBED_WERROR=ON
+    compiler=$4
+    consumer "-DCMAKE_PREFIX_PATH=$work/clang-prefix" -DCOMPONENTS=sim
     ;;
   *) fail "there is no test $case" ;;
 esac

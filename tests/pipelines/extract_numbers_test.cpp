@@ -275,7 +275,6 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   EXPECT_EQ(found["center_rms_error"]["unit"], "px");
   EXPECT_EQ(on_the_way.cut(), 1U);
   EXPECT_EQ(on_the_way.half_hidden(), 2U);
-  EXPECT_NEAR(on_the_way.expected_wrong_share(), 0.1, 1e-12);
   EXPECT_DOUBLE_EQ(on_the_way.quality()["lowest_percent"].get<double>(), 0.12) << "the class from 0.10 to 0.12";
   EXPECT_DOUBLE_EQ(on_the_way.quality()["median"].get<double>(), 0.96);
   on_the_way.quality_table(extract_.table("quality.csv")).write(extract_.output("quality.csv"));

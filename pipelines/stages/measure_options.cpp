@@ -1,0 +1,62 @@
+#include "pipelines/stages/measure_options.hpp"
+
+#include <string>
+
+#include "pipelines/formats/quantity.hpp"
+#include "pipelines/stages/kernel_options.hpp"
+
+namespace shakebed::pipelines {
+
+void BedMeasureOptions::describe(Fields& fields) {
+  fields.quantity("settle", settle_, dimension::time,
+                  {.help = "time before anything is measured", .range = non_negative, .example = "\"10 s\""});
+  fields.quantity(
+      "measure", duration_, dimension::time,
+      {.help = "time over which the bed is measured", .required = true, .range = positive, .example = "\"20 s\""});
+  fields.object<sim::MeasureOptions>(
+      "frames", measure_,
+      [](Fields& f, sim::MeasureOptions& frames) {
+        f.integer("count", frames.frames, {.help = "frames of the trajectory to keep; 0 for none"});
+        f.integer("phases", frames.phases,
+                  {.help = "moments of each period at which the bed is looked at; the frames visit all of them in turn",
+                   .range = from_to(1, 4096)});
+      },
+      {.help = "the trajectory"});
+  fields.object<sim::MeasureOptions>(
+      "profile", measure_,
+      [](Fields& f, sim::MeasureOptions& profile) {
+        f.number("spacing", profile.spacing,
+                 {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
+        f.object<Kernel>("kernel", profile.kernel, describe_measuring_kernel,
+                         {.help = "the window through which density is measured"});
+      },
+      {.help = "the density profile"});
+}
+
+sim::MeasureOptions BedMeasureOptions::reduced(double time_unit) const {
+  sim::MeasureOptions out = measure_;
+  out.settle = settle_ / time_unit;
+  out.duration = duration_ / time_unit;
+  return out;
+}
+
+void BedMeasureOptions::check(Fields& fields, double floor_period, double time_unit) const {
+  using Problem = sim::MeasureOptions::Problem;
+  const sim::MeasureOptions options = reduced(time_unit);
+  for (const Problem problem : options.problems(floor_period)) {
+    if (problem == Problem::shorter_than_a_period)
+      fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
+                     "Give " + quantity_text(floor_period * time_unit, dimension::time) + " or more");
+    if (problem == Problem::too_many_periods)
+      fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run lives to see",
+                     "Measure shorter, or shake more slowly");
+    if (problem == Problem::too_many_frames)
+      fields.require(false, "frames/count",
+                     std::to_string(options.frames) + " frames do not fit into the " +
+                         std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) +
+                         " moments at which the bed is looked at",
+                     "Measure longer, or ask for fewer frames");
+  }
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,124 @@
+#include "ingest/profile/photographs.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "ingest/synthetic/synthetic_frames.hpp"
+#include "tests/ingest/test_files.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+// A bed in a picture of whole levels, so that 8 bits hold it exactly.
+GrayFrame drawn(std::uint64_t seed) {
+  const auto disks = make_synthetic_bed(
+      {.left_wall_px = 20, .right_wall_px = 280, .floor_px = 220, .radius_px = 10, .rows = 6, .seed = seed});
+  GrayFrame frame = render_frame(disks, {.width = 300, .height = 240, .blur_px = 0.8, .read_noise = 4});
+  for (float& level : frame.pixels) level = std::round(std::min(255.0F, std::max(0.0F, level)));
+  return frame;
+}
+
+ImageView view_of(const GrayFrame& frame) {
+  return {.width = frame.width, .height = frame.height, .pixels = frame.pixels.data(), .type = PixelType::f32};
+}
+
+template <class Level>
+std::vector<Level> levels_of(const GrayFrame& frame, int row_length, float scale) {
+  std::vector<Level> out(static_cast<std::size_t>(row_length) * static_cast<std::size_t>(frame.height), Level(7));
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column)
+      out[static_cast<std::size_t>(row * row_length + column)] = static_cast<Level>(scale * frame.at(column, row));
+  return out;
+}
+
+TEST(Photographs, LevelsAreTheSameInAllTypesAndRowLengths) {
+  const GrayFrame frame = drawn(1);
+  const auto bytes = levels_of<std::uint8_t>(frame, 317, 1);
+  const auto words = levels_of<std::uint16_t>(frame, 300, 257);
+  const auto doubles = levels_of<double>(frame, 300, 1);
+  EXPECT_EQ(frame_of({300, 240, bytes.data(), PixelType::u8, 317}).pixels, frame.pixels);
+  EXPECT_EQ(frame_of({300, 240, words.data(), PixelType::u16}).pixels, frame.pixels);
+  EXPECT_EQ(frame_of({300, 240, doubles.data(), PixelType::f64}).pixels, frame.pixels);
+  EXPECT_EQ(frame_of(view_of(frame)).pixels, frame.pixels);
+}
+
+TEST(Photographs, AnImageThatCannotBeUsedIsNamed) {
+  GrayFrame frame = drawn(1);
+  EXPECT_EQ(find_disks(ImageView{}).status, FindStatus::bad_input);
+  frame.pixels[1234] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(find_disks(view_of(frame)).message, "the image holds levels that are not finite numbers");
+  const GrayFrame good = drawn(2);
+  const BedFound bed = measure_bed(std::vector{view_of(good), view_of(frame)}, {.bead_diameter_m = 3e-3});
+  EXPECT_EQ(bed.status, FindStatus::bad_input);
+  EXPECT_EQ(bed.message, "frame 1: the image holds levels that are not finite numbers");
+}
+
+TEST(Photographs, ImagesInMemoryAreMeasuredAsTheirFiles) {
+  const test::ScratchFolder folder;
+  std::vector<GrayFrame> frames;
+  std::vector<ImageView> views;
+  std::vector<std::string> files;
+  for (std::uint64_t k = 0; k < 4; ++k) frames.push_back(drawn(k + 1));
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    views.push_back(view_of(frames[k]));
+    files.push_back(folder / ("frame" + std::to_string(k) + ".png"));
+    write_png(files.back(), frames[k]);
+  }
+  const BedFound memory = measure_bed(views, {.bead_diameter_m = 3e-3}),
+                 disk = measure_bed(files, {.bead_diameter_m = 3e-3});
+  ASSERT_TRUE(memory.ok() && disk.ok());
+  EXPECT_GT(memory.measurement.disk_total, 200U);
+  EXPECT_EQ(memory.measurement.profile.number_density, disk.measurement.profile.number_density);
+  EXPECT_EQ(memory.measurement.calibration.radius_px, disk.measurement.calibration.radius_px);
+}
+
+TEST(Photographs, TheShareOfWrongDisksIsThatOfTheirProbabilities) {
+  std::vector<GrayFrame> frames{drawn(1), drawn(2)};
+  FrameSource source = FrameSource::from_frames(frames);
+  double wrong = 0;
+  std::size_t disks = 0;
+  MeasureOptions options{.bead_diameter_m = 3e-3};
+  options.disk_sink = [&](const FrameReport&, const std::vector<MeasuredDisk>& found) {
+    for (const MeasuredDisk& disk : found) wrong += 1 - disk.probability, ++disks;
+  };
+  const Measurement measured = measure_bed(source, options);
+  ASSERT_EQ(measured.disk_total, disks);
+  EXPECT_DOUBLE_EQ(measured.expected_wrong, wrong / static_cast<double>(disks));
+}
+
+TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
+  EXPECT_EQ(doubt_of(0.019), Doubt::little);
+  EXPECT_EQ(doubt_of(0.021), Doubt::some);
+  EXPECT_EQ(doubt_of(0.199), Doubt::some);
+  EXPECT_EQ(doubt_of(0.201), Doubt::too_many);
+}
+
+TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
+  EXPECT_EQ(reduction_for(1000, 1000, 90), 1) << "the frame is small";
+  for (const double radius : {11.0, 13.0, 23.9, 24.0, 37.0, 100.0}) {
+    const int by = reduction_for(4000, 3000, radius);
+    EXPECT_EQ(by, std::max(1, static_cast<int>(radius / 12)));
+    EXPECT_LT(radius / by, 24);
+  }
+}
+
+TEST(Photographs, PicturesThatCannotBeReadAreSkippedInTheFirstLook) {
+  const test::ScratchFolder folder;
+  std::ofstream(folder / "broken.png") << "no picture";
+  write_png(folder / "good.png", drawn(1));
+  const auto look = look_at_first({{folder / "broken.png", 0}, {folder / "good.png", 0}}, {});
+  ASSERT_TRUE(look.has_value());
+  EXPECT_EQ(look->path, folder / "good.png");
+  EXPECT_EQ(look->width, 300);
+  EXPECT_TRUE(look->survey.found);
+  EXPECT_FALSE(look_at_first({{folder / "broken.png", 0}}, {}).has_value());
+}
+
+}  // namespace
+}  // namespace shakebed::ingest

@@ -1,0 +1,86 @@
+// When a bed is looked at and at which heights: the rules that the library and the stage `simulate` share.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "sim/measure/measured_bed.hpp"
+
+namespace shakebed::sim {
+namespace {
+
+using Problem = MeasureOptions::Problem;
+
+TEST(MeasuredBed, ADurationOfWholePeriodsHoldsThemWhateverTheDivisionRoundsTo) {
+  for (int periods = 1; periods <= 500; ++periods) {
+    const double period = 1.0 / 3.7;
+    const LookPlan plan = plan_looks(period, {.settle = 2.5 * period, .duration = periods * period});
+    ASSERT_EQ(plan.schedule.periods, static_cast<std::uint64_t>(periods));
+    EXPECT_EQ(plan.schedule.looks(), static_cast<std::uint64_t>(32 * periods));
+    EXPECT_DOUBLE_EQ(plan.schedule.settle, 3 * period) << "it begins at phase 0";
+    EXPECT_TRUE(MeasureOptions{.duration = periods * period}.problems(period).empty());
+  }
+}
+
+TEST(MeasuredBed, ABedOnAStillFloorIsLookedAtFourTimesAUnitOfTimeWithinBounds) {
+  const auto looks = [](double duration, std::uint64_t frames = 0) {
+    return plan_looks(0.0, {.duration = duration, .frames = frames}).schedule.looks();
+  };
+  EXPECT_EQ(looks(250), 1000U);
+  EXPECT_EQ(looks(1), 100U);
+  EXPECT_EQ(looks(1e6), 20'000U);
+  EXPECT_EQ(looks(1e6, 30'000), 30'000U) << "a look for every frame";
+}
+
+TEST(MeasuredBed, FramesVisitEveryPhase) {
+  for (const std::uint32_t phases : {1U, 12U, 20U, 32U})
+    for (const std::uint64_t frames : {1U, 7U, 37U, 64U, 100U}) {
+      const LookPlan plan = plan_looks(0.3, {.duration = 30, .phases = phases, .frames = frames});
+      if (plan.frame_stride == 0) continue;
+      EXPECT_EQ(std::gcd(plan.frame_stride, std::uint64_t{phases}), 1U);
+      EXPECT_LE((frames - 1) * plan.frame_stride, plan.schedule.looks() - 1);
+    }
+}
+
+TEST(MeasuredBed, WhatCannotBeMeasuredIsNamed) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Problem> all{Problem::settle, Problem::duration, Problem::phases, Problem::spacing,
+                                 Problem::kernel};
+  EXPECT_EQ((MeasureOptions{.settle = -1, .duration = 0, .phases = 0, .spacing = none, .kernel = {}}.problems(0)), all);
+  EXPECT_EQ((MeasureOptions{.duration = 0.999}.problems(1)), std::vector{Problem::shorter_than_a_period});
+  EXPECT_TRUE((MeasureOptions{.duration = 1}.problems(1).empty()));
+  EXPECT_EQ((MeasureOptions{.duration = 1e13}.problems(1)), std::vector{Problem::too_many_periods});
+  EXPECT_EQ((MeasureOptions{.duration = 1, .frames = 33}.problems(1)), std::vector{Problem::too_many_frames});
+  Scene scene;
+  scene.box.floor = SinusoidalFloor{.amplitude = 1, .frequency = 0.5};
+  const std::vector<std::string> said = MeasureOptions{.duration = 1}.validate(scene);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said.front(), "duration is 1, shorter than one period of the floor, 2");
+}
+
+TEST(MeasuredBed, HeightsReachBelowTheFloorAndAboveTheLoosestBed) {
+  Scene scene;
+  scene.disks.species = {{.count = 100}};
+  scene.box.width = 10;
+  scene.box.floor = SinusoidalFloor{.amplitude = 2, .frequency = 0.5};
+  const HeightGrid still = profile_heights(scene, {});
+  EXPECT_EQ(still.lowest, -6.0) << "2 D of amplitude, 6 standard deviations of the kernel, 1 D";
+  EXPECT_NEAR(still.height(still.points - 1), 6 * 10 + 30, 0.5);
+  scene.bath = LangevinBath{.temperature = 3, .rate = 1, .interval = 0.1};
+  EXPECT_NEAR(profile_heights(scene, {}).height(profile_heights(scene, {}).points - 1), 90 + 25 * 3, 0.5);
+  const HeightGrid hot = profile_heights(scene, {}, 5);
+  EXPECT_NEAR(hot.height(hot.points - 1), 90 + 25 * 5, 0.5) << "the hotter of bath and annealing";
+}
+
+TEST(MeasuredBed, FilledHeightsLeaveOutTheKernelsTail) {
+  const Profile profile{.height = {0, 1, 2, 3, 4}, .number_density = {0, 1e-13, 0.4, 0, 2e-12}, .std_error = {}};
+  EXPECT_EQ(filled_heights(profile).first, 2U);
+  EXPECT_EQ(filled_heights(profile).last, 5U);
+  const Profile empty{.height = {0, 1}, .number_density = {0, 0}, .std_error = {}};
+  EXPECT_EQ(filled_heights(empty).first, filled_heights(empty).last);
+}
+
+}  // namespace
+}  // namespace shakebed::sim
