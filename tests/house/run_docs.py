@@ -10,7 +10,7 @@
 
 A comment above a block changes this: <!-- file: NAME --> saves it; <!-- needs: MODULE ... --> skips it where Python has no such
 module; <!-- exit: 6 --> expects that exit code; <!-- not run: why --> leaves it out. <!-- page: long --> makes the page one of
-the long set.
+the long set; <!-- page needs: PROGRAM ... --> skips it where a program is missing.
 
 usage: run_docs.py PROGRAM REPOSITORY quick|long [PAGE ...]    (exit 1: a page is wrong)
 """
@@ -19,6 +19,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -216,6 +217,17 @@ class Page:
                     self.fault(line, f"exit code {code}:\n{printed}")
 
 
+def end_daemons(folder):
+    """Ends what a page started in the background and left: the numbers in its files "pids"."""
+    for file in folder.glob("*/pids"):
+        for pid in file.read_text().split():
+            try:
+                if os.readlink(f"/proc/{pid}/cwd").startswith(str(folder)):
+                    os.kill(int(pid), signal.SIGTERM)
+            except OSError:
+                pass
+
+
 def notices_faults():
     assert matches(["a: done in 0.5 s"], ["  a:  31 % measuring, 4.5 s left", "a: done in 12 ms"]) is None
     assert matches(["a: done"], ["b: done"]) == "a: done"
@@ -240,10 +252,18 @@ def main():
             continue
         if not any(b[1] in CHECKED for b in blocks_of(text)):
             continue
-        with tempfile.TemporaryDirectory(prefix="shakebed-docs.") as folder:
+        absent = [p for needed in re.findall(r"<!-- page needs: (.*?) -->", text) for p in needed.split()
+                  if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin:/sbin")]
+        if absent:
+            skipped.append(f"{name}: {', '.join(absent)} not installed")
+            continue
+        with tempfile.TemporaryDirectory(prefix="shakebed-docs.", ignore_cleanup_errors=True) as folder:
             page = Page(name, text, program, root, pathlib.Path(folder))
             begin = time.monotonic()
-            page.run()
+            try:
+                page.run()
+            finally:
+                end_daemons(pathlib.Path(folder))
             print(f"{name}: {page.run_blocks} blocks, {time.monotonic() - begin:.0f} s", flush=True)
         faults += page.faults
         skipped += page.skipped
