@@ -1,0 +1,281 @@
+#!/usr/bin/env python3
+"""The words of the documents: no dialect, short sentences, symbols that GLOSSARY.md defines, links that lead somewhere,
+correct spelling, README and tutorial easy to read.
+
+usage: words.py REPOSITORY   (exit 1: something is wrong; what was skipped is printed)
+
+The dialect is in dialect.txt (a regular expression and, behind a tab, what to write). Words that a spell checker does
+not know are in known_words.txt. Both lists grow. Strings and header comments of the code are read as well and counted
+at the end; they do not fail the test.
+"""
+import collections
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+LONGEST_SENTENCE = 30  # words
+LEAST_EASE = 50.0      # Flesch reading ease
+
+HERE = pathlib.Path(__file__).resolve().parent
+GENERATED = ("docs/reference/", "docs/results.md")  # text of the code, which is read as code
+# Long sentences of these are counted and do not fail; all other rules hold for them.
+SENTENCES_REPORTED = {"docs/thermometer.md", "docs/python.md", "docs/library.md", "docs/kumaran.md"}
+EASY = ("README.md", "docs/tutorial/")
+
+GREEK = ("alpha beta gamma delta zeta eta theta lambda mu nu xi phi chi psi sigma tau omega Gamma Delta Lambda Sigma "
+         "Phi Psi Omega").split()
+SYMBOL = re.compile(r"(?<![\w/.-])(?:(?:%s|[A-Za-zα-ωΑ-Ω])_\w{1,3}|%s|[B-HJ-Zα-ωΑ-Ω]|chi2|a2)(?![\w-]|\.\w|\()"
+                    % ("|".join(GREEK), "|".join(g for g in GREEK if g != "beta")))
+
+
+def documents(root):
+    names = ["README.md", "GLOSSARY.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "paper/paper.md"]
+    files = [root / name for name in names if (root / name).exists()]
+    files += sorted((root / "docs").rglob("*.md"))
+    return [f for f in files if not f.relative_to(root).as_posix().startswith(GENERATED)]
+
+
+class Prose:
+    """A Markdown file without its code: paragraphs, list items and table cells, each with the line where it begins."""
+
+    def __init__(self, text):
+        self.blocks = []    # (line, kind, text); kind: text, heading or cell
+        self.anchors = set()
+        self.links = []     # (line, target)
+        fence = front = False
+        held, first = [], 0
+
+        def flush():
+            if held:
+                self.blocks.append((first, "text", " ".join(held)))
+                held.clear()
+
+        for number, line in enumerate(text.splitlines(), 1):
+            if number == 1 and line == "---":
+                front = True
+                continue
+            if front:
+                front = line != "---"
+                continue
+            if re.match(r"\s*(```|~~~)", line):
+                flush()
+                fence = not fence
+                continue
+            if fence:
+                continue
+            self.links += [(number, target) for target in re.findall(r"\]\(<?([^)\s>]+)>?\)", re.sub(r"`[^`]*`", "", line))]
+            line = re.sub(r"<!--.*?-->", "", line)
+            stripped = line.strip()
+            if not stripped:
+                flush()
+            elif stripped.startswith("#"):
+                flush()
+                title = stripped.lstrip("#").strip()
+                self.anchors.add(re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-"))
+                self.blocks.append((number, "heading", title))
+            elif stripped.startswith("|"):
+                flush()
+                for cell in re.split(r"(?<!\\)\|", stripped)[1:-1]:
+                    if not re.fullmatch(r"\s*:?-+:?\s*", cell):
+                        self.blocks.append((number, "cell", cell.strip()))
+            else:
+                item = re.match(r"\s*(?:[-*]|\d+\.)\s+(.*)", line)
+                if item:
+                    flush()
+                    stripped = item.group(1)
+                if not held:
+                    first = number
+                held.append(stripped)
+        flush()
+
+
+def plain(text):
+    """Without Markdown: code becomes one word, links their text."""
+    text = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", text)
+    text = re.sub(r"`[^`]*`", " CODE ", text)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    text = re.sub(r"\[@?[A-Z]\w+\d{4}\w*\]", "", text)  # keys of the bibliography
+    text = re.sub(r"https?://\S+|<[^>]+>", " ", text)
+    return re.sub(r"[*]{1,2}", "", text)
+
+
+def sentences(text):
+    text = re.sub(r"\b(e\.g|i\.e|Fig|Figs|eq|eqs|Eq|No|vs|al|Ref|St|Lett|Rev|Phys)\.", r"\1", plain(text))
+    return [s for s in re.split(r"(?<=[.!?])[)\"”]?\s+(?=[A-Z0-9\"“(`])", text) if s.strip()]
+
+
+def words(sentence):
+    return [w for w in re.split(r"[\s/]+", sentence) if re.search(r"\w", w)]
+
+
+def dialect(path=HERE / "dialect.txt"):
+    rows = [line.split("\t") for line in path.read_text().splitlines() if line and not line.startswith("#")]
+    return [(re.compile(row[0], re.IGNORECASE), row[1]) for row in rows]
+
+
+def syllables(word):
+    word = re.sub(r"[^a-z]", "", word.lower())
+    if len(word) <= 3:
+        return 1
+    word = re.sub(r"(?:[^laeiouy]es|[^aeiouydt]ed|[^laeiouy]e)$", "", word)
+    return max(1, len(re.findall(r"[aeiouy]{1,2}", word)))
+
+
+def reading_ease(prose):
+    count = collections.Counter()
+    for _, kind, text in prose.blocks:
+        if kind != "text":
+            continue
+        for sentence in sentences(text):
+            found = [w for w in words(sentence) if re.search(r"[a-zA-Z]", w) and w != "CODE"]
+            if len(found) < 2:
+                continue
+            count["sentences"] += 1
+            count["words"] += len(found)
+            count["syllables"] += sum(syllables(w) for w in found)
+    if not count["sentences"]:
+        return 100.0
+    return (206.835 - 1.015 * count["words"] / count["sentences"] - 84.6 * count["syllables"] / count["words"])
+
+
+def glossary_symbols(text):
+    """The symbols of the first column of the glossary's tables, each between backticks; several by commas."""
+    symbols = set()
+    for line in text.splitlines():
+        if line.startswith("|"):
+            for code in re.findall(r"`([^`]+)`", line.split("|")[1]):
+                symbols.add(code)
+    return symbols
+
+
+def faults_of(name, prose, rows, symbols, length=True):
+    for line, kind, text in prose.blocks:
+        bare = plain(text)
+        for pattern, instead in rows:
+            for hit in pattern.finditer(bare):
+                yield line, "dialect", f"\"{hit.group(0)}\": write {instead}"
+        if length and kind == "text":
+            for sentence in sentences(text):
+                if len(words(sentence)) > LONGEST_SENTENCE:
+                    yield line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
+        if name != "GLOSSARY.md" or kind == "text":
+            for symbol in SYMBOL.findall(re.sub(r"\"[^\"]*\"", "", bare)):
+                if symbol not in symbols:
+                    yield line, "symbol", f"\"{symbol}\" is not in GLOSSARY.md: {bare[:60]}"
+
+
+def dead_links(root, file, prose, parsed):
+    for line, target in prose.links:
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        aim = (file.parent / path).resolve() if path else file
+        if not aim.exists():
+            yield line, "link", f"{target}: there is no such file"
+        elif anchor and aim.suffix == ".md":
+            if aim not in parsed:
+                parsed[aim] = Prose(aim.read_text())
+            if anchor not in parsed[aim].anchors:
+                yield line, "link", f"{target}: there is no such heading"
+
+
+def misspelled(root, files, parsed):
+    """Faults by codespell and aspell; what is not installed is said."""
+    if shutil.which("codespell"):
+        found = subprocess.run(["codespell", "-L", "nd,te,fo", *map(str, files)], capture_output=True, text=True)
+        for line in found.stdout.splitlines():
+            yield line.replace(str(root) + "/", "")
+    else:
+        print("SKIPPED: codespell is not installed (Debian: codespell): common misspellings are not looked for")
+    if shutil.which("aspell"):
+        known = {w.lower() for w in (HERE / "known_words.txt").read_text().split()}
+        text = {}
+        for file in files:
+            for line, _, block in parsed[file].blocks:
+                block = re.sub(r"\S*[\d_/.=<>@]\S*[\w]", " ", plain(block).replace("CODE", " "))
+                for word in re.findall(r"[A-Za-zÀ-ÿ]+(?:'[a-z]+)?", block):
+                    text.setdefault(word.removesuffix("'s").removesuffix("'"), (file.relative_to(root), line))
+        listed = subprocess.run(["aspell", "--lang=en", "--encoding=utf-8", "list"], input="\n".join(text),
+                                capture_output=True, text=True, check=True)
+        for word in listed.stdout.split():
+            if word.lower() not in known and len(word) > 2:
+                where = text.get(word, ("?", 0))
+                yield f"{where[0]}:{where[1]}: \"{word}\": misspelled, or a word for tests/house/known_words.txt"
+    else:
+        print("SKIPPED: aspell is not installed (Debian: aspell, aspell-en): the spelling is not checked")
+
+
+def code_words(root, rows):
+    """What the code says: strings of .cpp files and comments of .hpp files. Counted, not failed."""
+    counts, examples = collections.Counter(), []
+    for room in ("statistics", "sim", "ingest", "fit", "pipelines"):
+        for file in sorted((root / room).rglob("*.[ch]pp")):
+            text = file.read_text()
+            if file.suffix == ".cpp":
+                pieces = [" ".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', group)) for group in
+                          re.findall(r'"(?:[^"\\\n]|\\.)*"(?:\s+"(?:[^"\\\n]|\\.)*")*', re.sub(r"//.*|#include.*", "", text))]
+            else:
+                pieces = [" ".join(re.findall(r"//\s?(.*)", group)) for group in
+                          re.findall(r"(?:^[ \t]*//.*\n)+", text, re.MULTILINE)]
+            for piece in pieces:
+                for pattern, _ in rows:
+                    if hit := pattern.search(piece):
+                        counts["dialect"] += 1
+                        examples.append(f"{file.relative_to(root)}: \"{hit.group(0)}\"")
+                if any(len(words(s)) > LONGEST_SENTENCE for s in sentences(piece)):
+                    counts["long"] += 1
+    return counts, examples
+
+
+def notices_faults(rows):
+    """The rules themselves: each must find the fault that it is for."""
+    bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
+    kinds = {kind for _, kind, _ in faults_of("x.md", bad, rows, {"T"})}
+    assert {"dialect", "long", "symbol"} <= kinds, kinds
+    assert [target for _, target in bad.links] == ["nowhere.md#b"]
+    assert list(dead_links(HERE, HERE / "x.md", bad, {}))
+    good = Prose("# A\n\nThe bed has T. It is 3 high, with `remembers` and eq. (5) as code.\n")
+    assert not list(faults_of("x.md", good, rows, {"T"})), list(faults_of("x.md", good, rows, {"T"}))
+    assert reading_ease(Prose("The cat sat on the mat. The dog ran to me.\n")) > 100
+    assert reading_ease(Prose("Institutional considerations necessitate interdisciplinary communication.\n")) < 0
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    rows = dialect()
+    notices_faults(rows)
+    files = documents(root)
+    parsed = {file: Prose(file.read_text()) for file in files}
+    symbols = glossary_symbols((root / "GLOSSARY.md").read_text())
+    faults, reported = [], collections.Counter()
+    for file in files:
+        name = file.relative_to(root).as_posix()
+        for line, kind, text in [*faults_of(name, parsed[file], rows, symbols), *dead_links(root, file, parsed[file], parsed)]:
+            if kind == "long" and name in SENTENCES_REPORTED:
+                reported[name] += 1
+            else:
+                faults.append(f"{name}:{line}: {kind}: {text}")
+    faults += misspelled(root, files, parsed)
+    for file in files:
+        name = file.relative_to(root).as_posix()
+        if name.startswith(EASY):
+            ease = reading_ease(parsed[file])
+            print(f"Flesch reading ease of {name}: {ease:.0f}")
+            if ease < LEAST_EASE:
+                faults.append(f"{name}: reading ease {ease:.1f}, must be at least {LEAST_EASE}: shorter sentences and words")
+    for name, number in sorted(reported.items()):
+        print(f"not failed: {name}: {number} sentences of more than {LONGEST_SENTENCE} words")
+    counts, examples = code_words(root, rows)
+    print(f"not failed: strings and header comments of the code: {counts['dialect']} with dialect, {counts['long']} with a "
+          f"sentence of more than {LONGEST_SENTENCE} words")
+    for example in examples[:10]:
+        print(f"  {example}")
+    print("\n".join(faults))
+    print(f"{len(files)} documents, {len(symbols)} symbols, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
