@@ -52,7 +52,9 @@ void Fields::finish() {
     if (member.key == "$comment" || std::find(known_.begin(), known_.end(), member.key) != known_.end()) continue;
     const std::string nearest = nearest_name(member.key, known_);
     std::string suggestion;
-    if (!nearest.empty()) {
+    if (const auto elsewhere = keys_elsewhere_.find(member.key); elsewhere != keys_elsewhere_.end()) {
+      suggestion = "It belongs to " + elsewhere->second + ".";
+    } else if (!nearest.empty()) {
       suggestion = fmt::format("Did you mean \"{}\"?", nearest);
     } else {
       for (const std::string& name : known_) suggestion += (suggestion.empty() ? "Known here: " : ", ") + name;
@@ -61,6 +63,16 @@ void Fields::finish() {
                                  member.value.from_command_line ? Position{} : member.at,
                                  pointer_join(pointer_, member.key), fmt::format("unknown key \"{}\"", member.key),
                                  suggestion});
+  }
+}
+
+void Fields::note_keys_of(std::string_view tag, std::string_view name, const std::function<void(Fields&)>& describe) {
+  Json inner = Json::object();
+  Fields fields = schema(inner);
+  describe(fields);
+  for (const auto& property : inner["properties"].items()) {
+    std::string& places = keys_elsewhere_[property.key()];
+    places += fmt::format("{}\"{}\": \"{}\"", places.empty() ? "" : " or ", tag, name);
   }
 }
 

@@ -218,6 +218,8 @@ class Fields {
   };
 
   const JsonNode* take(std::string_view key, const About& about, std::string_view expected);
+  // The keys of an alternative that was not chosen: finish() names it where one of them was written all the same.
+  void note_keys_of(std::string_view tag, std::string_view name, const std::function<void(Fields&)>& describe);
   Problem located(std::string_view pointer_below, const std::string& what, const std::string& suggestion) const;
   void complain(const JsonNode& node, std::string_view key, const std::string& what, const std::string& suggestion = {},
                 bool is_input = false);
@@ -252,6 +254,7 @@ class Fields {
   bool reduced_ = false;
   bool unknown_keys_matter_ = true;
   std::vector<std::string> known_;
+  std::map<std::string, std::string> keys_elsewhere_;  // key to the alternatives it belongs to, as text
 };
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -455,7 +458,15 @@ void Fields::tagged_alternatives(std::string_view tag, Variant& value, const Abo
     return;
   }
   const auto body = [&]<std::size_t Index, class A>(const Alternative<A>& row) {
-    if (*chosen != Index) return;
+    if (*chosen != Index) {
+      if (row.describe) {
+        note_keys_of(tag, row.name, [&row](Fields& fields) {
+          A scratch{};
+          row.describe(fields, scratch);
+        });
+      }
+      return;
+    }
     if (value.index() != Index) value.template emplace<Index>();
     if (row.describe) row.describe(*this, std::get<Index>(value));
   };

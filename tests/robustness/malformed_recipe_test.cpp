@@ -40,6 +40,8 @@ const Mistake mistakes[] = {
      "Did you mean \"stages\"?"},
     {"UnknownStage", "\"stage\": \"simulate\"", "\"stage\": \"simulat\"", 3, "/stages/0/stage",
      "Did you mean \"simulate\"?"},
+    {"KeyOfAnotherChoice", "\"motion\": \"sinusoidal\", ", "", 3, "/stages/0/floor/frequency",
+     "It belongs to \"motion\": \"sinusoidal\"."},
     {"UnknownChoice", "\"kind\": \"hard\"", "\"kind\": \"herd\"", 3, "/stages/0/box/sides/kind",
      "Did you mean \"hard\"?"},
     {"DuplicateKey", "\"count\": 40", "\"count\": 40, \"count\": 41", 3, "/stages/0/disks/count", "twice"},
