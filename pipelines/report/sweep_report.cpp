@@ -303,8 +303,8 @@ class SweepPage {
     std::string out;
     const auto group = [&](const char* heading, const std::vector<std::string>& sentences) {
       if (sentences.empty()) return;
-      out += fmt::format("<details{}><summary>{}: {}</summary>", out.empty() ? " open" : "", heading, sentences.size());
-      for (const std::string& sentence : sentences) out += fmt::format("<p>{}</p>\n", escape_markup(sentence));
+      out += fmt::format("<details><summary>{}: {}</summary>", heading, sentences.size());
+      for (const std::string& sentence : sentences) out += fmt::format("<p>{}</p>\n", prose(sentence));
       out += "</details>\n";
     };
     std::vector<std::string> of_recipe;
