@@ -211,11 +211,11 @@ std::string film_viewer(const FinishedStage& stage) {
       "frame\" "
       "aria-label=\"frame with the disks found: arrow keys go from disk to disk\"></canvas><div class=\"says\" "
       "role=\"status\" "
-      "hidden></div></div>\n<div class=\"side\"></div></div>\n<div class=\"controls\"><button "
+      "hidden></div>\n<div class=\"controls\"><button "
       "type=\"button\">Play</button><input type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the "
       "film\"><output></output>"
       "<label>colour <select>{}</select></label><span class=\"legend\"></span></div></div>\n<div "
-      "class=\"still\">{}</div>\n"
+      "class=\"side\"></div></div></div>\n<div class=\"still\">{}</div>\n"
       "<figcaption>{}; pictures {} px wide, compressed. Profile: this frame (orange) beside the mean of those shown "
       "(blue). "
       "Blue dashes: the floor.</figcaption></figure>\n",
