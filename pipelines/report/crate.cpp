@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -48,47 +49,77 @@ std::string uri_of(const std::string& path) {
   return out;
 }
 
+Json descriptor() {
+  return Json{{"@id", std::string(crate_name)},
+              {"@type", "CreativeWork"},
+              {"about", reference("./")},
+              {"conformsTo", reference("https://w3id.org/ro/crate/1.1")}};
+}
+
+Json software() {
+  return Json{{"@id", "#shakebed"},
+              {"@type", "SoftwareApplication"},
+              {"name", "shakebed"},
+              {"version", program_version()},
+              {"softwareVersion", source_revision()},
+              {"description", "shaken beds of disks under gravity: simulate, photograph, measure, fit"}};
+}
+
+Json no_licence() {
+  return Json{{"@id", "#licence"},
+              {"@type", "CreativeWork"},
+              {"name", "No licence is stated"},
+              {"description", "The program states no licence for results: whoever publishes them does."}};
+}
+
+Json root_of(const Plan& plan, Json parts, Json actions) {
+  const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
+  return Json{{"@id", "./"},
+              {"@type", "Dataset"},
+              {"name", title},
+              {"description", plan.description.empty()
+                                  ? fmt::format("Results of the shakebed recipe \"{}\": see report.html.", plan.name)
+                                  : plan.description},
+              {"datePublished", SHAKEBED_SOURCE_DATE},
+              {"license", reference("#licence")},
+              {"hasPart", std::move(parts)},
+              {"mentions", std::move(actions)}};
+}
+
+Json file_json(const std::string& path, const Json& more) {
+  Json file{{"@id", uri_of(path)}, {"@type", "File"}, {"name", path}, {"encodingFormat", format_of(path)}};
+  file.update(more);
+  return file;
+}
+
+Json document(Json graph) {
+  return Json{{"@context",
+               Json::array({"https://w3id.org/ro/crate/1.1/context", Json{{"sha256", "https://schema.org/sha256"}}})},
+              {"@graph", std::move(graph)}};
+}
+
 class Crate {
  public:
   Crate(const Plan& plan, const RunOutcome& outcome) : plan_(plan), outcome_(outcome) {}
 
   Json operator()() {
-    graph_.push_back(Json{{"@id", "ro-crate-metadata.json"},
-                          {"@type", "CreativeWork"},
-                          {"about", reference("./")},
-                          {"conformsTo", reference("https://w3id.org/ro/crate/1.1")}});
+    graph_.push_back(descriptor());
     graph_.push_back(Json::object());  // the root, once its parts are known
     add_pages();
     add_software();
     for (std::size_t i = 0; i < outcome_.stages.size() && i < plan_.stages.size(); ++i) add_stage(i);
     graph_[1] = root();
-    return Json{{"@context",
-                 Json::array({"https://w3id.org/ro/crate/1.1/context", Json{{"sha256", "https://schema.org/sha256"}}})},
-                {"@graph", std::move(graph_)}};
+    return document(std::move(graph_));
   }
 
  private:
   Json root() const {
-    const std::string title = plan_.report.title.empty() ? plan_.name : plan_.report.title;
-    Json out{{"@id", "./"},
-             {"@type", "Dataset"},
-             {"name", title},
-             {"description", plan_.description.empty()
-                                 ? fmt::format("Results of the shakebed recipe \"{}\": see report.html.", plan_.name)
-                                 : plan_.description},
-             {"datePublished", SHAKEBED_SOURCE_DATE},
-             {"license", reference("#licence")},
-             {"hasPart", parts_},
-             {"mentions", actions_}};
+    Json out = root_of(plan_, parts_, actions_);
     if (fs::exists(outcome_.out / "report.html")) out["mainEntity"] = reference("report.html");
     return out;
   }
 
-  void add_file(const std::string& path, Json more) {
-    Json file{{"@id", uri_of(path)}, {"@type", "File"}, {"name", path}, {"encodingFormat", format_of(path)}};
-    file.update(more);
-    graph_.push_back(std::move(file));
-  }
+  void add_file(const std::string& path, const Json& more) { graph_.push_back(file_json(path, more)); }
 
   void add_pages() {
     const auto page = [&](const char* name, const char* description) {
@@ -106,18 +137,7 @@ class Crate {
     parts_.push_back(reference("manifest.json"));
   }
 
-  void add_software() {
-    graph_.push_back(Json{{"@id", "#shakebed"},
-                          {"@type", "SoftwareApplication"},
-                          {"name", "shakebed"},
-                          {"version", program_version()},
-                          {"softwareVersion", source_revision()},
-                          {"description", "shaken beds of disks under gravity: simulate, photograph, measure, fit"}});
-    graph_.push_back(Json{{"@id", "#licence"},
-                          {"@type", "CreativeWork"},
-                          {"name", "No licence is stated"},
-                          {"description", "The program states no licence for results: whoever publishes them does."}});
-  }
+  void add_software() { graph_.push_back(software()), graph_.push_back(no_licence()); }
 
   void add_stage(std::size_t i) {
     const StageOutcome& stage = outcome_.stages[i];
@@ -177,5 +197,43 @@ class Crate {
 }  // namespace
 
 Json crate_json(const Plan& plan, const RunOutcome& outcome) { return Crate(plan, outcome)(); }
+
+Json crate_json(const Plan& plan, const SweepOutcome& sweep) {
+  Json parts = Json::array(), graph = Json::array({descriptor(), Json::object(), software(), no_licence()});
+  const auto add = [&](Json entity) {
+    parts.push_back(reference(entity["@id"].get<std::string>()));
+    graph.push_back(std::move(entity));
+  };
+  for (const auto& [name, description] :
+       {std::pair("sweep.csv", "a row a point: its values and the numbers gathered, in SI"),
+        std::pair("sweep.csv-metadata.json", "the columns of sweep.csv, as CSV on the Web says it"),
+        std::pair("resolved.json", "the recipe with every option written out"),
+        std::pair("report.html", "figures, maps and the table of points on one page"),
+        std::pair("summary.md", "the same in short")}) {
+    if (fs::exists(sweep.out / name)) add(file_json(name, Json{{"description", description}}));
+  }
+  if (fs::is_directory(sweep.out / "figures")) {
+    std::set<std::string> figures;  // in the order of their names
+    for (const fs::directory_entry& entry : fs::directory_iterator(sweep.out / "figures"))
+      figures.insert("figures/" + entry.path().filename().string());
+    for (const std::string& path : figures) add(file_json(path, Json::object()));
+  }
+  for (const SweepPoint& point : sweep.points) {
+    if (!fs::is_directory(sweep.out / "points" / point.name)) continue;
+    add(Json{{"@id", "points/" + point.name + "/"},
+             {"@type", "Dataset"},
+             {"name", "point " + point.name},
+             {"description", "results of one point; its stages are described in the metadata of its own folder"}});
+  }
+  const Json action{{"@id", "#run"},
+                    {"@type", "CreateAction"},
+                    {"name", plan.name},
+                    {"instrument", reference("#shakebed")},
+                    {"object", Json::array({reference("resolved.json")})},
+                    {"result", reference("./")}};
+  graph.push_back(action);
+  graph[1] = root_of(plan, std::move(parts), Json::array({reference("#run")}));
+  return document(std::move(graph));
+}
 
 }  // namespace shakebed::pipelines

@@ -4,12 +4,17 @@
 // program's source, whose results these are.
 #pragma once
 
-#include "pipelines/runner/run.hpp"
+#include <string_view>
+
+#include "pipelines/runner/pages.hpp"
 
 namespace shakebed::pipelines {
 
 inline constexpr std::string_view crate_name = "ro-crate-metadata.json";
 
 Json crate_json(const Plan& plan, const RunOutcome& outcome);
+// Of a sweep: its table, its figures, and the folders of its points, which have metadata of their own where they have a
+// page.
+Json crate_json(const Plan& plan, const SweepOutcome& sweep);
 
 }  // namespace shakebed::pipelines

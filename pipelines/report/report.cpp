@@ -44,7 +44,7 @@ class Report {
     std::string out = page_head(plan_.report.title.empty() ? plan_.name : plan_.report.title);
     // One figure shows the answer; those that other stages would lead with stand before the rest.
     std::vector<std::string> leading = parts(ReportPlace::lead_picture);
-    out += state_line() + sections(ReportPlace::lead) + published_facts();
+    out += state_line() + sections(ReportPlace::lead) + facts();
     if (!leading.empty()) {
       out += leading.front();
       leading.erase(leading.begin());
@@ -220,17 +220,22 @@ class Report {
     return text;
   }
 
-  // The published numbers beside the answer, in short; the table with their places is below.
-  std::string published_facts() const {
-    const std::vector<Row> rows = published_rows();
-    if (rows.empty()) return "";
-    std::string out = "<section class=\"answer\" aria-label=\"published numbers\"><dl class=\"facts\">\n";
-    for (const Row& row : rows)
-      out += fmt::format(
-          "<div><dt>{}</dt><dd>{} <span class=\"tag computed\">computed</span><br>{} <span class=\"tag "
-          "published\">published</span><br><span class=\"verdict {}\">{}</span></dd></div>\n",
-          prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad", html(row.verdict));
-    return out + "</dl></section>\n";
+  // Beside the answer: the first published number, and what stages measured besides; the rest is in tables below.
+  std::string facts() {
+    std::string own = sections(ReportPlace::facts);
+    if (const std::vector<Row> rows = published_rows(); !rows.empty()) {
+      const Row& row = rows.front();
+      own.insert(
+          0,
+          fmt::format("<div><dt>{0}</dt><dd>{1} <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>the "
+                      "same in print</dt><dd>{2} <span class=\"tag published\">published</span> <span "
+                      "class=\"verdict {3}\">{4}</span></dd></div>\n",
+                      prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad",
+                      html(row.verdict)));
+    }
+    if (own.empty()) return "";
+    return "<section class=\"answer beside\" aria-label=\"numbers beside the answer\"><dl class=\"facts\">\n" + own +
+           "</dl></section>\n";
   }
 
   std::string about() const {
@@ -261,7 +266,8 @@ class Report {
 
   // Tables and figures inside the page, so that they go where it goes; what is large is linked beside it.
   std::string downloads() const {
-    constexpr std::uint64_t largest = 300'000, most = 3'000'000;
+    // Inside a page of at most 4 MB beside film (1.8 MB), bed and figures.
+    constexpr std::uint64_t largest = 120'000, most = 600'000;
     std::uint64_t total = 0;
     std::string inside, beside;
     const auto type_of = [](const std::string& extension) {

@@ -14,6 +14,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/quantity.hpp"
+#include "pipelines/report/crate.hpp"
 #include "pipelines/report/page.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 #include "pipelines/runner/sweep_table.hpp"
@@ -303,8 +304,8 @@ class SweepPage {
     std::string out;
     const auto group = [&](const char* heading, const std::vector<std::string>& sentences) {
       if (sentences.empty()) return;
-      out += fmt::format("<details{}><summary>{}: {}</summary>", out.empty() ? " open" : "", heading, sentences.size());
-      for (const std::string& sentence : sentences) out += fmt::format("<p>{}</p>\n", escape_markup(sentence));
+      out += fmt::format("<details><summary>{}: {}</summary>", heading, sentences.size());
+      for (const std::string& sentence : sentences) out += fmt::format("<p>{}</p>\n", prose(sentence));
       out += "</details>\n";
     };
     std::vector<std::string> of_recipe;
@@ -352,7 +353,10 @@ class SweepPage {
     if (has_replicas()) out.push_back({cells[1], "number"});
     out.push_back({escape_markup(cells[2]), cells[2] == "ok" ? "good" : "bad"});
     std::size_t c = 3;
-    for (; c < 3 + plan_.sweep->axes.size(); ++c) out.push_back({escape_markup(cells[c]), "number"});
+    for (; c < 3 + plan_.sweep->axes.size(); ++c) {
+      const auto plain = number_of(cells[c]);
+      out.push_back({plain ? fmt::format("{:.6g}", *plain) : escape_markup(cells[c]), "number"});
+    }
     for (const std::string& pointer : sweep_.collected) {
       const double factor = words_of_number(plan_, pointer).factor;
       const auto value = number_of(cells[c]), error = number_of(cells[c + 1]);
@@ -415,6 +419,7 @@ void write_sweep_pages(const Plan& plan, const SweepOutcome& sweep) {
   write_file_atomically(sweep.out / "summary.md", markdown_of(plan, sweep));
   if (!sweep.complete) return;  // a shard alone has nothing to show yet
   write_file_atomically(sweep.out / "report.html", SweepPage(plan, sweep)());
+  write_file_atomically(sweep.out / crate_name, dump(crate_json(plan, sweep)));
 }
 
 }  // namespace shakebed::pipelines

@@ -158,10 +158,10 @@ std::string animation_html(const std::filesystem::path& trajectory, double perio
   return fmt::format(
       "<figure id=\"bed-in-motion\" class=\"bed\" data-scene=\"{}\" data-positions=\"{}\">\n<div class=\"stage\"><div "
       "class=\"views\"><div class=\"picture\"><canvas role=\"img\" aria-label=\"the bed in "
-      "motion\"></canvas></div>\n<div "
-      "class=\"side\"></div></div>\n<div class=\"controls\"><button type=\"button\">Play</button><input "
+      "motion\"></canvas>\n<div class=\"controls\"><button type=\"button\">Play</button><input "
       "type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the bed\"><output></output></div></div>\n<div "
-      "class=\"still\">{}</div>\n<figcaption>{} disks, {} frames of the trajectory{}. Two tones by the height at the "
+      "class=\"side\"></div></div></div>\n<div class=\"still\">{}</div>\n<figcaption>{} disks, {} frames of the "
+      "trajectory{}. Two tones by the height at the "
       "beginning show how the bed mixes. Profile: this frame (orange) beside the mean of all (blue); dashed: the "
       "floor.</figcaption></figure>\n",
       attribute_text(scene_json(frames, extent, period > 0)), base64(position_bytes(frames, extent)),

@@ -7,12 +7,16 @@
 #include <filesystem>
 #include <utility>
 
+#include "ingest/frames/small_picture.hpp"
 #include "ingest/profile/overlay.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/profile_csv.hpp"
 
 namespace shakebed::pipelines {
 namespace {
+
+// Of the picture of what the model leaves, for the page: marks of a pixel's width are still seen.
+constexpr int residual_width = 620, residual_quality = 50;
 
 ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::string description) {
   ProfileTable table;
@@ -235,6 +239,7 @@ void draw_overlays(RunContext& context, const FilmFiles& film, const ingest::Mea
       ingest::GrayFrame residual = ingest::residual_frame(frame, shown, found.finder);
       for (float& level : residual.pixels) level += 128;  // grey where the model explains all
       ingest::write_png(context.output(fmt::format("residual_{:06d}.png", item->index)), residual);
+      write_file(context.output("residual.webp"), ingest::small_webp(residual, residual_width, residual_quality));
     }
     first = false;
   }

@@ -29,38 +29,27 @@ std::vector<fs::path> overlays_of(const fs::path& directory) {
   return files;
 }
 
-// The film with the disks found, one still picture where scripts do not run.
-std::string film_html(const FinishedStage& stage, int&) {
-  const std::vector<fs::path> overlays = overlays_of(stage.files.directory);
-  std::string still;
-  if (!overlays.empty())
-    still = fmt::format("<img alt=\"disks found in frame {}\" src=\"data:image/png;base64,{}\">",
-                        escape_markup(overlays.front().stem().string().substr(8)), base64(read_file(overlays.front())));
-  return film_viewer(stage, still);
-}
+std::string film_html(const FinishedStage& stage, int&) { return film_viewer(stage); }
 
+// Of a stage without film its frames with what was found in them; what the model leaves of one frame; the bead.
 std::string pictures_html(const fs::path& directory) {
   std::string out;
-  const std::vector<fs::path> overlays = overlays_of(directory);
-  // The first stands in for the film.
-  for (std::size_t i = fs::exists(directory / "film.json") ? 1 : 0; i < overlays.size(); ++i) {
-    const fs::path& path = overlays[i];
-    out += fmt::format(
-        "<figure><img alt=\"disks found\" src=\"data:image/png;base64,{}\"><figcaption>Disks found in frame {}: "
-        "green circles; orange, those cut or half hidden; blue, floor and walls.</figcaption></figure>\n",
-        base64(read_file(path)), escape_markup(path.stem().string().substr(8)));
-  }
-  const auto picture = [&](const fs::path& path, const char* caption) {
+  const auto picture = [&](const fs::path& path, const char* kind, const std::string& caption) {
     if (fs::exists(path))
       out += fmt::format(
-          "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>\n", caption,
-          base64(read_file(path)));
+          "<figure><img alt=\"{0}\" src=\"data:image/{1};base64,{2}\"><figcaption>{0}</figcaption></figure>\n",
+          escape_markup(caption), kind, base64(read_file(path)));
   };
-  for (const fs::path& path : overlays) {
-    picture(directory / ("residual_" + path.stem().string().substr(8) + ".png"),
-            "What beads and light do not explain of that frame: grey where nothing is left.");
+  if (!fs::exists(directory / "film.json")) {
+    for (const fs::path& path : overlays_of(directory))
+      picture(path, "png",
+              fmt::format(
+                  "Disks found in frame {}: green circles; orange, those cut or half hidden; blue, floor and walls.",
+                  path.stem().string().substr(8)));
   }
-  picture(directory / "bead.png", "The bead as learned from the frames.");
+  picture(directory / "residual.webp", "webp",
+          "What beads and light do not explain of the first frame drawn: grey where nothing is left.");
+  picture(directory / "bead.png", "png", "The bead as learned from the frames.");
   return out;
 }
 

@@ -101,6 +101,21 @@ std::vector<std::optional<double>> steps_of(const FilmDisks& now, const FilmDisk
   return out;
 }
 
+// The first frame with its disks, where scripts do not run.
+std::string still_html(const Json& film, const FilmDisks& disks) {
+  std::string out = fmt::format(
+      "<svg viewBox=\"-0.5 -0.5 {0} {1}\" role=\"img\" aria-label=\"disks found in frame {2}\" "
+      "style=\"width:100%;max-width:720px\"><image href=\"data:image/{3};base64,{4}\" x=\"-0.5\" y=\"-0.5\" "
+      "width=\"{0}\" "
+      "height=\"{1}\"/><g fill=\"none\" stroke=\"#00c853\" stroke-width=\"1.5\">",
+      film.at("width").get<int>(), film.at("height").get<int>(), film.at("frames")[0].get<std::size_t>(),
+      film.at("kind").get<std::string>(), film.at("pictures")[0].get<std::string>());
+  for (std::size_t i = 0; i < disks.x_px.size(); ++i)
+    out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\"/>", disks.x_px[i], disks.y_px[i],
+                       disks.radius_px[i]);
+  return out + "</g></svg>";
+}
+
 // What the viewer reads, frame by frame.
 class FilmData {
  public:
@@ -116,6 +131,9 @@ class FilmData {
     if (const Json* width = find_pointer(stage.result, "/width/value"); width != nullptr && width->is_number())
       width_ = width->get<double>();
   }
+
+  // After json().
+  std::string still() const { return still_html(film_, frames_.at(film_.at("frames")[0].get<std::size_t>())); }
 
   Json json() {
     for (const auto& [ignored, disks] : frames_)
@@ -171,12 +189,13 @@ class FilmData {
 
 }  // namespace
 
-std::string film_viewer(const FinishedStage& stage, const std::string& still) {
+std::string film_viewer(const FinishedStage& stage) {
   if (!stage.files.has("film.json") || !stage.files.has("disks.csv")) return "";
-  const Json film = FilmData(stage, read_json(stage.files.file("film.json"))).json();
+  FilmData data(stage, read_json(stage.files.file("film.json")));
+  const Json film = data.json();
   const std::size_t shown = film.at("frames").size(), of = film.at("of");
   std::string choices =
-      "<option value=\"outline\">outlines</option><option value=\"quality\" selected>quality</option><option "
+      "<option value=\"outline\">outlines</option><option value=\"quality\">quality</option><option "
       "value=\"order\">crystalline order |ψ6|</option>";
   if (film.at("follows").get<bool>()) choices += "<option value=\"step\">step to the next frame</option>";
   if (film.contains("marks")) choices += "<option value=\"truth\">missed and false</option>";
@@ -192,15 +211,15 @@ std::string film_viewer(const FinishedStage& stage, const std::string& still) {
       "frame\" "
       "aria-label=\"frame with the disks found: arrow keys go from disk to disk\"></canvas><div class=\"says\" "
       "role=\"status\" "
-      "hidden></div></div>\n<div class=\"side\"></div></div>\n<div class=\"controls\"><button "
+      "hidden></div>\n<div class=\"controls\"><button "
       "type=\"button\">Play</button><input type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the "
       "film\"><output></output>"
       "<label>colour <select>{}</select></label><span class=\"legend\"></span></div></div>\n<div "
-      "class=\"still\">{}</div>\n"
+      "class=\"side\"></div></div></div>\n<div class=\"still\">{}</div>\n"
       "<figcaption>{}; pictures {} px wide, compressed. Profile: this frame (orange) beside the mean of those shown "
       "(blue). "
       "Blue dashes: the floor.</figcaption></figure>\n",
-      script_text(dump_canonical(film)), choices, still, thinned, film.at("picture_width").get<int>());
+      script_text(dump_canonical(film)), choices, data.still(), thinned, film.at("picture_width").get<int>());
 }
 
 }  // namespace shakebed::pipelines

@@ -86,6 +86,14 @@ std::string fit_lead_html(const FinishedStage& stage, int&) {
   return answer == nullptr ? "" : answer_html(*answer);
 }
 
+// The solid's height by the model of the fit, where the answer as a whole gives none.
+std::string solid_fact_html(const FinishedStage& stage, int&) {
+  const Json *all = find_pointer(stage.result, "/answer/solid_height"),
+             *own = find_pointer(stage.result, "/solid_height");
+  if ((all != nullptr && all->is_object()) || own == nullptr || !own->is_object()) return "";
+  return fact("height of the solid, by " + stage.result.value("model", "the model") + " alone", shown(*own));
+}
+
 std::string answer_markdown(const FinishedStage& stage) {
   const Json* answer = find_pointer(stage.result, "/answer");
   if (answer == nullptr) return "";
@@ -199,6 +207,7 @@ std::vector<WarningAdvice> fit_warnings() {
 
 StagePages fit_pages() {
   return {.sections = {{.place = ReportPlace::lead, .html = fit_lead_html, .once = true},
+                       {.place = ReportPlace::facts, .html = solid_fact_html, .once = true},
                        {ReportPlace::banner, "", banner_html},
                        {ReportPlace::fits, "", fit_html}},
           .warnings = fit_warnings(),

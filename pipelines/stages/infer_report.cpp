@@ -140,6 +140,8 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
     best += "\n";
   }
   write_file(context.output("pairs.dat"), draws + "\n\n" + (best.empty() ? "NaN\n" : best));
+  // The bars are of all draws; as points more than 400 hide one another and make the page large.
+  const std::size_t every = std::max<std::size_t>(1, (found.draws.size() + 399) / 400);
   std::string body = fmt::format(
       "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font ',9'\n",
       d);
@@ -173,9 +175,9 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
       }
       const auto [y_low, y_high] = ends(y);
       body += fmt::format(
-          "set yrange [{}:{}]\nplot 'pairs.dat' index 0 using {}:{} with points pt 7 ps 0.15 lc rgb '#0072B2', "
+          "set yrange [{}:{}]\nplot 'pairs.dat' index 0 every {} using {}:{} with points pt 7 ps 0.2 lc rgb '#0072B2', "
           "'pairs.dat' index 1 using {}:{} with points pt 2 ps 0.8 lw 2 lc rgb '#D55E00'",
-          y_low, y_high, column + 1, row + 1, column + 1, row + 1);
+          y_low, y_high, every, column + 1, row + 1, column + 1, row + 1);
       const auto a = x.in_scene(options.bed.scene), b = y.in_scene(options.bed.scene);
       if (a && b)
         body += fmt::format(", '+' using ({}):({}) every ::0::0 with points pt 6 ps 1 lw 2 lc rgb '#000000'", *a, *b);

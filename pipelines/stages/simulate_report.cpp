@@ -1,7 +1,11 @@
 // What the page shows of a simulate stage: the bed in motion.
+#include <fmt/format.h>
+
 #include <cmath>
+#include <utility>
 
 #include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/animation.hpp"
 #include "pipelines/stages/simulate.hpp"
 
@@ -21,10 +25,25 @@ std::string motion_html(const FinishedStage& stage, int&) {
   }
 }
 
+// What the disks' own motion says, whatever a fit of the profile does.
+std::string kinetic_facts_html(const FinishedStage& stage, int&) {
+  std::string out;
+  for (const auto& [key, name] : {std::pair("temperature_x", "T_x"), std::pair("temperature_z", "T_z")}) {
+    const std::string length = std::string(key) + "_over_mg";
+    const bool has_length = stage.result.contains(length);
+    if (!has_length && !stage.result.contains(key)) continue;
+    out += fmt::format("<div><dt>kinetic {}{} of the simulated disks ({})</dt><dd>{}</dd></div>\n", prose(name),
+                       has_length ? "/(m g)" : "", escape_markup(stage.files.id),
+                       shown(stage.result[has_length ? length : key]));
+  }
+  return out;
+}
+
 }  // namespace
 
 StagePages simulate_pages() {
-  return {.sections = {{.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
+  return {.sections = {{.place = ReportPlace::facts, .html = kinetic_facts_html, .once = true},
+                       {.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
           .warnings = {
               {"contact duration", WarningEffect::measurement, "Give a shorter \"contact_duration\", and compare T."},
               {"above the highest bin", WarningEffect::measurement, "Let the profile reach higher (\"profile\")."},

@@ -180,8 +180,9 @@ struct FinishedStage {
   Input files;
   Json result;
 };
-// Where on the page; in this order, with the sections of the page itself between them.
-enum class ReportPlace { lead, lead_picture, banner, motion, film, claims, figures, checks, fits, maps, frames };
+// Where on the page; in this order, with the sections of the page itself between them. `facts` are pairs
+// <div><dt>name</dt> <dd>value</dd></div> beside the answer.
+enum class ReportPlace { lead, facts, lead_picture, banner, motion, film, claims, figures, checks, fits, maps, frames };
 struct ReportSection {
   ReportPlace place;
   std::string_view heading = {};  // once above all sections of this place; none: the section has its own

@@ -96,7 +96,7 @@ class FilmPage : public testing::Test {
                    more + "}");
   }
   Json data() const {
-    const std::string page = film_viewer(stage_, "<img>");
+    const std::string page = film_viewer(stage_);
     const std::string open = "class=\"film-data\">";
     const std::size_t begin = page.find(open) + open.size();
     return Json::parse(page.substr(begin, page.find("</script>", begin) - begin));
@@ -122,7 +122,7 @@ TEST_F(FilmPage, HasEveryDiskOfItsFrames) {
   EXPECT_EQ(disks[6], 254U) << "the middle of a hexagon: |psi_6| = 1";
   EXPECT_EQ(disks[8 * 7 + 6], 0U) << "a disk without neighbours: |psi_6| = 0";
   EXPECT_EQ(disks[7], 255U) << "no steps without velocities";
-  EXPECT_THAT(film_viewer(stage_, "<img>"), HasSubstr("2 of 5 good frames (one in 2)"));
+  EXPECT_THAT(film_viewer(stage_), HasSubstr("2 of 5 good frames (one in 2)"));
 }
 
 TEST_F(FilmPage, HasTheStepsOfDisksThatWereFollowed) {
@@ -137,13 +137,13 @@ TEST_F(FilmPage, HasTheStepsOfDisksThatWereFollowed) {
 
 TEST_F(FilmPage, OffersTheTruthWhereItIsKnown) {
   film();
-  EXPECT_THAT(film_viewer(stage_, ""), Not(HasSubstr("missed and false")));
+  EXPECT_THAT(film_viewer(stage_), Not(HasSubstr("missed and false")));
   film(R"(, "marks": [{"missed": [1.5, 2.5], "false": [3]}, {"missed": [], "false": []}])");
-  EXPECT_THAT(film_viewer(stage_, ""), HasSubstr("missed and false"));
+  EXPECT_THAT(film_viewer(stage_), HasSubstr("missed and false"));
   EXPECT_EQ(data()["marks"][0]["missed"], Json::parse("[1.5, 2.5]"));
 }
 
-TEST_F(FilmPage, IsLeftOutWhereTheStageKeptNoPictures) { EXPECT_EQ(film_viewer(stage_, "<img>"), ""); }
+TEST_F(FilmPage, IsLeftOutWhereTheStageKeptNoPictures) { EXPECT_EQ(film_viewer(stage_), ""); }
 
 TEST(FigureHtml, CannotBeEndedByWhatItHolds) {
   const ScratchFolder folder;

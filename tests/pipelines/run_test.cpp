@@ -41,9 +41,10 @@ class Pipeline : public testing::Test {
 
 TEST_F(Pipeline, WritesTheFixedResultFiles) {
   ASSERT_EQ(run_recipe().exit_code, 0);
-  for (const char* name : {"manifest.json", "resolved.json", "summary.json", "summary.md", "report.html",
-                           "bed/profile.csv", "bed/observables.json", "bed/trajectory.extxyz.zst",
-                           "simulate/profile.csv", "fit/fit.json", "check/check.json", "check/junit.xml"}) {
+  for (const char* name :
+       {"manifest.json", "resolved.json", "summary.json", "summary.md", "report.html", "ro-crate-metadata.json",
+        "bed/profile.csv", "bed/observables.json", "bed/trajectory.extxyz.zst", "simulate/profile.csv", "fit/fit.json",
+        "check/check.json", "check/junit.xml"}) {
     EXPECT_TRUE(fs::is_regular_file(folder_ / "o" / name)) << name;
   }
   const Json manifest = read_json(folder_ / "o" / "manifest.json");

@@ -37,7 +37,7 @@
     if (scene.walls) { context.moveTo(x(0), 0); context.lineTo(x(0), floor); context.lineTo(x(scene.width), floor); context.lineTo(x(scene.width), 0); }
     else { context.moveTo(x(0), floor); context.lineTo(x(scene.width), floor); }
     context.stroke();
-    slider.value = shown; text.textContent = `${scene.label[shown]}, floor at ${scene.floor[shown].toFixed(2)} D`.replace("-", "−");
+    slider.value = shown; text.textContent = `${scene.label[shown]}, floor at ${(Math.round(100 * scene.floor[shown]) / 100 || 0).toFixed(2)} D`.replace("at -", "at −");
     if (profile) profile.show(shown, scene.floor[shown]);
     figure.dataset.drawn = Number(figure.dataset.drawn || 0) + 1;
   };

@@ -60,7 +60,7 @@
       if (!image.here) { try { await image.ready; } catch { /* the disks are shown without their picture */ } }
       if (this.shown !== k) return;
       this.draw();
-      if (k + 1 < this.of.frames.length) this.picture(k + 1);  // decoded before it is asked for
+      for (const near of [k + 1, k + 2, k - 1]) if (near >= 0 && near < this.of.frames.length) this.picture(near);  // decoded before they are asked for
     }
     play(on) {
       this.playing = on;

@@ -108,8 +108,10 @@
       }).observe(this.box);
     }
     buildKey() {
-      for (const s of this.data.series.length ? this.series : []) {
-        if (s.panel || !s.label) continue;
+      const named = new Set();
+      for (const s of this.series) {
+        if (s.panel || !s.label || named.has(s.label)) continue;  // points and the line through them share a name
+        named.add(s.label);
         const button = document.createElement("button");
         button.type = "button";
         button.setAttribute("aria-pressed", "true");
@@ -370,14 +372,20 @@
       else if (key === "-") this.zoomBy(1.6);
       else if (key === "Escape" || key === "0") { this.at = null; this.zoomTo(null); }
       else if (key.startsWith("Arrow") || key === "Home" || key === "End") {
-        if (!this.at) this.at = { s: shown[0], i: 0 };
+        // Along the points that are seen.
+        const seen = k => this.series[k].x.map((_, i) => i).filter(i => this.visible(this.series[k], i));
+        const first = shown.find(k => seen(k).length);
+        if (first === undefined) return;
+        if (!this.at) this.at = { s: first, i: seen(first)[0] };
         else if (key === "ArrowUp" || key === "ArrowDown") {
-          const k = shown.indexOf(this.at.s), next = shown[(k + (key === "ArrowDown" ? 1 : shown.length - 1)) % shown.length];
+          const others = shown.filter(k => seen(k).length), k = others.indexOf(this.at.s);
+          const next = others[(k + (key === "ArrowDown" ? 1 : others.length - 1)) % others.length];
           const x = this.u(this.series[this.at.s].x[this.at.i]), xs = this.series[next].x;
-          this.at = { s: next, i: xs.reduce((best, value, i) => (Math.abs(this.u(value) - x) < Math.abs(this.u(xs[best]) - x) ? i : best), 0) };
+          this.at = { s: next, i: seen(next).reduce((best, i) => (Math.abs(this.u(xs[i]) - x) < Math.abs(this.u(xs[best]) - x) ? i : best)) };
         } else {
-          const n = this.series[this.at.s].x.length;
-          this.at = { s: this.at.s, i: key === "Home" ? 0 : key === "End" ? n - 1 : Math.max(0, Math.min(n - 1, this.at.i + (key === "ArrowRight" ? 1 : -1))) };
+          const all = seen(this.at.s), at = Math.max(0, all.indexOf(this.at.i));
+          const to = key === "Home" ? 0 : key === "End" ? all.length - 1 : at + (key === "ArrowRight" ? 1 : -1);
+          this.at = { s: this.at.s, i: all[Math.max(0, Math.min(all.length - 1, to))] };
         }
         this.show();
       } else return;

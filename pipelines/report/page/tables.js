@@ -43,5 +43,18 @@
     tell(rows.length);
     (box || table).before(filter);
   }
+  // What scrolls within itself can be scrolled by keyboard.
+  const boxes = [...document.querySelectorAll(".scroll, .drawn, pre")];
+  const reach = () => {
+    for (const box of boxes) {
+      if (box.scrollWidth > box.clientWidth + 1) {
+        box.tabIndex = 0;
+        if (!box.hasAttribute("role")) { box.setAttribute("role", "region"); box.setAttribute("aria-label", "scrolls sideways"); }
+      } else box.removeAttribute("tabindex");
+    }
+  };
+  addEventListener("resize", reach);
+  document.addEventListener("toggle", reach, true);
+  reach();
   document.documentElement.classList.add("scripted");
 })();

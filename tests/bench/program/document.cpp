@@ -16,6 +16,7 @@
 #include "pipelines/formats/process.hpp"
 #include "pipelines/report/page.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "pipelines/stages/plot_data.hpp"
 
 namespace shakebed::pipelines::bench {
 
@@ -100,7 +101,8 @@ Table digits_table(const Json& digits) {
 }
 
 std::string html_table(const Table& table) {
-  std::string out = fmt::format("<h3>{}</h3>\n<div class=\"scroll\"><table>\n<tr>", escape_markup(table.title));
+  std::string out =
+      fmt::format("<h3>{}</h3>\n<div class=\"scroll\"><table class=\"sortable\">\n<tr>", escape_markup(table.title));
   for (const std::string& cell : table.header) out += fmt::format("<th>{}</th>", escape_markup(cell));
   out += "</tr>\n";
   for (const auto& row : table.rows) {
@@ -257,10 +259,46 @@ class Drawing {
   double best_ = std::numeric_limits<double>::max(), worst_ = 0;
 };
 
+// The same for the page, to be asked: points and the lines through them share a name in the key.
+Picture picture_of(const Figure& figure) {
+  Picture picture{
+      .x_label = figure.cost_label, .y_label = figure.error_label, .logarithmic_x = true, .logarithmic_y = true};
+  Series front{"Pareto front", Series::Style::line, 6, {}, {}, {}};
+  if (figure.pareto) {
+    for (const FrontPoint& point : pareto_front(figure)) {
+      if (!front.x.empty()) front.x.push_back(point.cost), front.y.push_back(front.y.back());
+      front.x.push_back(point.cost), front.y.push_back(point.error);
+    }
+  }
+  if (front.x.size() > 2) picture.series.push_back(std::move(front));
+  Series standard{"default", Series::Style::points, 0, {}, {}, {}};
+  int color = 1;
+  for (const Curve& curve : figure.curves) {
+    Series points{
+        curve.label, curve.limit ? Series::Style::dashed : Series::Style::points, curve.limit ? 0 : color++, {}, {},
+        {}};
+    for (std::size_t i = 0; i < curve.cost.size(); ++i) {
+      if (drawable(curve.cost[i], curve.error[i]))
+        points.x.push_back(curve.cost[i]), points.y.push_back(curve.error[i]);
+    }
+    Series through = points;
+    through.style = Series::Style::line;
+    picture.series.push_back(std::move(points));
+    if (curve.line && !curve.limit) picture.series.push_back(std::move(through));
+    if (curve.standard && drawable(curve.cost[*curve.standard], curve.error[*curve.standard]))
+      standard.x.push_back(curve.cost[*curve.standard]), standard.y.push_back(curve.error[*curve.standard]);
+  }
+  standard.hollow = true;
+  if (!standard.x.empty()) picture.series.push_back(std::move(standard));
+  return picture;
+}
+
 void draw(const Figure& figure, const fs::path& directory) {
   const Drawing drawing(figure);
   write_file(directory / (figure.name + ".dat"), drawing.data());
   write_file(directory / (figure.name + ".gp"), drawing.script());
+  write_file(directory / (figure.name + std::string(plot_data_suffix)),
+             dump_canonical(plot_data(picture_of(figure))) + "\n");
   ProcessResult result;
   try {
     result = run_process({"gnuplot", figure.name + ".gp"}, directory);
@@ -455,8 +493,7 @@ std::string document_html(const Document& document, const fs::path& directory) {
     for (const std::string& sentence : stage.sentences) out += fmt::format("<p>{}</p>\n", escape_markup(sentence));
     for (const Figure& figure : stage.figures) {
       draw(figure, directory);
-      out +=
-          fmt::format("<figure class=\"wide\">{}</figure>\n", inline_svg(directory / (figure.name + ".svg"), number++));
+      out += figure_html(directory / (figure.name + ".svg"), number++, escape_markup(figure.title));
     }
     for (const Table& table : stage.tables) out += html_table(table);
     if (!stage.hard_cases.empty()) out += html_table(hard_case_table(stage.hard_cases));
