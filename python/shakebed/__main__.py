@@ -5,6 +5,12 @@ import sys
 
 from .runs import program
 
-if __name__ == "__main__":
+
+def main() -> None:
+    """Become the program, with the arguments of this one."""
     command = program()
     os.execv(command, [command, *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
