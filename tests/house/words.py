@@ -26,7 +26,7 @@ EASY = ("README.md", "docs/tutorial/")
 
 GREEK = ("alpha beta gamma delta zeta eta theta lambda mu nu xi phi chi psi sigma tau omega Gamma Delta Lambda Sigma "
          "Phi Psi Omega").split()
-SYMBOL = re.compile(r"(?<![\w/.-])(?:(?:%s|[A-Za-zα-ωΑ-Ω])_\w{1,3}|%s|[B-HJ-Zα-ωΑ-Ω]|chi2|a2)(?![\w-]|\.\w|\()"
+SYMBOL = re.compile(r"(?<![\w/.-])(?:(?:%s|[A-Za-zα-ωΑ-Ω])_\w{1,3}|%s|[B-HJ-Zα-ορ-ωΑ-Ω]|chi2|a2)(?![\w+-]|\.\w|\. [A-Z]|\()"
                     % ("|".join(GREEK), "|".join(g for g in GREEK if g != "beta")))
 
 
@@ -161,7 +161,7 @@ def faults_of(name, prose, rows, symbols, length=True):
                 if len(words(sentence)) > LONGEST_SENTENCE:
                     yield line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
         if name != "GLOSSARY.md" or kind == "text":
-            for symbol in SYMBOL.findall(re.sub(r"\"[^\"]*\"", "", bare)):
+            for symbol in SYMBOL.findall(re.sub(r"\"[^\"]*\"|[²³]", "", bare)):
                 if symbol not in symbols:
                     yield line, "symbol", f"\"{symbol}\" is not in GLOSSARY.md: {bare[:60]}"
 
