@@ -103,3 +103,9 @@ def on_post_build(config):
     index = json.loads((folder / "search_index.json").read_text())
     lunr = (folder / "lunr.js").read_text()
     (folder / "main.js").write_text(lunr + "\nvar shakebed_index = " + json.dumps({"docs": index["docs"]}) + ";\n" + SEARCH)
+    # Debian's theme asks for these by names under which it does not ship them.
+    scripts = pathlib.Path(config["site_dir"]) / "js"
+    for wanted in set(re.findall(r'js/([\w.-]+\.js)"', (pathlib.Path(config["site_dir"]) / "index.html").read_text())):
+        if not (scripts / wanted).exists():
+            jquery = sorted(scripts.glob("jquery-*.js"))
+            (scripts / wanted).write_text(jquery[0].read_text() if wanted.startswith("jquery") and jquery else "")

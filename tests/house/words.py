@@ -156,6 +156,8 @@ def faults_of(name, prose, rows, symbols, length=True):
         for pattern, instead in rows:
             for hit in pattern.finditer(bare):
                 yield line, "dialect", f"\"{hit.group(0)}\": write {instead}"
+        for tag in re.findall(r"<[^<>]{1,40}>", re.sub(r"`[^`]*`|\]\(<[^>]*>\)", "", text)):
+            yield line, "html", f"{tag} is not shown: write ⟨ ⟩, or code"
         if length and kind == "text":
             for sentence in sentences(text):
                 if len(words(sentence)) > LONGEST_SENTENCE:
@@ -231,9 +233,9 @@ def code_words(root, rows):
 
 def notices_faults(rows):
     """The rules themselves: each must find the fault that it is for."""
-    bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
+    bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows, <v>.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
     kinds = {kind for _, kind, _ in faults_of("x.md", bad, rows, {"T"})}
-    assert {"dialect", "long", "symbol"} <= kinds, kinds
+    assert {"dialect", "long", "symbol", "html"} <= kinds, kinds
     assert [target for _, target in bad.links] == ["nowhere.md#b"]
     assert list(dead_links(HERE, HERE / "x.md", bad, {}))
     good = Prose("# A\n\nThe bed has T. It is 3 high, with `remembers` and eq. (5) as code.\n")
