@@ -26,7 +26,7 @@ EASY = ("README.md", "docs/tutorial/")
 
 GREEK = ("alpha beta gamma delta zeta eta theta lambda mu nu xi phi chi psi sigma tau omega Gamma Delta Lambda Sigma "
          "Phi Psi Omega").split()
-SYMBOL = re.compile(r"(?<![\w/.-])(?:(?:%s|[A-Za-zα-ωΑ-Ω])_\w{1,3}|%s|[B-HJ-Zα-ωΑ-Ω]|chi2|a2)(?![\w-]|\.\w|\()"
+SYMBOL = re.compile(r"(?<![\w/.-])(?:(?:%s|[A-Za-zα-ωΑ-Ω])_\w{1,3}|%s|[B-HJ-Zα-ορ-ωΑ-Ω]|chi2|a2)(?![\w+-]|\.\w|\. [A-Z]|\()"
                     % ("|".join(GREEK), "|".join(g for g in GREEK if g != "beta")))
 
 
@@ -156,12 +156,14 @@ def faults_of(name, prose, rows, symbols, length=True):
         for pattern, instead in rows:
             for hit in pattern.finditer(bare):
                 yield line, "dialect", f"\"{hit.group(0)}\": write {instead}"
+        for tag in re.findall(r"<[^<>]{1,40}>", re.sub(r"`[^`]*`|\]\(<[^>]*>\)", "", text)):
+            yield line, "html", f"{tag} is not shown: write ⟨ ⟩, or code"
         if length and kind == "text":
             for sentence in sentences(text):
                 if len(words(sentence)) > LONGEST_SENTENCE:
                     yield line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
         if name != "GLOSSARY.md" or kind == "text":
-            for symbol in SYMBOL.findall(re.sub(r"\"[^\"]*\"", "", bare)):
+            for symbol in SYMBOL.findall(re.sub(r"\"[^\"]*\"|[²³]", "", bare)):
                 if symbol not in symbols:
                     yield line, "symbol", f"\"{symbol}\" is not in GLOSSARY.md: {bare[:60]}"
 
@@ -231,9 +233,9 @@ def code_words(root, rows):
 
 def notices_faults(rows):
     """The rules themselves: each must find the fault that it is for."""
-    bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
+    bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows, <v>.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
     kinds = {kind for _, kind, _ in faults_of("x.md", bad, rows, {"T"})}
-    assert {"dialect", "long", "symbol"} <= kinds, kinds
+    assert {"dialect", "long", "symbol", "html"} <= kinds, kinds
     assert [target for _, target in bad.links] == ["nowhere.md#b"]
     assert list(dead_links(HERE, HERE / "x.md", bad, {}))
     good = Prose("# A\n\nThe bed has T. It is 3 high, with `remembers` and eq. (5) as code.\n")
