@@ -41,16 +41,16 @@ sim::MeasureOptions BedMeasureOptions::reduced(double time_unit) const {
 }
 
 void BedMeasureOptions::check(Fields& fields, double floor_period, double time_unit) const {
-  using Problem = sim::MeasureOptions::Problem;
+  using MeasureProblem = sim::MeasureOptions::Problem;
   const sim::MeasureOptions options = reduced(time_unit);
-  for (const Problem problem : options.problems(floor_period)) {
-    if (problem == Problem::shorter_than_a_period)
+  for (const MeasureProblem problem : options.problems(floor_period)) {
+    if (problem == MeasureProblem::shorter_than_a_period)
       fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
                      "Give " + quantity_text(floor_period * time_unit, dimension::time) + " or more");
-    if (problem == Problem::too_many_periods)
+    if (problem == MeasureProblem::too_many_periods)
       fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run lives to see",
                      "Measure shorter, or shake more slowly");
-    if (problem == Problem::too_many_frames)
+    if (problem == MeasureProblem::too_many_frames)
       fields.require(false, "frames/count",
                      std::to_string(options.frames) + " frames do not fit into the " +
                          std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) +

@@ -12,9 +12,9 @@
 namespace shakebed::sim {
 namespace {
 
-constexpr double frequency = 0.35;
+constexpr double bed_frequency = 0.35;
 
-Scene shaken_bed(std::uint64_t seed = 1) {
+Scene measured_bed_scene(std::uint64_t seed = 1) {
   Scene scene;
   scene.gravity = UniformGravity{};
   scene.disks.species = {{60, 1, 1}};
@@ -22,7 +22,7 @@ Scene shaken_bed(std::uint64_t seed = 1) {
   scene.disks.contact_duration = 1e-4;
   scene.box.width = 10.3;
   scene.box.sides = HardSides{{0.9, 0, 0}};
-  scene.box.floor = SinusoidalFloor{0.8, frequency};
+  scene.box.floor = SinusoidalFloor{0.8, bed_frequency};
   scene.box.floor_surface = {0.9, 0, 0};
   scene.start_temperature = 0.01;
   scene.seed = seed;
@@ -30,7 +30,7 @@ Scene shaken_bed(std::uint64_t seed = 1) {
 }
 
 MeasurementSchedule usual_schedule() {
-  return {.bath = {}, .settle = 5 / frequency, .period = 1 / frequency, .periods = 12, .phases = 8};
+  return {.bath = {}, .settle = 5 / bed_frequency, .period = 1 / bed_frequency, .periods = 12, .phases = 8};
 }
 
 // Every position and velocity that was seen, in order.
@@ -41,7 +41,7 @@ class Diary final : public RunObserver {
   void begin(Simulation&) override { ++begun; }
   void look(Simulation&, const Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
     EXPECT_EQ(phase, look % 8);
-    EXPECT_NEAR(at.time, (5 + static_cast<double>(look) / 8) / frequency, 1e-12);
+    EXPECT_NEAR(at.time, (5 + static_cast<double>(look) / 8) / bed_frequency, 1e-12);
     seen.insert(seen.end(), at.x.begin(), at.x.end());
     seen.insert(seen.end(), at.vz.begin(), at.vz.end());
   }
@@ -51,22 +51,22 @@ class Diary final : public RunObserver {
   void load(ArchiveReader& in) override { in(seen); }
 };
 
-bool same_bytes(const std::vector<double>& a, const std::vector<double>& b) {
+bool equal_bytes(const std::vector<double>& a, const std::vector<double>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 TEST(Measure, LooksAtEveryPhaseOfEveryPeriodOnce) {
   Diary diary;
-  const RunResult result = measure(shaken_bed(), usual_schedule(), {&diary});
+  const RunResult result = measure(measured_bed_scene(), usual_schedule(), {&diary});
   EXPECT_TRUE(result.finished);
-  EXPECT_NEAR(result.simulation->time(), 17 / frequency, 1e-12);
+  EXPECT_NEAR(result.simulation->time(), 17 / bed_frequency, 1e-12);
   EXPECT_EQ(diary.seen.size(), 12U * 8 * 2 * 60);
   EXPECT_EQ(diary.begun, 1);
   EXPECT_EQ(diary.ended, 1);
 }
 
 TEST(Measure, SeesWhatAHandWrittenLoopSees) {
-  const Scene scene = shaken_bed();
+  const Scene scene = measured_bed_scene();
   const MeasurementSchedule schedule = usual_schedule();
   const auto by_hand = simulate(scene);
   BedObserver expected(scene, by_hand->properties(), 8, {-3, 0.25, 160}, {KernelKind::gaussian, 0.5});
@@ -89,7 +89,7 @@ TEST(Measure, SeesWhatAHandWrittenLoopSees) {
 // Stopped at its 1st, 2nd, ... question, it goes on from what it kept last (or begins anew) and sees the same.
 TEST(Measure, GoesOnFromWhatItKeptToTheSameBytes) {
   Diary whole;
-  measure(shaken_bed(), usual_schedule(), {&whole});
+  measure(measured_bed_scene(), usual_schedule(), {&whole});
   for (int questions = 1; questions <= 200; questions *= 3) {
     std::vector<std::uint8_t> kept;
     int asked = 0, stops = 0;
@@ -98,13 +98,13 @@ TEST(Measure, GoesOnFromWhatItKeptToTheSameBytes) {
     control.keep = [&](const Simulation&, const RunControl::State& state) { kept = state(); };
     control.stop = [&] { return stops == 0 && ++asked == questions; };
     Diary before;
-    const RunResult first = measure(shaken_bed(), usual_schedule(), {&before}, control);
+    const RunResult first = measure(measured_bed_scene(), usual_schedule(), {&before}, control);
     EXPECT_FALSE(first.finished) << questions;
     stops = 1;
     Diary after;
-    const RunResult second = measure(shaken_bed(), usual_schedule(), {&after}, control, kept);
+    const RunResult second = measure(measured_bed_scene(), usual_schedule(), {&after}, control, kept);
     EXPECT_TRUE(second.finished);
-    EXPECT_TRUE(same_bytes(after.seen, whole.seen)) << questions;
+    EXPECT_TRUE(equal_bytes(after.seen, whole.seen)) << questions;
     EXPECT_EQ(after.begun + after.gone_on, 1);
   }
 }
@@ -114,17 +114,17 @@ TEST(Measure, RefusesAStateThatIsNotOfThisRun) {
   RunControl control;
   control.keep = [&](const Simulation&, const RunControl::State& state) { kept = state(); };
   Diary diary;
-  measure(shaken_bed(), usual_schedule(), {&diary}, control);
+  measure(measured_bed_scene(), usual_schedule(), {&diary}, control);
   ASSERT_FALSE(kept.empty());
-  Scene other = shaken_bed();
+  Scene other = measured_bed_scene();
   other.disks.species[0].count = 61;
   EXPECT_THROW(measure(other, usual_schedule(), {&diary}, {}, kept), StateError);
   MeasurementSchedule shorter = usual_schedule();
   shorter.periods = 2;
-  EXPECT_THROW(measure(shaken_bed(), shorter, {&diary}, {}, kept), StateError);
+  EXPECT_THROW(measure(measured_bed_scene(), shorter, {&diary}, {}, kept), StateError);
   kept.resize(kept.size() / 2);
-  EXPECT_THROW(measure(shaken_bed(), usual_schedule(), {&diary}, {}, kept), StateError);
-  EXPECT_THROW(measure(shaken_bed(), {.bath = {}, .settle = 0, .period = 0, .periods = 1, .phases = 1}, {}),
+  EXPECT_THROW(measure(measured_bed_scene(), usual_schedule(), {&diary}, {}, kept), StateError);
+  EXPECT_THROW(measure(measured_bed_scene(), {.bath = {}, .settle = 0, .period = 0, .periods = 1, .phases = 1}, {}),
                std::invalid_argument);
 }
 
@@ -132,7 +132,7 @@ TEST(Measure, TellsHowFarItHasCome) {
   std::vector<double> told;
   RunControl control;
   control.progress = [&](double fraction, RunPart) { told.push_back(fraction); };
-  measure(shaken_bed(), usual_schedule(), {}, control);
+  measure(measured_bed_scene(), usual_schedule(), {}, control);
   ASSERT_GT(told.size(), 12U * 8);
   for (std::size_t k = 1; k < told.size(); ++k) EXPECT_GE(told[k], told[k - 1]);
   EXPECT_GT(told.back(), 0.99);
@@ -140,7 +140,7 @@ TEST(Measure, TellsHowFarItHasCome) {
 
 // The reservoir's last temperature is that of a run that goes on, too.
 TEST(Measure, TakesTheReservoirThroughItsSteps) {
-  Scene scene = shaken_bed();
+  Scene scene = measured_bed_scene();
   scene.bath = LangevinBath{1, 1, 0.1};
   MeasurementSchedule schedule = usual_schedule();
   schedule.bath = {{4, 3}, {8, 0.5}};
@@ -153,23 +153,23 @@ TEST(Measure, TakesTheReservoirThroughItsSteps) {
   Diary first, second;
   EXPECT_FALSE(measure(scene, schedule, {&first}, control).finished);
   EXPECT_TRUE(measure(scene, schedule, {&second}, {}, kept).finished);
-  EXPECT_TRUE(same_bytes(second.seen, whole.seen));
+  EXPECT_TRUE(equal_bytes(second.seen, whole.seen));
   schedule.bath = {};
   Diary without;
   measure(scene, schedule, {&without});
-  EXPECT_FALSE(same_bytes(without.seen, whole.seen));
+  EXPECT_FALSE(equal_bytes(without.seen, whole.seen));
 }
 
 TEST(EachReplica, RunsEveryOneOnceWhateverTheThreads) {
   for (const int threads : {1, 2, 5}) {
     std::vector<Diary> diaries(6);
     EXPECT_TRUE(each_replica(6, threads, [&](std::uint32_t k) {
-      return measure(shaken_bed(k + 1), usual_schedule(), {&diaries[k]}).finished;
+      return measure(measured_bed_scene(k + 1), usual_schedule(), {&diaries[k]}).finished;
     }));
     Diary fourth;
-    measure(shaken_bed(4), usual_schedule(), {&fourth});
-    EXPECT_TRUE(same_bytes(diaries[3].seen, fourth.seen));
-    EXPECT_FALSE(same_bytes(diaries[2].seen, fourth.seen));
+    measure(measured_bed_scene(4), usual_schedule(), {&fourth});
+    EXPECT_TRUE(equal_bytes(diaries[3].seen, fourth.seen));
+    EXPECT_FALSE(equal_bytes(diaries[2].seen, fourth.seen));
   }
 }
 
