@@ -1,5 +1,8 @@
 // Temperatures of the two species of a bed, of the whole and by height, from snapshots: granular gases do not share
 // their energy equally [FeitosaMenon2002]. Reduced units.
+//
+// An observer owns its sums and keeps nothing of the scene. One thread at a time may use one; different ones share
+// nothing.
 #pragma once
 
 #include <array>

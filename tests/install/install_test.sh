@@ -42,7 +42,7 @@ built_alone() {
 no_symbols_outside() {
   outside=$(grep -E '^[0-9a-f]+ [TDBRGS] ' |
     grep -vE '^[0-9a-f]+ [A-Z] ((typeinfo|typeinfo name|vtable|guard variable|construction vtable|VTT) for |(non-)?virtual thunk to )?shakebed::' |
-    grep -vE ' (_init|_fini)$' || true)
+    grep -vE ' (_init|_fini|_edata|_end|__bss_start)$' || true)
   [ -z "$outside" ] || fail "$1 has symbols outside namespace shakebed: $outside"
 }
 
