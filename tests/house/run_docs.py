@@ -144,7 +144,7 @@ class Page:
         if not starter.exists():
             self.shell("shakebed init .starter.json")
         recipe = json.loads(starter.read_text())
-        if "stages" in value:
+        if "stages" in value and "stage" not in value:  # a study has both
             recipe = value
         elif "stage" in value:
             kinds = [stage["stage"] for stage in recipe["stages"]]
