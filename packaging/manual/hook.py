@@ -16,7 +16,7 @@ def on_files(files, config):
     for name in PAGES:
         files.append(File(name, str(ROOT), config["site_dir"], config["use_directory_urls"]))
     for file in list(files):
-        if file.src_uri.startswith(("results/", "pictures/pictures")) or file.src_uri.endswith((".py", ".sh")):
+        if re.search(r"^results/.*\.json$|^pictures/pictures|\.(py|sh)$", file.src_uri):
             files.remove(file)
     for name in pictures_outside():
         files.append(File(name, str(ROOT), config["site_dir"], config["use_directory_urls"]))

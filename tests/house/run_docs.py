@@ -144,7 +144,7 @@ class Page:
         if not starter.exists():
             self.shell("shakebed init .starter.json")
         recipe = json.loads(starter.read_text())
-        if "stages" in value:
+        if "stages" in value and "stage" not in value:  # a study has both
             recipe = value
         elif "stage" in value:
             kinds = [stage["stage"] for stage in recipe["stages"]]
@@ -264,13 +264,12 @@ def main():
                 page.run()
             finally:
                 end_daemons(pathlib.Path(folder))
-            print(f"{name}: {page.run_blocks} blocks, {time.monotonic() - begin:.0f} s", flush=True)
+            print(f"{name}: {page.run_blocks} blocks, {time.monotonic() - begin:.0f} s", *page.faults, sep="\n", flush=True)
         faults += page.faults
         skipped += page.skipped
         total += page.run_blocks
     for line in skipped:
         print("SKIPPED:", line)
-    print("\n".join(faults))
     print(f"{total} blocks run, {len(skipped)} skipped, {len(faults)} wrong")
     return 1 if faults or total == 0 else 0
 
