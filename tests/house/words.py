@@ -19,7 +19,7 @@ LONGEST_SENTENCE = 30  # words
 LEAST_EASE = 50.0      # Flesch reading ease
 
 HERE = pathlib.Path(__file__).resolve().parent
-GENERATED = ("docs/reference/", "docs/results.md")  # text of the code, which is read as code
+GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of the code, which is read as code
 # Long sentences of these are counted and do not fail; all other rules hold for them.
 SENTENCES_REPORTED = {"docs/thermometer.md", "docs/python.md", "docs/library.md", "docs/kumaran.md"}
 EASY = ("README.md", "docs/tutorial/")
