@@ -68,7 +68,7 @@ std::string counted(const std::vector<Json>& claims) {
 std::string paragraph(const std::string& text) {
   for (const char* word : {"Claim", "Scene", "What we find", "What differs and why", "What was chosen, and when"}) {
     const std::string start = std::string(word) + ": ";
-    if (text.starts_with(start)) return "**" + std::string(word) + ".** " + text.substr(start.size());
+    if (text.starts_with(start)) return "**" + std::string(word) + ":** " + text.substr(start.size());
   }
   return text;
 }
@@ -107,6 +107,8 @@ std::string results_page(const std::vector<ShippedRecipe>& recipes) {
     const ShownRecipe one = shown(recipe);
     const std::string link = fmt::format("[{0}](results/{0}.md)", one.name), all = counted(claims_of(one, false));
     std::string first = link + " | ", last = " " + all + " |";
+    if (claims_of(one, true).empty())
+      out += "| " + first + "no claims: its report compares number by number | | | | |\n";
     for (const Json& claim : claims_of(one, true)) {
       out += claim_row(claim, first) + last + "\n";
       first = " | ", last = " |";

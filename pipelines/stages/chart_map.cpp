@@ -177,9 +177,15 @@ Json draw_map(const RunContext& context, const MapOptions& map) {
                      .value_label = map.value_label,
                      .value_low = map.value_low,
                      .value_high = map.value_high,
-                     .logarithmic_x = map.logarithmic_x,
-                     .logarithmic_y = map.logarithmic_y,
+                     .decades_x = {},
+                     .decades_y = {},
                      .marks = {}};
+  const auto by_x = [](const MapPoint& l, const MapPoint& r) { return l.x < r.x; };
+  const auto by_y = [](const MapPoint& l, const MapPoint& r) { return l.y < r.y; };
+  const auto across = std::minmax_element(points.begin(), points.end(), by_x);
+  const auto upwards = std::minmax_element(points.begin(), points.end(), by_y);
+  if (map.logarithmic_x) picture.decades_x = {across.first->x, across.second->x};
+  if (map.logarithmic_y) picture.decades_y = {upwards.first->y, upwards.second->y};
   for (std::size_t k = 0; k < map.marks.size(); ++k) {
     const auto count =
         std::count_if(points.begin(), points.end(), [&](const MapPoint& point) { return point.marked[k]; });

@@ -74,6 +74,20 @@ double tic_distance(const std::vector<Series>& all) {
   return 10 * power;
 }
 
+// Labels at 1, 2 and 5 times the powers of ten on an axis of decades that is short: gnuplot labels whole decades alone.
+constexpr double long_axis = 300;  // highest over lowest number from which decades are labels enough
+std::string decade_tics(char axis, double low, double high) {
+  if (!(low > 0) || !(high > low) || high / low >= long_axis) return "";
+  std::string places;
+  for (double power = std::pow(10, std::floor(std::log10(low)) - 1); power <= high; power *= 10) {
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      if (digit * power < low / 2 || digit * power > high * 2) continue;
+      places += fmt::format("{}{:g}", places.empty() ? "" : ", ", digit * power);
+    }
+  }
+  return fmt::format("set {}tics ({})\n", axis, places);
+}
+
 // Both pictures from one script: it is drawn twice, and what differs (size, font, place, file) comes first. The PDF is
 // as wide as one column of a journal, 86 mm, with text of 7 points that reads there (gnuplot's pdfcairo draws a font
 // of 10.5 so large).
@@ -205,8 +219,15 @@ std::string frame_script(const Picture& picture) {
   if (!picture.title.empty()) script += fmt::format("set title {}\n", gnuplot_text(plain(picture.title)));
   script += fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\n", bound(picture.x_low), bound(picture.x_high),
                         bound(picture.y_low), bound(picture.y_high));
-  if (picture.logarithmic_x) script += "set logscale x\n";
-  if (picture.logarithmic_y) script += "set logscale y\n";
+  for (const bool across : {true, false}) {
+    if (!(across ? picture.logarithmic_x : picture.logarithmic_y)) continue;
+    double low = INFINITY, high = -INFINITY;
+    for (const Series& series : picture.series) {
+      for (const double place : across ? series.x : series.y)
+        if (place > 0) low = std::min(low, place), high = std::max(high, place);
+    }
+    script += fmt::format("set logscale {}\n", across ? 'x' : 'y') + decade_tics(across ? 'x' : 'y', low, high);
+  }
   return script +
          "set border lc rgb '#404040'\nset tics nomirror\nset grid lc rgb '#dddddd' lt 1 lw 0.6\nset bars 0.6\nset "
          "pointintervalbox 0\n";
@@ -308,8 +329,9 @@ void draw_cells(const MapPicture& picture, const std::filesystem::path& director
       gnuplot_text(picture.x_label), gnuplot_text(picture.y_label), gnuplot_text(picture.value_label),
       bound(picture.value_low), bound(picture.value_high));
   body += lightness_palette;
-  if (picture.logarithmic_x) body += "set logscale x\n";
-  if (picture.logarithmic_y) body += "set logscale y\n";
+  for (const auto& [axis, range] : {std::pair('x', picture.decades_x), std::pair('y', picture.decades_y)}) {
+    if (range) body += fmt::format("set logscale {}\n", axis) + decade_tics(axis, range->first, range->second);
+  }
   body += fmt::format("plot {} index 0 using 1:2:3:4:5:6:7 with boxxyerror lc palette notitle", file);
   constexpr std::array symbols = {7, 2, 8, 4, 12};
   for (std::size_t k = 0; k < picture.marks.size(); ++k) {

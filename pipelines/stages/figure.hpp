@@ -43,8 +43,8 @@ struct MapPicture {
   std::string name, data;
   std::string x_label{}, y_label{}, value_label{};
   std::optional<double> value_low{}, value_high{};
-  bool logarithmic_x = false, logarithmic_y = false;
-  std::vector<std::pair<std::string, std::size_t>> marks{};  // label, number of the symbol
+  std::optional<std::pair<double, double>> decades_x{}, decades_y{};  // lowest and highest place of a logarithmic axis
+  std::vector<std::pair<std::string, std::size_t>> marks{};           // label, number of the symbol
 };
 void draw_cells(const MapPicture& picture, const std::filesystem::path& directory);
 void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
