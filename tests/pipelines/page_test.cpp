@@ -200,8 +200,9 @@ TEST_F(Crate, SaysWhatWasMadeFromWhat) {
     if (entity["@type"] != "File") continue;
     ++files;
     ASSERT_TRUE(std::filesystem::is_regular_file(folder_ / ("o/" + id))) << id;
-    if (entity.contains("contentSize"))
+    if (entity.contains("contentSize")) {
       EXPECT_EQ(entity["contentSize"], std::to_string(std::filesystem::file_size(folder_ / ("o/" + id)))) << id;
+    }
   }
   EXPECT_GE(files, 8U);
   EXPECT_EQ(actions, Json::parse(read_text(folder_ / "o/manifest.json"))["stages"].size());

@@ -224,10 +224,21 @@
       return low < high ? [low - 0.06 * (high - low), high + 0.06 * (high - low)] : otherwise;
     }
     // --- drawing
+    // A label in as many lines as its axis is short: a letter is about 7 px wide.
+    static lines(label, length) {
+      const out = [""];
+      for (const word of (label || "").split(" ")) {
+        if (out.at(-1) && 7 * (plain(out.at(-1), true).length + 1 + plain(word, true).length) > length) out.push("");
+        out.push(`${out.pop()} ${word}`.trim());
+      }
+      return out;
+    }
     draw() {
       const d = this.data, view = this.view || this.whole(), two = this.series.some(s => s.panel === 1);
-      const width = this.width, narrow = width < 560, left = narrow ? 50 : 66, right = 12, top = 8, bottom = 46;
+      const width = this.width, narrow = width < 560, right = 12, top = 8, bottom = 46;
       const upper = Math.round(Math.min(420, Math.max(230, width * (narrow ? 0.72 : 0.5)))), lowerHeight = two ? Math.round(upper * 0.42) : 0, gap = two ? 16 : 0;
+      const lines = [Plot.lines(d.y, upper), two ? Plot.lines(d.lowerLabel, lowerHeight) : [""]];
+      const left = (narrow ? 50 : 66) + 15 * (Math.max(lines[0].length, lines[1].length) - 1);
       const height = top + upper + gap + lowerHeight + bottom;
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, width, height, tabindex: 0, role: "application", "aria-roledescription": "interactive figure",
         "aria-label": `${plain(d.y, true)} against ${plain(d.x, true)}: arrow keys go from point to point and from series to series, plus and minus zoom, Escape shows the whole` });
@@ -252,7 +263,7 @@
           make("text", { class: "tick", x: left - 6, y: py(v) + 4, "text-anchor": "end" }, svg).textContent = number(value).replace("-", "−");
         }
         make("rect", { class: "axis", x: left, y: f.y0, width: width - left - right, height: f.h }, svg);
-        svgText(f.label || "", true, { transform: `translate(${narrow ? 11 : 14} ${f.y0 + f.h / 2}) rotate(-90)`, "text-anchor": "middle" }, svg);
+        lines[f.panel].forEach((line, i) => svgText(line, true, { transform: `translate(${(narrow ? 11 : 14) + 15 * i} ${f.y0 + f.h / 2}) rotate(-90)`, "text-anchor": "middle" }, svg));
         for (const s of this.series) if (s.on && s.panel === f.panel) this.drawSeries(s, f, inside);
       }
       const base = top + upper + gap + lowerHeight;

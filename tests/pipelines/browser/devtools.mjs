@@ -74,11 +74,11 @@ export class Browser {
   }
   mouse(type, x, y, more = {}) { return this.send("Input.dispatchMouseEvent", { type, x, y, ...more }); }
   key(key, code = key) { return this.send("Input.dispatchKeyEvent", { type: "keyDown", key, code }).then(() => this.send("Input.dispatchKeyEvent", { type: "keyUp", key, code })); }
-  async picture(full) {
+  async picture(full, scale = 1) {
     let clip;
     if (full) {
       const { cssContentSize: size } = await this.send("Page.getLayoutMetrics");
-      clip = { x: 0, y: 0, width: size.width, height: Math.min(size.height, full), scale: 1 };
+      clip = { x: 0, y: 0, width: size.width, height: Math.min(size.height, full), scale };
     }
     const { data } = await this.send("Page.captureScreenshot", { format: "png", captureBeyondViewport: true, ...(clip ? { clip } : {}) });
     return Buffer.from(data, "base64");
