@@ -19,6 +19,7 @@ inline constexpr double twice_rounding = 0x1p-51;  // four times the largest rel
 // Where the quick way does not hold: products that are far too small, sums as good as halfway between two doubles,
 // zeros, what overflows, what is not finite.
 [[gnu::noinline]] inline double fused_rarely(double a, double b, double c) {
+  if (std::isinf(c) && std::isfinite(a) && std::isfinite(b)) return c;  // also where the product overflows
   if (a == 0 || b == 0 || !std::isfinite(b) || !std::isfinite(c)) return a * b + c;
   return std::fma(a, b, c);
 }
@@ -55,7 +56,8 @@ template <class Number>
   const Number rest = sum_rest + low_rest, doubt = rest * twice_rounding;
   const Number result = sum + (rest + doubt), other = sum + (rest - doubt);
   const auto finite = a - a == 0.0;
-  const auto exact = (magnitude(product) >= smallest_exact_product) | (product == 0.0);
+  const auto exact =
+      (magnitude(product) >= smallest_exact_product) | ((product == 0.0) & (magnitude(c) >= smallest_exact_product));
   if (!all_hold((exact & (result == other) & (result != 0.0)) | !finite)) [[unlikely]]
     return fused_rarely(a, b, c);
   return finite ? result : product + c;

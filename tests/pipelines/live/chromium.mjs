@@ -64,7 +64,7 @@ export class Chromium {
     };
     page.until = async (expression, seconds = 60) => {
       for (const end = Date.now() + 1000 * seconds; Date.now() < end; await new Promise((resolve) => setTimeout(resolve, 100)))
-        if (await page.value(expression)) return;
+        if (await page.value(`document.documentElement && (${expression})`)) return;
       throw new Error(`not so after ${seconds} s: ${expression}`);
     };
     page.press = async (key) => {

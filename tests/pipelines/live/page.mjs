@@ -18,14 +18,14 @@ const silent = (page, name) => page.said.forEach((text) => complain(`${name}: ${
 
 async function answersSliders() {
   const page = await chromium.open(url, { width: 1300 });
-  await page.until(measuredFor(150), 120);
+  await page.until(measuredFor(100), 600);
   const cold = await page.value(facts);
   if (!(Number(cold.collisions) > 10000)) complain(`${cold.collisions} collisions`);
   console.log(`${(cold.rate / 1e6).toFixed(2)} million collisions a second in Chromium`);
   const change = async (id, value) => {
     const before = (await page.value(facts)).bed;
     await page.value(set(id, value));
-    await page.until(`Number(document.documentElement.dataset.bed) > ${before} && ${measuredFor(150)}`, 180);
+    await page.until(`Number(document.documentElement.dataset.bed) > ${before} && ${measuredFor(100)}`, 600);
     return page.value(facts);
   };
   // Hotter by a stronger shaking, colder by more loss: 6 standard errors and more.
@@ -76,7 +76,7 @@ const looks = `(() => {
 
 async function fits(width, dark) {
   const name = `${width}-${dark ? "dark" : "light"}`, page = await chromium.open(url, { width, dark });
-  await page.until(measuredFor(60), 120);
+  await page.until(measuredFor(20), 300);
   const { smallest, contrast, nameless, wide, texts } = await page.value(looks);
   if (smallest < 11) complain(`${name}: text of ${smallest} px`);
   if (contrast < 4.5) complain(`${name}: contrast ${contrast}`);

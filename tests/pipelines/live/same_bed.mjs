@@ -17,7 +17,7 @@ const exact = [
   { ...base, friction: 0, restitution: 0.85, count: 120 },
   { ...base, periodic: 1, width: 0.063, count: 210, frequency: 33 },
   { ...base, periodic: 1, friction: 0, gamma: 11.1, restitution: 0.97 },
-  { ...base, gamma: 0.9, count: 80, width: 0.045 }, // the bed comes to rest
+  { ...base, gamma: 0.9, count: 80, width: 0.045 }, // comes to rest
   { ...base, gamma: 1.6, restitution: 0.6, friction: 0.9, frequency: 60 },
 ];
 const similar = { ...base, hexagonal: 1, seed: 3 };
