@@ -1,5 +1,6 @@
 // The bed on its canvas: disks by speed or plain, floor, sides.
 const speedSteps = 24;
+const smallest = 40; // sides of a canvas that can show a bed (px)
 
 export class BedCanvas {
   constructor(canvas) {
@@ -27,6 +28,7 @@ export class BedCanvas {
     if (!frame) return;
     const density = window.devicePixelRatio || 1;
     const width = canvas.clientWidth, height = canvas.clientHeight;
+    if (width < smallest || height < smallest) return; // it is not laid out yet
     if (canvas.width !== Math.round(width * density) || canvas.height !== Math.round(height * density)) {
       canvas.width = Math.round(width * density);
       canvas.height = Math.round(height * density);
