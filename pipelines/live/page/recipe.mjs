@@ -17,6 +17,7 @@ export function recipeOf(settings) {
         ...(settings.hexagonal ? {} : { start_temperature: "0 m" }),
         settle: `${settings.settle} s`,
         measure: "20 s",
+        replicas: 4,
         frames: { count: 640, phases: 32 },
       },
       { stage: "fit", from: "bed", model: "enskog-rectangle" },
