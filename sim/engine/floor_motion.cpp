@@ -59,9 +59,9 @@ SineCosine sine_cosine(double frequency, double now, double later) {
   // Taken in pairs: half as many steps wait for one another.
   const double yy = y * y, y4 = yy * yy;
   const auto pair = [y](double first, double second) { return fused(second, y, first); };
-  const double s = fused(
-      y4, fused(yy, pair(-1 / 1307674368000.0, 1 / 355687428096000.0), pair(-1 / 39916800.0, 1 / 6227020800.0)),
-      fused(yy, pair(-1 / 5040.0, 1 / 362880.0), pair(-1 / 6.0, 1 / 120.0)));
+  const double s =
+      fused(y4, fused(yy, pair(-1 / 1307674368000.0, 1 / 355687428096000.0), pair(-1 / 39916800.0, 1 / 6227020800.0)),
+            fused(yy, pair(-1 / 5040.0, 1 / 362880.0), pair(-1 / 6.0, 1 / 120.0)));
   const double c = fused(
       y4, fused(yy, pair(1 / 20922789888000.0, -1 / 6402373705728000.0), pair(1 / 479001600.0, -1 / 87178291200.0)),
       fused(yy, pair(1 / 40320.0, -1 / 3628800.0), pair(1 / 24.0, -1 / 720.0)));
