@@ -18,7 +18,7 @@ const exact = [
   { ...base, periodic: 1, width: 0.063, count: 210, frequency: 33 },
   { ...base, periodic: 1, friction: 0, gamma: 11.1, restitution: 0.97 },
   { ...base, gamma: 0.9, count: 80, width: 0.045 }, // comes to rest
-  { ...base, gamma: 1.6, restitution: 0.6, friction: 0.9, frequency: 60 },
+  { ...base, gamma: 2.5, restitution: 0.7, friction: 0.9, frequency: 60, count: 90, width: 0.0303, settle: 0.5 },
 ];
 const similar = { ...base, hexagonal: 1, seed: 3 };
 
