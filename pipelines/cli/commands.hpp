@@ -13,6 +13,7 @@ void add_theory(Program& program);
 void add_map(Program& program);
 void add_audit(Program& program);
 void add_init(Program& program);
+void add_live(Program& program);
 void add_schema(Program& program);
 void add_reference(Program& program);
 void add_validate(Program& program);

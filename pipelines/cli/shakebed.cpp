@@ -7,9 +7,10 @@ int main(int argc, char** argv) {
   using namespace shakebed::pipelines;
   return exit_code_of([&] {
     Program program(argc, argv);
-    for (const auto add : {add_reproduce, add_run, add_fit_images, add_fit_profile, add_theory, add_map, add_audit,
-                           add_init, add_schema, add_reference, add_validate, add_explain, add_graph, add_status,
-                           add_verify, add_rerun, add_clean, add_bench, add_submit})
+    for (const auto add :
+         {add_reproduce, add_run,    add_fit_images, add_fit_profile, add_theory,   add_map,     add_audit,
+          add_init,      add_live,   add_schema,     add_reference,   add_validate, add_explain, add_graph,
+          add_status,    add_verify, add_rerun,      add_clean,       add_bench,    add_submit})
       add(program);
     return program.run();
   });

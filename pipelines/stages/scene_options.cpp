@@ -8,6 +8,7 @@
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/formats/reduced_scales.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "sim/engine/start.hpp"
 
@@ -17,8 +18,6 @@ namespace {
 
 // Largest scene whose start is laid out and checked for overlap while a recipe is only being read.
 constexpr std::uint32_t checked_when_read = 50'000;
-// t_c where something dissipates and none is named [sqrt(D/g)]: 1.4 us for beads of 2 mm.
-constexpr double usual_contact_duration = 1e-4;
 constexpr Dimension cube_over_time{.length = 2, .time = -3};
 
 void describe_surface(Fields& fields, SurfaceOptions& surface) {
@@ -87,7 +86,8 @@ void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<d
   const double omega = 2 * std::numbers::pi * s.frequency;
   if (fields.decoding()) {
     fields.require(!s.gamma || gravity, "gamma", "a weightless scene has no Gamma", "Give the amplitude");
-    s.amplitude = amplitude.value_or(s.gamma && gravity && omega > 0 ? *s.gamma * *gravity / (omega * omega) : 0);
+    s.amplitude =
+        amplitude.value_or(s.gamma && gravity && omega > 0 ? amplitude_of(*s.gamma, *gravity, s.frequency) : 0);
   }
   if (!gravity) return;
   if (s.gamma)
@@ -353,7 +353,7 @@ void SceneOptions::describe(Fields& fields) {
 
 // Of 9.81 m/s^2 where nothing else is said; in reduced units 1, or 0 for none.
 void SceneOptions::describe_gravity(Fields& fields) {
-  if (fields.decoding() || fields.mode() == Fields::Mode::schema) gravity_ = reduced_ ? 1.0 : 9.81;
+  if (fields.decoding() || fields.mode() == Fields::Mode::schema) gravity_ = reduced_ ? 1.0 : usual_gravity;
   if (!reduced_) {
     fields.quantity("gravity", gravity_, dimension::acceleration,
                     {.help = "acceleration g; a weightless scene is written in reduced units",
@@ -397,7 +397,9 @@ void SceneOptions::set_material(double restitution, double friction, double side
   }
 }
 
-double SceneOptions::time_unit() const { return gravity_ && !reduced_ ? std::sqrt(disks_.diameter / *gravity_) : 1; }
+double SceneOptions::time_unit() const {
+  return gravity_ && !reduced_ ? ReducedScales::of(disks_.diameter, *gravity_).time : 1;
+}
 
 double SceneOptions::period() const {
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "sim/engine/contact_time.hpp"
+#include "sim/engine/lanes.hpp"
 
 namespace shakebed::sim {
 
@@ -46,27 +47,27 @@ SineCosine sine_cosine(double frequency, double now, double later) {
   const double time = now + later, from_now = time - now;
   const double time_rest = (now - (time - from_now)) + (later - from_now);
   const double turns = frequency * time;
-  const double turns_rest = std::fma(frequency, time, -turns) + frequency * time_rest;
+  const double turns_rest = fused(frequency, time, -turns) + frequency * time_rest;
   const double quarters = std::nearbyint(4 * turns);
   const double nearly = turns - 0.25 * quarters;  // exact, within 1/8
   const double part = nearly + turns_rest, part_rest = turns_rest - (part - nearly);
   constexpr double two_pi = 2 * std::numbers::pi, two_pi_rest = 2.4492935982947064e-16;
   const double x = two_pi * part;
-  const double x_rest = std::fma(two_pi, part, -x) + (two_pi_rest * part + two_pi * part_rest);
+  const double x_rest = fused(two_pi, part, -x) + (two_pi_rest * part + two_pi * part_rest);
   // The series to x^17 and x^18: their remainders are below 1e-18 at pi/4.
   const double y = x * x;
   // Taken in pairs: half as many steps wait for one another.
   const double yy = y * y, y4 = yy * yy;
-  const auto pair = [y](double first, double second) { return std::fma(second, y, first); };
-  const double s = std::fma(
-      y4, std::fma(yy, pair(-1 / 1307674368000.0, 1 / 355687428096000.0), pair(-1 / 39916800.0, 1 / 6227020800.0)),
-      std::fma(yy, pair(-1 / 5040.0, 1 / 362880.0), pair(-1 / 6.0, 1 / 120.0)));
-  const double c = std::fma(
-      y4, std::fma(yy, pair(1 / 20922789888000.0, -1 / 6402373705728000.0), pair(1 / 479001600.0, -1 / 87178291200.0)),
-      std::fma(yy, pair(1 / 40320.0, -1 / 3628800.0), pair(1 / 24.0, -1 / 720.0)));
+  const auto pair = [y](double first, double second) { return fused(second, y, first); };
+  const double s =
+      fused(y4, fused(yy, pair(-1 / 1307674368000.0, 1 / 355687428096000.0), pair(-1 / 39916800.0, 1 / 6227020800.0)),
+            fused(yy, pair(-1 / 5040.0, 1 / 362880.0), pair(-1 / 6.0, 1 / 120.0)));
+  const double c = fused(
+      y4, fused(yy, pair(1 / 20922789888000.0, -1 / 6402373705728000.0), pair(1 / 479001600.0, -1 / 87178291200.0)),
+      fused(yy, pair(1 / 40320.0, -1 / 3628800.0), pair(1 / 24.0, -1 / 720.0)));
   const double half = 0.5 * y, one_less = 1 - half;
-  const double cosine_of_x = one_less + (((1 - one_less) - half) + std::fma(yy, c, -x * x_rest));
-  const double sine_of_x = x + std::fma(x * y, s, x_rest * one_less);
+  const double cosine_of_x = one_less + (((1 - one_less) - half) + fused(yy, c, -x * x_rest));
+  const double sine_of_x = x + fused(x * y, s, x_rest * one_less);
   switch (static_cast<std::int64_t>(quarters) & 3) {
     case 0:
       return {sine_of_x, cosine_of_x};

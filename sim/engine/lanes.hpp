@@ -13,6 +13,9 @@
 #if defined(__SSE2__)
 #include <immintrin.h>
 #endif
+#if defined(__wasm_simd128__)
+#include "sim/engine/fused_wasm.hpp"
+#endif
 
 namespace shakebed::sim {
 
@@ -45,6 +48,7 @@ inline void put_pair(double* doubles, TwoLanes lanes) {
 #endif
 }
 // a b + c, rounded once; the same bytes by instruction or by library.
+#if !defined(__wasm_simd128__)
 inline double fused(double a, double b, double c) { return std::fma(a, b, c); }
 inline TwoLanes fused(TwoLanes a, TwoLanes b, TwoLanes c) {
 #if defined(__FMA__)
@@ -53,6 +57,7 @@ inline TwoLanes fused(TwoLanes a, TwoLanes b, TwoLanes c) {
   return TwoLanes{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1])};
 #endif
 }
+#endif
 inline double sqrt_lanes(double value) { return std::sqrt(value); }
 inline TwoLanes sqrt_lanes(TwoLanes value) {
 #if defined(__SSE2__)
@@ -110,6 +115,10 @@ inline Lanes sqrt_lanes(Lanes value) {
 inline Lanes fused(Lanes a, Lanes b, Lanes c) {
 #if defined(__FMA__)
   return _mm256_fmadd_pd(a, b, c);
+#elif defined(__wasm_simd128__)
+  const TwoLanes low = fused(TwoLanes{a[0], a[1]}, TwoLanes{b[0], b[1]}, TwoLanes{c[0], c[1]});
+  const TwoLanes high = fused(TwoLanes{a[2], a[3]}, TwoLanes{b[2], b[3]}, TwoLanes{c[2], c[3]});
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3);
 #else
   return Lanes{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1]), std::fma(a[2], b[2], c[2]),
                std::fma(a[3], b[3], c[3])};

@@ -37,7 +37,7 @@ struct Period {
   // and taking away a large one, which is quicker than the instruction made for it.
   double to_nearest(double difference) const {
     constexpr double large = 0x1.8p52;
-    return minus_length * (std::fma(difference, inverse, large) - large);
+    return minus_length * (fused(difference, inverse, large) - large);
   }
   static TwoLanes to_nearest(const Period& x, const Period& z, TwoLanes difference) {
     const TwoLanes large = both(0x1.8p52);

@@ -31,7 +31,7 @@ const std::vector<Room> house = {
     {"sim", {"statistics"}, {"scene", "engine", "measure"}},
     {"ingest", {"statistics"}, {"frames", "calibrate", "find", "profile", "synthetic"}},
     {"fit", {"statistics"}, {"theory", "profile_fit", "map", "audit", "inference"}},
-    {"pipelines", {"statistics", "sim", "ingest", "fit"}, {"formats", "stages", "runner", "report", "cli"}},
+    {"pipelines", {"statistics", "sim", "ingest", "fit"}, {"formats", "live", "stages", "runner", "report", "cli"}},
 };
 
 // Libraries of others, and the rooms that may include them.

@@ -1,0 +1,94 @@
+// Where a scene becomes one of the specialised engines. Offered: which of them a program holds, since each is compiled;
+// a scene that needs another is refused. run_scene.cpp holds all.
+#pragma once
+
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <variant>
+#include <vector>
+
+#include "sim/engine/engine.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/engine/start.hpp"
+
+namespace shakebed::sim {
+
+// All of them: 4 spaces x 3 rules x 2 sizes.
+struct EveryEngine {
+  static constexpr bool weightless = true, two_sizes = true;
+};
+
+// The cheapest rule that does what every surface of the scene asks for.
+struct Needs {
+  bool dissipates = false, spins = false;
+  void add(const Surface& s) {
+    dissipates = dissipates || s.restitution < 1;
+    spins = spins || s.friction > 0;
+  }
+};
+
+inline Needs needs_of(const Scene& scene) {
+  Needs needs;
+  needs.add(scene.disks.contact);
+  needs.add(scene.box.floor_surface);
+  if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) needs.add(sides->surface);
+  if (const auto* lid = std::get_if<Lid>(&scene.box.top)) needs.add(lid->surface);
+  return needs;
+}
+
+template <class Offered>
+class ChooseEngine {
+ public:
+  explicit ChooseEngine(const Scene& scene)
+      : scene_(scene),
+        disks_(place_disks(scene)),
+        floor_(std::visit([](const auto& kind) { return FloorMotion(kind); }, scene.box.floor)) {}
+
+  std::unique_ptr<Simulation> operator()() const {
+    const bool periodic_sides = std::holds_alternative<PeriodicSides>(scene_.box.sides);
+    if (std::holds_alternative<UniformGravity>(scene_.gravity))
+      return periodic_sides ? with_rule<PeriodicSidesBox>() : with_rule<HardBox>();
+    if constexpr (Offered::weightless) {
+      if (std::holds_alternative<PeriodicTop>(scene_.box.top)) return with_rule<PeriodicSpace>();
+      return with_rule<WeightlessBox>();
+    }
+    throw std::invalid_argument("/gravity: this program holds no engine for weightless scenes");
+  }
+
+ private:
+  template <class Space>
+  std::unique_ptr<Simulation> with_rule() const {
+    const Needs needs = needs_of(scene_);
+    if (needs.spins) return with_sizes<Space, RoughRule>();
+    if (needs.dissipates) return with_sizes<Space, DissipativeRule>();
+    return with_sizes<Space, ElasticRule>();
+  }
+
+  template <class Space, class Rule>
+  std::unique_ptr<Simulation> with_sizes() const {
+    bool equal = true;
+    for (const Species& s : scene_.disks.species) equal = equal && s.diameter == 1 && s.mass == 1;
+    if (equal) return std::make_unique<Engine<Space, Rule, EqualSizes>>(scene_, floor_, disks_);
+    if constexpr (Offered::two_sizes) return std::make_unique<Engine<Space, Rule, TwoSizes>>(scene_, floor_, disks_);
+    throw std::invalid_argument("/disks: this program holds no engine for two sizes of disks");
+  }
+
+  const Scene& scene_;
+  std::vector<Placed> disks_;
+  FloorMotion floor_;
+};
+
+// simulate() of a program that holds these engines.
+template <class Offered>
+std::unique_ptr<Simulation> simulate_with(const Scene& scene) {
+  const std::vector<SceneProblem> problems = check(scene);
+  if (!problems.empty()) {
+    std::ostringstream out;
+    for (const SceneProblem& p : problems) out << p.where << ": " << p.what << "\n";
+    throw std::invalid_argument(out.str());
+  }
+  return ChooseEngine<Offered>(scene)();
+}
+
+}  // namespace shakebed::sim
