@@ -77,9 +77,9 @@ std::size_t found_beads(const std::vector<FoundDisk>& disks, const std::vector<B
 }
 
 TEST(Sizes, BeadsOfTwoSizesAreFoundEachWithItsRadius) {
-  const std::vector<Bead> beads = scattered(60, {22, 15.5}, 620, 520, 11);
+  const std::vector<Bead> beads = scattered(60, {22, 15.5}, 540, 460, 11);
   ASSERT_EQ(beads.size(), 60U);
-  const GrayFrame frame = drawn(beads, 620, 520, 190, plain_face, 5);
+  const GrayFrame frame = drawn(beads, 540, 460, 190, plain_face, 5);
   FindOptions options;
   options.seen = BeadsSeen{Polarity::dark_beads, 22};
   const CalibrationResult learned = learn_beads({&frame}, options);
