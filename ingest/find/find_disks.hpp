@@ -30,6 +30,7 @@ struct FoundDisk {
   double contrast = 0;                    // its own contrast, 1 for a typical bead
   double probability = 1;                 // that it is a bead; 1 unless rims were looked at (learn_beads.hpp)
   bool cut = false;                       // cut by the border of the frame or of the region of interest
+  bool other_size = false;                // radius_px is its own, not that of the most frequent beads
   bool half_hidden = false;               // part of it does not look like a bead: covered, out of focus, in shadow
 };
 
@@ -45,6 +46,7 @@ struct FindOptions {
   std::optional<double> radius_px{};    // a first value, refined unless hold_radius
   bool hold_radius = false;             // keep radius_px exactly
   std::optional<BeadsSeen> seen{};      // for learn_beads()
+  bool one_size = false;                // learn_beads() looks for no beads of other sizes
   std::optional<PixelRectangle> roi{};  // centres outside are not reported
   int joint_fit_sweeps =
       20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px
@@ -78,6 +80,7 @@ struct FinderCalibration {
   std::vector<std::string> warnings;  // plain sentences
   // Of a film that was surveyed (learn_beads.hpp):
   std::optional<RimModel> rims;
+  double expected_missed = 0;       // share of the beads that are seen too poorly to be reported, by their rims
   bool by_rims = false;             // beads are found by rims alone: light and profile are empty
   bool rims_to_be_checked = false;  // faces without a rim occur, and are dropped
   // Where faces fit, but none has a rim, as in surroundings as bright as the beads: 1 for each pixel that is left out.

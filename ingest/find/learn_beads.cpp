@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -27,6 +28,9 @@ constexpr int most_left_out_rounds = 3;
 // A face's radius over that of the rims, which hidden parts make smaller: black beads in a packed bed 1.05,
 // photoelastic disks 1.04 to 1.06. A face smaller than the rims is a part of the bead.
 constexpr double least_ratio = 0.97, most_ratio = 1.15;
+constexpr double plainly_seen = 0.8;  // mean share of the rims
+constexpr double well_explained =
+    0.35;  // of the edges: where most beads were found by rims 0.35 to 0.85, else 0.10 to 0.34
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
 Circle place_of(const FoundDisk& disk) {
@@ -75,6 +79,7 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
 
 struct Agreement {
   double missed = 0;                  // share of the sure rims that no face has
+  double missed_beads = 0;            // that rims show and faces do not
   double rimless = 0;                 // share of the faces
   std::vector<Circle> faces, no_rim;  // whole faces with a rim, and without
   [[nodiscard]] bool good() const { return missed <= most_missed && rimless <= most_rimless; }
@@ -86,9 +91,11 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
                        [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
   double sure = 0, missed = 0;
   for (const RimDisk& rim : rims.disks) {
+    const bool has_no_face = !by_face.any_near(rim.circle.x, rim.circle.y);
+    if (has_no_face) agreement.missed_beads += rim.probability;
     if (rim.probability < surely_a_bead) continue;
     ++sure;
-    missed += !by_face.any_near(rim.circle.x, rim.circle.y);
+    missed += has_no_face;
   }
   agreement.missed = sure > 0 ? missed / sure : 1;
   std::vector<Circle> places;
@@ -133,6 +140,8 @@ class FacesAndRims {
       const Agreement agreement = compare(frame, rims_, find_disks(frame, faces.calibration, asked_));
       if (agreement.good()) {
         faces.calibration.rims = rims_.model;
+        faces.calibration.expected_missed =
+            agreement.missed_beads / (static_cast<double>(agreement.faces.size()) + agreement.missed_beads);
         faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
         return faces;
       }
@@ -168,6 +177,40 @@ class FacesAndRims {
   std::shared_ptr<const std::vector<std::uint8_t>> left_out_;
 };
 
+// What rims cannot show: that more beads are there.
+void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCalibration& calibration) {
+  double support = 0, others = 0, smallest = HUGE_VAL, largest = 0, explained = 0;
+  for (const RimDisk& disk : seen.disks) {
+    support += disk.circle.support / static_cast<double>(seen.disks.size());
+    others += disk.other_size;
+    smallest = std::min(smallest, disk.circle.radius), largest = std::max(largest, disk.circle.radius);
+    explained += disk.probability * 2 * std::numbers::pi * disk.circle.radius * disk.circle.support;
+  }
+  char text[300];
+  if (support < plainly_seen) {
+    std::snprintf(text, sizeof text,
+                  "Beads were found by their rims alone, and on average only %.0f %% of a rim is seen: beads may be "
+                  "missed, and centres may be off by a tenth of a radius. Look at the overlays.",
+                  100 * support);
+    calibration.warnings.emplace_back(text);
+  }
+  const double share = explained / std::max(1.0, rims.edge_length_px);
+  if (share < well_explained) {
+    std::snprintf(text, sizeof text,
+                  "The rims of the beads found are only %.0f %% of the edges in the picture: more beads, or beads of "
+                  "other sizes, may be there. Look at the overlays.",
+                  100 * share);
+    calibration.warnings.emplace_back(text);
+  }
+  if (others > 0) {
+    std::snprintf(text, sizeof text,
+                  "Beads of several sizes were found, with radii from %.1f to %.1f px: %.0f of the first frame's %zu "
+                  "are not of the most frequent size, to which the diameter refers.",
+                  smallest, largest, others, seen.disks.size());
+    calibration.warnings.emplace_back(text);
+  }
+}
+
 CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims) {
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
@@ -182,20 +225,13 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.height = frame.height;
   calibration.profile.step_px = 1;
   calibration.frames_used = 1;
-  calibration.disks_used = rims.disks.size();
+  const RimsFound seen = find_rims(frame, rims.model);
+  calibration.disks_used = seen.disks.size();
   calibration.rims = rims.model;
   calibration.by_rims = true;
-  double support = 0;
-  for (const RimDisk& disk : rims.disks) support += disk.circle.support / static_cast<double>(rims.disks.size());
-  constexpr double plainly_seen = 0.8;
-  if (support < plainly_seen) {
-    char text[240];
-    std::snprintf(text, sizeof text,
-                  "Beads were found by their rims alone, and on average only %.0f %% of a rim is seen: beads may be "
-                  "missed, and centres may be off by a tenth of a radius. Look at the overlays.",
-                  100 * support);
-    calibration.warnings.emplace_back(text);
-  }
+  calibration.expected_missed =
+      seen.expected_missed / std::max(1.0, static_cast<double>(seen.disks.size()) + seen.expected_missed);
+  warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
   if (!result.found) result.why_not = "no rim of " + std::to_string(rims.model.radius_px) + " px is seen";
   return result;
@@ -205,7 +241,9 @@ FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, c
   FoundDisk disk;
   disk.x_px = rim.circle.x;
   disk.y_px = rim.circle.y;
-  disk.radius_px = calibration.radius_px;
+  const RimModel& rims = *calibration.rims;
+  disk.radius_px = rim.other_size ? rim.circle.radius * calibration.radius_px / rims.radius_px : calibration.radius_px;
+  disk.other_size = rim.other_size;
   disk.variance_x = disk.variance_y = rim.variance_px2;
   disk.quality = disk.probability = rim.probability;
   disk.contrast = rim.circle.contrast / std::max(1e-6, calibration.rims->contrast);
@@ -221,7 +259,7 @@ FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, c
 
 FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
   FindResult result;
-  for (const RimDisk& rim : find_rims(frame, *calibration.rims)) {
+  for (const RimDisk& rim : find_rims(frame, *calibration.rims).disks) {
     const FoundDisk disk = found_disk(rim, calibration, options);
     const bool outside = options.roi && (disk.x_px < options.roi->left - 0.5 || disk.y_px < options.roi->top - 0.5 ||
                                          disk.x_px >= options.roi->left + options.roi->width - 0.5 ||
@@ -237,16 +275,20 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
   const GrayFrame& frame = *frames.back();
-  const LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px);
+  LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px, true);
+  learn_gaps(frame, rims, options.one_size);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
-  if (auto faces = FacesAndRims(frames, asked, rims).learn()) return std::move(*faces);
+  const bool of_one_size = rims.model.gaps->other_size.empty();
+  if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   return calibration_by_rims(frame, rims);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
-  return calibration_by_rims(frame, learn_rims(frame, seen.polarity, seen.radius_px));
+  LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, true);
+  learn_gaps(frame, rims, true);
+  return calibration_by_rims(frame, rims);
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

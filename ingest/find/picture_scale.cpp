@@ -9,7 +9,28 @@ namespace shakebed::ingest {
 
 namespace {
 constexpr double least_radius = 5, wanted_radius = 8;  // px: below the first a rim is too coarse to tell a circle
-}
+
+class Stretching {
+ public:
+  Stretching(const GrayFrame& frame, double ratio, double angle)
+      : last_column_(frame.width - 1.0), last_row_(frame.height - 1.0) {
+    const double along = std::sqrt(ratio), c = std::cos(angle), s = std::sin(angle);
+    xx_ = c * c * along + s * s / along, xy_ = c * s * (along - 1 / along), yy_ = s * s * along + c * c / along;
+  }
+  [[nodiscard]] FramePlace source_of(double column, double row) const {
+    const double middle_x = 0.5 * last_column_, middle_y = 0.5 * last_row_;
+    const double u = column - middle_x, v = row - middle_y;
+    return {mirrored(middle_x + xx_ * u + xy_ * v, last_column_), mirrored(middle_y + xy_ * u + yy_ * v, last_row_)};
+  }
+
+ private:
+  static double mirrored(double x, double last) {
+    x = std::abs(x);
+    return std::clamp(x > last ? 2 * last - x : x, 0.0, last - 1e-3);
+  }
+  double last_column_, last_row_, xx_ = 1, xy_ = 0, yy_ = 1;
+};
+}  // namespace
 
 GrayFrame doubled(const GrayFrame& frame) {
   GrayFrame twice;
@@ -33,23 +54,19 @@ GrayFrame doubled(const GrayFrame& frame) {
   return twice;
 }
 
+FramePlace place_before_stretching(const GrayFrame& frame, double ratio, double angle, double x, double y) {
+  return Stretching(frame, ratio, angle).source_of(x, y);
+}
+
 GrayFrame stretched(const GrayFrame& frame, double ratio, double angle) {
-  const double along = std::sqrt(ratio), c = std::cos(angle), s = std::sin(angle);
-  const double xx = c * c * along + s * s / along, xy = c * s * (along - 1 / along), yy = s * s * along + c * c / along;
-  const double middle_x = 0.5 * (frame.width - 1), middle_y = 0.5 * (frame.height - 1);
-  const auto mirrored = [](double x, double last) {
-    x = std::abs(x);
-    return std::clamp(x > last ? 2 * last - x : x, 0.0, last - 1e-3);
-  };
+  const Stretching stretching(frame, ratio, angle);
   GrayFrame out;
   out.width = frame.width;
   out.height = frame.height;
   out.pixels.resize(frame.pixels.size());
   for (int row = 0; row < frame.height; ++row)
     for (int column = 0; column < frame.width; ++column) {
-      const double u = column - middle_x, v = row - middle_y;
-      const double x = mirrored(middle_x + xx * u + xy * v, frame.width - 1.0);
-      const double y = mirrored(middle_y + xy * u + yy * v, frame.height - 1.0);
+      const auto [x, y] = stretching.source_of(column, row);
       const int left = static_cast<int>(x), upper = static_cast<int>(y);
       const float right = static_cast<float>(x - left), down = static_cast<float>(y - upper);
       out.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +

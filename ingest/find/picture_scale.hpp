@@ -12,6 +12,12 @@ GrayFrame doubled(const GrayFrame& frame);
 // what lies beyond the border is mirrored.
 GrayFrame stretched(const GrayFrame& frame, double ratio, double angle);
 
+// Where in the frame the copy's place (x, y) was taken from.
+struct FramePlace {
+  double x = 0, y = 0;
+};
+FramePlace place_before_stretching(const GrayFrame& frame, double ratio, double angle, double x, double y);
+
 // A picture in which a length of the frame is `scale` times as long, and where its places are in the frame.
 struct ScaledPicture {
   GrayFrame picture;

@@ -8,6 +8,8 @@
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/picture_scale.hpp"
+#include "ingest/find/rim_gaps.hpp"
+#include "ingest/find/rim_probability.hpp"
 
 namespace shakebed::ingest {
 
@@ -16,10 +18,6 @@ namespace {
 constexpr double radius_window = 0.12;     // radii, either way: circles of one kind of bead
 constexpr double nearest_centres = 0.8;    // diameters: two circles nearer than that are one
 constexpr double faintest_support = 0.3;   // share of the rim
-constexpr std::size_t support_steps = 20;  // of the table of probabilities
-constexpr double support_width = 0.055;    // over which circles are counted, either way
-// Before any is seen: circles that chance makes up in a class of support, fewer the better the support.
-constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
 constexpr double least_probability = 0.8;  // of a disk that is reported: more than one circle alone in its class has
 constexpr double well_supported = 0.9;     // probability from which a circle counts for the radius
 // Where blurred beads touch, their steepest edges lie farther out than a lone one's: in a photograph of beads of 2.5 px
@@ -41,52 +39,6 @@ std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity pol
   std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_support);
   std::erase_if(circles, [&](const Circle& circle) { return std::abs(circle.radius / radius - 1) > radius_window; });
   return without_doubles(std::move(circles), nearest_centres);
-}
-
-// Circles of one class of support, in the frame and (the mean) in its copies.
-struct SupportClass {
-  double here = 0, chance = 0, support_sum = 0;
-  std::size_t classes = 1;  // that were put together
-  [[nodiscard]] double doubt() const { return here > 0 ? chance / here : 0; }
-};
-
-std::size_t class_of(double support) {
-  return std::min(support_steps, static_cast<std::size_t>(std::lround(support * support_steps)));
-}
-
-// Better support is never less likely a bead's: neighbouring classes that say otherwise are put together (isotonic
-// regression [Barlow]).
-std::vector<double> probabilities(const std::vector<Circle>& seen, const std::vector<std::vector<Circle>>& copies) {
-  std::vector<SupportClass> classes(support_steps + 1);
-  for (const Circle& circle : seen) {
-    SupportClass& its = classes[class_of(circle.support)];
-    ++its.here;
-    its.support_sum += circle.support;
-  }
-  for (const auto& copy : copies)
-    for (const Circle& circle : copy)
-      classes[class_of(circle.support)].chance += 1 / static_cast<double>(copies.size());
-  std::vector<SupportClass> pooled;
-  for (const SupportClass& one : classes) {
-    pooled.push_back(one);
-    while (pooled.size() > 1) {
-      SupportClass& below = pooled[pooled.size() - 2];
-      const SupportClass& above = pooled.back();
-      if (below.here > 0 && above.here > 0 && below.doubt() >= above.doubt()) break;
-      below = {below.here + above.here, below.chance + above.chance, below.support_sum + above.support_sum,
-               below.classes + above.classes};
-      pooled.pop_back();
-    }
-  }
-  std::vector<double> probability;
-  for (const SupportClass& pool : pooled) {
-    const double missing = pool.here > 0 ? 1 - pool.support_sum / pool.here : 1;
-    const double chance = pool.chance + prior_at_full + prior_per_missing * missing;
-    const double sure = pool.here > 0 ? std::max(0.0, 1 - chance / pool.here) : 0;
-    const double before = probability.empty() ? 0 : probability.back();
-    probability.insert(probability.end(), pool.classes, std::max(before, sure));
-  }
-  return probability;
 }
 
 // Edges fainter than the beads' rims count less.
@@ -208,15 +160,9 @@ std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPi
 
 }  // namespace
 
-double RimModel::probability_of(double support) const {
-  if (probability.empty()) return 0;
-  const double place = std::clamp(support, 0.0, 1.0) * static_cast<double>(probability.size() - 1);
-  const auto cell = std::min(probability.size() - 2, static_cast<std::size_t>(place));
-  const double part = place - static_cast<double>(cell);
-  return (1 - part) * probability[cell] + part * probability[cell + 1];
-}
+double RimModel::probability_of(double support) const { return probability_at(probability, support); }
 
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px) {
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, bool beads_are_there) {
   LearnedRims learned;
   RimModel& model = learned.model;
   model.polarity = polarity;
@@ -234,13 +180,18 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
     circles = circles_of(edges, radius, polarity);
     std::vector<std::vector<Circle>> by_chance;
     for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, polarity));
-    model.probability = probabilities(circles, by_chance);
+    model.probability = probabilities_by_support(circles, by_chance, beads_are_there);
     measure_rims(circles, at.scale, model);
   }
   learned.disks = likely_ones(circles, edges, at, model);
   learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
   measure_open_rims(on_the_map(learned.disks, at), edges, at.scale, model);
   return learned;
+}
+
+void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
+  const ScaledPicture at = scaled_for(frame, learned.model.radius_px);
+  learned.model.gaps = chances_in_gaps(at, on_the_map(learned.disks, at), learned.model, one_size);
 }
 
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks) {
@@ -251,10 +202,23 @@ Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std:
   return roundness_of(find_edges(at.picture), on_the_map(disks, at), model.polarity);
 }
 
-std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model) {
+RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   const ScaledPicture at = scaled_for(frame, model.radius_px);
   const EdgeMap edges = find_edges(at.picture, model.threshold);
-  return likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
+  RimsFound found;
+  found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
+  if (!model.gaps) return found;
+  const GapCircles more = circles_in_gaps(edges, on_the_map(found.disks, at), model, at.scale);
+  found.expected_missed = more.expected_missed;
+  for (const GapCircle& one : more.circles) {
+    const Circle fine = fit_circle(edges, one.circle, model.polarity, fine_rays);
+    const bool better = fine.support > 0.7 * one.circle.support;
+    found.disks.push_back(disk_of(better ? fine : one.circle, at, model));
+    found.disks.back().probability = one.probability;
+    found.disks.back().other_size = one.other_size;
+  }
+  sort_by_place(found.disks);
+  return found;
 }
 
 std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places) {

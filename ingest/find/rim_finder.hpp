@@ -6,12 +6,20 @@
 // the same search on copies of the frame stretched along one axis, where no bead is round any more, shows how
 // many circles so well supported chance makes up (target and decoy [EliasGygi]).
 
+#include <optional>
 #include <vector>
 
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/outline.hpp"
 
 namespace shakebed::ingest {
+
+// What a second look beside the beads already found may add (rim_gaps.hpp): probabilities by support, as below, of
+// circles that overlap none of them.
+struct GapModel {
+  std::vector<double> same_size;
+  std::vector<double> other_size;  // empty: all beads are of one size
+};
 
 struct RimModel {
   Polarity polarity = Polarity::automatic;
@@ -24,6 +32,7 @@ struct RimModel {
   double contrast = 0;              // median step across a rim, grey levels
   float threshold = 0;              // weakest edge, grey levels per px of the reduced frame
   std::vector<double> probability;  // of a circle with support 0, 1/20, 2/20 .. 1
+  std::optional<GapModel> gaps;     // once learn_gaps() has looked
   [[nodiscard]] double probability_of(double support) const;
 };
 
@@ -31,6 +40,7 @@ struct RimDisk {
   Circle circle;            // px of the frame
   double probability = 0;   // that it is a bead
   double variance_px2 = 0;  // of the centre along each axis
+  bool other_size = false;  // its radius is not that of the others
 };
 
 struct LearnedRims {
@@ -39,14 +49,23 @@ struct LearnedRims {
   double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
 };
 
-// Learns from one frame, starting from a radius good to a tenth.
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px);
+// Learns from one frame, starting from a radius good to a tenth. Where a survey has shown `beads_are_there`, poor circles
+// of chance, as the copies of beads of another size make, say nothing against circles that are seen well.
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, bool beads_are_there = false);
 
 // Whether the outlines of the disks are round.
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);
 
-// Disks that are beads with a probability of 0.8 or more, from top to bottom.
-std::vector<RimDisk> find_rims(const GrayFrame& frame, const RimModel& model);
+// Looks again beside the beads found: chance makes up few circles there, so poorer rims are enough. Beads of other
+// sizes are looked for unless `one_size`.
+void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size);
+
+struct RimsFound {
+  std::vector<RimDisk> disks;  // from top to bottom
+  double expected_missed = 0;  // beads: sum of the probabilities of circles that are not reported (after learn_gaps)
+};
+// Disks that are beads with a probability of 0.8 or more, or of 0.5 in the gaps between them.
+RimsFound find_rims(const GrayFrame& frame, const RimModel& model);
 
 // The support of circles of this radius at given places (after a fit that may move them by a third of the radius).
 std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places);

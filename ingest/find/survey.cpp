@@ -8,6 +8,7 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/circle_census.hpp"
+#include "ingest/find/settle_channel.hpp"
 
 namespace shakebed::ingest {
 
@@ -214,6 +215,11 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
                      return a.gain_px > b.gain_px;
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
+  if (survey.found) {
+    SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), options);
+    if (settled.channel != survey.candidates.front().channel)
+      survey.candidates.insert(survey.candidates.begin(), std::move(settled));
+  }
   if (!survey.found)
     survey.why_not = survey.candidates.empty() ? "no circle is seen more often than chance makes up"
                                                : survey.candidates.front().why_not;

@@ -36,7 +36,8 @@ class GeometryFinder {
     for (const FrameFindings& frame : frames_) radius.add(frame.rim);
     radius.refine(refined_);
     for (FrameFindings& frame : frames_)
-      for (FoundDisk& disk : frame.disks) disk.radius_px = refined_.radius_px;
+      for (FoundDisk& disk : frame.disks)
+        if (!disk.other_size) disk.radius_px = refined_.radius_px;
   }
 
   void set_scale() {

@@ -56,6 +56,7 @@ class FilmLearner {
   FilmLearner(FrameSource& source, const MeasureOptions& asked)
       : source_(source), find_(asked.find), lens_{asked.pixel_aspect.value_or(1.0), asked.lens_radial.value_or(0.0)} {
     film_.options = asked;
+    find_.one_size = asked.second_diameter_m.has_value();
     if (asked.scale_m_per_px && !find_.radius_px)  // a good first value; refined all the same
       find_.radius_px = 0.5 * asked.bead_diameter_m / *asked.scale_m_per_px;
   }

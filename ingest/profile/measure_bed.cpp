@@ -227,7 +227,7 @@ class BedMeasurer {
         film_.lens.plain() ? PixelPlace{disk.x_px, disk.y_px} : lens_map_.to_recorded({disk.x_px, disk.y_px});
     measured.x_px = seen_at.x;
     measured.y_px = seen_at.y;
-    measured.radius_px = species == 1 ? refined_.radius_px : disk.radius_px;
+    measured.radius_px = species == 1 && !disk.other_size ? refined_.radius_px : disk.radius_px;
     const double cosine = std::cos(std::atan(bed_.floor_slope));
     measured.z = (bed_.floor_px + bed_.floor_slope * disk.x_px - disk.y_px) * cosine / diameter_px_;
     measured.x = ((disk.x_px - bed_.left_wall_px) * cosine +

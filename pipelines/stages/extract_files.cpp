@@ -111,6 +111,8 @@ Json bed_numbers(const ExtractOptions& options, const ingest::Measurement& found
   add_beads(options, found, result);
   add_geometry(found, result);
   add_density(options, found, result);
+  if (found.finder.rims)
+    result["expected_wrong"] = found.expected_wrong, result["expected_missed"] = found.finder.expected_missed;
   return result;
 }
 

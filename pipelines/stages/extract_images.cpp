@@ -79,7 +79,7 @@ void use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
 void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
   constexpr double far_off = 0.2;
-  const double wrong = found.expected_wrong;
+  const double wrong = found.expected_wrong, missed = found.finder.expected_missed;
   const ingest::Doubt doubt = ingest::doubt_of(wrong);
   if (doubt == ingest::Doubt::too_many)
     throw StageError(
@@ -91,6 +91,11 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
         fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
                     "numbers.",
                     100 * wrong));
+  if (ingest::doubt_of(missed) != ingest::Doubt::little)
+    context.warning(fmt::format(
+        "About {:.0f} % of the beads may be missed: so many are seen too poorly to be reported. Look at the "
+        "overlays before you use the density.",
+        100 * missed));
   if (!options.bead_number) return;
   const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
   const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",

@@ -16,6 +16,10 @@ void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/half_hidden_disks", "1", "disks partly covered by others");
   list.number("/quality/lowest_percent", "1", "quality below which 1 % of the disks lie");
   list.number("/quality/median", "1", "median quality of the disks");
+  const Given surveyed = given_when("the frames are photographs and the beads' rims were looked at");
+  list.number("/expected_wrong", "1", "share of the disks that are no beads, as expected from their rims", surveyed);
+  list.number("/expected_missed", "1",
+              "share of the beads that are seen too poorly to be reported, in the first frames", surveyed);
   const Given rendered = given_when("the frames were rendered and the true centres are known");
   list.number("/truth/recall", "1", "share of the true disks that were found", rendered);
   list.number("/truth/precision", "1", "share of the disks found that are true", rendered);

@@ -54,6 +54,7 @@ ingest::Measurement a_measurement() {
   found.phases = {{0.0625, a_profile(1.0)}, {0.5625, a_profile(0.95)}};
   found.coverage_disagreement = 0.015;
   found.disk_count_mean = 50, found.disk_count_std = 2;
+  found.finder.rims.emplace(), found.finder.expected_missed = 0.03, found.expected_wrong = 0.017;
   found.second_finder.emplace();
   found.second_finder->radius_px = 5.5, found.second_finder->radius_std_error_px = 0.08;
   found.finder.profile.step_px = 0.25;
@@ -120,6 +121,8 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
                                         {"/frames_used", 4},
                                         {"/disks_per_frame_scatter", 2},
                                         {"/bead_number", 51},
+                                        {"/expected_wrong", 0.017},
+                                        {"/expected_missed", 0.03},
                                         {"/frequency_false_alarm", 1e-5},
                                         {"/floor_phase", 0.3},
                                         {"/kernel/width", 0.5},

@@ -1,0 +1,70 @@
+#include "ingest/find/rim_probability.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr std::size_t support_steps = 20;  // of the table of probabilities
+// Before any is seen: circles that chance makes up in a class of support, fewer the better the support.
+constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
+
+// Circles of one class of support, in the frame and (the mean) in its copies.
+struct SupportClass {
+  double here = 0, chance = 0, support_sum = 0;
+  std::size_t classes = 1;  // that were put together
+  [[nodiscard]] double doubt() const { return here > 0 ? chance / here : chance > 0 ? HUGE_VAL : 0; }
+};
+
+std::size_t class_of(double support) {
+  return std::min(support_steps, static_cast<std::size_t>(std::lround(support * support_steps)));
+}
+
+}  // namespace
+
+std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
+                                             const std::vector<std::vector<Circle>>& copies, bool few_circles) {
+  std::vector<SupportClass> classes(support_steps + 1);
+  for (const Circle& circle : seen) {
+    SupportClass& its = classes[class_of(circle.support)];
+    ++its.here;
+    its.support_sum += circle.support;
+  }
+  for (const auto& copy : copies)
+    for (const Circle& circle : copy)
+      classes[class_of(circle.support)].chance += 1 / static_cast<double>(copies.size());
+  std::vector<SupportClass> pooled;
+  for (const SupportClass& one : classes) {
+    pooled.push_back(one);
+    while (pooled.size() > 1) {
+      SupportClass& below = pooled[pooled.size() - 2];
+      const SupportClass& above = pooled.back();
+      const bool below_says_something = below.here > 0 || (few_circles && below.chance > 0);
+      if (below_says_something && above.here > 0 && below.doubt() >= above.doubt()) break;
+      below = {below.here + above.here, below.chance + above.chance, below.support_sum + above.support_sum,
+               below.classes + above.classes};
+      pooled.pop_back();
+    }
+  }
+  std::vector<double> probability;
+  for (const SupportClass& pool : pooled) {
+    const double missing = pool.here > 0 ? 1 - pool.support_sum / pool.here : 1;
+    const double chance = pool.chance + prior_at_full + prior_per_missing * missing;
+    const double sure = pool.here > 0 ? std::max(0.0, 1 - chance / pool.here) : 0;
+    const double before = probability.empty() ? 0 : probability.back();
+    probability.insert(probability.end(), pool.classes, std::max(before, sure));
+  }
+  return probability;
+}
+
+double probability_at(const std::vector<double>& by_support, double support) {
+  if (by_support.empty()) return 0;
+  const double place = std::clamp(support, 0.0, 1.0) * static_cast<double>(by_support.size() - 1);
+  const auto cell = std::min(by_support.size() - 2, static_cast<std::size_t>(place));
+  const double part = place - static_cast<double>(cell);
+  return (1 - part) * by_support[cell] + part * by_support[cell + 1];
+}
+
+}  // namespace shakebed::ingest

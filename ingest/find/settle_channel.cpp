@@ -1,0 +1,119 @@
+#include "ingest/find/settle_channel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/learn_beads.hpp"
+#include "ingest/frames/smooth_field.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double enough_radius_px = 12;                         // frames are averaged down to it for the trials
+constexpr double clearly_more = 1.03;                           // times as many beads, for a change of channel
+constexpr double inside = 0.8, outside = 1.15, farthest = 1.3;  // radii: where a face and what is behind it are seen
+constexpr double least_contrast = 4;                            // grey levels between the two
+
+struct Trial {
+  double expected = 0;  // beads found, each by its probability
+  bool by_rims = true;
+};
+Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi) {
+  FindOptions find;
+  find.seen = seen;
+  find.roi = roi;
+  const CalibrationResult learned = learn_beads({&frame}, find);
+  Trial trial;
+  if (!learned.found) return trial;
+  trial.by_rims = learned.calibration.by_rims;
+  for (const FoundDisk& disk : find_beads(frame, learned.calibration, find).disks) trial.expected += disk.probability;
+  return trial;
+}
+
+// Median over the disks of the level inside less that around them.
+double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, double scale) {
+  std::vector<double> contrasts;
+  for (const RimDisk& disk : disks) {
+    const double x = (disk.circle.x + 0.5) / scale - 0.5, y = (disk.circle.y + 0.5) / scale - 0.5;
+    const double radius = disk.circle.radius / scale;
+    const int reach = static_cast<int>(std::ceil(farthest * radius));
+    double in = 0, in_count = 0, out = 0, out_count = 0;
+    for (int row = std::max(0, static_cast<int>(y) - reach);
+         row <= std::min(frame.height - 1, static_cast<int>(y) + reach); ++row)
+      for (int column = std::max(0, static_cast<int>(x) - reach);
+           column <= std::min(frame.width - 1, static_cast<int>(x) + reach); ++column) {
+        const double away = std::hypot(column - x, row - y) / radius;
+        const float level = frame.at(column, row);
+        if (unseen(level)) continue;
+        if (away < inside) in += static_cast<double>(level), ++in_count;
+        if (away > outside && away < farthest) out += static_cast<double>(level), ++out_count;
+      }
+    if (in_count > 0 && out_count > 0) contrasts.push_back(in / in_count - out / out_count);
+  }
+  if (contrasts.empty()) return 0;
+  const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
+  std::nth_element(contrasts.begin(), middle, contrasts.end());
+  return *middle;
+}
+
+class ChannelTrials {
+ public:
+  ChannelTrials(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options)
+      : frames_(frames), best_(best) {
+    const double radius = best.rims.radius_px / frames.reduction;
+    factor_ = std::max(1, static_cast<int>(radius / enough_radius_px));
+    if (!options.roi) return;
+    const int all = factor_ * frames.reduction;
+    roi_ = PixelRectangle{options.roi->left / all, options.roi->top / all, options.roi->width / all,
+                          options.roi->height / all};
+  }
+
+  [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity) const {
+    const GrayFrame small = factor_ > 1 ? reduced(picture, factor_) : picture;
+    return tried(small, {polarity, best_.rims.radius_px / (frames_.reduction * factor_)}, roi_);
+  }
+
+  // Of the beads in this channel; none where they hardly stand out.
+  [[nodiscard]] std::optional<Polarity> polarity_in(const ChannelFrames::One& one) const {
+    if (one.channel == best_.channel) return best_.rims.polarity;
+    const double contrast = contrast_of(one.frame, best_.disks, frames_.reduction);
+    if (std::abs(contrast) < least_contrast) return std::nullopt;
+    return contrast > 0 ? Polarity::bright_beads : Polarity::dark_beads;
+  }
+
+ private:
+  const ChannelFrames& frames_;
+  const SurveyCandidate& best_;
+  int factor_ = 1;
+  std::optional<PixelRectangle> roi_;
+};
+
+}  // namespace
+
+SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
+  const ChannelTrials trials(frames, best, options);
+  const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),
+                                  [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
+  if (frames.channels.size() < 2 || first == frames.channels.end()) return best;
+  const Trial here = trials.trial_in(first->frame, best.rims.polarity);
+  if (!here.by_rims) return best;
+  SurveyCandidate settled = best;
+  double most = clearly_more * here.expected;
+  for (const ChannelFrames::One& one : frames.channels) {
+    if (one.channel == best.channel) continue;
+    const std::optional<Polarity> polarity = trials.polarity_in(one);
+    if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
+    const Trial there = trials.trial_in(one.frame, *polarity);
+    if (!(there.expected > most)) continue;
+    most = there.expected;
+    settled.channel = one.channel;
+    settled.rims.polarity = *polarity;
+  }
+  return settled;
+}
+
+}  // namespace shakebed::ingest

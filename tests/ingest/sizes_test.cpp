@@ -1,0 +1,153 @@
+// Beads of several sizes, beads whose rims are hidden by their neighbours, and colours that show faces where another
+// shows fringes; drawn.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ingest/find/learn_beads.hpp"
+#include "ingest/find/rim_probability.hpp"
+#include "ingest/find/survey.hpp"
+#include "ingest/profile/measure_bed.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+struct Bead {
+  double x, y, radius;
+};
+
+// Beads that do not touch, the k-th of radius radii[k % radii.size()].
+std::vector<Bead> scattered(std::size_t count, const std::vector<double>& radii, int width, int height, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<Bead> beads;
+  for (int tries = 0; beads.size() < count && tries < 200000; ++tries) {
+    const double radius = radii[beads.size() % radii.size()];
+    const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    const Bead one{radius + 4 + part() * (width - 2 * radius - 8), radius + 4 + part() * (height - 2 * radius - 8),
+                   radius};
+    if (std::none_of(beads.begin(), beads.end(), [&](const Bead& other) {
+          return std::hypot(other.x - one.x, other.y - one.y) < 1.06 * (other.radius + one.radius);
+        }))
+      beads.push_back(one);
+  }
+  return beads;
+}
+
+// Level inside a bead at (u, v) radii from its centre.
+using Face = double (*)(const Bead& bead, double u, double v);
+
+GrayFrame drawn(const std::vector<Bead>& beads, int width, int height, double background, Face face, unsigned seed) {
+  std::mt19937 random(seed);
+  GrayFrame frame{width, height, {}};
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      double level = 0;
+      for (const double dx : {-0.25, 0.25})
+        for (const double dy : {-0.25, 0.25}) {
+          const double x = column + dx, y = row + dy;
+          const auto bead = std::find_if(beads.begin(), beads.end(), [&](const Bead& one) {
+            return std::hypot(one.x - x, one.y - y) < one.radius;
+          });
+          level += bead == beads.end() ? background / 4
+                                       : face(*bead, (x - bead->x) / bead->radius, (y - bead->y) / bead->radius) / 4;
+        }
+      double noise = -6;
+      for (int k = 0; k < 12; ++k) noise += static_cast<double>(random()) / 4294967296.0;
+      frame.pixels.push_back(static_cast<float>(level + 2 * noise));
+    }
+  return frame;
+}
+
+double plain_face(const Bead&, double, double) { return 80; }
+double fringed_face(const Bead& bead, double u, double v) {
+  return 100 + 80 * std::sin(9 * u * v + bead.x) * std::cos(4 * u + bead.y);
+}
+
+std::size_t found_beads(const std::vector<FoundDisk>& disks, const std::vector<Bead>& beads) {
+  return static_cast<std::size_t>(std::count_if(beads.begin(), beads.end(), [&](const Bead& bead) {
+    return std::any_of(disks.begin(), disks.end(), [&](const FoundDisk& disk) {
+      return std::hypot(disk.x_px - bead.x, disk.y_px - bead.y) < 0.25 * bead.radius;
+    });
+  }));
+}
+
+TEST(Sizes, BeadsOfTwoSizesAreFoundEachWithItsRadius) {
+  const std::vector<Bead> beads = scattered(60, {22, 15.5}, 540, 460, 11);
+  ASSERT_EQ(beads.size(), 60U);
+  const GrayFrame frame = drawn(beads, 540, 460, 190, plain_face, 5);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 22};
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  const FindResult result = find_beads(frame, learned.calibration, options);
+  EXPECT_EQ(found_beads(result.disks, beads), 60U);
+  EXPECT_EQ(result.disks.size(), 60U);
+  for (const FoundDisk& disk : result.disks)
+    for (const Bead& bead : beads)
+      if (std::hypot(disk.x_px - bead.x, disk.y_px - bead.y) < 0.25 * bead.radius) {
+        EXPECT_NEAR(disk.radius_px, bead.radius, 0.06 * bead.radius);
+        EXPECT_EQ(disk.other_size, bead.radius < 20);
+      }
+  const auto& warnings = learned.calibration.warnings;
+  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const std::string& one) {
+    return one.find("several sizes") != std::string::npos &&
+           one.find("30 of the first frame's 60") != std::string::npos;
+  }));
+  EXPECT_LT(learned.calibration.expected_missed, 0.02);
+}
+
+TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
+  const std::vector<Bead> beads = scattered(50, {18}, 520, 460, 12);
+  const GrayFrame frame = drawn(beads, 520, 460, 190, fringed_face, 6);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 18};
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  for (const FoundDisk& disk : find_beads(frame, learned.calibration, options).disks) EXPECT_FALSE(disk.other_size);
+  options.one_size = true;
+  EXPECT_TRUE(learn_beads({&frame}, options).calibration.rims->gaps->other_size.empty());
+}
+
+TEST(Sizes, TheChannelIsSettledInWhichTheFacesAreSeen) {
+  const std::vector<Bead> beads = scattered(50, {18}, 520, 460, 13);
+  ChannelFrames frames;
+  frames.width = 520, frames.height = 460;
+  frames.channels = {{Channel::red, drawn(beads, 520, 460, 190, fringed_face, 7)},
+                     {Channel::blue, drawn(beads, 520, 460, 118, plain_face, 8)}};
+  const Survey survey = take_survey(frames);
+  ASSERT_TRUE(survey.found) << survey.why_not;
+  EXPECT_EQ(survey.candidates.front().channel, Channel::blue);
+}
+
+TEST(Sizes, DoubtsOfAFilmAreTheMeanOverItsDisks) {
+  const std::vector<Bead> beads = scattered(40, {18}, 520, 460, 14);
+  MeasureOptions options;
+  options.bead_diameter_m = 1e-3;
+  options.find.seen = BeadsSeen{Polarity::dark_beads, 18};
+  std::vector<GrayFrame> film;
+  film.push_back(drawn(beads, 520, 460, 190, fringed_face, 9));
+  FrameSource source = FrameSource::from_frames(std::move(film));
+  const Measurement found = measure_bed(source, options);
+  ASSERT_FALSE(found.disks.empty());
+  double doubts = 0;
+  for (const MeasuredDisk& disk : found.disks) doubts += 1 - disk.probability;
+  EXPECT_NEAR(found.expected_wrong, doubts / static_cast<double>(found.disks.size()), 1e-12);
+}
+
+// Four circles seen whole, and in each copy two that are hardly seen: nothing speaks against the four.
+TEST(Sizes, FewWellSeenCirclesAreNotDoubtedForPoorOnesOfChance) {
+  std::vector<Circle> seen(4), poor(2);
+  for (Circle& circle : seen) circle.support = 1;
+  for (Circle& circle : poor) circle.support = 0.35;
+  EXPECT_GT(probability_at(probabilities_by_support(seen, {poor, poor}, true), 1), 0.95);
+  EXPECT_LT(probability_at(probabilities_by_support(seen, {poor, poor}, false), 1), 0.6);
+  EXPECT_EQ(probability_at({}, 1), 0);
+}
+
+}  // namespace
+}  // namespace shakebed::ingest
