@@ -37,7 +37,12 @@ void append(Json& text, const std::string& more) {
 
 class Judge {
  public:
-  Judge(const SceneOptions& bed, const Json& joined, std::size_t beds) : bed_(bed), joined_(joined), beds_(beds) {}
+  Judge(const SceneOptions& bed, const Json& joined, std::size_t beds)
+      : bed_(bed),
+        joined_(joined),
+        beds_(beds),
+        trust_(trust_in_hard_disks({bed.restitution(), bed.friction(), bed.tangential_restitution(), bed.gamma(),
+                                    bed.description().column_number()})) {}
 
   Json run() {
     rows();
@@ -52,7 +57,7 @@ class Judge {
       append(out["why"], one.why);
       append(out["advice"], one.advice);
     }
-    if (!agreement_.empty()) append(out["why"], agreement_);
+    if (as_real_contacts()) append(out["why"], trust_.why);
     return out;
   }
 
@@ -61,7 +66,7 @@ class Judge {
     Json out{{"verdict", holds}, {"why", ""}, {"advice", "Quote the numbers with their errors."}};
     append(out["why"], beds_ > 1 ? fmt::format("{} beds agree, and none of them changed while it was measured", beds_)
                                  : "the bed did not change while it was measured");
-    if (!agreement_.empty()) append(out["why"], agreement_);
+    if (as_real_contacts()) append(out["why"], trust_.why);
     return out;
   }
 
@@ -75,7 +80,7 @@ class Judge {
 
   void contact_duration() {
     const auto effect = number_at(joined_, "/contact_duration_effect/value");
-    if (!effect || !(*effect > allowed_contact_effect)) return;
+    if (!effect || !(*effect > allowed_contact_effect) || as_real_contacts()) return;
     object(
         "contact duration too long",
         fmt::format("T may be too high by about {:.2g} %, or more, by the contact duration t_c, which makes {:.2g} % "
@@ -113,21 +118,22 @@ class Judge {
            "Run several \"replicas\" (4 by default)");
   }
 
-  // Said in any case where the study covers such a bed.
+  // The study covers such a bed, and its hard disks, with no longer a contact duration, do as soft spheres do.
+  [[nodiscard]] bool as_real_contacts() const {
+    constexpr double rounding = 1e-3;
+    return trust_.covered && trust_.agrees && !bed_.locking() &&
+           bed_.contact_duration() <= contact_duration_of_study * (1 + rounding);
+  }
+
   void real_contacts() {
-    const HardDiskTrust trust = trust_in_hard_disks({bed_.restitution(), bed_.friction(), bed_.tangential_restitution(),
-                                                     bed_.gamma(), bed_.description().column_number()});
-    if (trust.agrees)
-      agreement_ = trust.why;
-    else
-      object("real contacts may matter", trust.why, trust.advice);
+    if (!trust_.agrees) object("real contacts may matter", trust_.why, trust_.advice);
   }
 
   const SceneOptions& bed_;
   const Json& joined_;
   std::size_t beds_;
+  HardDiskTrust trust_;
   std::vector<Objection> objections_;
-  std::string agreement_;
 };
 
 }  // namespace

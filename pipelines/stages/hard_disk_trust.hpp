@@ -14,12 +14,14 @@ struct HardDiskBed {
   double elastic_share;  // of the hard disks
 };
 std::span<const HardDiskBed> hard_disk_study();
+// Their t_c [sqrt(D/g)].
+inline constexpr double contact_duration_of_study = 1e-4;
 
 struct HardDiskScene {
   double restitution = 1, friction = 0, tangential_restitution = 0, gamma = 0, column_number = 0;
 };
 struct HardDiskTrust {
-  bool covered = false;  // by a bed of the study that is near enough
+  bool covered = false;  // by a bed of the study that is near enough and decides
   bool agrees = true;    // nothing is known against it
   std::string why, advice;
 };

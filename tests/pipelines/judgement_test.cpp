@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -52,7 +53,7 @@ Judged judged(const Shaken& bed, const std::string& measure = "1 s") {
 }
 
 TEST(FirstLine, OfBedsThatAgreeSaysThatTheNumbersHold) {
-  const Judged bed = judged({});
+  const Judged bed = judged({}, "3 s");
   EXPECT_THAT(bed.first_line, AllOf(StartsWith("bed: T_x = "), HasSubstr(" ± "), HasSubstr("Holds: 4 beds agree")));
   EXPECT_EQ(bed.observed["judgement"]["verdict"], "holds");
 }
@@ -111,9 +112,12 @@ TEST(HardDiskTrust, IsThatOfTheNearestBedOfTheStudy) {
   for (const HardDiskBed& bed : hard_disk_study()) {
     const HardDiskTrust trust = trust_in_hard_disks(
         {bed.restitution, bed.friction, std::pow(bed.restitution, 1.75), bed.gamma, bed.column_number});
-    EXPECT_TRUE(trust.covered);
-    EXPECT_THAT(trust.why, HasSubstr(fmt::format("e = {:g}, friction {:g}, Gamma = {:g}", bed.restitution, bed.friction,
-                                                 bed.gamma)));
+    constexpr double decisive = 0.05;
+    EXPECT_EQ(trust.covered, std::max(bed.error_x, bed.error_z) <= decisive) << "none of them differs";
+    EXPECT_TRUE(trust.agrees);
+    if (!trust.covered) continue;
+    EXPECT_THAT(trust.why, HasSubstr(fmt::format("e = {:g}, friction {:g}, Gamma = {:g}", bed.restitution,
+                                                 bed.friction, bed.gamma)));
   }
   const HardDiskTrust far = trust_in_hard_disks({0.3, 0, 0, 20, 100});
   EXPECT_FALSE(far.covered);
