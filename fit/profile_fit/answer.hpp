@@ -35,11 +35,12 @@ struct ThermometerReading {
   std::string thermometer;  // "whole column, N known"
   std::string model;        // FitOptions::model
   FitStatus status = FitStatus::not_converged;
-  Estimate fitted;                // as fitted [m g D]
-  double bias = 0.0;              // known, relative; taken off in `temperature`
-  double bias_uncertainty = 0.0;  // relative: from bed to bed
-  double temperature = 0.0;       // fitted/(1 + bias) [m g D]
-  double std_error = 0.0;         // of it: statistical and of the bias [m g D]
+  Estimate fitted;                 // as fitted [m g D]
+  double statistical_error = 0.0;  // of it, by the measured errors alone [m g D]
+  double bias = 0.0;               // known, relative; taken off in `temperature`
+  double bias_uncertainty = 0.0;   // relative: from bed to bed
+  double temperature = 0.0;        // fitted/(1 + bias) [m g D]
+  double std_error = 0.0;          // of it: statistical and of the bias [m g D]
   double chi2_per_dof = 0.0, model_error = 0.0;
   double window_low = 0.0, window_high = 0.0;  // [D]
   bool admissible = false;                     // converged, and its bias is known well enough to check the answer
@@ -52,7 +53,8 @@ struct Answer {
 
   std::string thermometer, model;             // that gave T
   double temperature = 0.0;                   // [m g D]; with no_single_temperature the middle of the range
-  double statistical_error = 0.0;             // one standard error each [m g D]:
+  double statistical_error = 0.0;             // one standard error each [m g D]: by the measured errors alone,
+  double misfit_error = 0.0;                  // of what the model misses of the profile,
   double bias_uncertainty = 0.0;              // of the thermometer's known bias, which has been taken off
   double spread = 0.0;                        // of the admissible thermometers beyond what these two explain
   double contact_duration_uncertainty = 0.0;  // of the simulation that gave the profile
@@ -61,6 +63,9 @@ struct Answer {
   // Of T; with no_single_temperature the range of all readings and kinetic T. Ends that are open lie a factor of twenty
   // away: T is then not known.
   Interval interval;
+  // Of the T that this thermometer reads, by the statistical error alone: where further beds lie, on average. The other
+  // parts are the same for all of them.
+  Interval next_bed_interval;
   Estimate solid_height;                                 // of the Enskog tail at this T [D]
   std::optional<Estimate> temperature_x, temperature_z;  // kinetic, as given
   std::vector<ThermometerReading> readings;              // of all thermometers

@@ -129,4 +129,19 @@ Bins bins_of(const MeasuredProfile& measured, const Window& window, FitResult* r
   return bins;
 }
 
+Bins with_measured_errors(Bins bins, double model_error) {
+  const auto n = static_cast<Eigen::Index>(bins.size());
+  if (bins.correlation.size() == 0) bins.correlation = Eigen::MatrixXd::Identity(n, n);
+  const double square = model_error * model_error;
+  if (bins.whitening.size() > 0) {
+    const Eigen::MatrixXd inverse =
+        bins.whitening.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
+    bins.correlation -= square * inverse * inverse.transpose();
+  } else {
+    for (Eigen::Index i = 0; i < n; ++i)
+      bins.correlation(i, i) -= square * std::pow(bins.inverse_error[static_cast<std::size_t>(i)], 2);
+  }
+  return bins;
+}
+
 }  // namespace shakebed::fit

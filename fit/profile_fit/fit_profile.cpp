@@ -158,6 +158,7 @@ class ProfileFitter {
     }
     result_.temperature = {model.uses_temperature() ? solution.parameters[FitModel::temperature] : 0.0,
                            parameter_error(setup_, fitted_, FitModel::temperature), !is_free(FitModel::temperature)};
+    result_.statistical_error = fitted_.measured_share * result_.temperature.std_error;
     result_.shift = derived([&](const FitModel::Parameters&) { return model.shift(); });
     result_.shift.fixed = options_.fixed_shift.has_value();
     result_.solid_height = derived([&](const FitModel::Parameters&) { return model.solid_height(); });
@@ -219,7 +220,11 @@ class ProfileFitter {
 
   // The interval of T, T against window, and other models.
   void look_further() {
-    if (options_.interval) result_.temperature_interval = likelihood_interval(fitted_, setup_, options_.confidence);
+    if (options_.interval) {
+      result_.temperature_interval = likelihood_interval(fitted_, setup_, options_.confidence);
+      if (is_free(FitModel::temperature))
+        result_.next_bed_interval = statistical_interval(fitted_, result_.statistical_error, options_.confidence);
+    }
     if (options_.sweep && is_free(FitModel::temperature) && result_.status == FitStatus::ok) {
       result_.window_sweep = sweep_windows(measured_, window_, setup_, fitted_.solution.parameters);
     }

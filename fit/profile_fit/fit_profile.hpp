@@ -83,6 +83,9 @@ struct FitOptions {
   // and the bins of a crystal, whose errors are the smallest, decide the temperature by what no equation of state says
   // of them: at 0.4 T_c a whole Enskog column then gives T 42 % too high instead of 5 %.
   bool model_error = true;
+  // The least of that error where the model is known to miss such profiles, also where the data are too poor to show
+  // it: else poor data weigh the bins otherwise than good ones, and T is off by something else. [1/D^2]
+  double least_model_error = 0.0;
 
   // Beyond the fit itself (each costs some more fits).
   bool interval = true;      // profile-likelihood interval of T
@@ -171,6 +174,9 @@ struct FitResult {
   // curve, by model_error or else multiplied by sqrt(chi2/dof).
   bool errors_scaled = false;
   double model_error = 0.0;  // of every bin, beside its own error; 0 for none [1/D^2]
+  // The part of temperature.std_error that the measured errors make: how far the same fit of another measurement would
+  // be. The rest, in quadrature, is the model's misfit, which other measurements share. [m g D]
+  double statistical_error = 0.0;
 
   double chi2 = 0.0;  // the least, by the measured errors alone; so are the numbers that follow
   int dof = 0;
@@ -186,6 +192,8 @@ struct FitResult {
   Kernel kernel{};
 
   Interval temperature_interval;
+  // Of T by the statistical error alone: where the same fit of further beds lies, on average.
+  Interval next_bed_interval;
   std::vector<WindowFit> window_sweep;
   std::vector<ModelFit> model_comparison;  // the first row is the fit itself
   std::vector<CurvePoint> curve;

@@ -112,6 +112,7 @@ FitStatus make_setup(const FitOptions& options, const MeasuredProfile& measured,
   setup.start = first_guess(options, model);
   setup.parameters = static_cast<int>(std::count(least_squares.free.begin(), least_squares.free.end(), true));
   setup.model_error = options.model_error;
+  setup.least_model_error = options.least_model_error;
   return FitStatus::ok;
 }
 

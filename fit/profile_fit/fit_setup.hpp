@@ -15,6 +15,7 @@ struct FitSetup {
   LeastSquaresOptions least_squares;
   int parameters = 0;        // how many are free
   bool model_error = false;  // a misfit becomes an error of the model [FitOptions::model_error]
+  double least_model_error = 0.0;
 };
 
 // What can be said of the options before there are data. bad_input or undefined_model, with a message in `result`.

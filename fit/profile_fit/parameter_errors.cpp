@@ -18,17 +18,19 @@ constexpr double end_tolerance = 1e-4, farthest_end = 12.0;
 constexpr int end_steps = 40;
 
 // Degrees of freedom behind the errors: those of few samples, or of the scatter, have Student's tails.
+constexpr double normal = 1e300;
+double dof_of_samples(const Bins& bins) {
+  return bins.correlation.size() > 0 && bins.samples > 1 ? bins.samples - 1.0 : normal;
+}
 double tail_dof(const FittedWindow& fitted) {
-  constexpr double normal = 1e300;
-  const Bins& bins = fitted.bins;
-  const double by_samples = bins.correlation.size() > 0 && bins.samples > 1 ? bins.samples - 1.0 : normal;
+  const double by_samples = dof_of_samples(fitted.bins);
   const double by_scatter = fitted.good.scaled && fitted.good.dof > 0 ? static_cast<double>(fitted.good.dof) : normal;
   return std::min(by_samples, by_scatter);
 }
 
 double quantile_of_chi2(double confidence, double dof) {
-  return dof < 1e300 ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, dof), 2)
-                     : gsl_cdf_chisq_Pinv(confidence, 1.0);
+  return dof < normal ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, dof), 2)
+                      : gsl_cdf_chisq_Pinv(confidence, 1.0);
 }
 
 // The end of the interval on one side: sqrt(delta chi2) is nearly linear in ln T, so a secant search on it.
@@ -158,6 +160,18 @@ Interval likelihood_interval(const FittedWindow& fitted, FitSetup& setup, double
   const bool high = search(+1, interval.high, interval.high_open);
   if (low && high) interval.status = FitStatus::ok;
   setup.model->set(fitted.solution.parameters);
+  return interval;
+}
+
+Interval statistical_interval(const FittedWindow& fitted, double std_error, double confidence) {
+  Interval interval;
+  const double temperature = fitted.solution.parameters[FitModel::temperature];
+  if (!(temperature > 0.0) || !std::isfinite(std_error)) return interval;
+  const double reach = std::sqrt(quantile_of_chi2(confidence, dof_of_samples(fitted.bins))) * std_error / temperature;
+  interval.confidence = confidence;
+  interval.status = FitStatus::ok;
+  interval.low = temperature * std::exp(-reach);
+  interval.high = temperature * std::exp(reach);
   return interval;
 }
 

@@ -17,4 +17,7 @@ double propagated_error(FitSetup& setup, const FittedWindow& fitted, const Quant
 // The temperatures whose best chi2 exceeds the least by no more than the quantile of the confidence asks.
 Interval likelihood_interval(const FittedWindow& fitted, FitSetup& setup, double confidence);
 
+// Of T by a statistical error of it alone, in ln T; Student's where few samples are behind the errors.
+Interval statistical_interval(const FittedWindow& fitted, double std_error, double confidence);
+
 }  // namespace shakebed::fit

@@ -22,4 +22,7 @@ std::size_t count_bins(const MeasuredProfile& measured, const Window& window);
 // The bins of the window with their weights; warnings about the covariance go to `result` unless it is nullptr.
 Bins bins_of(const MeasuredProfile& measured, const Window& window, FitResult* result);
 
+// The same bins and weights where every error holds one of the model: errors come through the measured part alone.
+Bins with_measured_errors(Bins bins, double model_error);
+
 }  // namespace shakebed::fit

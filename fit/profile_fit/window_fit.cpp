@@ -124,6 +124,11 @@ class ModelErrorSearch {
     starts_.insert(starts_.end(), starts.begin(), starts.end());
   }
 
+  // False where there is no curve.
+  bool fit_with(double error) {
+    misfit(std::log(error));
+    return trial_.solution.has_curve && trial_.solution.converged;
+  }
   // False where no error does it.
   bool run() { return find_bracket() && narrow() && trial_.solution.has_curve && trial_.solution.converged; }
   // The fit with that error; its goodness is by the errors with it.
@@ -202,6 +207,15 @@ class ModelErrorSearch {
   double low_ = 0.0, high_ = 0.0, at_low_ = 0.0, at_high_ = 0.0;  // ln(error) and the misfit there
 };
 
+// Of the error of T, by the weights of a fit whose bins hold an error of the model: the part of their measured errors.
+double measured_share_of(const FittedWindow& fitted, FitSetup& setup) {
+  if (!setup.least_squares.free[FitModel::temperature]) return 1.0;
+  const Solution by_samples = least_squares(with_measured_errors(fitted.bins, fitted.model_error), *setup.model,
+                                            fitted.solution.parameters, setup.least_squares);
+  const double all = fitted.solution.covariance(0, 0), measured = by_samples.covariance(0, 0);
+  return by_samples.has_curve && all > 0.0 ? std::sqrt(std::clamp(measured / all, 0.0, 1.0)) : 1.0;
+}
+
 }  // namespace
 
 std::vector<FitModel::Parameters> find_starts(const Bins& bins, const FitSetup& setup) {
@@ -248,10 +262,14 @@ FittedWindow fit_window(const MeasuredProfile& measured, const Window& window, F
   fitted.error_scale = fitted.good.error_scale;
   fitted.bins = std::move(bins);
   const bool misses = fitted.good.scaled && measured.errors_known && fitted.solution.has_curve;
-  if (!setup.model_error || setup.least_squares.robust || !misses || setup.parameters == 0) return fitted;
+  if (misses && !setup.least_squares.robust) fitted.measured_share = 1.0 / std::sqrt(fitted.good.chi2_per_dof);
+  const double least = measured.errors_known && fitted.solution.has_curve ? setup.least_model_error : 0.0;
+  if (!setup.model_error || setup.least_squares.robust || setup.parameters == 0) return fitted;
+  if (!misses && !(least > 0.0)) return fitted;
 
   ModelErrorSearch search(measured, window, setup, fitted, starts);
-  if (!search.run()) {
+  const bool enough = misses && search.run() && search.found().model_error >= least;
+  if (!enough && (!(least > 0.0) || !search.fit_with(least))) {
     setup.model->set(fitted.solution.parameters);
     return fitted;
   }
@@ -259,6 +277,7 @@ FittedWindow fit_window(const MeasuredProfile& measured, const Window& window, F
   found.solution.chi2 = fitted.solution.chi2;
   found.error_scale = found.good.error_scale;
   found.good = fitted.good;
+  found.measured_share = measured_share_of(found, setup);
   setup.model->set(found.solution.parameters);
   return std::move(found);
 }

@@ -21,6 +21,8 @@ struct FittedWindow {
   Goodness good;             // by the measured errors
   double error_scale = 1.0;  // of the solution's covariance
   double model_error = 0.0;
+  // Of the standard error of T: what the measured errors alone make of it, 0 to 1. The rest is the model's misfit.
+  double measured_share = 1.0;
 };
 
 // Starts that need no guess: temperatures on a logarithmic grid, each with the place that puts the curve through the

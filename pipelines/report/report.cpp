@@ -33,6 +33,7 @@ class Report {
       try {
         finished_.push_back({files, files.result()});
         pages_.push_back(&plan.stages[i].row->pages);
+        answered_ = answered_ || !plan.stages[i].row->answer.empty();
       } catch (const InputError&) {
         // A damaged result: the page is shown without it.
       }
@@ -79,6 +80,7 @@ class Report {
   std::string of_stages(TextOfStage StagePages::*text) const {
     std::string out;
     for (std::size_t i = 0; i < finished_.size(); ++i) {
+      if (answered_ && pages_[i]->yields_to_answer) continue;
       if (pages_[i]->*text != nullptr) out += (pages_[i]->*text)(finished_[i]);
     }
     return out;
@@ -90,6 +92,7 @@ class Report {
     for (std::size_t i = 0; i < finished_.size(); ++i) {
       for (const ReportSection& section : pages_[i]->sections) {
         if (section.place != place || (section.once && !out.empty())) continue;
+        if (place == ReportPlace::banner && answered_ && pages_[i]->yields_to_answer) continue;
         std::string own = section.html(finished_[i], pictures_);
         if (own.empty()) continue;
         if (out.empty() && !section.heading.empty()) own.insert(0, fmt::format("<h2>{}</h2>\n", section.heading));
@@ -441,6 +444,7 @@ class Report {
   const RunOutcome& outcome_;
   std::vector<FinishedStage> finished_;
   std::vector<const StagePages*> pages_;  // of each finished stage
+  bool answered_ = false;                 // one of them gives an answer
   int pictures_ = 0;
 };
 

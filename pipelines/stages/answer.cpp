@@ -4,6 +4,8 @@
 
 #include <cctype>
 
+#include "pipelines/stages/bed_judgement.hpp"
+
 namespace shakebed::pipelines {
 namespace {
 
@@ -45,6 +47,13 @@ double contact_duration_effect(const Input& input) {
   return effect != nullptr && effect->is_number() ? effect->get<double>() : 0;
 }
 
+void add_judgement(const Json& observables, Json& answer) {
+  const Json* judgement = find_pointer(observables, "/judgement");
+  if (judgement == nullptr || !speaks_against(*judgement)) return;
+  for (const char* key : {"why", "advice"})
+    answer[key] = fmt::format("{} The simulated bed: {}", answer.value(key, ""), judgement->value(key, ""));
+}
+
 bool is_one_temperature(std::string_view verdict) { return verdict == fit::to_string(fit::Verdict::one_temperature); }
 
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
@@ -61,6 +70,10 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
                          {"high_open", answer.interval.high_open},
                          {"confidence", answer.interval.confidence}};
   out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
+  out["misfit_error"] = quantity_json(answer.misfit_error, "m g D");
+  out["next_bed_interval"] = Json{{"low", quantity_json(answer.next_bed_interval.low, "m g D")},
+                                  {"high", quantity_json(answer.next_bed_interval.high, "m g D")},
+                                  {"confidence", answer.next_bed_interval.confidence}};
   out["bias_uncertainty"] = quantity_json(answer.bias_uncertainty, "m g D");
   out["spread"] = quantity_json(answer.spread, "m g D");
   out["contact_duration_uncertainty"] = quantity_json(answer.contact_duration_uncertainty, "m g D");

@@ -34,6 +34,9 @@ struct AnswerScale {
 };
 AnswerScale answer_scale(const Json& answer);
 
+// Adds to the answer's reason and advice what speaks against the numbers of the simulated bed it was read from.
+void add_judgement(const Json& observables, Json& answer);
+
 // "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why." Ends without a line break.
 std::string answer_text(const Json& answer);
 

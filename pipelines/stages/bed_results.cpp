@@ -28,6 +28,7 @@ class BedStatement {
     counts();
     profiles();
     tables();
+    judgement();
     replicas();
   }
 
@@ -121,6 +122,13 @@ class BedStatement {
     list_.number("/events", "1", "events of all kinds");
     list_.number("/periods", "1", "periods over which the bed was measured");
     list_.quantity("/max_overlap", "D", "largest overlap of two disks, by rounding");
+  }
+
+  void judgement() {
+    const Given judged = given_if(bed_.judged, "the floor shakes and there is gravity");
+    list_.text("/judgement/verdict", "\"holds\", or what speaks most against the numbers", judged);
+    list_.text("/judgement/why", "all that speaks against the numbers, the gravest first", judged);
+    list_.text("/judgement/advice", "what to do", judged);
   }
 
   void profiles() {

@@ -10,6 +10,7 @@ namespace shakebed::pipelines {
 
 struct BedOutput {
   bool reduced = false, weightless = false, periodic_upwards = false;
+  bool judged = false;            // a shaken bed under gravity
   bool contact_duration = false;  // the TC model's
   bool material = false;          // is named
   bool shaken = false, frames = false, annealed = false;

@@ -408,7 +408,9 @@ Json answer_of(const FitTask& task, const RunContext& context) {
     if (!input.temperature_x) input.temperature_x = kinetic.x, input.temperature_z = kinetic.z;
     input.contact_duration_effect = std::max(input.contact_duration_effect, contact_duration_effect(upstream));
   }
-  return answer_json(fit::find_answer(input), task.diameter);
+  Json answer = answer_json(fit::find_answer(input), task.diameter);
+  for (const Input& upstream : context.inputs()) add_judgement(upstream.result(), answer);
+  return answer;
 }
 
 // Our own file, else the profile of the first stage of "from", with its covariance where that is asked for.

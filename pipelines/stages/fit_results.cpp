@@ -28,6 +28,8 @@ class FitStatement {
     const Given known = both(fitted_, given_when("the diameter is known"));
     list_.quantity("/temperature", "m g D", "fitted temperature", fitted_);
     list_.quantity("/temperature_over_mg", "m", "fitted temperature as T/(m g)", known);
+    list_.quantity("/statistical_error", "m g D",
+                   "standard error of T by the measured errors alone, without the model's misfit", fitted_);
     list_.quantity("/shift", "D", "height at which the fluid begins", fitted_);
     list_.quantity("/solid_height", "D", "height of the solid, zeta_F", fitted_);
     list_.quantity("/plateau_density", "1/D^2", "density of the solid, phi_0", fitted_);
@@ -39,6 +41,7 @@ class FitStatement {
     list_.quantity("/solid_height_by_sum_rule", "D", "height of the solid by the number of disks", critical);
     list_.text("/critical_temperature_status", "why T_c is not known", given_when("T_c is not known"));
     interval("/temperature_interval", fitted_);
+    interval("/next_bed_interval", fitted_);
     list_.text("/parameters/#", "name of a fitted parameter", fitted_);
     list_.number("/covariance/#/#", "1", "covariance of the parameters, in their order", fitted_);
   }
@@ -119,7 +122,12 @@ class FitStatement {
     list_.number("/answer/interval/confidence", "1", "confidence of the interval", found);
     list_.truth("/answer/interval/low_open", "whether the data set no lower end", found);
     list_.truth("/answer/interval/high_open", "whether the data set no upper end", found);
-    list_.quantity("/answer/statistical_error", "m g D", "statistical error of T", found);
+    list_.quantity("/answer/next_bed_interval/low", "m g D",
+                   "lower end of the interval of what the chosen thermometer reads in further beds, on average", found);
+    list_.quantity("/answer/next_bed_interval/high", "m g D", "its upper end", found);
+    list_.number("/answer/next_bed_interval/confidence", "1", "its confidence", found);
+    list_.quantity("/answer/statistical_error", "m g D", "statistical error of T, by the measured errors alone", found);
+    list_.quantity("/answer/misfit_error", "m g D", "error of T by what the model misses of the profile", found);
     list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
     list_.quantity("/answer/contact_duration_uncertainty", "m g D",
                    "uncertainty by the contact duration of the simulation", found);

@@ -15,7 +15,7 @@ namespace shakebed::pipelines {
 namespace {
 
 // Beds differ where their spread is so many times what each states, at this significance.
-constexpr double notable_spread = 2, spread_significance = 0.01;
+constexpr double notable_ratio = 2, spread_significance = 0.01;
 // A drift counts from so many of its standard errors on; they come from few samples, each run being cut in halves.
 constexpr double notable_drift = 4;
 constexpr double two_sided_95 = 0.975;
@@ -96,7 +96,7 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
 }
 
 bool differ(double spread, double within, std::size_t n) {
-  if (!(within > 0) || !(spread > notable_spread * within)) return false;
+  if (!(within > 0) || !(spread > notable_ratio * within)) return false;
   const auto freedom = static_cast<double>(n - 1);
   const boost::math::chi_squared_distribution<double, InDouble> chi2(freedom);
   return boost::math::cdf(boost::math::complement(chi2, freedom * spread * spread / (within * within))) <
@@ -137,29 +137,39 @@ Json joined_results(const std::vector<Json>& results) {
   return out;
 }
 
+std::optional<NotableSpread> notable_spread(const Json& joined, std::size_t n) {
+  for (const char* key : {"temperature_x", "temperature_z", "center_of_mass_rise"}) {
+    const double spread = part_of(joined, key, "spread"), within = part_of(joined, key, "within");
+    if (n >= 2 && differ(spread, within, n)) return NotableSpread{key, spoken(key), spread, within};
+  }
+  return std::nullopt;
+}
+
+std::optional<NotableDrift> notable_drift_of(const Json& joined) {
+  for (const auto& [drift, key] : drifting) {
+    const double change = part_of(joined, drift, "value"), error = part_of(joined, drift, "std_error");
+    if (error > 0 && std::abs(change) > notable_drift * error)
+      return NotableDrift{spoken(key), change, error, std::abs(change / part_of(joined, key, "value"))};
+  }
+  return std::nullopt;
+}
+
 std::vector<std::string> replica_warnings(const std::vector<Json>& results, const Json& joined, ReplicaStarts starts) {
   std::vector<std::string> warnings;
   const std::size_t n = results.size();
-  for (const char* key : {"temperature_x", "temperature_z", "center_of_mass_rise"}) {
-    const double spread = part_of(joined, key, "spread"), within = part_of(joined, key, "within");
-    if (n < 2 || !differ(spread, within, n)) continue;
+  if (const auto found = notable_spread(joined, n))
     warnings.push_back(fmt::format(
         "the {} beds differ by more than chance: {} scatters by {:.2g}, each bed states {:.2g}{}. The result depends "
         "on how the bed was filled; the stated error allows for it. A longer \"settle\" may lessen it, more "
         "\"replicas\" lessen the error",
-        n, spoken(key), spread, within, starts == ReplicaStarts::alternate ? " (" + by_start(results, key) + ")" : ""));
-    break;
-  }
-  for (const auto& [drift, key] : drifting) {
-    const double change = part_of(joined, drift, "value"), error = part_of(joined, drift, "std_error");
-    if (!(error > 0) || !(std::abs(change) > notable_drift * error)) continue;
+        n, found->what, found->spread, found->within,
+        starts == ReplicaStarts::alternate ? " (" + by_start(results, found->key) + ")" : ""));
+  if (const auto found = notable_drift_of(joined))
     warnings.push_back(fmt::format(
         "the bed still changes while it is measured: {} is {} by {:.2g} ({:.2g} %) in the second half of the time, "
         "{:.1f} times the error of this difference. Let it settle longer",
-        spoken(key), change > 0 ? "higher" : "lower", std::abs(change),
-        100 * std::abs(change / part_of(joined, key, "value")), std::abs(change) / error));
-    break;
-  }
+        found->what, found->change > 0 ? "higher" : "lower", std::abs(found->change), 100 * found->part,
+        std::abs(found->change) / found->error));
   return warnings;
 }
 

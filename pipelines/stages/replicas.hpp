@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,19 @@ enum class ReplicaStarts {
 // the mean of independent beds, never below what the beds state: so wide that 1.96 of it hold the mean of further beds
 // in 95 % of all cases, few as the replicas are (Student's t).
 Json joined_results(const std::vector<Json>& results);
+// The first of T_x, T_z and the rise by which n beds differ by more than each of them states.
+struct NotableSpread {
+  const char *key, *what;  // "temperature_x", "T_x"
+  double spread, within;
+};
+std::optional<NotableSpread> notable_spread(const Json& joined, std::size_t n);
+// The first of T_x and the rise that changed while it was measured.
+struct NotableDrift {
+  const char* what;
+  double change, error;
+  double part;  // |change| over the number itself
+};
+std::optional<NotableDrift> notable_drift_of(const Json& joined);
 // What the replicas say of the bed's measurement, a sentence each: that they differ by more than each of them states,
 // that the bed still changed while it was measured. Also for a single run.
 std::vector<std::string> replica_warnings(const std::vector<Json>& results, const Json& joined, ReplicaStarts starts);

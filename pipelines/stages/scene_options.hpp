@@ -154,6 +154,13 @@ class SceneOptions {
   double gamma() const;
   // Says what is odd about the bed, though it can be simulated (decoding only). `settle` as written.
   void warn(Fields& fields, double settle) const;
+  // Why rows of disks lock in a box of this width, and what to do; nothing where they do not.
+  std::optional<Misfit> locking() const;
+  // Whether contacts lose energy.
+  bool dissipates() const;
+  double restitution() const { return disks_.surface.restitution; }
+  double friction() const { return disks_.surface.friction; }
+  double tangential_restitution() const { return disks_.surface.tangential_restitution; }
   // For Stage::facts.
   Json facts() const;
 
@@ -164,7 +171,6 @@ class SceneOptions {
   void warn_of_size(Fields& fields) const;
   void warn_of_locking(Fields& fields) const;
   double height_at_rest() const;  // [D]
-  bool dissipates() const;
   std::string length_text(double length) const;
 
   DiskOptions disks_;

@@ -127,19 +127,22 @@ void SceneOptions::warn_of_size(Fields& fields) const {
                 "Raise the lid, or take fewer disks");
 }
 
-void SceneOptions::warn_of_locking(Fields& fields) const {
-  if (!gravity_ || disks_.second || !std::holds_alternative<HardSidesOptions>(box_.sides)) return;
+std::optional<Misfit> SceneOptions::locking() const {
+  if (!gravity_ || disks_.second || !std::holds_alternative<HardSidesOptions>(box_.sides)) return std::nullopt;
   const double width = box_.width / length_unit();
   const std::optional<Commensurate> near = commensurate(width);
-  if (width < least_width || !near) return;
+  if (width < least_width || !near) return std::nullopt;
   const auto [below, above] = safe_widths(width);
-  fields.warn("commensurate width", "/box/width",
-              fmt::format("the box is {:.4g} diameters wide, {} {:g}: {} between hard sides, and a locked bed's "
-                          "temperature differs from seed to seed and costs many more collisions",
-                          width, width == near->multiple ? "exactly" : "nearly", near->multiple,
-                          near->whole ? "rows of disks fit exactly and can lock" : "alternate rows can lock"),
-              fmt::format("Unless the width is given by an experiment, take {} ({:g} D) or {} ({:g} D)",
-                          length_text(below * length_unit()), below, length_text(above * length_unit()), above));
+  return Misfit{fmt::format("the box is {:.4g} diameters wide, {} {:g}: {} between hard sides, and a locked bed's "
+                            "temperature differs from seed to seed and costs many more collisions",
+                            width, width == near->multiple ? "exactly" : "nearly", near->multiple,
+                            near->whole ? "rows of disks fit exactly and can lock" : "alternate rows can lock"),
+                fmt::format("Unless the width is given by an experiment, take {} ({:g} D) or {} ({:g} D)",
+                            length_text(below * length_unit()), below, length_text(above * length_unit()), above)};
+}
+
+void SceneOptions::warn_of_locking(Fields& fields) const {
+  if (const auto odd = locking()) fields.warn("commensurate width", "/box/width", odd->what, odd->suggestion);
 }
 
 void SceneOptions::warn(Fields& fields, double settle) const {

@@ -15,6 +15,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/annealing.hpp"
+#include "pipelines/stages/bed_judgement.hpp"
 #include "pipelines/stages/bed_measurement.hpp"
 #include "pipelines/stages/bed_results.hpp"
 #include "pipelines/stages/measure_options.hpp"
@@ -33,8 +34,6 @@ namespace {
 // A shaken bed that dissipates may keep for long how it was filled. Four beds, two of them filled at random, give
 // errors that hold the mean of further beds: the study is in docs/thermometer.md.
 constexpr std::uint32_t replicas_of_shaken = 4;
-// Of T: so much error by the contact duration is left without a word.
-constexpr double allowed_contact_effect = 0.02;
 
 class Simulate : public Stage {
  public:
@@ -43,6 +42,7 @@ class Simulate : public Stage {
     state_bed_results(list, {.reduced = bed_.description().reduced,
                              .weightless = bed_.weightless(),
                              .periodic_upwards = bed_.periodic_upwards(),
+                             .judged = bed_.gamma() > 0,
                              .contact_duration = bed_.contact_duration() > 0,
                              .material = bed_.hertz_contact_time().has_value(),
                              .shaken = bed_.period() > 0,
@@ -263,7 +263,8 @@ void Simulate::run(RunContext& context) const {
     write_joined(context, runs);
     replicas_table(results).write(context.output("replicas.csv"));
   }
-  const Json joined = replicas() > 1 ? joined_results(results) : results[0];
+  Json joined = replicas() > 1 ? joined_results(results) : results[0];
+  if (bed_.gamma() > 0) joined["judgement"] = judgement_of(bed_, joined, results.size());
   write_file(context.output("observables.json"), dump(joined));
   for (const std::string& warning : replica_warnings(results, joined, starts_of_replicas(context)))
     context.warning(warning);

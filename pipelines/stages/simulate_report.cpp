@@ -1,4 +1,4 @@
-// What the page shows of a simulate stage: the bed in motion.
+// What the pages show of a simulate stage: its numbers with what speaks against them, and the bed in motion.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,6 +7,7 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/animation.hpp"
+#include "pipelines/stages/bed_judgement.hpp"
 #include "pipelines/stages/simulate.hpp"
 
 namespace shakebed::pipelines {
@@ -39,16 +40,38 @@ std::string kinetic_facts_html(const FinishedStage& stage, int&) {
   return out;
 }
 
+std::string judgement_html(const FinishedStage& stage, int&) {
+  const std::string text = judgement_text(stage.result);
+  if (text.empty()) return "";
+  return fmt::format("<div class=\"answer\"><strong>{}</strong>: {}</div>\n", escape_markup(stage.files.id),
+                     escape_markup(text));
+}
+
+std::string judgement_markdown(const FinishedStage& stage) {
+  const std::string text = judgement_text(stage.result);
+  return text.empty() ? "" : fmt::format("**{}**: {}\n\n", stage.files.id, text);
+}
+
+std::string judgement_line(const FinishedStage& stage) {
+  const std::string text = judgement_text(stage.result);
+  return text.empty() ? "" : fmt::format("{}: {}\n", stage.files.id, text);
+}
+
 }  // namespace
 
 StagePages simulate_pages() {
-  return {.sections = {{.place = ReportPlace::facts, .html = kinetic_facts_html, .once = true},
-                       {.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
-          .warnings = {
-              {"contact duration", WarningEffect::measurement, "Give a shorter \"contact_duration\", and compare T."},
-              {"above the highest bin", WarningEffect::measurement, "Let the profile reach higher (\"profile\")."},
-              {"checkpoint", WarningEffect::rest, "Nothing: the run began anew."},
-              {"", WarningEffect::measurement, "Measure longer, or from more beds (\"replicas\")."}}};
+  return {
+      .sections = {{.place = ReportPlace::banner, .html = judgement_html},
+                   {.place = ReportPlace::facts, .html = kinetic_facts_html, .once = true},
+                   {.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
+      .warnings = {{"contact duration", WarningEffect::measurement,
+                    "Give a shorter \"contact_duration\", and compare T."},
+                   {"above the highest bin", WarningEffect::measurement, "Let the profile reach higher (\"profile\")."},
+                   {"checkpoint", WarningEffect::rest, "Nothing: the run began anew."},
+                   {"", WarningEffect::measurement, "Measure longer, or from more beds (\"replicas\")."}},
+      .markdown = judgement_markdown,
+      .terminal = judgement_line,
+      .yields_to_answer = true};
 }
 
 }  // namespace shakebed::pipelines

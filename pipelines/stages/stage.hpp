@@ -203,6 +203,8 @@ struct StagePages {
   std::vector<WarningAdvice> warnings{};                          // the first whose words are in a warning counts
   std::string (*markdown)(const FinishedStage& stage) = nullptr;  // of summary.md
   std::string (*terminal)(const FinishedStage& stage) = nullptr;  // a line on stdout
+  // Its banner and these texts are left out where another stage gives the answer, which then holds what they say.
+  bool yields_to_answer = false;
 };
 
 struct StageRow {

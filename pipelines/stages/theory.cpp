@@ -223,6 +223,7 @@ Json interval_json(const fit::Interval& interval, double factor = 1) {
 // The fitted parameters, what follows from them, and how good the fit is.
 void add_parameters(const fit::FitResult& result, std::optional<double> diameter, Json& out) {
   out["temperature"] = estimate_json(result.temperature, "m g D");
+  out["statistical_error"] = quantity_json(result.statistical_error, "m g D");
   if (diameter) out["temperature_over_mg"] = estimate_json(result.temperature, "m", *diameter);
   out["shift"] = estimate_json(result.shift, "D");
   out["solid_height"] = estimate_json(result.solid_height, "D");
@@ -237,6 +238,7 @@ void add_parameters(const fit::FitResult& result, std::optional<double> diameter
     out["critical_temperature_status"] = fit::to_string(result.critical_status);
   }
   out["temperature_interval"] = interval_json(result.temperature_interval);
+  out["next_bed_interval"] = interval_json(result.next_bed_interval);
   out["chi2"] = result.chi2;
   out["dof"] = result.dof;
   out["chi2_per_dof"] = result.chi2_per_dof;

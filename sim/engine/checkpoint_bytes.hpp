@@ -11,7 +11,7 @@
 
 namespace shakebed::sim::checkpoint_bytes {
 
-inline constexpr std::uint64_t magic = 0x33306465626b6873;  // "shkbed03", little-endian
+inline constexpr std::uint64_t magic = 0x34306465626b6873;  // "shkbed04", little-endian
 
 template <class T>
 void put(std::vector<std::uint8_t>& out, const T& value) {

@@ -282,15 +282,17 @@ class Engine final : public Simulation {
   Bath bath_;
 
   // --- the state
-  LargeVector<Disk> disks_;             // and a sentinel after the last
-  std::vector<std::uint32_t> labels_;   // what a disk is called outside: its place in the start
-  std::vector<double> spins_;           // rough disks only
-  std::vector<double> last_contact_;    // contact clocks, dissipative disks only
-  std::vector<std::uint8_t> withheld_;  // whether its latest contacts, elastic by the clock, have been counted; as many
-  double now_ = 0;                      // since base_
-  double base_ = 0;                     // of the present count, since the start
-  double interval_ = 1;                 // the floor's period
-  std::uint64_t intervals_ = 1;         // that many of them between synchronisations now
+  LargeVector<Disk> disks_;            // and a sentinel after the last
+  std::vector<std::uint32_t> labels_;  // what a disk is called outside: its place in the start
+  std::vector<double> spins_;          // rough disks only
+  std::vector<double> last_contact_;   // contact clocks, dissipative disks only
+  // When its latest contact was that the clock made elastic and that belongs to a chain whose energy has been counted.
+  std::vector<double> withheld_at_;
+  bool chain_counted_ = false;   // of the contact at hand, where the clock made it elastic
+  double now_ = 0;               // since base_
+  double base_ = 0;              // of the present count, since the start
+  double interval_ = 1;          // the floor's period
+  std::uint64_t intervals_ = 1;  // that many of them between synchronisations now
   std::uint64_t intervals_done_ = 0;
   double synchronise_at_ = 1;
   double event_rate_ = 1;

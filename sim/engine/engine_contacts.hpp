@@ -11,22 +11,25 @@ inline constexpr double rest_hop = 1e-4;
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   if (contact_duration_ <= 0) return false;
-  const bool elastic = now_ - last_contact_[i] < contact_duration_ || now_ - last_contact_[j] < contact_duration_;
+  const double of_first = last_contact_[i], of_second = last_contact_[j];
   last_contact_[i] = last_contact_[j] = now_;
-  if (!elastic) withheld_[i] = withheld_[j] = 0;
-  counters_.elastic_contacts += elastic;
+  const bool elastic = now_ - of_first < contact_duration_ || now_ - of_second < contact_duration_;
+  if (elastic) [[unlikely]] {
+    ++counters_.elastic_contacts;
+    chain_counted_ = withheld_at_[i] == of_first || withheld_at_[j] == of_second;
+  }
   return elastic;
 }
 
 // Writes down what a contact would have dissipated that the clock made elastic; of a chain of them only the first that
-// would have dissipated anything, since the others keep the same energy again.
+// would have dissipated anything, since the others keep the same energy again. A disk is in a counted chain as long as
+// its latest contact is the one noted here: nothing has to be undone by contacts that dissipate.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach,
                                           const Contact& surface) {
   const double e = surface.varies() ? surface.restitution_at(approach) : surface.restitution;
-  const bool counted = withheld_[i] + withheld_[j] > 0;
-  if (!counted) counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
-  withheld_[i] = withheld_[j] = counted || e < 1;
+  if (!chain_counted_) counters_.withheld += 0.5 * reduced_mass * (1 - e * e) * approach * approach;
+  if (chain_counted_ || e < 1) withheld_at_[i] = withheld_at_[j] = now_;
 }
 
 // The restitution of two disks where it may depend on their approach; none if they touch as smooth elastic disks do.

@@ -42,7 +42,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   }
   if constexpr (Rule::dissipates) {
     last_contact_.assign(count_, -never);
-    withheld_.assign(count_, 0);
+    withheld_at_.assign(count_, never);
   }
   if constexpr (!Sizes::equal) {
     for (const Placed& p : placed) {

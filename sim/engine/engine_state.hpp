@@ -102,7 +102,7 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
 template <class Space, class Rule, class Sizes>
 std::size_t Engine<Space, Rule, Sizes>::bytes() const {
   return disks_.capacity() * sizeof(Disk) + labels_.capacity() * sizeof(std::uint32_t) +
-         (spins_.capacity() + last_contact_.capacity()) * sizeof(double) +
+         (spins_.capacity() + last_contact_.capacity() + withheld_at_.capacity()) * sizeof(double) +
          std::visit([](const auto& grid) { return grid.bytes(); }, grid_) + lists_.bytes() + queue_.bytes() +
          log_.bytes() + (deferred_.capacity() + rest_.capacity()) * sizeof(EventEntry);
 }

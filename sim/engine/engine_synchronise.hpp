@@ -14,6 +14,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
     disks_[i].own_time = 0;
   }
   for (double& time : last_contact_) time -= now_;
+  for (double& time : withheld_at_) time -= now_;
   bath_at_ -= now_;
   rest_at_ -= now_;
   look_at_ -= now_;
@@ -55,7 +56,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
   if constexpr (Rule::spins) permute(spins_);
   if constexpr (Rule::dissipates) {
     permute(last_contact_);
-    permute(withheld_);
+    permute(withheld_at_);
   }
   if constexpr (rests_apply) permute(rest_height_);
   if constexpr (!Sizes::equal) {
@@ -162,7 +163,7 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   }
   for (auto& spin : self.spins_) visit(spin);
   for (auto& clock : self.last_contact_) visit(clock);
-  for (auto& elastic : self.withheld_) visit(elastic);
+  for (auto& time : self.withheld_at_) visit(time);
   if constexpr (rests_apply) {
     for (auto& height : self.rest_height_) visit(height);
     visit(self.resting_);

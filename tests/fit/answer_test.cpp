@@ -56,7 +56,13 @@ TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
   const Answer answer = find_answer(column(1.0));
   ASSERT_TRUE(answer.ok()) << answer.why;
   ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
-  EXPECT_NEAR(answer.std_error, std::hypot(answer.statistical_error, answer.bias_uncertainty, answer.spread), 1e-15);
+  EXPECT_NEAR(
+      answer.std_error,
+      std::hypot(std::hypot(answer.statistical_error, answer.misfit_error), answer.bias_uncertainty, answer.spread),
+      1e-15);
+  EXPECT_NEAR(
+      std::log(answer.next_bed_interval.high / answer.temperature) * answer.temperature / answer.statistical_error,
+      1.959964, 1e-4);
   EXPECT_GT(answer.bias_uncertainty, 0.0);
   // Errors that are known: normal, 1.96 of them in ln T.
   EXPECT_NEAR(std::log(answer.interval.high / answer.temperature) * answer.temperature / answer.std_error, 1.959964,

@@ -249,6 +249,70 @@ TEST(FitProfile, UsesTheFullCovariance) {
   EXPECT_GT(pull_without / trials, 2.0);
 }
 
+// What a model misses is the same in every measurement: T scatters by the statistical error, 4 standard errors of a
+// scatter of 200, the whole error is larger, and the interval of the next bed holds the mean of many in 95 %, 4
+// standard errors of a share. With errors alone and with a covariance.
+TEST(FitProfile, TellsTheNoiseInTFromWhatTheModelMisses) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.6, {11.22, 1.10});
+  constexpr int trials = 200;
+  for (const bool covariance : {false, true}) {
+    std::vector<FitResult> fits;
+    double mean = 0.0;
+    for (int trial = 0; trial < trials; ++trial) {
+      Profile data = profile_of(truth, {}, 60, top_of(truth), 0.005, 3000 + static_cast<std::uint64_t>(trial));
+      const std::size_t n = data.height.size();
+      for (std::size_t i = 0; i < n; ++i)
+        data.number_density[i] += 0.02 * std::sin(2.0 * data.height[i]) * std::min(1.0, 5.0 * data.number_density[i]);
+      if (covariance) {
+        data.covariance.assign(n * n, 0.0);
+        for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
+        data.covariance_samples = 5000;
+      }
+      FitOptions options = core_options(1.10);
+      options.interval = true;
+      options.window.low = 1.0;
+      fits.push_back(fit_profile(data, options));
+      ASSERT_EQ(fits.back().status, FitStatus::ok);
+      ASSERT_GT(fits.back().model_error, 0.0);
+      mean += fits.back().temperature.value / trials;
+    }
+    double scatter = 0.0, stated = 0.0;
+    int held = 0;
+    for (const FitResult& fit : fits) {
+      scatter += std::pow(fit.temperature.value - mean, 2) / (trials - 1);
+      stated += fit.statistical_error * fit.statistical_error / trials;
+      held += fit.next_bed_interval.low < mean && mean < fit.next_bed_interval.high;
+      EXPECT_GT(fit.temperature.std_error, 1.5 * fit.statistical_error);
+      EXPECT_LT(fit.temperature_interval.low, fit.next_bed_interval.low);
+      EXPECT_GT(fit.temperature_interval.high, fit.next_bed_interval.high);
+    }
+    EXPECT_NEAR(std::sqrt(stated / scatter), 1.0, 4.0 / std::sqrt(2.0 * trials)) << covariance;
+    EXPECT_NEAR(held, 0.95 * trials, 4.0 * std::sqrt(0.95 * 0.05 * trials)) << covariance;
+  }
+}
+
+// An error of the model that is known beforehand enters where the data do not show it, and changes nothing where they
+// show more.
+TEST(FitProfile, TakesAnErrorOfTheModelThatIsKnownBeforehand) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.6, {11.22, 1.10});
+  FitOptions options = core_options(1.10);
+  const Profile good = profile_of(truth, {}, 60, top_of(truth), 0.005, 7);
+  const FitResult plain = fit_profile(good, options);
+  ASSERT_EQ(plain.model_error, 0.0);
+  options.least_model_error = 0.01;
+  const FitResult with = fit_profile(good, options);
+  EXPECT_DOUBLE_EQ(with.model_error, 0.01);
+  EXPECT_GT(with.temperature.std_error, plain.temperature.std_error);
+  EXPECT_DOUBLE_EQ(with.chi2, plain.chi2) << "by the measured errors alone";
+  Profile bad = good;
+  for (std::size_t i = 0; i < bad.height.size(); ++i)
+    bad.number_density[i] += 0.1 * std::sin(2.0 * bad.height[i]) * std::min(1.0, 5.0 * bad.number_density[i]);
+  const FitResult more = fit_profile(bad, options);
+  ASSERT_GT(more.model_error, 0.02);
+  options.least_model_error = 0.0;
+  EXPECT_DOUBLE_EQ(fit_profile(bad, options).temperature.value, more.temperature.value);
+}
+
 // The same noise with every tenth bin off by 8 errors: the robust fit states what T scatters by, to four standard
 // errors of a variance from 200 profiles, and scatters by less than half of what the plain one does.
 TEST(FitProfile, IsRobustWithAFullCovariance) {

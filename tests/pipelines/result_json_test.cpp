@@ -67,6 +67,8 @@ fit::FitResult a_fit() {
   fit.window_low = 2.5, fit.window_high = 14.25, fit.bins = 22, fit.window_rule = "by hand";
   fit.kernel = {KernelKind::top_hat, 0.75};
   fit.temperature_interval = {fit::FitStatus::ok, 0.22, 0.28, 0.95, true, false};
+  fit.next_bed_interval = {fit::FitStatus::ok, 0.23, 0.27, 0.96, false, true};
+  fit.statistical_error = 0.0075;
   fit.window_sweep = {{3, 13, 18, fit::FitStatus::ok, {0.26, 0.017}, {9.6, 0.18}, 1.4},
                       {4, 12, 15, fit::FitStatus::no_tail, {}, {}, 0}};
   fit.model_comparison = {
@@ -82,6 +84,7 @@ fit::FitResult a_fit() {
 TEST(FitJson, HoldsEveryEstimateWithItsErrorAndUnit) {
   expect_quantities(fit_json(a_fit(), diameter), {{"/temperature", 0.25, 0.0125, "m g D"},
                                                   {"/temperature_over_mg", 0.001, 0.00005, "m"},
+                                                  {"/statistical_error", 0.0075, -1, "m g D"},
                                                   {"/shift", 9.5, 0.11, "D"},
                                                   {"/solid_height", 9.4, 0.12, "D"},
                                                   {"/plateau_density", 1.1, 0.013, "1/D^2"},
@@ -103,6 +106,9 @@ TEST(FitJson, HoldsEveryPlainNumber) {
   expect_numbers(json, {{"/temperature_interval/low", 0.22},
                         {"/temperature_interval/high", 0.28},
                         {"/temperature_interval/confidence", 0.95},
+                        {"/next_bed_interval/low", 0.23},
+                        {"/next_bed_interval/high", 0.27},
+                        {"/next_bed_interval/confidence", 0.96},
                         {"/chi2", 31},
                         {"/dof", 20},
                         {"/chi2_per_dof", 1.55},
@@ -136,6 +142,9 @@ TEST(FitJson, HoldsEveryPlainNumber) {
                       {"/temperature_interval/status", "ok"},
                       {"/temperature_interval/low_open", true},
                       {"/temperature_interval/high_open", false},
+                      {"/next_bed_interval/status", "ok"},
+                      {"/next_bed_interval/low_open", false},
+                      {"/next_bed_interval/high_open", true},
                       {"/temperature_by_window/0/status", "ok"},
                       {"/models/0/model", "fermi"},
                       {"/models/0/plateau_density_free", true},
@@ -202,7 +211,8 @@ fit::Answer an_answer() {
   answer.thermometer = "whole column", answer.model = "fermi";
   answer.temperature = 0.25, answer.std_error = 0.025;
   answer.statistical_error = 0.011, answer.bias_uncertainty = 0.012, answer.spread = 0.013;
-  answer.contact_duration_uncertainty = 0.014;
+  answer.contact_duration_uncertainty = 0.014, answer.misfit_error = 0.016;
+  answer.next_bed_interval = {fit::FitStatus::ok, 0.23, 0.27, 0.85};
   answer.bias = 0.07;
   answer.interval = {fit::FitStatus::ok, 0.21, 0.31, 0.9, false, true};
   answer.solid_height = {9.5, 0.14};
@@ -229,10 +239,14 @@ TEST(AnswerJson, HoldsEveryNumberWithItsErrorAndUnit) {
                            {"/statistical_error", 0.011, -1, "m g D"},
                            {"/contact_duration_uncertainty", 0.014, -1, "m g D"},
                            {"/bias_uncertainty", 0.012, -1, "m g D"},
+                           {"/misfit_error", 0.016, -1, "m g D"},
+                           {"/next_bed_interval/low", 0.23, -1, "m g D"},
+                           {"/next_bed_interval/high", 0.27, -1, "m g D"},
                            {"/spread", 0.013, -1, "m g D"},
                            {"/solid_height", 9.5, 0.14, "D"},
                            {"/readings/0/temperature", 0.26, 0.017, "m g D"}});
   expect_numbers(json, {{"/interval/confidence", 0.9},
+                        {"/next_bed_interval/confidence", 0.85},
                         {"/bias", 0.07},
                         {"/readings/0/bias", 0.04},
                         {"/readings/0/bias_uncertainty", 0.05},

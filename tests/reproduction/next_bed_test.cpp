@@ -49,8 +49,8 @@ struct Held {
     held += low <= value && value <= high;
   }
   // Of 60 intervals of 95 %, 56 +- 1.9 hold the mean of thirty beds, which has an error of its own (a third of a
-  // result's): fewer than 54 by chance in 7 %. Intervals of the fit are wider: they hold the misfit of the model, which
-  // further beds share.
+  // result's): fewer than 54 by chance in 7 %. Of T the interval of the statistical error alone is asked: the misfit of
+  // the model is the same in further beds.
   void expect_as_stated(const char* what) const {
     std::printf("| %s | %d of %d (%.0f %%) |\n", what, held, all, 100.0 * held / all);
     EXPECT_GE(held, 0.9 * all) << what;
@@ -85,7 +85,7 @@ TEST(NextBed, IsWithinTheStatedInterval) {
       };
       judge("temperature_x", temperature, here[0]);
       judge("center_of_mass_rise", rise, here[1]);
-      const Json& interval = one["temperature_interval"];
+      const Json& interval = one["next_bed_interval"];
       for (Held* held : {&fitted, &here[2]})
         held->add(fitted_further, interval["low"].get<double>(), interval["high"].get<double>());
     }
