@@ -18,19 +18,20 @@ constexpr double end_tolerance = 1e-4, farthest_end = 12.0;
 constexpr int end_steps = 40;
 
 // Degrees of freedom behind the errors: those of few samples, or of the scatter, have Student's tails.
-constexpr double normal = 1e300;
+constexpr double normal_dof = 1e300;
 double dof_of_samples(const Bins& bins) {
-  return bins.correlation.size() > 0 && bins.samples > 1 ? bins.samples - 1.0 : normal;
+  return bins.correlation.size() > 0 && bins.samples > 1 ? bins.samples - 1.0 : normal_dof;
 }
 double tail_dof(const FittedWindow& fitted) {
   const double by_samples = dof_of_samples(fitted.bins);
-  const double by_scatter = fitted.good.scaled && fitted.good.dof > 0 ? static_cast<double>(fitted.good.dof) : normal;
+  const double by_scatter =
+      fitted.good.scaled && fitted.good.dof > 0 ? static_cast<double>(fitted.good.dof) : normal_dof;
   return std::min(by_samples, by_scatter);
 }
 
 double quantile_of_chi2(double confidence, double dof) {
-  return dof < normal ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, dof), 2)
-                      : gsl_cdf_chisq_Pinv(confidence, 1.0);
+  return dof < normal_dof ? std::pow(gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, dof), 2)
+                          : gsl_cdf_chisq_Pinv(confidence, 1.0);
 }
 
 // The end of the interval on one side: sqrt(delta chi2) is nearly linear in ln T, so a secant search on it.

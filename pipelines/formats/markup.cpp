@@ -184,6 +184,11 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
+std::string capitalized(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
 std::string markdown(std::string_view text) {
   std::string out;
   for (const char c : text) {

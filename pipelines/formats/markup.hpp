@@ -24,6 +24,9 @@ std::string shown(const Json& quantity);
 // "temperature_over_mg" → "temperature over mg".
 std::string words(std::string name);
 
+// The first letter (ASCII) as a capital.
+std::string capitalized(std::string text);
+
 // 1234567 → "1.2 MB".
 std::string size_text(std::uint64_t bytes);
 

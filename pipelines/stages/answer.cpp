@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
-
+#include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/bed_judgement.hpp"
 
 namespace shakebed::pipelines {
@@ -22,11 +21,6 @@ void put_temperature(Json& out, const std::string& name, double value, double st
                      std::optional<double> diameter) {
   out[name] = quantity_json(value, "m g D", std_error);
   if (diameter) out[name + "_over_mg"] = quantity_json(value * *diameter, "m", std_error * *diameter);
-}
-
-std::string sentence(std::string text) {
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-  return text;
 }
 
 }  // namespace
@@ -109,7 +103,7 @@ AnswerScale answer_scale(const Json& answer) {
 
 std::string answer_text(const Json& answer) {
   const Json* value = find_pointer(answer, "/temperature/value");
-  const std::string verdict = sentence(answer.value("verdict", "")) + ": " + answer.value("why", "");
+  const std::string verdict = capitalized(answer.value("verdict", "")) + ": " + answer.value("why", "");
   if (value == nullptr) return "no temperature. " + verdict;
   const AnswerScale scale = answer_scale(answer);
   const auto number = [&](const char* pointer) {

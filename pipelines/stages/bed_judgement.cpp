@@ -2,18 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
 #include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/hard_disk_trust.hpp"
 
 namespace shakebed::pipelines {
 namespace {
 
-constexpr std::string_view holds = "holds";
+constexpr std::string_view verdict_holds = "holds";
 
 struct Objection {
   std::string verdict, why, advice;
@@ -25,7 +25,7 @@ std::optional<double> number_at(const Json& json, const std::string& pointer) {
 }
 
 std::string sentence(std::string text) {
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  text = capitalized(std::move(text));
   if (!text.empty() && text.back() != '.') text += '.';
   return text;
 }
@@ -63,7 +63,7 @@ class Judge {
 
  private:
   [[nodiscard]] Json without_objection() const {
-    Json out{{"verdict", holds}, {"why", ""}, {"advice", "Quote the numbers with their errors."}};
+    Json out{{"verdict", verdict_holds}, {"why", ""}, {"advice", "Quote the numbers with their errors."}};
     append(out["why"], beds_ > 1 ? fmt::format("{} beds agree, and none of them changed while it was measured", beds_)
                                  : "the bed did not change while it was measured");
     if (as_real_contacts()) append(out["why"], trust_.why);
@@ -143,7 +143,7 @@ Json judgement_of(const SceneOptions& bed, const Json& joined, std::size_t beds)
 }
 
 bool speaks_against(const Json& judgement) {
-  return judgement.is_object() && judgement.contains("verdict") && judgement.at("verdict") != holds;
+  return judgement.is_object() && judgement.contains("verdict") && judgement.at("verdict") != verdict_holds;
 }
 
 std::string judgement_text(const Json& observables) {
