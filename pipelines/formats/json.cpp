@@ -330,6 +330,11 @@ std::string dump_canonical(const Json& json) {
   return out;
 }
 
+double stated_error(const Json& quantity) {
+  const auto error = quantity.find("std_error");
+  return error != quantity.end() && error->is_number() ? error->get<double>() : 0;
+}
+
 Json quantity_json(double value, std::string_view unit, std::optional<double> std_error) {
   Json out;
   out["value"] = value;

@@ -88,4 +88,7 @@ std::string number_text(double value);
 // {"value": v, "std_error": s, "unit": u}; std_error left out when absent.
 Json quantity_json(double value, std::string_view unit, std::optional<double> std_error = std::nullopt);
 
+// Standard error of a quantity, in its unit; 0 where none is stated or none could be had (null).
+double stated_error(const Json& quantity);
+
 }  // namespace shakebed::pipelines

@@ -140,7 +140,7 @@ std::string shown(const Json& quantity) {
   if (quantity.is_number()) return fmt::format("{:.5g}", quantity.get<double>());
   if (!quantity.is_object() || !quantity.contains("value") || !quantity["value"].is_number())
     return escape_markup(dump_canonical(quantity));
-  double value = quantity["value"].get<double>(), error = quantity.value("std_error", 0.0);
+  double value = quantity["value"].get<double>(), error = stated_error(quantity);
   std::string unit = quantity.value("unit", "");
   if (unit == "m") value *= 1e3, error *= 1e3, unit = "mm";
   if (unit == "m/px") value *= 1e3, error *= 1e3, unit = "mm/px";

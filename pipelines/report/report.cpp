@@ -137,7 +137,7 @@ class Report {
         factor = 1;
       }
     }
-    const double ours = (*found)["value"].get<double>() * factor, error = found->value("std_error", 0.0) * factor;
+    const double ours = (*found)["value"].get<double>() * factor, error = stated_error(*found) * factor;
     row.ours = error > 0 ? fmt::format("{:.4g} ± {:.2g}", ours, error) : fmt::format("{:.4g}", ours);
     if (!unit.empty() && unit != "1") row.ours += " " + unit;
     const double off = printed != 0 ? (ours - printed) / std::abs(printed) : ours;

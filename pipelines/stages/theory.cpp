@@ -357,7 +357,7 @@ std::string fit_text(const Json& fit) {
     if (!fit.contains(name)) return;
     const Json& quantity = fit[name];
     const std::string unit = quantity.value("unit", "");
-    double value = quantity["value"].get<double>(), error = quantity.value("std_error", 0.0);
+    double value = quantity["value"].get<double>(), error = stated_error(quantity);
     std::string shown = unit == "1" ? "" : unit;
     if (unit == "m") value *= 1e3, error *= 1e3, shown = "mm";
     out += fmt::format("{:<22} {:>12.6g}{} {}\n", label, value,

@@ -28,7 +28,7 @@ TEST(BenchCommand, WritesOnePageThatNeedsNothingElseAndComparesWithItself) {
   EXPECT_FALSE(json["machine"]["processor"].get<std::string>().empty());
   const std::string page = read_text(folder / "o/bench.html");
   EXPECT_NE(page.find("<svg"), std::string::npos);
-  for (const char* outside : {"<script", "<link rel=\"stylesheet", "src=\"http", "href=\"http", "@import"})
+  for (const char* outside : {"<script src", "<link rel=\"stylesheet", "src=\"http", "href=\"http", "@import"})
     EXPECT_EQ(page.find(outside), std::string::npos) << outside;
   EXPECT_FALSE(std::filesystem::exists(folder / "o/scratch")) << "what it worked with is gone";
 

@@ -51,7 +51,7 @@
   button.onclick = () => set(!playing);
   slider.max = frames - 1;
   slider.oninput = () => { set(false); shown = Number(slider.value); draw(); };
-  new ResizeObserver(draw).observe(canvas);
+  new ResizeObserver(() => requestAnimationFrame(draw)).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   draw(); set(playing);
 })();

@@ -31,7 +31,7 @@
       this.canvas.addEventListener("pointerdown", event => this.point(event));
       this.canvas.addEventListener("pointerleave", () => { this.disk = -1; this.draw(); });
       this.canvas.addEventListener("keydown", event => this.press(event));
-      new ResizeObserver(() => this.draw()).observe(this.canvas);
+      new ResizeObserver(() => requestAnimationFrame(() => this.draw())).observe(this.canvas);
       this.go(0);
     }
     // --- a disk's numbers

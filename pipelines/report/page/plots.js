@@ -102,10 +102,11 @@
       this.buildTools();
       figure.classList.add("answers");
       this.width = 0;
-      new ResizeObserver(() => {
+      // In the next frame: a drawing changes the box's height, which the observer must not see at once.
+      new ResizeObserver(() => requestAnimationFrame(() => {
         const width = Math.round(this.box.clientWidth);
         if (width && width !== this.width) { this.width = width; this.draw(); }
-      }).observe(this.box);
+      })).observe(this.box);
     }
     buildKey() {
       const named = new Set();
