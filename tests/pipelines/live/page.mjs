@@ -64,14 +64,16 @@ const looks = `(() => {
   const ground = (e) => { for (; e; e = e.parentElement) { const c = rgb(getComputedStyle(e).backgroundColor); if (c.length && c[3] !== 0) return c; } return [255, 255, 255]; };
   let smallest = 99, contrast = 21;
   for (const e of document.querySelectorAll("h1,h2,p,label,output,button,select,input,dt,dd,figcaption,pre,footer,.legend span,svg text")) {
-    if (!e.getClientRects().length || (!e.textContent.trim() && e.tagName !== "INPUT")) continue;
+    const shown = e.tagName === "INPUT" ? e.type !== "range" : e.textContent.trim();  // a slider shows no text
+    if (!e.getClientRects().length || !shown) continue;
     const style = getComputedStyle(e), svg = e.tagName === "text";
     smallest = Math.min(smallest, parseFloat(style.fontSize));
     const a = light(rgb(svg ? style.fill : style.color)), b = light(ground(svg ? e.closest("figure") : e));
     contrast = Math.min(contrast, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05));
   }
   const nameless = [...document.querySelectorAll("input,select,button")].filter((e) => !(e.labels?.length || e.textContent.trim())).length;
-  return { smallest, contrast, nameless, wide: document.documentElement.scrollWidth, texts: document.querySelectorAll("svg text").length };
+  return { smallest, contrast, nameless, wide: document.documentElement.scrollWidth,
+    texts: [...document.querySelectorAll("figure svg")].map((chart) => chart.querySelectorAll("text").length) };
 })()`;
 
 async function fits(width, dark) {
@@ -82,7 +84,8 @@ async function fits(width, dark) {
   if (contrast < 4.5) complain(`${name}: contrast ${contrast}`);
   if (nameless > 0) complain(`${name}: ${nameless} controls without a name`);
   if (wide > width) complain(`${name}: ${wide} px wide`);
-  if (texts < 20) complain(`${name}: no charts`);
+  // Each chart has the names of its axes and at least three numbers at each.
+  if (texts.length !== 2 || Math.min(...texts) < 8) complain(`${name}: charts with ${texts} texts`);
   if (pictures) {
     mkdirSync(pictures, { recursive: true });
     writeFileSync(`${pictures}/live-${name}.png`, await page.picture());
