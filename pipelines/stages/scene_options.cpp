@@ -311,7 +311,7 @@ sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks&
     throw InputError(fmt::format("{}: its last frame has {} disks, the bed {}", path.string(), last.size(), count));
   if (disks.species.size() > 1 && disks.species[1].diameter == disks.species[0].diameter)
     throw InputError(
-        fmt::format("{}: which disk is of which species cannot be told: their diameters are the same", path.string()));
+        fmt::format("{}: the species of a disk cannot be determined: the diameters are the same", path.string()));
   std::vector<std::size_t> found(disks.species.size());
   for (std::size_t i = 0; i < last.size(); ++i) {
     const double diameter = i < last.radius.size() ? 2 * last.radius[i] : 1;
