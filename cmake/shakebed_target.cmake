@@ -67,11 +67,12 @@ function(shakebed_test_headers name)
                             <sstream> <string> <vector>)
 endfunction()
 
-# shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [OPTIMIZED])
+# shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [OPTIMIZED]
+#               [LONG patterns...] [STUDY patterns...])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
-# compute long.
+# compute long. LONG, STUDY: names of tests (* and ? as in --gtest_filter) that also get the label long or study.
 function(shakebed_test name)
-  cmake_parse_arguments(ARG "OPTIMIZED" "TIMEOUT" "SOURCES;LABELS;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED" "TIMEOUT" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -91,12 +92,27 @@ function(shakebed_test name)
     endif()
   endif()
   target_compile_definitions(${name} PRIVATE "SHAKEBED_SOURCE_DIR=\"${PROJECT_SOURCE_DIR}\"")
-  # With PRE_TEST discovery a list of labels loses all but its first on the way to ctest: the properties are set by a
-  # script that ctest reads after it has discovered the tests.
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 TEST_LIST ${name}_tests
-                       PROPERTIES TIMEOUT ${ARG_TIMEOUT})
-  set(labels_file "${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake")
-  file(WRITE "${labels_file}" "foreach(test IN LISTS ${name}_tests)\n"
-       "  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARG_LABELS}\")\nendforeach()\n")
+  list(JOIN ARG_LONG ":" long)
+  list(JOIN ARG_STUDY ":" study)
+  set(slow ${ARG_LONG} ${ARG_STUDY})
+  list(JOIN slow ":" slow)
+  shakebed_discover_tests(${name} quick "-${slow}" ${ARG_TIMEOUT} ${ARG_LABELS})
+  if(ARG_LONG)
+    shakebed_discover_tests(${name} long "${long}" ${ARG_TIMEOUT} ${ARG_LABELS} long)
+  endif()
+  if(ARG_STUDY)
+    shakebed_discover_tests(${name} study "${study}" ${ARG_TIMEOUT} ${ARG_LABELS} study)
+  endif()
+endfunction()
+
+# The tests of the program `name` that pass `filter`, with the labels that follow. With PRE_TEST discovery a list of labels
+# loses all but its first on the way to ctest: the labels are set by a script that ctest reads after it has discovered
+# the tests.
+function(shakebed_discover_tests name part filter timeout)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 TEST_FILTER "${filter}"
+                       TEST_LIST ${name}_${part}_tests PROPERTIES TIMEOUT ${timeout})
+  set(labels_file "${CMAKE_CURRENT_BINARY_DIR}/${name}_${part}_labels.cmake")
+  file(WRITE "${labels_file}" "foreach(test IN LISTS ${name}_${part}_tests)\n"
+       "  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARGN}\")\nendforeach()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${labels_file}")
 endfunction()

@@ -48,8 +48,6 @@ void expect_compressibility(std::uint32_t rows, double phi, double expected, dou
   EXPECT_LT(z.std_error(), 1e-3 * expected);
 }
 
-#ifndef SHAKEBED_LONG_TESTS
-
 // 1,024 disks would be 0.05 % low at 0.70: what they miss goes as 1/N.
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottner) {
   expect_compressibility(64, 0.40, 2.1514393, 50, 64, 5);
@@ -77,8 +75,6 @@ TEST(ElasticBed, KeepsItsEnergyAndNeverOverlaps) {
              1e-11);
   expect_law("largest overlap [D]", worst_overlap, 0, 0, 1e-12);
 }
-
-#else
 
 // Towards freezing (0.891) correlations span more disks: 16,384 and more.
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottnerTowardsFreezing) {
@@ -111,8 +107,6 @@ TEST(ElasticBed, KeepsItsEnergyForAHundredMillionCollisions) {
              1e-11);
   expect_law("largest overlap [D]", worst_overlap, 0, 0, 1e-12);
 }
-
-#endif
 
 }  // namespace
 }  // namespace shakebed::sim

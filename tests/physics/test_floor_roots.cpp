@@ -272,8 +272,6 @@ Verdict judge_adversarial(int flights, std::uint64_t seed, int only = -1) {
   return verdict;
 }
 
-#ifndef SHAKEBED_LONG_TESTS
-
 TEST(FloorRoots, AgreeWith60DigitsOnRandomFlights) {
   expect_no_fault("random, 60 digits", judge_random<Digits60>(2'000, 31));
 }
@@ -283,8 +281,6 @@ TEST(FloorRoots, AgreeWithExtendedPrecisionOnRandomFlights) {
 TEST(FloorRoots, AgreeWith60DigitsOnAdversarialFlights) {
   for (int k = 0; k < 7; ++k) expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(300, 33, k));
 }
-
-#else
 
 // 1e7 random flights and 1e5 adversarial ones, in parts of a quarter of a minute; those at Gamma = 1 +- 1e-12, whose
 // turning points all but coincide, take 60 digits some minutes a part.
@@ -311,8 +307,6 @@ INSTANTIATE_TEST_SUITE_P(KindAndPart, AdversarialFloorRoots,
 // Of the first three kinds some begin below the floor and are left out: one part more makes up for them.
 INSTANTIATE_TEST_SUITE_P(KindAndOnePartMore, AdversarialFloorRoots,
                          testing::Combine(testing::Range(0, 3), testing::Values(3)));
-
-#endif
 
 }  // namespace
 }  // namespace shakebed::sim

@@ -28,8 +28,6 @@ Scene bed(std::uint32_t count, double width, double temperature) {
   return scene;
 }
 
-#ifndef SHAKEBED_LONG_TESTS
-
 // Rows of sqrt(3)/2 D from the floor up, dilute gas to crystal, up to where a row holds 1 % of a packed one. The beds
 // are left to themselves: what P_zz is more than the weight above changes the momentum above, so its mean falls as
 // 1/time and is below 0.1 % here.
@@ -74,8 +72,6 @@ TEST(Hydrostatics, PressureCarriesTheWeightAboveInEveryRow) {
     EXPECT_GT(rows, 10);
   }
 }
-
-#else
 
 // f(phi), df = d(phi Z)/phi with Ree and Hoover's pair function: -z/T but for a constant, by hydrostatics.
 double enskog_f(double phi) {
@@ -182,8 +178,6 @@ void expect_enskog_profile(double reduced, double from, double length) {
 
 TEST(Hydrostatics, FluidBedHasEnskogsProfileAt15CriticalTemperatures) { expect_enskog_profile(15, 8, 16000); }
 TEST(Hydrostatics, FluidBedHasEnskogsProfileAt40CriticalTemperatures) { expect_enskog_profile(40, 5, 16000); }
-
-#endif
 
 }  // namespace
 }  // namespace shakebed::sim

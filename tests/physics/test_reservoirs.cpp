@@ -87,8 +87,6 @@ void expect_equilibrium(const char* name, const Bath& bath, std::uint32_t count 
   expect_law("energy ledger, of the energy held", ledger.imbalance() / ledger.initial, 0, 0, 1e-10);
 }
 
-#ifndef SHAKEBED_LONG_TESTS
-
 TEST(Reservoir, LangevinKicksHoldTheBedInEquilibrium) {
   expect_equilibrium("Langevin", LangevinBath{temperature, 2, 0.25});
 }
@@ -126,15 +124,11 @@ TEST(Reservoir, WhiteNoiseIsNotIsothermal) {
   EXPECT_GT(dilute, 2 * dense);
 }
 
-#else
-
 // Every floor contact redraws from the flux at T: the same equilibrium without anything done in the bulk. Heat has to
 // be conducted up from the floor, and the bed's T wanders the more slowly the higher it is: a low one, for a long time.
 TEST(Reservoir, ThermalFloorHoldsTheBedInEquilibrium) {
   expect_equilibrium("thermal floor", ThermalFloor{temperature}, 60, 320'000);
 }
-
-#endif
 
 }  // namespace
 }  // namespace shakebed::sim

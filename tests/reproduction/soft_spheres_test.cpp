@@ -41,11 +41,11 @@ struct Bed {
   double fitted = 0, cpu_seconds = 0, elastic_share = 0;
 };
 
-struct Scene {
+struct SoftScene {
   double restitution = 0, friction = 0;
   int layers = 0, gamma = 0, periods = 0;
   [[nodiscard]] int count() const { return 20 * layers; }
-  auto operator<=>(const Scene&) const = default;
+  auto operator<=>(const SoftScene&) const = default;
 };
 
 std::vector<std::string> cells_of(const std::string& line) {
@@ -76,16 +76,16 @@ double fitted_temperature(const std::filesystem::path& profile, const std::files
 }
 
 // The reference by scene and contact time [us]: means over starts.
-std::map<Scene, std::map<int, Bed>> reference(const std::filesystem::path& folder) {
+std::map<SoftScene, std::map<int, Bed>> reference(const std::filesystem::path& folder) {
   const std::filesystem::path home = SHAKEBED_SOFT_SPHERES;
   std::ifstream file(home / "soft_spheres.csv");
   std::string line;
   std::getline(file, line);
-  std::map<Scene, std::map<int, std::vector<Bed>>> beds;
+  std::map<SoftScene, std::map<int, std::vector<Bed>>> beds;
   while (std::getline(file, line)) {
     const std::vector<std::string> cells = cells_of(line);
     const auto number = [&](std::size_t i) { return std::stod(cells.at(i)); };
-    const Scene scene{number(1), number(2), static_cast<int>(number(3)), static_cast<int>(number(4)),
+    const SoftScene scene{number(1), number(2), static_cast<int>(number(3)), static_cast<int>(number(4)),
                       static_cast<int>(number(9))};
     beds[scene][static_cast<int>(number(5))].push_back(
         {{number(10), number(11)},
@@ -94,7 +94,7 @@ std::map<Scene, std::map<int, Bed>> reference(const std::filesystem::path& folde
          fitted_temperature(home / "profiles" / (cells[0] + ".csv"), folder),
          number(16)});
   }
-  std::map<Scene, std::map<int, Bed>> means;
+  std::map<SoftScene, std::map<int, Bed>> means;
   for (const auto& [scene, by_time] : beds) {
     for (const auto& [time, all] : by_time) {
       Bed& mean = means[scene][time];
@@ -114,7 +114,7 @@ std::map<Scene, std::map<int, Bed>> reference(const std::filesystem::path& folde
 
 // The tangential restitution of a sphere on a spring of 2/7 of the normal stiffness and half of its damping: its
 // tangential oscillation takes as long as the normal one and is damped 7/4 times as much.
-double tangential(const Scene& scene) { return scene.friction > 0 ? std::pow(scene.restitution, 1.75) : 0; }
+double tangential(const SoftScene& scene) { return scene.friction > 0 ? std::pow(scene.restitution, 1.75) : 0; }
 
 struct Kind {
   const char *id, *name;
@@ -127,11 +127,11 @@ constexpr Kind kinds[] = {{"tc", "t_c 1.4 us", "1.42784 us"},
                           {"visc", "viscoelastic, no t_c", "0 s", true}};
 
 // Without a contact clock, dense beds that lose little have no end of contacts.
-bool can_run(const Scene& scene, const Kind& kind) {
+bool can_run(const SoftScene& scene, const Kind& kind) {
   return !kind.viscoelastic || scene.layers == 5 || scene.restitution < 0.9;
 }
 
-std::string stage_of(const Scene& scene, const Kind& kind) {
+std::string stage_of(const SoftScene& scene, const Kind& kind) {
   const double floor_speed = scene.gamma * gravity / (2 * std::numbers::pi * frequency);
   std::string law = fmt::format(R"("restitution": {:g})", scene.restitution);
   if (kind.viscoelastic)
@@ -169,7 +169,7 @@ Number from_the_packing(const std::filesystem::path& table, const std::string& n
   return {mean, std::max(std::sqrt(square), within) / std::sqrt(n)};
 }
 
-std::map<std::string, Bed> hard_disks(const Scene& scene, const ScratchFolder& folder) {
+std::map<std::string, Bed> hard_disks(const SoftScene& scene, const ScratchFolder& folder) {
   std::string stages;
   for (const Kind& kind : kinds)
     if (can_run(scene, kind)) stages += (stages.empty() ? "" : ",\n") + stage_of(scene, kind);
@@ -195,11 +195,11 @@ std::map<std::string, Bed> hard_disks(const Scene& scene, const ScratchFolder& f
 }
 
 // Height of the centre of mass of the packing from which the rise is measured: rows of 20 disks.
-double packed(const Scene& scene) { return 0.5 + 0.5 * (scene.layers - 1) * std::numbers::sqrt3 / 2; }
+double packed(const SoftScene& scene) { return 0.5 + 0.5 * (scene.layers - 1) * std::numbers::sqrt3 / 2; }
 
 std::string per_cent(const Number& r) { return fmt::format("{:+.0f} ± {:.0f}", 100 * (r.value - 1), 100 * r.error); }
 
-void print_row(const Scene& scene, const char* name, const Bed& bed, const Bed& soft) {
+void print_row(const SoftScene& scene, const char* name, const Bed& bed, const Bed& soft) {
   const Number rise{soft.centre.value - packed(scene), soft.centre.error};
   std::printf("| %g | %g | %d | %d | %s | %s | %s | %s | %+.0f | %.2f | %.1f |\n", scene.restitution, scene.friction,
               scene.layers, scene.gamma, name, per_cent(ratio(bed.x, soft.x)).c_str(),
@@ -207,7 +207,7 @@ void print_row(const Scene& scene, const char* name, const Bed& bed, const Bed& 
               100 * (bed.fitted / soft.fitted - 1), bed.elastic_share, bed.cpu_seconds);
 }
 
-const HardDiskBed* stored_bed(const Scene& scene) {
+const HardDiskBed* stored_bed(const SoftScene& scene) {
   for (const HardDiskBed& bed : shakebed::pipelines::hard_disk_study()) {
     if (bed.restitution == scene.restitution && bed.friction == scene.friction && bed.gamma == scene.gamma &&
         std::abs(bed.column_number - scene.count() / width) < 0.1)

@@ -12,12 +12,12 @@ namespace {
 using pipelines::Json;
 using pipelines::read_json;
 
-const std::string source = SHAKEBED_SOURCE_DIR;
+const std::string project = SHAKEBED_SOURCE_DIR;
 
 // The first beds of the design, run again: to the six digits that are stored (another machine's chaos would show).
 TEST(Inference, RunsTheStoredBedsAgain) {
   ScratchFolder folder;
-  const std::string recipe = source + "/pipelines/recipes/clement-rajchenbach/infer.json";
+  const std::string recipe = project + "/pipelines/recipes/clement-rajchenbach/infer.json";
   const ProgramResult result = run_shakebed(
       {"run", recipe, "--out", "out", "--jobs", "2", "--set", "/stages/posterior/stored=\"\"", "--set",
        "/stages/posterior/first=24", "--set", "/stages/posterior/rounds=0", "--set", "/stages/posterior/best=0"},
@@ -25,7 +25,7 @@ TEST(Inference, RunsTheStoredBedsAgain) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json again = read_json(folder / "out/posterior/beds.json")["beds"];
   const Json stored =
-      read_json(source + "/reference-data/quinn-hong-2000/measured/clement-rajchenbach-beds.json")["beds"];
+      read_json(project + "/reference-data/quinn-hong-2000/measured/clement-rajchenbach-beds.json")["beds"];
   ASSERT_EQ(again.size(), 24U);
   for (std::size_t i = 0; i < 24; ++i) {
     EXPECT_EQ(again[i]["values"], stored[i]["values"]);

@@ -21,7 +21,7 @@ using namespace shakebed::tests;
 namespace fs = std::filesystem;
 
 // A bed of 40 disks, photographed and found again: half a second of CPU.
-std::string recipe(const std::string& scale = "0.25 mm/px") {
+std::string image_recipe(const std::string& scale = "0.25 mm/px") {
   return R"({ "name": "camera", "stages": [
     { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 },
       "gravity": "9.81 m/s^2", "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
@@ -35,7 +35,7 @@ std::string recipe(const std::string& scale = "0.25 mm/px") {
 class ImageFaults : public testing::Test {
  protected:
   void SetUp() override {
-    write_text(folder_ / "r.json", recipe());
+    write_text(folder_ / "r.json", image_recipe());
     const ProgramResult result = run("expected");
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
@@ -215,7 +215,7 @@ TEST_F(ImageFaults, FramesVanishWhileTheyAreRead) {
 TEST_F(ImageFaults, MemoryIsShort) {
   // From about 300 MB of addresses on the libraries of the pictures can be loaded; frames of six million pixels then
   // want more than is there.
-  write_text(folder_ / "r.json", recipe("0.012 mm/px"));
+  write_text(folder_ / "r.json", image_recipe("0.012 mm/px"));
   int started = 0;
   for (const rlim_t megabytes : {60, 420, 500}) {
     start_from({"bed"});

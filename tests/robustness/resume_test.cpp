@@ -17,7 +17,7 @@ using namespace shakebed::tests;
 namespace fs = std::filesystem;
 
 // Everything that a checkpoint has to hold: annealing, every observer, frames, spins, contact clocks, a bath's numbers.
-std::string recipe(int replicas) {
+std::string bed_recipe(int replicas) {
   return R"({ "name": "resume", "stages": [
     { "stage": "simulate", "id": "bed", "seed": 3, "units": "reduced",
       "disks": { "count": 100, "restitution": 0.9, "friction": 0.1, "contact_duration": 1e-3 },
@@ -44,7 +44,7 @@ std::map<std::string, std::string> results_of(const fs::path& out) {
 
 void kill_and_resume(int replicas, std::uint32_t seed) {
   ScratchFolder folder;
-  write_text(folder / "r.json", recipe(replicas));
+  write_text(folder / "r.json", bed_recipe(replicas));
   const ProgramResult undisturbed = run_shakebed({"run", "r.json", "--out", "whole"}, folder.path());
   ASSERT_EQ(undisturbed.exit_code, 0) << undisturbed.err;
   const auto expected = results_of(folder / "whole");
@@ -86,7 +86,7 @@ TEST(Resume, SoDoReplicas) { kill_and_resume(2, 2); }
 // What cannot be read is said, and the run begins anew.
 TEST(Resume, ADamagedCheckpointIsNotUsed) {
   ScratchFolder folder;
-  write_text(folder / "r.json", recipe(1));
+  write_text(folder / "r.json", bed_recipe(1));
   const ProgramResult undisturbed = run_shakebed({"run", "r.json", "--out", "whole"}, folder.path());
   ASSERT_EQ(undisturbed.exit_code, 0) << undisturbed.err;
   fs::path checkpoint;

@@ -90,7 +90,7 @@ void finder(const Effort& effort, StageResult& result) {
   result.tables.push_back(std::move(table));
 }
 
-void hard_cases(const Effort& effort, StageResult& result) {
+void extract_hard_cases(const Effort& effort, StageResult& result) {
   effort.step("extract: hard cases");
   const fs::path scratch = fs::path(effort.scratch) / "hard-cases";
   fs::create_directories(scratch);
@@ -179,7 +179,7 @@ StageResult bench_extract(const Effort& effort) {
   result.name = "extract", result.title = "extract: disks in pictures";
   result.cpu_seconds = cpu_seconds_of([&] {
     finder(effort, result);
-    hard_cases(effort, result);
+    extract_hard_cases(effort, result);
     growth(effort, result);
   });
   return result;

@@ -173,7 +173,7 @@ void there_and_back(const Effort& effort, StageResult& result) {
                   readings.size(), 1e6 * all, 1e6 * back));
 }
 
-void hard_cases(const Effort& effort, StageResult& result) {
+void map_hard_cases(const Effort& effort, StageResult& result) {
   effort.step("map: hard cases");
   const auto add = [&](const std::string& name, double limit, const std::function<void(HardCase&)>& work) {
     effort.check_interrupted();
@@ -235,7 +235,7 @@ StageResult bench_map(const Effort& effort) {
     jump_heights(effort, result);
     bounce_statistics(effort, result);
     there_and_back(effort, result);
-    hard_cases(effort, result);
+    map_hard_cases(effort, result);
   });
   return result;
 }

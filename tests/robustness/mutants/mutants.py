@@ -45,10 +45,7 @@ PROGRAMS = {
     "pipelines_images_test": "tests/pipelines/pipelines_images_test",
     "test_physics": "tests/physics/test_physics",
     "digits_test": "tests/robustness/digits_test",
-    "malformed_recipe_test": "tests/robustness/malformed_recipe_test",
-    "damaged_recipe_test": "tests/robustness/damaged_recipe_test",
-    "safety_test": "tests/robustness/safety_test",
-    "resume_test": "tests/robustness/resume_test",
+    "test_robustness": "tests/robustness/test_robustness",
 }
 # Tests that take more than a second (release build, 24 November 2026): they run when the quick ones have noticed nothing.
 SLOW = {
@@ -65,11 +62,10 @@ SLOW = {
 # The tests of a room first, then those of the rooms above.
 ORDER = {
     "statistics": ("test_statistics", "test_sim", "test_fit", "test_ingest", "test_numbers", "test_pipelines"),
-    "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "resume_test"),
+    "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "test_robustness"),
     "fit": ("test_fit", "test_numbers", "test_pipelines", "digits_test"),
     "ingest": ("test_ingest", "extract_numbers_test", "pipelines_images_test"),
-    "pipelines": ("extract_numbers_test", "test_numbers", "test_pipelines", "pipelines_images_test", "malformed_recipe_test", "damaged_recipe_test",
-                  "safety_test", "resume_test"),
+    "pipelines": ("extract_numbers_test", "test_numbers", "test_pipelines", "pipelines_images_test", "test_robustness"),
 }
 
 
