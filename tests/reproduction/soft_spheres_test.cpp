@@ -86,7 +86,7 @@ std::map<SoftScene, std::map<int, Bed>> reference(const std::filesystem::path& f
     const std::vector<std::string> cells = cells_of(line);
     const auto number = [&](std::size_t i) { return std::stod(cells.at(i)); };
     const SoftScene scene{number(1), number(2), static_cast<int>(number(3)), static_cast<int>(number(4)),
-                      static_cast<int>(number(9))};
+                          static_cast<int>(number(9))};
     beds[scene][static_cast<int>(number(5))].push_back(
         {{number(10), number(11)},
          {number(12), number(13)},
