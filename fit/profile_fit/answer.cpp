@@ -305,8 +305,8 @@ class AnswerFinder {
       answer_.advice = "Measure longer, or at finer heights where the density falls.";
       return;
     }
-    answer_.why = misfit + "The " + per_cent(at.confidence) + " interval of T reaches from " + number(at.low) + " to " +
-                  number(at.high) + " m g D, over a factor of " + number(at.high / at.low, 2) + ".";
+    answer_.why = misfit + "The " + per_cent(at.confidence) + " interval of T spans a factor of " +
+                  number(at.high / at.low, 2) + ".";
     answer_.advice = "Quote this range, not one T. " + answer_.advice;
   }
 

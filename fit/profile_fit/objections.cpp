@@ -111,7 +111,7 @@ class ProfileReader {
     std::nth_element(relative.begin(), middle, relative.end());
     if (*middle <= greatest_error) return;
     object("Where the bed is densest, the density is uncertain by " + number(100.0 * *middle, 2) + " % of itself.",
-           "Take more photographs, or measure longer.");
+           "Take more photographs of the bed from the side, or measure longer.");
   }
 
   void look_at_fall() {
@@ -119,12 +119,15 @@ class ProfileReader {
     const double error =
         measured_.errors_known ? std::hypot(error_of_mean(densest()), error_of_mean(measured_.size() - 1)) : 0.0;
     if (top <= fallen * greatest_ && greatest_ - top >= fall_errors * error) return;
-    const bool by_errors = top <= fallen * greatest_;
-    object("The density does not " + std::string(by_errors ? "clearly " : "") + "fall with height: it is " +
-               number(greatest_, 2) + " per D^2 where it is greatest, and " + number(top, 2) + " at the top, " +
-               number(measured_.height.back(), 3) + " D" + (by_errors ? ", with errors as large as that" : "") + ".",
-           "T follows from how the density falls: look at the bed from the side, with floor and surface in view, and "
-           "measure heights upwards.");
+    const std::string values = number(greatest_, 2) + " per D^2 where it is greatest, and " + number(top, 2) +
+                               " at the top, " + number(measured_.height.back(), 3) + " D";
+    if (top > fallen * greatest_)
+      object("The density does not fall with height: it is " + values + ".",
+             "T follows from how the density falls: look at the bed from the side, with floor and surface in view, and "
+             "measure heights upwards.");
+    else if (found_.empty())
+      object("The density does not fall by more than its errors: it is " + values + ".",
+             "Take more photographs of the bed from the side, or measure longer.");
   }
 
   // The part of the area that belongs to height i [1/D].

@@ -45,7 +45,7 @@ std::string number_html(const Json& answer, const AnswerScale& scale) {
                        prose(scale.name), number_text(*low), *low, number_text(*high), *high, scale.unit);
   const auto value = in_scale(answer, "/temperature/value", scale.factor),
              error = in_scale(answer, "/temperature/std_error", scale.factor);
-  if (!value) return "no temperature";
+  if (!value) return "";
   return fmt::format("{} = <data value=\"{}\">{:.4g}</data> ± {:.2g} {}", prose(scale.name), number_text(*value),
                      *value, error.value_or(0), scale.unit);
 }
@@ -91,6 +91,7 @@ std::string solid_fact_html(const FinishedStage& stage, int&) {
   const Json *all = find_pointer(stage.result, "/answer/solid_height"),
              *own = find_pointer(stage.result, "/solid_height");
   if ((all != nullptr && all->is_object()) || own == nullptr || !own->is_object()) return "";
+  if (!stage.result.value("describes_data", true)) return "";
   return fact("height of the solid, by " + stage.result.value("model", "the model") + " alone", shown(*own));
 }
 
@@ -134,12 +135,13 @@ std::string fit_html(const FinishedStage& stage, int&) {
     out += fmt::format("<p><strong>{}</strong></p>\n", prose(answer_text(*answer)));
   if (!fit.value("describes_data", true))
     out += fmt::format(
-        "<p>The model alone does not describe this profile: {}. Its numbers below are none of the bed.</p>\n",
+        "<p>The model alone does not describe this profile: {}. Its numbers below are not those of the bed.</p>\n",
         prose(fit.value("why_not", "")));
-  out += fmt::format("<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n<div class=\"scroll\"><table>\n",
-                     escape_markup(fit.value("model", "")), shown(fit["window"]["low"]), shown(fit["window"]["high"]),
-                     fit["window"].value("bins", 0), escape_markup(fit["window"].value("rule", "")));
-  out += "<tr><th>number</th><th></th></tr>\n";
+  out += fmt::format("<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n", escape_markup(fit.value("model", "")),
+                     shown(fit["window"]["low"]), shown(fit["window"]["high"]), fit["window"].value("bins", 0),
+                     escape_markup(fit["window"].value("rule", "")));
+  if (!fit.contains("temperature")) return out;
+  out += "<div class=\"scroll\"><table>\n<tr><th>number</th><th></th></tr>\n";
   for (const char* key : {"temperature_over_mg", "temperature", "solid_height", "solid_height_by_sum_rule", "shift",
                           "plateau_density", "column_number", "critical_temperature_over_mg", "critical_temperature",
                           "reduced_temperature", "chi2_per_dof", "relative_misfit"}) {

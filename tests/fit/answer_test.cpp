@@ -411,7 +411,7 @@ TEST(Answer, IsARangeWhereTheIntervalSpansAFactorOfTwo) {
   EXPECT_GT(answer.interval.high, 2.0 * answer.interval.low);
   EXPECT_LT(answer.interval.low, 0.04);
   EXPECT_GT(answer.interval.high, 0.04);
-  EXPECT_THAT(answer.why, testing::HasSubstr("over a factor of"));
+  EXPECT_THAT(answer.why, testing::HasSubstr("spans a factor of"));
 }
 
 // Rows of a crystal seen through no window: two of them may lie within a diameter, which is no wrong unit.
