@@ -44,6 +44,7 @@ class ProfileReader {
     }
     look_at_heights();
     look_at_units();
+    if (!found_.empty()) return found_;  // what follows would be of the wrong unit
     look_at_errors();
     look_at_fall();
     look_at_order();
