@@ -231,8 +231,8 @@ class AnswerFinder {
     }
     if (farthest_ != nullptr) {
       answer_.why = "T depends on the part of the profile it is read from: " + number(chosen_->temperature) +
-                    " m g D from the " + chosen_->thermometer + ", " + number(farthest_->temperature) + " from the " +
-                    farthest_->thermometer + ".";
+                    " m g D (" + chosen_->thermometer + ") or " + number(farthest_->temperature) + " m g D (" +
+                    farthest_->thermometer + ").";
       answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
       return;
     }
