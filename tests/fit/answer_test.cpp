@@ -329,7 +329,7 @@ TEST(Answer, OfABedWithABackgroundIsNotOneTemperature) {
 }
 
 TEST(Answer, OfTwoLayersWithAGapIsNoTemperature) {
-  const auto layers = [](double z) { return 0.5 * std::exp(-z) + 0.2 * std::exp(-std::pow((z - 9.0) / 1.3, 2)); };
+  const auto layers = [](double z) { return std::exp(-1.2 * z) + 0.3 * std::exp(-std::pow((z - 9.0) / 1.3, 2)); };
   expect_not_determined(find_answer(made_of(13.0, layers, [](double) { return 0.003; })), "above a gap");
 }
 
