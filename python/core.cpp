@@ -331,18 +331,23 @@ py::dict estimate(const fit::Estimate& value) {
 
 py::dict answer_of(const fit::Answer& answer) {
   py::dict out;
+  // No number where there is no answer.
+  const auto number = [&](double value) -> py::object {
+    if (!answer.ok()) return py::none();
+    return py::float_(value);
+  };
   out["status"] = std::string(to_string(answer.status));
   out["verdict"] = std::string(to_string(answer.verdict));
   out["why"] = answer.why;
   out["advice"] = answer.advice;
-  out["temperature"] = answer.temperature;
-  out["std_error"] = answer.std_error;
-  out["statistical_error"] = answer.statistical_error;
-  out["bias_uncertainty"] = answer.bias_uncertainty;
-  out["contact_duration_uncertainty"] = answer.contact_duration_uncertainty;
-  out["spread"] = answer.spread;
-  out["low"] = answer.interval.low;
-  out["high"] = answer.interval.high;
+  out["temperature"] = number(answer.temperature);
+  out["std_error"] = number(answer.std_error);
+  out["statistical_error"] = number(answer.statistical_error);
+  out["bias_uncertainty"] = number(answer.bias_uncertainty);
+  out["contact_duration_uncertainty"] = number(answer.contact_duration_uncertainty);
+  out["spread"] = number(answer.spread);
+  out["low"] = number(answer.interval.low);
+  out["high"] = number(answer.interval.high);
   out["confidence"] = answer.interval.confidence;
   out["solid_height"] = estimate(answer.solid_height);
   out["thermometer"] = answer.thermometer;

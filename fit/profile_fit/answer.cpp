@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fit/profile_fit/measured_profile.hpp"
+#include "fit/profile_fit/objections.hpp"
 #include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 
@@ -22,6 +23,10 @@ constexpr double significant = 3.0, significant_kinetic = 2.0;
 constexpr double admissible_uncertainty = 0.15;
 // A model fits that misses the densities by up to so many times what it misses on equilibrium beds.
 constexpr double admissible_misfit = 2.0;
+// What is known of the misfit is of beds whose windows hold this density and more. Where a window holds less, a model
+// may miss as much less: else a tail over a uniform background, as false disks make, passes for that of a hot gas.
+// [1/D^2]
+constexpr double usual_density = 0.5;
 // The misfit that is known of beds without a crystal: none that matters. Below, a model misses the densities by so much
 // more; weights hold it also where the data are too poor to show it, as they do in the beds from which the biases are
 // known. Else 60 photographs gave T 2 % lower, between 1 and 2 T_c, than all of the same beds' densities. [1/D^2]
@@ -31,8 +36,9 @@ constexpr double misfit_of_fluids = 0.005;
 constexpr double row_modulation = 1.633;
 // A thermometer is preferred to one before it in the list where its scatter is less than this part of the other's.
 constexpr double clearly_less = 0.8;
-// An interval that reaches farther than this in ln T, a factor of twenty, says that T is not known: its ends are open.
-constexpr double widest_interval = 3.0;
+// An interval whose ends differ by more than this factor does not determine T. One that reaches farther from T than
+// this in ln T, a factor of twenty, does not even bound it.
+constexpr double widest_factor = 2.0, widest_interval = 3.0;
 // Steps in which the known bias and the temperature at which it is looked up settle.
 constexpr int bias_steps = 4;
 // The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
@@ -55,17 +61,32 @@ class AnswerFinder {
   Answer run() {
     answer_.temperature_x = input_.temperature_x;
     answer_.temperature_z = input_.temperature_z;
-    if (!read_thermometers()) return answer_;
+    if (!is_readable() || !read_thermometers()) return answer_;
     choose();
     compare_readings();
     judge();
     combine();
+    judge_interval();
     find_next_bed_interval();
     find_solid_height();
     return answer_;
   }
 
  private:
+  // False when something speaks against any temperature; the answer then says what.
+  bool is_readable() {
+    std::vector<Objection> all = input_.objections;
+    const bool velocities = input_.temperature_x || input_.temperature_z;
+    for (Objection& one : objections_to(seen_, input_.column_number, velocities)) all.push_back(std::move(one));
+    if (all.empty()) return true;
+    answer_.status = FitStatus::unreadable;
+    for (const Objection& one : all) {
+      answer_.why += (answer_.why.empty() ? "" : " ") + one.why;
+      answer_.advice += (answer_.advice.empty() ? "" : " ") + one.advice;
+    }
+    return false;
+  }
+
   [[nodiscard]] FitOptions options_of(const Thermometer& thermometer) const {
     FitOptions options;
     options.model = thermometer.model;
@@ -210,15 +231,16 @@ class AnswerFinder {
     }
     if (farthest_ != nullptr) {
       answer_.why = "T depends on the part of the profile it is read from: " + number(chosen_->temperature) +
-                    " m g D from the " + chosen_->thermometer + ", " + number(farthest_->temperature) + " from the " +
-                    farthest_->thermometer + ".";
+                    " m g D (" + chosen_->thermometer + ") or " + number(farthest_->temperature) + " m g D (" +
+                    farthest_->thermometer + ").";
       answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
       return;
     }
     const ThermometerReading& whole = whole_column();
-    const double misfit = known_misfit(whole.temperature) + row_modulation * seen_.rows_seen;
+    const double misfit = std::min(1.0, greatest_density(whole) / usual_density) *
+                          (known_misfit(whole.temperature) + row_modulation * seen_.rows_seen);
     answer_.verdict = Verdict::model_does_not_fit;
-    if (whole.model_error > admissible_misfit * misfit) {
+    if (whole.model_error > std::max(least_misfit_, admissible_misfit * misfit)) {
       answer_.why = "The best model misses the densities by " + number(whole.model_error, 2) + " per D^2, " +
                     number(whole.model_error / misfit, 2) +
                     " times as much as it does on beds in equilibrium at this temperature.";
@@ -233,6 +255,17 @@ class AnswerFinder {
     answer_.advice = std::hypot(answer_.bias_uncertainty, answer_.misfit_error) > answer_.statistical_error
                          ? "Most of the uncertainty is the model's: measuring longer does not lessen it."
                          : "Most of the uncertainty is statistical: measure longer to lessen it.";
+  }
+
+  // In the window of a reading [1/D^2].
+  [[nodiscard]] double greatest_density(const ThermometerReading& reading) const {
+    double greatest = 0.0;
+    for (std::size_t i = 0; i < seen_.profile.height.size(); ++i) {
+      const double z = seen_.profile.height[i];
+      if (z >= reading.window_low && z <= reading.window_high)
+        greatest = std::max(greatest, seen_.profile.number_density[i]);
+    }
+    return greatest;
   }
 
   // The whole column's reading whose misfit is known.
@@ -255,13 +288,26 @@ class AnswerFinder {
       take_the_range();
       return;
     }
-    double far = quantile() * a.std_error / a.temperature;
-    if (far > widest_interval) {
-      far = widest_interval;
-      a.interval.low_open = a.interval.high_open = true;
-    }
+    const double far = std::min(quantile() * a.std_error / a.temperature, widest_interval);
     a.interval.low = a.temperature * std::exp(-far);
     a.interval.high = a.temperature * std::exp(far);
+  }
+
+  // An interval that is too wide leaves T open, however well the model fits.
+  void judge_interval() {
+    const Interval& at = answer_.interval;
+    if (answer_.verdict == Verdict::no_single_temperature || at.high < widest_factor * at.low) return;
+    const std::string misfit = answer_.verdict == Verdict::model_does_not_fit ? answer_.why + " " : "";
+    answer_.verdict = Verdict::no_single_temperature;
+    if (std::log(at.high / answer_.temperature) >= widest_interval) {
+      answer_.status = FitStatus::unreadable;
+      answer_.why = misfit + "The profile does not even say within a factor of twenty what T is.";
+      answer_.advice = "Measure longer, or at finer heights where the density falls.";
+      return;
+    }
+    answer_.why = misfit + "The " + per_cent(at.confidence) + " interval of T spans a factor of " +
+                  number(at.high / at.low, 2) + ".";
+    answer_.advice = "Quote this range, not one T. " + answer_.advice;
   }
 
   // Student's, with the degrees of freedom that the statistical part leaves the whole uncertainty [Welch1947].

@@ -15,6 +15,11 @@
 // Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
+// What speaks against reading any temperature: why, and what to do; a sentence or more each.
+struct Objection {
+  std::string why, advice;
+};
+
 struct AnswerInput {
   Profile profile{};
   Kernel kernel{};  // what it was measured through
@@ -25,6 +30,8 @@ struct AnswerInput {
   // One standard error of T, relative, that the simulation's contact duration leaves; 0 where nothing is simulated.
   double contact_duration_effect = 0.0;
   double confidence = 0.95;
+  // What whoever measured the profile knows against it, beside what the profile itself shows (objections.hpp).
+  std::vector<Objection> objections{};
 };
 
 enum class Verdict { one_temperature, model_does_not_fit, no_single_temperature };
@@ -48,7 +55,7 @@ struct ThermometerReading {
 
 struct Answer {
   FitStatus status = FitStatus::not_converged;  // ok: there is an answer; else `why` says what is wrong
-  Verdict verdict = Verdict::model_does_not_fit;
+  Verdict verdict = Verdict::no_single_temperature;
   std::string why, advice;  // a sentence each
 
   std::string thermometer, model;             // that gave T
@@ -60,8 +67,7 @@ struct Answer {
   double contact_duration_uncertainty = 0.0;  // of the simulation that gave the profile
   double std_error = 0.0;                     // all of these in quadrature
   double bias = 0.0;                          // what has been taken off, relative
-  // Of T; with no_single_temperature the range of all readings and kinetic T. Ends that are open lie a factor of twenty
-  // away: T is then not known.
+  // Of T; with no_single_temperature the range of all readings and kinetic T.
   Interval interval;
   // Of the T that this thermometer reads, by the statistical error alone: where further beds lie, on average. The other
   // parts are the same for all of them.

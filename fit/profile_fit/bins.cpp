@@ -118,9 +118,9 @@ Bins bins_of(const MeasuredProfile& measured, const Window& window, FitResult* r
     weigh_by_smooth_errors(covariance, bins);
   } else if (bins.samples > 0 && too_few_samples(bins.samples, n)) {
     if (result != nullptr) {
-      result->warnings.push_back("the covariance comes from " + std::to_string(bins.samples) +
-                                 " independent samples, too few to weigh " + std::to_string(n) +
-                                 " bins by it: the weights are diagonal, the errors come through the covariance");
+      result->warnings.push_back("Only " + std::to_string(bins.samples) + " independent samples for " +
+                                 std::to_string(n) +
+                                 " heights: the fit ignores correlations between heights (its errors include them).");
     }
     weigh_by_smooth_errors(covariance, bins);
   } else {

@@ -269,6 +269,8 @@ std::string_view to_string(FitStatus status) {
       return "unresolved temperature";
     case FitStatus::undefined_model:
       return "undefined model";
+    case FitStatus::unreadable:
+      return "unreadable";
   }
   return "unknown";
 }

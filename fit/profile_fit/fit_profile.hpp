@@ -108,6 +108,7 @@ enum class FitStatus {
   no_tail,                 // the profile does not fall: the temperature is undetermined
   unresolved_temperature,  // the tail is sharper than bins and kernel can tell: only an upper bound (interval)
   undefined_model,         // the equation of state has a pole or no value at this phi_0
+  unreadable,              // of an answer: something speaks against any temperature (answer.hpp)
 };
 std::string_view to_string(FitStatus status);
 

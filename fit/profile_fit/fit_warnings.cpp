@@ -87,13 +87,24 @@ void warn_about_the_sum_rule(FitResult& result) {
 
 }  // namespace
 
-void warn_about_units(const MeasuredProfile& measured, const FitOptions& options, FitResult& result) {
+bool heights_look_like_metres(const MeasuredProfile& measured) {
   const double range = measured.height.back() - measured.height.front();
-  if (range > 0.0 && range < least_range && measured.size() >= range_bins) {
-    result.warnings.push_back("the heights span only " + number(range) +
+  return range > 0.0 && range < least_range && measured.size() >= range_bins;
+}
+
+bool is_denser_than_close_packing(double density) { return density > density_margin * close_packing_density; }
+
+bool area_is_of_another_unit(double area, double column_number) {
+  const double ratio = area / column_number;
+  return ratio > unit_ratio || ratio < 1.0 / unit_ratio;
+}
+
+void warn_about_units(const MeasuredProfile& measured, const FitOptions& options, FitResult& result) {
+  if (heights_look_like_metres(measured)) {
+    result.warnings.push_back("the heights span only " + number(measured.height.back() - measured.height.front()) +
                               " D: are they in metres? They should be in disk diameters");
   }
-  if (measured.greatest_mean > density_margin * close_packing_density) {
+  if (is_denser_than_close_packing(measured.greatest_mean)) {
     result.warnings.push_back("the density averaged over one diameter reaches " + number(measured.greatest_mean, 4) +
                               ", above close packing (1.155): is it n D^2, with the right D?");
   }
@@ -103,7 +114,7 @@ void warn_about_units(const MeasuredProfile& measured, const FitOptions& options
   if (std::abs(ratio - 1.0) <= area_margin) return;
   std::string text = "the area under the profile is " + number(measured.area, 4) + ", but N D/W is " +
                      number(given, 4) + " (ratio " + number(ratio) + ")";
-  if (ratio > unit_ratio || (ratio > 0.0 && ratio < 1.0 / unit_ratio)) {
+  if (ratio > 0.0 && area_is_of_another_unit(measured.area, given)) {
     text += ": the heights look to be in the wrong unit, or part of the bed is missing; heights divided by " +
             number(ratio, 4) + " would agree";
   }

@@ -122,10 +122,9 @@ void clean_errors(const Profile& profile, const std::vector<std::size_t>& order,
     }
   }
   if (filled > 0) {
-    result.warnings.push_back(std::to_string(filled) +
-                              " bins have a density but no standard error; they were given the "
-                              "median error, " +
-                              number(typical));
+    result.warnings.push_back((filled == 1 ? "1 bin has" : std::to_string(filled) + " bins have") +
+                              " a density but no standard error; the median error, " + number(typical) +
+                              ", was taken there");
   }
 }
 

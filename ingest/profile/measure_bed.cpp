@@ -198,6 +198,7 @@ class BedMeasurer {
       if (in_width) (species == 1 ? heights : second_heights).push_back(z);
       highest_ = std::max(highest_, z);
       cut_below_ += species == 1 && disk.cut && disk.y_px > film_.finder.height - refined_.radius_px;
+      cut_above_ += species == 1 && disk.cut && disk.y_px < refined_.radius_px;
     };
     for (const FoundDisk& disk : frame.disks) add(disk, 1);
     for (const FoundDisk& disk : frame.second) add(disk, 2);
@@ -323,7 +324,9 @@ class BedMeasurer {
           "The number of disks found varies by %.1f from frame to frame around %.1f: beads leave the view, or "
           "are missed.",
           result_.disk_count_std, result_.disk_count_mean);
-    if (good_ > 0 && cut_below_ > good_ && !bed_.floor_given)
+    result_.floor_out_of_view = good_ > 0 && cut_below_ > good_ && !bed_.floor_given;
+    result_.surface_out_of_view = good_ > 0 && cut_above_ > good_;
+    if (result_.floor_out_of_view)
       result_.warnings.emplace_back("Beads are cut by the lower border of the frame: the floor is not in view.");
     if (std::abs(bed_.floor_tilt_degrees) > floor_tilts)
       warn("The floor is tilted by %.2f +- %.2f degrees; heights are measured across it.", bed_.floor_tilt_degrees,
@@ -358,7 +361,7 @@ class BedMeasurer {
   std::vector<std::size_t> frame_of_;
   std::vector<double> counts_;
   double highest_ = 0;  // D
-  std::size_t good_ = 0, cut_below_ = 0;
+  std::size_t good_ = 0, cut_below_ = 0, cut_above_ = 0;
   double wrong_ = 0;  // disks that are none, by their probabilities
 };
 

@@ -140,6 +140,8 @@ struct Measurement {
   std::vector<PhaseProfile> phases;
   double disk_count_mean = 0;
   double disk_count_std = 0;          // scatter of the bead number from frame to frame
+  bool floor_out_of_view = false;     // the lower border cuts beads, and no floor was given
+  bool surface_out_of_view = false;   // the upper border cuts beads
   std::vector<std::string> warnings;  // plain sentences
 };
 
@@ -153,7 +155,7 @@ inline constexpr const char* disks_csv_head = "frame,x_px,y_px,radius_px,x,z,qua
 std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks);
 // What else is known of each disk: errors of its centre, contrast, flags.
 inline constexpr const char* disk_details_csv_head =
-    "frame,x_px,y_px,std_error_x_px,std_error_y_px,correlation,contrast,cut,half_hidden,species\n";
+    "frame,x_px,y_px,std_error_x_px,std_error_y_px,correlation,contrast,cut,half_hidden,species,probability\n";
 std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks);
 
 // CSV: frame,x_px,y_px,radius_px,x,z,quality. Atomic.

@@ -7,6 +7,7 @@
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/program.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/measured_profile.hpp"
 #include "pipelines/stages/theory.hpp"
 
@@ -41,6 +42,13 @@ fit::FitOptions options_of(const ProfileArguments& given, const MeasuredProfile&
   return options;
 }
 
+// Whether the profile has one temperature, whatever model and window were asked for.
+fit::Answer answer_of(const MeasuredProfile& measured, const fit::FitOptions& options) {
+  fit::AnswerInput input;
+  input.profile = measured.profile, input.kernel = measured.kernel, input.column_number = options.column_number;
+  return fit::find_answer(input);
+}
+
 int fit_profile(const Call& call, const ProfileArguments& given) {
   std::optional<Kernel> kernel;
   if (given.kernel) kernel = kernel_argument(*given.kernel);
@@ -51,12 +59,15 @@ int fit_profile(const Call& call, const ProfileArguments& given) {
   const fit::FitResult result = fit::fit_profile(measured.profile, options);
   if (result.status == fit::FitStatus::bad_input) throw InputError(fmt::format("{}: {}", given.file, result.message));
   Json json = fit_json(result, diameter);
+  json["answer"] = answer_json(answer_of(measured, options), diameter);
   for (const std::string& warning : measured.warnings) json["warnings"].push_back(warning);
   if (call.out) {
     std::filesystem::create_directories(*call.out);
     write_file_atomically(std::filesystem::path(*call.out) / "fit.json", dump(json));
   }
-  print(call.json ? dump(json) : fit_text(json));
+  print(call.json ? dump(json)
+                  : fmt::format("{} {}\n\n{} alone:\n{}", answer_text(json["answer"]),
+                                json["answer"].value("advice", ""), result.model, fit_text(json)));
   return result.ok() ? exit_ok : exit_stage_failed;
 }
 

@@ -66,6 +66,17 @@ NumberWords words_of_number(const Plan& plan, const std::string& pointer) {
   const std::vector<std::string> tokens = split_pointer(pointer);
   const PlannedStage* stage = tokens.empty() ? nullptr : plan.find(tokens.front());
   NumberWords out{words_of(pointer, false), unit_of_result(plan, pointer)};
+  // Temperatures by their symbols: their meanings are longer than an axis.
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> symbols{
+      {{"temperature_over_mg", "T/(m g)"},
+       {"temperature_x_over_mg", "T_x/(m g)"},
+       {"temperature_z_over_mg", "T_z/(m g)"},
+       {"temperature", "T"},
+       {"temperature_x", "T_x"},
+       {"temperature_z", "T_z"},
+       {"reduced_temperature", "T/T_c"}}};
+  for (const auto& [name, symbol] : symbols)
+    if (tokens.size() == 2 && tokens.back() == name) out.name = fmt::format("{} of {}", symbol, tokens.front());
   if (stage != nullptr && stage->results) {
     const std::string own = pointer.substr(1 + escape_pointer_token(tokens.front()).size());
     if (const StatedResult* stated = stage->results->find(own);

@@ -41,6 +41,14 @@ double contact_duration_effect(const Input& input) {
   return effect != nullptr && effect->is_number() ? effect->get<double>() : 0;
 }
 
+std::vector<fit::Objection> objections_of(const Input& input) {
+  std::vector<fit::Objection> found;
+  const Json result = input.result();
+  if (const Json* all = find_pointer(result, "/objections"); all != nullptr && all->is_array())
+    for (const Json& one : *all) found.push_back({one.value("why", ""), one.value("advice", "")});
+  return found;
+}
+
 void add_judgement(const Json& observables, Json& answer) {
   const Json* judgement = find_pointer(observables, "/judgement");
   if (judgement == nullptr || !speaks_against(*judgement)) return;
@@ -49,6 +57,10 @@ void add_judgement(const Json& observables, Json& answer) {
 }
 
 bool is_one_temperature(std::string_view verdict) { return verdict == fit::to_string(fit::Verdict::one_temperature); }
+
+bool is_range(const Json& answer) {
+  return answer.value("verdict", "") == fit::to_string(fit::Verdict::no_single_temperature);
+}
 
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   Json out;
@@ -60,8 +72,6 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   put_temperature(out, "temperature", answer.temperature, answer.std_error, diameter);
   out["interval"] = Json{{"low", quantity_json(answer.interval.low, "m g D")},
                          {"high", quantity_json(answer.interval.high, "m g D")},
-                         {"low_open", answer.interval.low_open},
-                         {"high_open", answer.interval.high_open},
                          {"confidence", answer.interval.confidence}};
   out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
   out["misfit_error"] = quantity_json(answer.misfit_error, "m g D");
@@ -104,14 +114,14 @@ AnswerScale answer_scale(const Json& answer) {
 std::string answer_text(const Json& answer) {
   const Json* value = find_pointer(answer, "/temperature/value");
   const std::string verdict = capitalized(answer.value("verdict", "")) + ": " + answer.value("why", "");
-  if (value == nullptr) return "no temperature. " + verdict;
+  if (value == nullptr) return verdict;
   const AnswerScale scale = answer_scale(answer);
   const auto number = [&](const char* pointer) {
     const Json* found = find_pointer(answer, pointer);
     return found != nullptr && found->is_number() ? scale.factor * found->get<double>() : 0;
   };
   std::string text;
-  if (answer.value("verdict", "") == fit::to_string(fit::Verdict::no_single_temperature))
+  if (is_range(answer))
     text = fmt::format("{} between {:.3g} and {:.3g} {}", scale.name, number("/interval/low/value"),
                        number("/interval/high/value"), scale.unit);
   else

@@ -20,9 +20,13 @@ struct KineticTemperatures {
 KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter);
 // Relative effect of the contact duration on T, where a simulation states one; else 0.
 double contact_duration_effect(const Input& input);
+// What an input stage knows against its own profile: "objections" of its result.
+std::vector<fit::Objection> objections_of(const Input& input);
 
 // Whether a verdict, as it stands in the results, says that the bed has one temperature.
 bool is_one_temperature(std::string_view verdict);
+// Whether an answer is its interval, and no value within it.
+bool is_range(const Json& answer);
 
 // Temperatures in m g D and, with the diameter [m], as T/(m g) in m.
 Json answer_json(const fit::Answer& answer, std::optional<double> diameter);
@@ -37,7 +41,8 @@ AnswerScale answer_scale(const Json& answer);
 // Adds to the answer's reason and advice what speaks against the numbers of the simulated bed it was read from.
 void add_judgement(const Json& observables, Json& answer);
 
-// "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why." Ends without a line break.
+// "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why."; "No single temperature: why." where
+// there is no number. Ends without a line break.
 std::string answer_text(const Json& answer);
 
 }  // namespace shakebed::pipelines

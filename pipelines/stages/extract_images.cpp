@@ -14,6 +14,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
+#include "pipelines/stages/extract_objections.hpp"
 #include "pipelines/stages/film.hpp"
 #include "pipelines/stages/preview.hpp"
 
@@ -55,12 +56,13 @@ const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const Ext
   return *chosen;
 }
 
-// The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none.
-void use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
+// The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none. Whether
+// their outlines are those of disks.
+bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
                     ingest::MeasureOptions& measure) {
   context.progress(0, "looking for beads");
   const std::optional<FirstLook> look = look_at_first(film.paths, options);
-  if (!look) return;  // measure_bed() says which files cannot be read
+  if (!look) return true;  // measure_bed() says which files cannot be read
   if (!look->survey.found) refuse(options, context, *look);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
   if (chosen->not_round)
@@ -74,6 +76,7 @@ void use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   source.reduction = measure.reduction = ingest::reduction_for(look->width, look->height, chosen->rims.radius_px);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
                           options_for(*chosen), chosen->disks.size()));
+  return !chosen->not_round;
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
@@ -161,7 +164,7 @@ class Extraction {
       use_rendered();
     } else {
       film_.paths = named_pictures(options_.images);
-      use_first_look(options_, context_, film_, measure_);
+      round_ = use_first_look(options_, context_, film_, measure_);
     }
     std::optional<std::ifstream> truth_file;
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
@@ -242,6 +245,7 @@ class Extraction {
     result["quality"] = on_the_way.quality();
     result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
     add_velocities(on_the_way, result);
+    if (const Json against = objections_json(found, !round_); !against.empty()) result["objections"] = against;
     if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
     write_file(context_.output("extract.json"), dump(result));
     const BedDescription bed =
@@ -254,7 +258,7 @@ class Extraction {
     write_file(context_.output("count.svg"), count_figure(found.frames));
     if (options_.overlays == 0) return;
     draw_overlays(context_, film_, found, on_the_way);
-    write_film(context_, film_, found, on_the_way);
+    write_film(context_, film_, found, on_the_way, options_.frame_rate ? measure_.frame_rate_hz : std::nullopt);
   }
 
   void add_velocities(DisksOnTheWay& on_the_way, Json& result) {
@@ -269,6 +273,7 @@ class Extraction {
   const Input* rendered_;  // the render stage, if the frames are its
   ingest::MeasureOptions measure_;
   FilmFiles film_;
+  bool round_ = true;  // the outlines are those of disks
 };
 
 }  // namespace

@@ -20,6 +20,9 @@ void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/expected_wrong", "1", "share of the disks that are no beads, as expected from their rims", surveyed);
   list.number("/expected_missed", "1",
               "share of the beads that are seen too poorly to be reported, in the first frames", surveyed);
+  const Given against = given_when("something speaks against reading a temperature from the frames");
+  list.text("/objections/#/why", "what speaks against reading a temperature from the frames", against);
+  list.text("/objections/#/advice", "what to do about it", against);
   const Given rendered = given_when("the frames were rendered and the true centres are known");
   list.number("/truth/recall", "1", "share of the true disks that were found", rendered);
   list.number("/truth/precision", "1", "share of the disks found that are true", rendered);
@@ -110,7 +113,8 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
                                  {"contrast", "1", "contrast relative to that of the mean bead"},
                                  {"cut", "1", "1 where the border of the frame cuts the bead"},
                                  {"half_hidden", "1", "1 where something covers part of the bead"},
-                                 {"species", "1", "1: the first diameter, 2: the second"}});
+                                 {"species", "1", "1: the first diameter, 2: the second"},
+                                 {"probability", "1", "that it is a bead; 1 where rims were not looked at"}});
   list.table({"disks.csv", "disks found in each frame", disks});
   list.table({"disk_details.csv", "errors and marks of the disks found, row by row as in disks.csv", details});
   list.table({"frames.csv",

@@ -591,13 +591,17 @@ class ProfilePicture {
   }
 
  private:
+  // With its T where that may be read from this model.
   static std::string label_of_fit(const Json& result) {
+    const std::string name = "our fit, " + result.value("model", "") + " alone";
+    const bool unreadable = result.contains("answer") && !result.at("answer").contains("temperature");
+    if (unreadable || !result.value("describes_data", true)) return name + " (does not describe it)";
     const Json* t = find_pointer(result, "/temperature_over_mg/value");
     const Json* reduced = find_pointer(result, "/temperature/value");
-    if (t != nullptr && t->is_number()) return fmt::format("our fit, T/mg = {:.3g} mm", t->get<double>() * 1e3);
+    if (t != nullptr && t->is_number()) return fmt::format("{}: T/mg = {:.3g} mm", name, t->get<double>() * 1e3);
     if (reduced != nullptr && reduced->is_number())
-      return fmt::format("our fit, T = {:.3g} mgD", reduced->get<double>());
-    return "our fit";
+      return fmt::format("{}: T = {:.3g} mgD", name, reduced->get<double>());
+    return name;
   }
 
   void compare(const std::string& of, const Curve& a, const std::string& with, const Curve& b) {

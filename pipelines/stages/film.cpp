@@ -13,8 +13,8 @@ namespace {
 
 // Of pictures and disks together: 1.3 MB are 1.7 MB in base64, less than half of a page of 4 MB.
 constexpr std::size_t film_bytes = 1'300'000;
-// A disk on the page: place, radius, quality, order, step (extract_report.cpp).
-constexpr std::size_t bytes_of_disk = 8;
+// A disk on the page: place, radius, quality, order, probability, step (film_viewer.cpp).
+constexpr std::size_t bytes_of_disk = 10;
 // Disks of 20 px in frames 620 px wide are 12 px wide then; at this quality their rims are still sharp (looked at).
 constexpr int picture_width = 400, picture_quality = 32;
 
@@ -60,7 +60,7 @@ Json marks_json(const DisksOnTheWay::Marks* marks) {
 }  // namespace
 
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
-                const DisksOnTheWay& on_the_way) {
+                const DisksOnTheWay& on_the_way, std::optional<double> rate) {
   ingest::FrameSourceOptions whole = film.source;
   whole.reduction = 1;
   ingest::FrameSource source = ingest::FrameSource::open(film.paths, whole);
@@ -87,6 +87,7 @@ void write_film(RunContext& context, const FilmFiles& film, const ingest::Measur
            {"floor", found.calibration.floor_px},
            {"frames", Json::array()},
            {"pictures", Json::array()}};
+  if (rate) out["rate"] = *rate;
   for (const auto& [ignored, one] : thinned.kept()) {
     out["frames"].push_back(one.frame);
     out["pictures"].push_back(base64(one.picture));

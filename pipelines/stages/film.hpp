@@ -2,6 +2,8 @@
 // the viewer of the page. Which disks were found is in disks.csv.
 #pragma once
 
+#include <optional>
+
 #include "ingest/profile/measure_bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
@@ -9,10 +11,10 @@
 namespace shakebed::pipelines {
 
 // {"kind": "webp", "width", "height" (of the frames, in px), "picture_width", "every", "of" (good frames), "floor" (row
-// in px), "frames": [numbers], "pictures": [base64], "marks": [{"missed": [x, y, ...], "false": [number of the disk]}]
-// where the truth is known}. Every frame is in it, as long as pictures and disks stay within film_bytes; else every
-// second, every fourth, ... of the good ones.
+// in px), "rate" (frames a second, where it was given), "frames": [numbers], "pictures": [base64], "marks": [{"missed":
+// [x, y, ...], "false": [number of the disk]}] where the truth is known}. Every frame is in it, as long as pictures and
+// disks stay within film_bytes; else every second, every fourth, ... of the good ones.
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
-                const DisksOnTheWay& on_the_way);
+                const DisksOnTheWay& on_the_way, std::optional<double> rate);
 
 }  // namespace shakebed::pipelines

@@ -26,12 +26,16 @@ constexpr double longest_step = 0.5;
 constexpr double least_linked = 0.5;
 
 struct FilmDisks {
-  std::vector<double> x_px, y_px, radius_px, x, z, quality;
+  std::vector<double> x_px, y_px, radius_px, x, z, quality, probability;
+};
+struct DiskColumn {
+  const char* name;
+  std::vector<double> FilmDisks::*to;
 };
 
-// The frames wanted from disks.csv.
-std::map<std::size_t, FilmDisks> read_disks(const std::filesystem::path& path, const std::set<std::size_t>& wanted) {
-  std::map<std::size_t, FilmDisks> frames;
+// Columns of a table of disks, of the frames wanted alone.
+void read_columns(const std::filesystem::path& path, const std::set<std::size_t>& wanted,
+                  const std::vector<DiskColumn>& read, std::map<std::size_t, FilmDisks>& frames) {
   const std::string text = read_file(path);
   std::vector<std::size_t> columns;
   for (std::size_t begin = 0, end; begin < text.size(); begin = end + 1) {
@@ -39,8 +43,7 @@ std::map<std::size_t, FilmDisks> read_disks(const std::filesystem::path& path, c
     const std::string_view line(text.data() + begin, end - begin);
     if (columns.empty()) {
       const std::vector<std::string> header = split_csv_line(line);
-      for (const char* name : {"frame", "x_px", "y_px", "radius_px", "x", "z", "quality"})
-        columns.push_back(csv_column(header, name, path.string()));
+      for (const DiskColumn& column : read) columns.push_back(csv_column(header, column.name, path.string()));
       continue;
     }
     // Most lines are of other frames: their first cell alone is looked at.
@@ -49,13 +52,32 @@ std::map<std::size_t, FilmDisks> read_disks(const std::filesystem::path& path, c
     if (line.empty() || !wanted.contains(frame)) continue;
     const std::vector<std::string> cells = split_csv_line(line);
     FilmDisks& disks = frames[frame];
-    std::size_t k = 1;
-    for (std::vector<double>* to : {&disks.x_px, &disks.y_px, &disks.radius_px, &disks.x, &disks.z, &disks.quality}) {
+    for (std::size_t k = 0; k < read.size(); ++k) {
       const std::optional<double> value = columns[k] < cells.size() ? number_in(cells[columns[k]]) : std::nullopt;
       if (!value)
         throw InputError(fmt::format("{}: a row of frame {} has a cell that is no number", path.string(), frame));
-      to->push_back(*value), ++k;
+      (disks.*read[k].to).push_back(*value);
     }
+  }
+}
+
+// disks.csv, and row by row beside it disk_details.csv, where there is one.
+std::map<std::size_t, FilmDisks> read_disks(const Input& files, const std::set<std::size_t>& wanted) {
+  std::map<std::size_t, FilmDisks> frames;
+  read_columns(files.file("disks.csv"), wanted,
+               {{"x_px", &FilmDisks::x_px},
+                {"y_px", &FilmDisks::y_px},
+                {"radius_px", &FilmDisks::radius_px},
+                {"x", &FilmDisks::x},
+                {"z", &FilmDisks::z},
+                {"quality", &FilmDisks::quality}},
+               frames);
+  if (files.has("disk_details.csv"))
+    read_columns(files.file("disk_details.csv"), wanted, {{"probability", &FilmDisks::probability}}, frames);
+  for (auto& [frame, disks] : frames) {
+    if (!disks.probability.empty() && disks.probability.size() != disks.x.size())
+      throw InputError(fmt::format("{}: disks.csv and disk_details.csv have other disks in frame {}",
+                                   files.directory.string(), frame));
   }
   return frames;
 }
@@ -90,13 +112,17 @@ std::vector<std::optional<std::size_t>> nearest_disks(const FilmDisks& from, con
   return out;
 }
 
-// How far each disk is in the next frame [D]; nothing where it was not followed, or others are as near.
-std::vector<std::optional<double>> steps_of(const FilmDisks& now, const FilmDisks& next) {
+struct Step {
+  double x = 0, z = 0;  // [D]
+};
+// Where each disk is in the next frame, as seen from where it is; nothing where it was not followed, or others are as
+// near.
+std::vector<std::optional<Step>> steps_of(const FilmDisks& now, const FilmDisks& next) {
   const auto forward = nearest_disks(now, next), back = nearest_disks(next, now);
-  std::vector<std::optional<double>> out(now.x.size());
+  std::vector<std::optional<Step>> out(now.x.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (forward[i] && back[*forward[i]] == i)
-      out[i] = std::hypot(next.x[*forward[i]] - now.x[i], next.z[*forward[i]] - now.z[i]);
+      out[i] = Step{next.x[*forward[i]] - now.x[i], next.z[*forward[i]] - now.z[i]};
   }
   return out;
 }
@@ -127,7 +153,10 @@ class FilmData {
       wanted.insert(frame.get<std::size_t>());
       if (follows_) wanted.insert(frame.get<std::size_t>() + 1);
     }
-    frames_ = read_disks(stage.files.file("disks.csv"), wanted);
+    frames_ = read_disks(stage.files, wanted);
+    if (const Json* diameter = find_pointer(stage.result, "/diameter/value");
+        diameter != nullptr && diameter->is_number())
+      film_["diameter"] = *diameter;
     if (const Json* width = find_pointer(stage.result, "/width/value"); width != nullptr && width->is_number())
       width_ = width->get<double>();
   }
@@ -148,7 +177,7 @@ class FilmData {
       out["counts"].push_back(disks.x.size());
       add_disks(disks,
                 follows_ && frames_.contains(frame + 1) ? steps_of(disks, frames_[frame + 1])
-                                                        : std::vector<std::optional<double>>(disks.x.size()),
+                                                        : std::vector<std::optional<Step>>(disks.x.size()),
                 bytes);
       heights.push_back(disks.z);
       for (const double z : disks.z) highest = std::max(highest, z), lowest = std::min(lowest, z);
@@ -160,8 +189,9 @@ class FilmData {
   }
 
  private:
-  // 8 bytes a disk: place (two 16-bit fractions of the frame), radius, quality, order, step.
-  void add_disks(const FilmDisks& disks, const std::vector<std::optional<double>>& steps, std::string& bytes) const {
+  // 10 bytes a disk: place (two 16-bit fractions of the frame), radius, quality, order, probability, step to the right
+  // and upwards; 255: not known.
+  void add_disks(const FilmDisks& disks, const std::vector<std::optional<Step>>& steps, std::string& bytes) const {
     const double width = film_.at("width"), height = film_.at("height");
     const std::vector<double> order = order_of(disks);
     const auto byte = [&](double share, double most) {
@@ -174,10 +204,14 @@ class FilmData {
     for (std::size_t i = 0; i < disks.x.size(); ++i) {
       two(disks.x_px[i] / width), two(disks.y_px[i] / height);
       byte(disks.radius_px[i] / largest_radius_, 255), byte(disks.quality[i], 254), byte(order[i], 254);
-      if (steps[i])
-        byte(*steps[i] / longest_step, 254);
+      if (disks.probability.empty())
+        bytes += static_cast<char>(255);
       else
-        bytes += static_cast<char>(255);  // not known
+        byte(disks.probability[i], 254);
+      if (steps[i])
+        byte(0.5 + 0.5 * steps[i]->x / longest_step, 254), byte(0.5 + 0.5 * steps[i]->z / longest_step, 254);
+      else
+        bytes += "\xFF\xFF";
     }
   }
 
@@ -197,10 +231,11 @@ std::string film_viewer(const FinishedStage& stage) {
   std::string choices =
       "<option value=\"outline\">outlines</option><option value=\"quality\">quality</option><option "
       "value=\"order\">crystalline order |ψ6|</option>";
-  if (film.at("follows").get<bool>()) choices += "<option value=\"step\">step to the next frame</option>";
+  if (film.at("follows").get<bool>()) choices += "<option value=\"speed\">speed</option>";
   if (film.contains("marks")) choices += "<option value=\"truth\">missed and false</option>";
   choices += "<option value=\"none\">picture alone</option>";
-  const std::string thinned = shown == of
+  const std::string thinned = of == 1 ? std::string("The one good frame")
+                              : shown == of
                                   ? fmt::format("All {} good frames", of)
                                   : fmt::format("{} of {} good frames (one in {}), so that the page stays small", shown,
                                                 of, film.at("every").get<int>());

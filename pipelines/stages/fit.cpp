@@ -408,6 +408,9 @@ Json answer_of(const FitTask& task, const RunContext& context) {
     if (!input.temperature_x) input.temperature_x = kinetic.x, input.temperature_z = kinetic.z;
     input.contact_duration_effect = std::max(input.contact_duration_effect, contact_duration_effect(upstream));
   }
+  // Of the profile's own stage alone: a profile of the user's is not what it measured.
+  if (task.source != nullptr && task.path == task.source->directory / "profile.csv")
+    input.objections = objections_of(*task.source);
   Json answer = answer_json(fit::find_answer(input), task.diameter);
   for (const Input& upstream : context.inputs()) add_judgement(upstream.result(), answer);
   return answer;
@@ -502,8 +505,8 @@ void Fit::run(RunContext& context) const {
   if (answer_ && !matching) json["answer"] = answer_of(task, context);
   if (bootstrap_ > 0) json["bootstrap"] = bootstrap(task, context);
   if (!json["describes_data"].get<bool>()) {
-    context.warning(
-        fmt::format("{} does not describe this profile: {}", result.model, json["why_not"].get<std::string>()));
+    context.warning(fmt::format("{}{} does not describe this profile: {}", result.model,
+                                json.contains("answer") ? " alone" : "", json["why_not"].get<std::string>()));
   }
   write_file(context.output("fit.json"), dump(json));
   write_tables(context, result);

@@ -40,12 +40,12 @@ std::string temperature_text(const Json& answer, const std::string& pointer, con
 std::string number_html(const Json& answer, const AnswerScale& scale) {
   const auto low = in_scale(answer, "/interval/low/value", scale.factor),
              high = in_scale(answer, "/interval/high/value", scale.factor);
-  if (answer.value("verdict", "") == fit::to_string(fit::Verdict::no_single_temperature) && low && high)
+  if (is_range(answer) && low && high)
     return fmt::format("{} between <data value=\"{}\">{:.3g}</data> and <data value=\"{}\">{:.3g}</data> {}",
                        prose(scale.name), number_text(*low), *low, number_text(*high), *high, scale.unit);
   const auto value = in_scale(answer, "/temperature/value", scale.factor),
              error = in_scale(answer, "/temperature/std_error", scale.factor);
-  if (!value) return "no temperature";
+  if (!value) return "";
   return fmt::format("{} = <data value=\"{}\">{:.4g}</data> ± {:.2g} {}", prose(scale.name), number_text(*value),
                      *value, error.value_or(0), scale.unit);
 }
@@ -64,7 +64,7 @@ std::string answer_html(const Json& answer) {
   std::string facts;
   const auto low = in_scale(answer, "/interval/low/value", scale.factor),
              high = in_scale(answer, "/interval/high/value", scale.factor);
-  if (low && high && verdict != fit::to_string(fit::Verdict::no_single_temperature))
+  if (low && high && !is_range(answer))
     facts += fact("95 % interval", fmt::format("{:.3g} to {:.3g} {}", *low, *high, scale.unit));
   for (const auto& [pointer, label] :
        {std::pair("/temperature_x", "kinetic T_x"), std::pair("/temperature_z", "kinetic T_z")}) {
@@ -91,6 +91,7 @@ std::string solid_fact_html(const FinishedStage& stage, int&) {
   const Json *all = find_pointer(stage.result, "/answer/solid_height"),
              *own = find_pointer(stage.result, "/solid_height");
   if ((all != nullptr && all->is_object()) || own == nullptr || !own->is_object()) return "";
+  if (!stage.result.value("describes_data", true)) return "";
   return fact("height of the solid, by " + stage.result.value("model", "the model") + " alone", shown(*own));
 }
 
@@ -100,8 +101,9 @@ std::string answer_markdown(const FinishedStage& stage) {
   return fmt::format("**{}**: {} {}\n\n", stage.files.id, answer_text(*answer), answer->value("advice", ""));
 }
 
+// Only where there is no answer: else the answer says what speaks against a temperature, and nothing else does.
 std::string banner_html(const FinishedStage& stage, int&) {
-  if (stage.result.value("describes_data", true)) return "";
+  if (stage.result.value("describes_data", true) || stage.result.contains("answer")) return "";
   return fmt::format(
       "<div class=\"banner\"><strong>The profile is not one this model describes</strong>{} ({}): {}. Read no "
       "temperature from it without that.</div>\n",
@@ -131,10 +133,15 @@ std::string fit_html(const FinishedStage& stage, int&) {
   std::string out = fmt::format("<h2>Fit ({})</h2>\n", escape_markup(stage.files.id));
   if (const Json* answer = find_pointer(fit, "/answer"); answer != nullptr)
     out += fmt::format("<p><strong>{}</strong></p>\n", prose(answer_text(*answer)));
-  out += fmt::format("<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n<div class=\"scroll\"><table>\n",
-                     escape_markup(fit.value("model", "")), shown(fit["window"]["low"]), shown(fit["window"]["high"]),
-                     fit["window"].value("bins", 0), escape_markup(fit["window"].value("rule", "")));
-  out += "<tr><th>number</th><th></th></tr>\n";
+  if (!fit.value("describes_data", true))
+    out += fmt::format(
+        "<p>The model alone does not describe this profile: {}. Its numbers below are not those of the bed.</p>\n",
+        prose(fit.value("why_not", "")));
+  out += fmt::format("<p class=\"soft\">{}; window {} to {}, {} bins: {}.</p>\n", escape_markup(fit.value("model", "")),
+                     shown(fit["window"]["low"]), shown(fit["window"]["high"]), fit["window"].value("bins", 0),
+                     escape_markup(fit["window"].value("rule", "")));
+  if (!fit.contains("temperature")) return out;
+  out += "<div class=\"scroll\"><table>\n<tr><th>number</th><th></th></tr>\n";
   for (const char* key : {"temperature_over_mg", "temperature", "solid_height", "solid_height_by_sum_rule", "shift",
                           "plateau_density", "column_number", "critical_temperature_over_mg", "critical_temperature",
                           "reduced_temperature", "chi2_per_dof", "relative_misfit"}) {
@@ -168,39 +175,42 @@ std::string numbers_text(const FinishedStage& stage) {
   std::string text;
   if (answer != nullptr)
     text = fmt::format("{}: {} {}\n", stage.files.id, answer_text(*answer), answer->value("advice", ""));
-  if (!numbers.empty())
+  // Where the answer gives no number, a model alone gives none either.
+  if (!numbers.empty() && (answer == nullptr || answer->contains("temperature")))
     text += fmt::format("{} ({} alone): {}\n", stage.files.id, fit.value("model", "model"), numbers);
   return text;
 }
 
 std::vector<WarningAdvice> fit_warnings() {
   using enum WarningEffect;
-  return {{"does not describe", answer,
-           "Do not quote T from this fit. Look at the residuals, and try another model or window."},
-          {"model does not fit", answer,
-           "Look at the residuals in the figure: where the fit misses, the model is wrong or a bias was measured. "
-           "Quote T with the answer's whole uncertainty, not with the fit's own error."},
-          {"changes with the window", answer,
-           "Quote the range of the answer. A single T needs a bed with one temperature: shake faster with a smaller "
-           "amplitude, or take less dissipative beads."},
-          {"outlier", answer, "Look at this height in the figure; set \"robust\" if it is an outlier."},
-          {"positive definite", answer, "Measure longer: the correlations between heights are poorly known."},
-          {"too few to weigh", answer,
-           "Measure longer, or in more independent runs, to use the correlations between heights."},
-          {"window rule", answer, "Give \"window\" yourself, or measure the profile at finer heights."},
-          {"sum rule", answer, "The plateau density may be off: try it free, and compare the models below."},
-          {"no solid", answer, "T is above T_c in this model: quote T, and no height of the solid."},
-          {"plateau density", answer,
-           "Give \"plateau_density\", or begin the window lower so that it holds part of the plateau."},
-          {"heights span", answer, "Heights must be in disk diameters, not in metres."},
-          {"close packing", answer, "Check the diameter D and that the density is n D^2."},
-          {"standard error", answer, "Give a column std_error: the error of T follows from it."},
-          {"repeat the height", answer, "Remove the doubled rows if they are not measurements of their own."},
-          {"through which kernel", answer,
-           "Name the kernel (\"kernel\": \"gaussian:0.5\", say): without it T is too high by the kernel's width."},
-          {"library", answer, "Run beds nearer to this one for the library."},
-          {"ascending order", rest, "Nothing: the bins were sorted."},
-          {"", answer, "See the figure of the profile and the table of models."}};
+  return {
+      {"alone does not describe", rest, "Quote the answer, which does not rest on this model, and not its T."},
+      {"does not describe", answer,
+       "Do not quote T from this fit. Look at the residuals, and try another model or window."},
+      {"model does not fit", answer,
+       "Look at the residuals in the figure: where the fit misses, the model is wrong or a bias was measured. "
+       "Quote T with the answer's whole uncertainty, not with the fit's own error."},
+      {"changes with the window", answer,
+       "Quote the answer: it compares windows and models, and says whether the bed has one temperature. For one, shake "
+       "faster with a smaller amplitude, or take less dissipative beads."},
+      {"outlier", answer, "Look at this height in the figure; set \"robust\" if it is an outlier."},
+      {"positive definite", answer, "Measure longer: the correlations between heights are poorly known."},
+      {"ignores correlations", answer,
+       "Measure longer, or in more independent runs, to use the correlations between heights."},
+      {"window rule", answer, "Give \"window\" yourself, or measure the profile at finer heights."},
+      {"sum rule", answer, "The plateau density may be off: try it free, and compare the models below."},
+      {"no solid", answer, "T is above T_c in this model: quote T, and no height of the solid."},
+      {"plateau density", answer,
+       "Give \"plateau_density\", or begin the window lower so that it holds part of the plateau."},
+      {"heights span", answer, "Heights must be in disk diameters, not in metres."},
+      {"close packing", answer, "Check the diameter D and that the density is n D^2."},
+      {"standard error", answer, "Give a column std_error: the error of T follows from it."},
+      {"repeat the height", answer, "Remove the doubled rows if they are not measurements of their own."},
+      {"through which kernel", answer,
+       "Name the kernel (\"kernel\": \"gaussian:0.5\", say): without it T is too high by the kernel's width."},
+      {"library", answer, "Run beds nearer to this one for the library."},
+      {"ascending order", rest, "Nothing: the bins were sorted."},
+      {"", answer, "See the figure of the profile and the table of models."}};
 }
 
 }  // namespace

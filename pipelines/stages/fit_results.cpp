@@ -104,7 +104,8 @@ class FitStatement {
   void answer() {
     const Given asked = given_if(fit_.answer, "\"answer\" is true and the model is not \"simulation\""),
                 found = both(asked, given_when("there is an answer"));
-    list_.text("/answer/verdict", "one temperature, model does not fit, or no single temperature", asked);
+    list_.text("/answer/verdict",
+               "one temperature, model does not fit, or no single temperature", asked);
     list_.text("/answer/why", "the reason of the verdict", asked);
     list_.text("/answer/advice", "what to do", asked);
     list_.text("/answer/status", "ok, or why there is no answer", asked);
@@ -120,8 +121,6 @@ class FitStatement {
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
     list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
     list_.number("/answer/interval/confidence", "1", "confidence of the interval", found);
-    list_.truth("/answer/interval/low_open", "whether the data set no lower end", found);
-    list_.truth("/answer/interval/high_open", "whether the data set no upper end", found);
     list_.quantity("/answer/next_bed_interval/low", "m g D",
                    "lower end of the interval of what the chosen thermometer reads in further beds, on average", found);
     list_.quantity("/answer/next_bed_interval/high", "m g D", "its upper end", found);

@@ -196,7 +196,8 @@ def find_answer(
 
     Parameters are those of `fit_profile`; temperature_x and temperature_z are the kinetic temperatures in m g D, where
     velocities are known. Returns a dict with verdict, why, advice, temperature, std_error, low, high
-    (m g D), solid_height, thermometer, model, status.
+    (m g D), solid_height, thermometer, model, status. The numbers are None where the verdict is "temperature not
+    determined" and no interval is known: why and advice say the reason.
     """
     arrays = _arrays(height, density, error, covariance)
     kinetic = [None if t is None else (t.value, t.std_error or 0.0) for t in (temperature_x, temperature_z)]

@@ -274,6 +274,161 @@ TEST(Answer, WithoutATemperatureSaysWhy) {
   EXPECT_EQ(find_answer({}).status, FitStatus::bad_input);
 }
 
+// --- profiles from which no temperature may be read
+
+// Heights every quarter of a diameter, up to `top`; the density and its error by height.
+template <class Density, class Error>
+AnswerInput made_of(double top, Density density, Error error) {
+  AnswerInput input;
+  input.base = 0.0;
+  synthetic::Normal normal(77);
+  for (double z = 0.125; z < top; z += 0.25) {
+    const double sigma = error(density(z));
+    input.profile.height.push_back(z);
+    input.profile.number_density.push_back(std::max(0.0, density(z) + sigma * normal()));
+    input.profile.std_error.push_back(sigma);
+  }
+  return input;
+}
+
+void expect_no_temperature(const Answer& answer, const std::string& words) {
+  EXPECT_FALSE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
+  EXPECT_EQ(answer.temperature, 0.0) << "no number that could be quoted";
+  EXPECT_THAT(answer.why, testing::HasSubstr(words));
+  EXPECT_FALSE(answer.advice.empty());
+}
+
+TEST(Answer, OfAFlatProfileIsNoTemperature) {
+  const auto flat = [](double) { return 0.5; };
+  expect_no_temperature(find_answer(made_of(20.0, flat, [](double) { return 0.01; })), "does not fall");
+  const Answer uncertain = find_answer(made_of(20.0, flat, [](double d) { return d; }));
+  expect_no_temperature(uncertain, "");
+  AnswerInput bare = made_of(20.0, flat, [](double) { return 0.05; });
+  bare.profile.std_error.clear();
+  expect_no_temperature(find_answer(bare), "does not fall");
+}
+
+// A fall that the errors do not show, however steep it looks: they are as large as the density.
+TEST(Answer, OfDensitiesAsUncertainAsThemselvesIsNoTemperature) {
+  AnswerInput input = column(1.0);
+  ASSERT_EQ(find_answer(input).verdict, Verdict::one_temperature);
+  for (std::size_t i = 0; i < input.profile.height.size(); ++i)
+    input.profile.std_error[i] = 2.0 * std::abs(input.profile.number_density[i]) + 1e-4;
+  expect_no_temperature(find_answer(input), "uncertain by");
+}
+
+// A cold gas over a uniform background, as false disks make: its tail looks like that of a hot gas.
+TEST(Answer, OfABedWithABackgroundIsNotOneTemperature) {
+  for (const double background : {0.01, 0.02, 0.05, 0.1}) {
+    const Answer answer = find_answer(made_of(
+        14.0, [&](double z) { return 0.5 * std::exp(-z / 2.0) + background; },
+        [](double d) { return 0.03 * d + 0.002; }));
+    EXPECT_NE(answer.verdict, Verdict::one_temperature) << background << ": " << answer.why;
+  }
+}
+
+TEST(Answer, OfTwoLayersWithAGapIsNoTemperature) {
+  const auto layers = [](double z) { return std::exp(-1.2 * z) + 0.3 * std::exp(-std::pow((z - 9.0) / 1.3, 2)); };
+  expect_no_temperature(find_answer(made_of(13.0, layers, [](double) { return 0.003; })), "above a gap");
+}
+
+TEST(Answer, OfNoiseIsNoTemperature) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    synthetic::Normal normal(1000 + seed);
+    AnswerInput input;
+    for (double z = 0.125; z < 15.0; z += 0.25) {
+      input.profile.height.push_back(z);
+      input.profile.number_density.push_back(std::abs(0.4 * normal()));
+      input.profile.std_error.push_back(0.4);
+    }
+    const Answer with_errors = find_answer(input);
+    EXPECT_EQ(with_errors.verdict, Verdict::no_single_temperature) << seed << ": " << with_errors.why;
+    input.profile.std_error.clear();
+    const Answer bare = find_answer(input);
+    EXPECT_NE(bare.verdict, Verdict::one_temperature) << seed << ": " << bare.why;
+  }
+}
+
+TEST(Answer, OfABedUpsideDownIsNoTemperature) {
+  const AnswerInput upright = column(1.0);
+  ASSERT_EQ(find_answer(upright).verdict, Verdict::one_temperature);
+  AnswerInput turned = upright;  // heights as depths below the highest
+  const double top = upright.profile.height.back();
+  for (double& height : turned.profile.height) height = top - height;
+  expect_no_temperature(find_answer(turned), "");
+  AnswerInput depths = upright;  // heights counted downwards from the floor
+  for (double& height : depths.profile.height) height = -height;
+  expect_no_temperature(find_answer(depths), "");
+  AnswerInput below = upright;  // as depths, with empty space below the floor
+  for (double& height : below.profile.height) height = top + 5.0 - height;
+  for (int k = 0; k < 20; ++k) {
+    below.profile.height.push_back(top + 5.0 + 0.25 * k);
+    below.profile.number_density.push_back(0.0);
+    below.profile.std_error.push_back(1e-3);
+  }
+  expect_no_temperature(find_answer(below), "density rises with height");
+}
+
+TEST(Answer, OfTooFewHeightsIsNoTemperature) {
+  AnswerInput input;
+  input.profile = {{1.0, 2.0}, {0.8, 0.3}, {0.01, 0.01}, {}, 0};
+  EXPECT_EQ(find_answer(input).verdict, Verdict::no_single_temperature);
+  input.profile = {{1.0, 2.0, 3.0, 4.0}, {0.8, 0.3, 0.1, 0.03}, {}, {}, 0};
+  expect_no_temperature(find_answer(input), "4 heights");
+}
+
+TEST(Answer, OfHeightsInMetresOrDensitiesOfAnotherUnitIsNoTemperature) {
+  AnswerInput metres = column(1.0);
+  for (double& height : metres.profile.height) height *= 3e-3;
+  metres.kernel = {};
+  expect_no_temperature(find_answer(metres), "span only");
+  AnswerInput dense = column(1.0);
+  for (double& density : dense.profile.number_density) density *= 3.0;
+  expect_no_temperature(find_answer(dense), "close packing");
+  AnswerInput millimetres = column(1.0);  // of beads of 3 mm, their number known
+  millimetres.column_number = 20.0;
+  ASSERT_EQ(find_answer(millimetres).verdict, Verdict::one_temperature) << find_answer(millimetres).why;
+  for (double& height : millimetres.profile.height) height *= 3.0;
+  expect_no_temperature(find_answer(millimetres), "N D/W is 20");
+}
+
+// An objection of whoever measured the profile outweighs how well it is fitted.
+TEST(Answer, TakesInWhatSpeaksAgainstTheMeasurement) {
+  AnswerInput input = column(1.0);
+  input.objections = {{"No floor is in view.", "Show it."}, {"Few beads.", "Show more."}};
+  const Answer answer = find_answer(input);
+  expect_no_temperature(answer, "No floor is in view. Few beads.");
+  EXPECT_EQ(answer.advice, "Show it. Show more.");
+  EXPECT_EQ(answer.status, FitStatus::unreadable);
+}
+
+// A cold bed, of which the best thermometer is known to 23 %: 95 % of what is possible spans more than a factor of two.
+TEST(Answer, IsARangeWhereTheIntervalSpansAFactorOfTwo) {
+  const Answer answer = find_answer(column(0.04));
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature) << answer.why;
+  EXPECT_GT(answer.interval.high, 2.0 * answer.interval.low);
+  EXPECT_LT(answer.interval.low, 0.04);
+  EXPECT_GT(answer.interval.high, 0.04);
+  EXPECT_THAT(answer.why, testing::HasSubstr("spans a factor of"));
+}
+
+// Rows of a crystal seen through no window: two of them may lie within a diameter, which is no wrong unit.
+TEST(Answer, DoesNotTakeRowsForTooDense) {
+  const auto truth = HydrostaticProfile::of_column(best_of(), 0.3, {20.0, close_packing_density});
+  AnswerInput input;
+  input.base = 0.0;
+  for (double z = 0.05; z < synthetic::top_of(truth); z += 0.1) {
+    const double density = truth.density(z),
+                 rows = density > 0.9 ? 0.9 * std::cos(2.0 * 3.14159265358979 * z / 0.8660254) : 0.0;
+    input.profile.height.push_back(z);
+    input.profile.number_density.push_back(density * (1.0 + rows));
+  }
+  const Answer answer = find_answer(input);
+  EXPECT_THAT(answer.why, testing::Not(testing::HasSubstr("close packing")));
+}
+
 TEST(Answer, OfAnyProfileIsFiniteAndInOrder) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     synthetic::Normal normal(17 * seed + 5);

@@ -108,10 +108,11 @@ if [ -z "$node" ]; then
 else
   axe=
   if command -v npm >/dev/null && timeout 60 npm install --prefix "$folder/npm" --no-audit --no-fund --ignore-scripts \
-      axe-core@4.10.2 >/dev/null 2>&1; then
+      axe-core@4.10.2 ro-crate@3.7.2 >/dev/null 2>&1; then
     axe="$folder/npm/node_modules/axe-core/axe.min.js"
+    "$node" "$here/browser/crate.cjs" "$folder/npm/node_modules" o s || complain "metadata that are no RO-Crate"
   else
-    echo "SKIPPED in part: axe-core cannot be had from npm; contrast was looked at by this script alone"
+    echo "SKIPPED in part: axe-core and ro-crate cannot be had from npm; contrast was looked at by this script alone"
   fi
   timeout 200 "$node" "$here/browser/report.mjs" "$browser" o s $axe || complain "the pages do not do what they should"
 fi

@@ -10,6 +10,7 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
+#include "pipelines/stages/extract_objections.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -266,6 +267,7 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   std::vector<ingest::MeasuredDisk> first{disk(0, 10, 20, 0.99), disk(0, 40, 20, 0.95), disk(0, 70, 20, 0.95)},
       second{disk(1, 10, 80, 0.95), disk(1, 40, 80, 0.31), disk(1, 90, 80, 0.11)};
   first[0].cut = true, second[1].half_hidden = true, second[2].half_hidden = true, second[2].species = 2;
+  second[1].probability = 0.875;
   ingest::FrameReport frame;
   on_the_way.take(frame, first);
   frame.index = 1;
@@ -307,6 +309,8 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   EXPECT_EQ(details("cut", 4), 0);
   EXPECT_EQ(details("half_hidden", 4), 1);
   EXPECT_EQ(details("species", 5), 2);
+  EXPECT_NEAR(details("probability", 4), 0.875, 1e-6);
+  EXPECT_NEAR(details("probability", 0), 0.9, 1e-6);
 }
 
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
@@ -338,6 +342,34 @@ TEST_F(ExtractTables, HoldTemperaturesByTheFramesReadAndByGravity) {
   EXPECT_NEAR(temperature(500, 1, 9.81) / plain, 0.25, 1e-9);
   EXPECT_NEAR(temperature(1000, 2, 9.81) / plain, 0.25, 1e-9);
   EXPECT_NEAR(temperature(1000, 1, 4.905) / plain, 2, 1e-9);
+}
+
+// What speaks against a temperature, one by one: of a measurement in which nothing else does.
+TEST(ExtractObjections, NameWhatThePhotographsShow) {
+  ingest::Measurement good = a_measurement();
+  good.disk_total = 200;
+  EXPECT_EQ(objections_json(good, false), Json::array());
+  const auto only = [](const ingest::Measurement& found, bool not_round) {
+    const Json all = objections_json(found, not_round);
+    EXPECT_EQ(all.size(), 1U) << all;
+    EXPECT_FALSE(all[0]["advice"].get<std::string>().empty());
+    return all[0]["why"].get<std::string>();
+  };
+  const auto has = [](const std::string& text, const char* words) { return text.find(words) != std::string::npos; };
+  ingest::Measurement found = good;
+  found.floor_out_of_view = true;
+  EXPECT_TRUE(has(only(found, false), "the floor is not in view"));
+  found.surface_out_of_view = true;
+  EXPECT_TRUE(has(only(found, false), "as from above"));
+  found = good, found.surface_out_of_view = true;
+  EXPECT_EQ(objections_json(found, false), Json::array()) << "disks may fly out of the picture";
+  found = good, found.disk_total = 29;
+  EXPECT_TRUE(has(only(found, false), "Only 29 beads"));
+  found = good, found.finder.expected_missed = 0.09;
+  EXPECT_TRUE(has(only(found, false), "2 % of the disks found may be wrong, and 9 % of the beads may be missed"));
+  found = good, found.calibration.floor_tilt_degrees = -12;
+  EXPECT_TRUE(has(only(found, false), "tilted by 12 degrees"));
+  EXPECT_TRUE(has(only(good, true), "not those of disks"));
 }
 
 }  // namespace

@@ -2,8 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <cmath>
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
@@ -190,6 +194,85 @@ TEST_F(FitStage, ResamplesFrames) {
   const ProgramResult result = run(bed("measured", 20, 1) + fit_stage("fit", "measured"));
   EXPECT_EQ(result.exit_code, 4);
   EXPECT_THAT(result.err, HasSubstr("kept no frames"));
+}
+
+// --- one statement: summary.json, the terminal, the page and summary.md
+
+// Heights every quarter of a diameter with the density at each, known to a part of itself.
+std::string profile_csv(const std::function<double(double)>& density, double relative_error) {
+  std::string rows = "# kernel: none\nheight,number_density,std_error\n";
+  for (double z = 0.125; z < 20; z += 0.25)
+    rows += std::to_string(z) + "," + std::to_string(density(z)) + "," +
+            std::to_string(relative_error * density(z) + 1e-5) + "\n";
+  return rows;
+}
+
+class AnswerOfAProfile : public FitStage {
+ protected:
+  // Runs a fit stage over a profile; the answer of summary.json.
+  Json answer(const std::function<double(double)>& density, double relative_error) {
+    write_text(folder_ / "p.csv", profile_csv(density, relative_error));
+    ran_ = run(R"({ "stage": "fit", "profile": "p.csv", "diameter": "2 mm" })");
+    EXPECT_EQ(ran_.exit_code, 0) << ran_.err;
+    page_ = read_text(folder_ / "o/report.html");
+    return Json::parse(read_text(folder_ / "o/summary.json"))["answer"];
+  }
+  // Of the page: what stands in its first line, with nothing below that says otherwise.
+  void expect_one_statement(const Json& answer) {
+    const std::string verdict = answer["verdict"];
+    const std::size_t headline = page_.find("class=\"headline\"");
+    ASSERT_NE(headline, std::string::npos);
+    std::string shown = page_.substr(page_.find("class=\"verdict", headline), 200);
+    shown = shown.substr(shown.find('>') + 1);
+    shown = shown.substr(0, shown.find('<'));
+    ASSERT_FALSE(shown.empty());
+    shown[0] = static_cast<char>(std::tolower(shown[0]));
+    EXPECT_EQ(shown, verdict);
+    EXPECT_EQ(page_.find("class=\"banner\""), std::string::npos) << "the answer is the one statement";
+    for (const char* file : {"o/summary.md"}) EXPECT_THAT(read_text(folder_ / file), HasSubstr(verdict.substr(1)));
+    EXPECT_THAT(ran_.out, HasSubstr(verdict.substr(1)));
+    EXPECT_THAT(ran_.out, HasSubstr(answer["advice"].get<std::string>()));
+  }
+  ProgramResult ran_;
+  std::string page_;
+};
+
+TEST_F(AnswerOfAProfile, IsOneTemperatureOnAllPages) {
+  // A thin gas in equilibrium: exp(-m g z/T), T = 3 m g D.
+  const Json found = answer([](double z) { return 0.05 * std::exp(-z / 3); }, 0.02);
+  EXPECT_EQ(found["verdict"], "one temperature") << found;
+  EXPECT_NEAR(found["temperature"]["value"].get<double>(), 3, 0.3);
+  expect_one_statement(found);
+}
+
+TEST_F(AnswerOfAProfile, IsNoTemperatureOnAnyPage) {
+  const std::vector<std::pair<std::function<double(double)>, double>> profiles{
+      {[](double) { return 0.5; }, 0.02},                          // flat
+      {[](double z) { return 0.5 * std::exp(-z / 2); }, 1.0},      // errors as large as the density
+      {[](double z) { return 0.05 * std::exp(z / 8 - 2); }, 0.02}  // upside down
+  };
+  for (const auto& [density, error] : profiles) {
+    const Json found = answer(density, error);
+    EXPECT_EQ(found["verdict"], "no single temperature") << found;
+    EXPECT_FALSE(found.contains("temperature"));
+    expect_one_statement(found);
+    EXPECT_THAT(page_, testing::Not(HasSubstr("<data"))) << "no number in the first line";
+    EXPECT_THAT(ran_.out, testing::Not(HasSubstr("T/(m g) ="))) << "no model alone gives a number, either";
+    // A check may ask for the verdict.
+    run(R"({ "stage": "fit", "profile": "p.csv" }, { "stage": "check", "from": "fit",
+             "expect": { "/fit/answer/verdict": { "value": "one temperature" } } })");
+    EXPECT_THAT(read_text(folder_ / "o/check/junit.xml"), HasSubstr("failures=\"1\""));
+  }
+}
+
+// Without an answer the model's own verdict stands in a box, and there only.
+TEST_F(AnswerOfAProfile, IsTheModelsOwnVerdictWhereNoneIsAskedFor) {
+  write_text(folder_ / "p.csv", profile_csv([](double) { return 0.5; }, 0.02));
+  const ProgramResult ran = run(R"({ "stage": "fit", "profile": "p.csv", "answer": false })");
+  EXPECT_EQ(ran.exit_code, 0) << ran.err;
+  const std::string page = read_text(folder_ / "o/report.html");
+  EXPECT_THAT(page, HasSubstr("class=\"banner\""));
+  EXPECT_EQ(page.find("class=\"headline\""), std::string::npos);
 }
 
 }  // namespace

@@ -110,18 +110,20 @@ TEST_F(FilmPage, HasEveryDiskOfItsFrames) {
   const Json found = data();
   EXPECT_EQ(found["counts"], Json::parse("[7, 1]")) << "frame 4 is not among those shown";
   const std::vector<unsigned> disks = bytes_of(found["disks"]);
-  ASSERT_EQ(disks.size(), 8U * 8U);
-  const auto x = [&](std::size_t i) { return (disks[8 * i] + 256 * disks[8 * i + 1]) / 65535.0 * 400; };
-  const auto y = [&](std::size_t i) { return (disks[8 * i + 2] + 256 * disks[8 * i + 3]) / 65535.0 * 220; };
+  ASSERT_EQ(disks.size(), 8U * 10U);
+  const auto x = [&](std::size_t i) { return (disks[10 * i] + 256 * disks[10 * i + 1]) / 65535.0 * 400; };
+  const auto y = [&](std::size_t i) { return (disks[10 * i + 2] + 256 * disks[10 * i + 3]) / 65535.0 * 220; };
   EXPECT_NEAR(x(0), 100, 0.01);
   EXPECT_NEAR(y(0), 120, 0.01);
   EXPECT_NEAR(x(7), 400, 0.01);
   EXPECT_DOUBLE_EQ(found["radius"].get<double>(), 10);
-  EXPECT_NEAR(disks[8 * 7 + 4] / 255.0 * 10, 8, 0.03);
+  EXPECT_NEAR(disks[10 * 7 + 4] / 255.0 * 10, 8, 0.03);
   EXPECT_NEAR(disks[5] / 254.0, 0.5, 0.003);
   EXPECT_EQ(disks[6], 254U) << "the middle of a hexagon: |psi_6| = 1";
-  EXPECT_EQ(disks[8 * 7 + 6], 0U) << "a disk without neighbours: |psi_6| = 0";
-  EXPECT_EQ(disks[7], 255U) << "no steps without velocities";
+  EXPECT_EQ(disks[10 * 7 + 6], 0U) << "a disk without neighbours: |psi_6| = 0";
+  EXPECT_EQ(disks[7], 255U) << "no probabilities without disk_details.csv";
+  EXPECT_EQ(disks[8], 255U) << "no steps without velocities";
+  EXPECT_EQ(disks[9], 255U);
   EXPECT_THAT(film_viewer(stage_), HasSubstr("2 of 5 good frames (one in 2)"));
 }
 
@@ -129,10 +131,24 @@ TEST_F(FilmPage, HasTheStepsOfDisksThatWereFollowed) {
   film();
   stage_.result["velocities"] = Json{{"linked_share", 0.9}};
   const std::vector<unsigned> disks = bytes_of(data()["disks"]);
-  EXPECT_NEAR(disks[7] / 254.0 * 0.5, 0.1, 0.002) << "from (5, 5) to (5.1, 5)";
-  EXPECT_EQ(disks[8 + 7], 255U) << "a disk with none near it in the next frame";
+  EXPECT_NEAR((disks[8] / 127.0 - 1) * 0.5, 0.1, 0.004) << "from (5, 5) to (5.1, 5)";
+  EXPECT_NEAR((disks[9] / 127.0 - 1) * 0.5, 0.0, 0.004);
+  EXPECT_EQ(disks[10 + 8], 255U) << "a disk with none near it in the next frame";
   stage_.result["velocities"] = Json{{"linked_share", 0.2}};
-  EXPECT_EQ(bytes_of(data()["disks"])[7], 255U) << "most of such steps would be those of other disks";
+  EXPECT_EQ(bytes_of(data()["disks"])[8], 255U) << "most of such steps would be those of other disks";
+}
+
+TEST_F(FilmPage, HasTheProbabilityOfEveryDisk) {
+  film();
+  std::string rows = "frame,probability\n";
+  for (int k = 0; k < 7; ++k) rows += "3," + std::to_string(0.125 * k) + "\n";
+  write_text(folder_ / "extract/disk_details.csv", rows + "4,1\n5,0.5\n");
+  const std::vector<unsigned> disks = bytes_of(data()["disks"]);
+  for (std::size_t k = 0; k < 7; ++k)
+    EXPECT_NEAR(disks[10 * k + 7] / 254.0, 0.125 * static_cast<double>(k), 0.002) << k;
+  EXPECT_EQ(disks[10 * 7 + 7], 127U);
+  write_text(folder_ / "extract/disk_details.csv", "frame,probability\n3,1\n");
+  EXPECT_THROW(film_viewer(stage_), InputError) << "a row for every disk";
 }
 
 TEST_F(FilmPage, OffersTheTruthWhereItIsKnown) {

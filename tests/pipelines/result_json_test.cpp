@@ -214,7 +214,7 @@ fit::Answer an_answer() {
   answer.contact_duration_uncertainty = 0.014, answer.misfit_error = 0.016;
   answer.next_bed_interval = {fit::FitStatus::ok, 0.23, 0.27, 0.85};
   answer.bias = 0.07;
-  answer.interval = {fit::FitStatus::ok, 0.21, 0.31, 0.9, false, true};
+  answer.interval = {fit::FitStatus::ok, 0.21, 0.31, 0.9};
   answer.solid_height = {9.5, 0.14};
   answer.temperature_x = fit::Estimate{0.2, 0.015};
   answer.temperature_z = fit::Estimate{0.3, 0.016};
@@ -255,8 +255,6 @@ TEST(AnswerJson, HoldsEveryNumberWithItsErrorAndUnit) {
                       {"/why", "so it is"},
                       {"/advice", "go on"},
                       {"/status", "ok"},
-                      {"/interval/low_open", false},
-                      {"/interval/high_open", true},
                       {"/thermometer", "whole column"},
                       {"/model", "fermi"},
                       {"/readings/0/thermometer", "tail"},

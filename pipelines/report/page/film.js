@@ -1,7 +1,7 @@
 // The frames of a film with the disks found over them: every disk can be asked, the disks coloured by what is known.
 (() => {
   "use strict";
-  const bytesOfDisk = 8;
+  const bytesOfDisk = 10;
   class Film {
     constructor(figure) {
       this.figure = figure;
@@ -40,8 +40,14 @@
       return {
         x: (d[k] + 256 * d[k + 1]) / 65535 * of.width, y: (d[k + 2] + 256 * d[k + 3]) / 65535 * of.height,
         radius: d[k + 4] / 255 * of.radius, quality: d[k + 5] / 254, order: d[k + 6] === 255 ? null : d[k + 6] / 254,
-        step: d[k + 7] === 255 ? null : d[k + 7] / 254 * of.step,
+        probability: d[k + 7] === 255 ? null : d[k + 7] / 254,
+        step: d[k + 8] === 255 ? null : [d[k + 8], d[k + 9]].map(v => (v / 127 - 1) * of.step),
       };
+    }
+    // A way in D from frame to frame, as a velocity: in mm/s where rate and diameter are known.
+    speed(way) {
+      const { rate, diameter } = this.of;
+      return rate && diameter ? [way * rate * diameter * 1e3, "mm/s"] : [way, "D a frame"];
     }
     picture(k) {
       if (!this.pictures[k]) {
@@ -72,7 +78,7 @@
       switch (this.choice.value) {
         case "quality": return shakebed.color(disk.quality);
         case "order": return disk.order === null ? null : shakebed.color(disk.order);
-        case "step": return disk.step === null ? null : shakebed.color(disk.step / this.of.step);
+        case "speed": return disk.step === null ? null : shakebed.color(Math.hypot(...disk.step) / this.of.step);
         default: return null;
       }
     }
@@ -123,7 +129,7 @@
     }
     tell(scale, width) {
       const { of } = this, marks = of.marks && of.marks[this.shown];
-      const words = { quality: ["poor", "a bead like all the others"], order: ["disordered, |ψ6| = 0", "crystal, 1"], step: ["0", `${Number(of.step.toPrecision(2))} D to the next frame`] }[this.choice.value];
+      const words = { quality: ["poor", "a bead like all the others"], order: ["disordered, |ψ6| = 0", "crystal, 1"], speed: ["0", this.speed(of.step).map((v, i) => (i ? v : String(Number(v.toPrecision(2))))).join(" ") + " or more"] }[this.choice.value];
       this.legend.replaceChildren();
       if (words) {
         const bar = document.createElement("i");
@@ -139,7 +145,11 @@
       this.context.beginPath(); this.context.arc(x, y, disk.radius * scale + 2, 0, 2 * Math.PI); this.context.stroke();
       const lines = [`disk ${this.disk}`, `radius ${disk.radius.toFixed(2)} px`, `quality ${disk.quality.toFixed(2)}`];
       if (disk.order !== null) lines.push(`|ψ6| ${disk.order.toFixed(2)}`);
-      if (disk.step !== null) lines.push(`step ${disk.step.toFixed(2)} D a frame`);
+      if (disk.probability !== null) lines.push(`probability ${disk.probability.toFixed(2)}`);
+      if (disk.step !== null) {
+        const [x, z] = disk.step.map(way => this.speed(way));
+        lines.push(`velocity ${[x, z].map(v => shakebed.minus(Number(v[0].toPrecision(2)))).join(", ")} ${x[1]}`);
+      }
       if (marks) lines.push(marks.false.includes(this.disk) ? "false: no bead is there" : "a bead is there");
       this.says.replaceChildren(...lines.flatMap((line, k) => (k ? [document.createElement("br"), line] : [line])));
       this.says.style.left = `${Math.max(0, Math.min(width - this.says.offsetWidth, x + (x > width / 2 ? -this.says.offsetWidth - 12 : 12)))}px`;

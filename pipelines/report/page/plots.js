@@ -3,13 +3,7 @@
 // zoom, copy as CSV. No library: the figures are SVG, so their text is text, keys and touch work, colours follow the page.
 (() => {
   "use strict";
-  const ns = "http://www.w3.org/2000/svg";
-  const make = (name, attributes, parent) => {
-    const element = document.createElementNS(ns, name);
-    for (const key in attributes) element.setAttribute(key, attributes[key]);
-    if (parent) parent.append(element);
-    return element;
-  };
+  const { make, minus } = shakebed;
   // T_c, D^2, m^{-1} as the axes of the drawings write them: [text, shift] pieces.
   const pieces = text => {
     const out = [];
@@ -261,14 +255,14 @@
         const yTicks = f.log ? decades(f.range[0], f.range[1], 7) : ticks(f.range[0], f.range[1], f.panel ? 4 : 7).map(t => [t, t]);
         for (const [v, value] of yTicks) {
           make("path", { class: "grid", d: `M${left} ${py(v).toFixed(1)}H${width - right}` }, inside);
-          make("text", { class: "tick", x: left - 6, y: py(v) + 4, "text-anchor": "end" }, svg).textContent = number(value).replace("-", "−");
+          make("text", { class: "tick", x: left - 6, y: py(v) + 4, "text-anchor": "end" }, svg).textContent = minus(number(value));
         }
         make("rect", { class: "axis", x: left, y: f.y0, width: width - left - right, height: f.h }, svg);
         lines[f.panel].forEach((line, i) => svgText(line, true, { transform: `translate(${(narrow ? 11 : 14) + 15 * i} ${f.y0 + f.h / 2}) rotate(-90)`, "text-anchor": "middle" }, svg));
         for (const s of this.series) if (s.on && s.panel === f.panel) this.drawSeries(s, f, inside);
       }
       const base = top + upper + gap + lowerHeight;
-      for (const [u, value] of xTicks) make("text", { class: "tick", x: px(u), y: base + 16, "text-anchor": "middle" }, svg).textContent = number(value).replace("-", "−");
+      for (const [u, value] of xTicks) make("text", { class: "tick", x: px(u), y: base + 16, "text-anchor": "middle" }, svg).textContent = minus(number(value));
       svgText(d.x, true, { x: (left + width - right) / 2, y: base + 38, "text-anchor": "middle" }, svg);
       this.mark = make("g", {}, svg);
       const focused = this.svg && this.svg === document.activeElement;

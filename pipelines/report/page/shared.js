@@ -1,4 +1,4 @@
-// What the viewers of films and of simulated beds share.
+// What figures and the viewers of films and of simulated beds share.
 const shakebed = (() => {
   "use strict";
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
@@ -15,6 +15,8 @@ const shakebed = (() => {
     if (parent) parent.append(element);
     return element;
   };
+  // With the sign of typography.
+  const minus = text => String(text).replace("-", "−");
 
   // The density of one frame beside the mean, heights upwards. `of`: lowest height, spacing and number of the heights,
   // largest density, the mean, and the densities of all frames as bytes (255: the largest).
@@ -34,7 +36,7 @@ const shakebed = (() => {
       }
       for (let z = Math.ceil(of.low / dz) * dz; z <= highest; z += dz) {
         make("path", { class: "grid", d: `M${left} ${this.y(z)}H${width - right}` }, svg);
-        make("text", { class: "tick", x: left - 5, y: this.y(z) + 4, "text-anchor": "end" }, svg).textContent = String(Number(z.toFixed(2))).replace("-", "−");
+        make("text", { class: "tick", x: left - 5, y: this.y(z) + 4, "text-anchor": "end" }, svg).textContent = minus(Number(z.toFixed(2)));
       }
       make("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, svg).textContent = "density n D²";
       make("text", { transform: `translate(12 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg).textContent = "height z/D";
@@ -52,5 +54,5 @@ const shakebed = (() => {
       if (floor !== undefined) this.floor.setAttribute("d", `M${this.left} ${this.y(floor).toFixed(1)}H${this.right}`);
     }
   }
-  return { bytes, color, Profile };
+  return { bytes, color, make, minus, Profile };
 })();

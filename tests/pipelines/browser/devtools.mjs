@@ -85,8 +85,9 @@ export class Browser {
   }
   async stop() {
     try { await Promise.race([this.send("Browser.close", {}, null), new Promise(done => setTimeout(done, 2000))]); } catch { /* it is gone already */ }
+    const ended = this.process.exitCode !== null ? Promise.resolve() : new Promise(done => this.process.once("exit", done));
     if (this.process.exitCode === null) this.process.kill();
-    await new Promise(done => setTimeout(done, 200));
-    rmSync(this.profile, { recursive: true, force: true });
+    await Promise.race([ended, new Promise(done => setTimeout(done, 5000))]);
+    rmSync(this.profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 200 });  // its children write a little longer
   }
 }
