@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <tuple>
 
 #include "fit/profile_fit/answer.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
@@ -35,7 +36,7 @@ py::object from_json(const Json& json) {
 
 Kernel kernel_named(const std::string& text) {
   if (const auto kernel = kernel_from(text)) return *kernel;
-  throw py::value_error(fmt::format(
+  throw Mistake(fmt::format(
       "there is no kernel \"{}\"; write none, gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)", text));
 }
 
@@ -215,7 +216,7 @@ class Stepper {
 
   void advance_to(double time) {
     if (!(time >= simulation_->time()) || !std::isfinite(time))
-      throw py::value_error(fmt::format("the bed stands at time {}; it cannot go to {}", simulation_->time(), time));
+      throw Mistake(fmt::format("the bed stands at time {}; it cannot go to {}", simulation_->time(), time));
     Caller caller(py::none{});
     {
       const py::gil_scoped_release release;
@@ -263,30 +264,28 @@ std::vector<double> values_of(const std::optional<Doubles>& array) {
 
 fit::FitOptions fit_options(const py::dict& wanted) {
   fit::FitOptions out;
-  const auto take = [&](const char* name, auto& value) {
-    using Value = std::remove_reference_t<decltype(value)>;
-    if (wanted.contains(name) && !wanted[name].is_none()) value = wanted[name].cast<Value>();
-  };
-  take("model", out.model);
-  take("plateau_density", out.plateau_density);
-  take("plateau_density_free", out.plateau_density_free);
-  take("fixed_temperature", out.fixed_temperature);
-  take("fixed_shift", out.fixed_shift);
-  take("column_number", out.column_number);
-  take("constrain_column", out.constrain_column);
-  take("base", out.base);
-  take("robust", out.robust);
-  take("model_error", out.model_error);
-  take("interval", out.interval);
-  take("sweep", out.sweep);
-  take("compare", out.compare);
-  take("confidence", out.confidence);
-  std::string kernel = "none";
-  take("kernel", kernel);
-  out.kernel = kernel_named(kernel);
-  if (wanted.contains("window") && !wanted["window"].is_none()) {
-    const auto window = wanted["window"].cast<std::pair<double, double>>();
-    out.window.low = window.first, out.window.high = window.second;
+  for (const auto& [key, value] : wanted) {
+    if (value.is_none()) continue;
+    const auto name = key.cast<std::string>();
+    const auto take = [&, &given = value](const char* option, auto& target) {
+      if (name == option) take_option(given, option, target);
+    };
+    take("model", out.model);
+    take("plateau_density", out.plateau_density);
+    take("plateau_density_free", out.plateau_density_free);
+    take("fixed_temperature", out.fixed_temperature);
+    take("fixed_shift", out.fixed_shift);
+    take("column_number", out.column_number);
+    take("constrain_column", out.constrain_column);
+    take("base", out.base);
+    take("robust", out.robust);
+    take("model_error", out.model_error);
+    take("interval", out.interval);
+    take("sweep", out.sweep);
+    take("compare", out.compare);
+    take("confidence", out.confidence);
+    if (name == "kernel") out.kernel = kernel_named(option_as<std::string>(value, "kernel"));
+    if (name == "window") std::tie(out.window.low, out.window.high) = option_as<std::pair<double, double>>(value, "window");
   }
   return out;
 }
@@ -455,12 +454,12 @@ void bind_beds(py::module_& m) {
 }
 
 // Frames of a trajectory file as one array, which is filled while the file is read.
-py::tuple read_trajectory(const std::string& path) {
+py::tuple read_trajectory(const std::string& path, bool y_is_up) {
   Bed bed;
   {
     const py::gil_scoped_release release;
     const std::size_t frames = pipelines::count_frames(path);
-    pipelines::TrajectoryReader reader(path);
+    pipelines::TrajectoryReader reader(path, y_is_up ? pipelines::UpAxis::y : pipelines::UpAxis::z);
     pipelines::TrajectoryFrame frame;
     while (reader.read(frame)) {
       if (bed.times.empty()) {
@@ -491,7 +490,7 @@ py::dict density_profile(const Doubles& z, double width, const std::string& kern
     add_density(grid, kernel, width, {z.data() + k * disks, disks}, 0,
                 std::span(densities.number_density).subspan(k * grid.points, grid.points));
   const fit::FrameAverage average = fit::average_frames(densities);
-  if (average.status != fit::FitStatus::ok) throw py::value_error(average.message);
+  if (average.status != fit::FitStatus::ok) throw Mistake(average.message);
   py::dict out;
   out["height"] = array_of(average.profile.height);
   out["number_density"] = array_of(average.profile.number_density);
@@ -558,6 +557,7 @@ double quantity(const std::string& text, const std::string& kind) {
 PYBIND11_MODULE(_core, m) {
   using namespace shakebed::python;
   translate_errors();
+  translate_mistakes();
   bind_beds(m);
   bind_fits(m);
   m.def("read_trajectory", &read_trajectory);

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 import numpy as np
 
 from . import _core
-from .errors import UsageError
+from .errors import UsageError, check_options
 from .quantities import Number, Quantity, in_diameters, in_si, table_html
 
 if TYPE_CHECKING:
@@ -117,16 +117,28 @@ class Fit:
         return table_html(f"fit: {self._numbers.get('model', '')}", rows, self.warnings)
 
 
+_fit_options = frozenset({
+    "base", "column_number", "compare", "confidence", "constrain_column", "fixed_shift", "fixed_temperature", "interval",
+    "model", "model_error", "plateau_density", "plateau_density_free", "robust", "sweep", "window"})
+
+
+def _numbers(values: Any, name: str) -> Array:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name} cannot be read as numbers: {error}") from None
+
+
 def _arrays(height: Any, density: Any, error: Any, covariance: Any) -> tuple[Array, Array, Optional[Array], Optional[Array]]:
-    height, density = np.atleast_1d(np.asarray(height, float)), np.atleast_1d(np.asarray(density, float))
+    height, density = _numbers(height, "height"), _numbers(density, "density")
     if height.ndim != 1 or height.shape != density.shape:
         raise UsageError(f"height has shape {height.shape} and density {density.shape}; they must be equal, (heights,)")
     if error is not None:
-        error = np.asarray(error, float)
+        error = _numbers(error, "error")
         if error.shape != height.shape:
             raise UsageError(f"error has shape {error.shape}; it must be {height.shape}")
     if covariance is not None:
-        covariance = np.ascontiguousarray(covariance, float)
+        covariance = _numbers(covariance, "covariance")
         if covariance.shape != (height.size, height.size):
             raise UsageError(f"covariance has shape {covariance.shape}; it must be {(height.size, height.size)}")
     return height, density, error, covariance
@@ -170,14 +182,10 @@ def fit_profile(
     Fit
         What is wrong with the data is in its status and message; nothing is raised for it.
     """
-    known = {"model", "plateau_density", "plateau_density_free", "column_number", "constrain_column",
-             "fixed_temperature", "fixed_shift", "window", "base", "robust", "model_error", "interval", "sweep",
-             "compare", "confidence"}
-    if unknown := set(options) - known:
-        raise TypeError(f"fit_profile() has no option {sorted(unknown)[0]!r}; it has {', '.join(sorted(known))}")
+    check_options("fit_profile", options, _fit_options)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
     arrays = _arrays(height, density, error, covariance)
-    return Fit(_core.fit_profile(*arrays, covariance_samples, {**options, "kernel": kernel}, length))
+    return Fit(_core.fit_profile(*arrays, covariance_samples, options | {"kernel": kernel}, length))
 
 
 def find_answer(

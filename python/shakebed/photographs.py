@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Sequence, Union
 
 import numpy as np
 
-from .errors import StageError, UsageError
+from .errors import StageError, UsageError, check_options
 from .quantities import Number, Progress, in_si, reporter, table_html
 from .scenes import Profile, profile_from
 
@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_find_options = {"polarity", "radius", "roi", "keep_half_hidden"}
+_find_options = frozenset({"polarity", "radius", "roi", "keep_half_hidden"})
 _measure_options = _find_options | {"scale", "floor", "floor_slope", "left_wall", "right_wall", "pixel_aspect",
                                     "lens_radial", "spacing", "lowest", "highest", "frame_rate", "frequency", "kernel"}
 
 
-def _checked(options: dict[str, Any], known: set[str], function: str) -> dict[str, Any]:
-    if unknown := set(options) - known:
-        raise TypeError(f"{function}() has no option {sorted(unknown)[0]!r}; it has {', '.join(sorted(known))}")
+def _checked(options: dict[str, Any], known: frozenset[str], function: str) -> dict[str, Any]:
+    check_options(function, options, known)
     return {name: value for name, value in options.items() if value is not None}
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from . import _core
 from ._place import program as _program_place
-from .errors import CheckFailed, InputError, StageError, error_of_code
+from .errors import CheckFailed, StageError, error_of_code, input_error
 from .quantities import Progress, Quantity, reporter, table_html
 from .scenes import Trajectory, read_trajectory
 
@@ -111,8 +111,8 @@ class StageResults:
         """One CSV, by its name without .csv."""
         path = self.folder / f"{name}.csv"
         if not path.is_file():
-            raise InputError(f"{path}: there is no such table; there are "
-                             f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}")
+            raise input_error(f"{path}: there is no such table; there are "
+                              f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}", str(path))
         return Table(path)
 
     def __getitem__(self, name: str) -> Any:
@@ -123,7 +123,8 @@ class StageResults:
         for name in ("trajectory.extxyz.zst", "trajectory.extxyz"):
             if (self.folder / name).is_file():
                 return read_trajectory(self.folder / name)
-        raise InputError(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"")
+        raise input_error(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"",
+                          str(self.folder))
 
     def __repr__(self) -> str:
         return f"<shakebed.StageResults {self.folder.name}>"
@@ -148,9 +149,10 @@ class Results:
             content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             return content
         except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}; is it a folder of results?") from None
+            raise input_error(f"{path}: cannot be read: {error.strerror}; is it a folder of results?",
+                              str(path)) from None
         except ValueError as error:
-            raise InputError(f"{path}: is no JSON: {error}") from None
+            raise input_error(f"{path}: is no JSON: {error}", str(path)) from None
 
     @property
     def answer(self) -> Optional[dict[str, Any]]:
@@ -191,7 +193,7 @@ def load(out: Union[str, "os.PathLike[str]"]) -> Results:
     """
     folder = Path(out)
     if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder")
+        raise input_error(f"{folder}: there is no such folder", str(folder))
     return Results(folder)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Dict, NamedTuple, Optional, Union
 import numpy as np
 
 from . import _core
-from .errors import InputError, RecipeError, UsageError
+from .errors import RecipeError, UsageError, input_error, recipe_error
 from .quantities import Progress, Quantity, reporter, table_html
 
 if TYPE_CHECKING:
@@ -94,12 +94,28 @@ class Trajectory(NamedTuple):
         return self.array[:, :, 2:4]
 
 
-def read_trajectory(path: Union[str, "os.PathLike[str]"]) -> Trajectory:
+def read_trajectory(path: Union[str, "os.PathLike[str]"], *, up: str = "z") -> Trajectory:
     """Read a trajectory in extended XYZ (also compressed, .zst), ours or that of another program.
 
-    Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
+    Parameters
+    ----------
+    path : str or path
+        Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
+    up : "z" or "y"
+        The coordinate that is the height, where positions have three. Programs that simulate in a plane often have y.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, or all heights are 0.
     """
-    return Trajectory(*_core.read_trajectory(os.fspath(path)))
+    if up not in ("y", "z"):
+        raise UsageError(f"up is {up!r}; it must be \"z\" or \"y\"")
+    file = os.fspath(path)
+    trajectory = Trajectory(*_core.read_trajectory(file, up == "y"))
+    if trajectory.array.size > 0 and not trajectory.array[:, :, 1].any():
+        raise input_error(f"{file}: all heights (coordinate {up}) are 0; where y points upwards, pass up=\"y\"", file)
+    return trajectory
 
 
 def density_profile(
@@ -158,7 +174,7 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
             try:
                 text = path.read_text(encoding="utf-8")
             except OSError as error:
-                raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+                raise input_error(f"{path}: cannot be read: {error.strerror}", str(path)) from None
             file, directory = str(path), str(path.resolve().parent)
         try:
             content = json.loads(text)
@@ -192,8 +208,6 @@ def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
             problem["line"] = problem["column"] = 0
         lines.append(" ".join(p for p in (f"{problem['file']}: {problem['pointer']}: {problem['problem']}.",
                                           problem["suggestion"]) if p))
-    from .errors import recipe_error
-
     found = recipe_error("\n".join(lines), error.problems, error.exit_code)
     return found  # type: ignore[return-value]
 
