@@ -26,7 +26,9 @@ ingest::Polarity polarity_named(const std::string& name) {
 ingest::ImageView view_of(const py::array& image) {
   if (image.ndim() != 2)
     throw Mistake("the image has " + std::to_string(image.ndim()) +
-                          " dimensions; pass a grey image (rows x columns), or one channel of a colour image");
+                  " dimensions; pass a grey image (rows x columns), or one channel of a colour image");
+  if (image.size() == 0) throw Mistake("the image is empty");
+  if (py::hasattr(image, "mask")) throw Mistake("the image is a masked array; pass image.filled(level), or image.data");
   ingest::ImageView view;
   view.height = static_cast<int>(image.shape(0));
   view.width = static_cast<int>(image.shape(1));

@@ -39,6 +39,7 @@ inline void translate_mistakes() {
   });
 }
 
+using OpenInterval = std::pair<std::optional<double>, std::optional<double>>;
 template <class Value>
 constexpr const char* kind_of = "a number";
 template <>
@@ -48,7 +49,7 @@ inline constexpr const char* kind_of<unsigned> = "a whole number, 0 or more";
 template <>
 inline constexpr const char* kind_of<std::string> = "a string";
 template <>
-inline constexpr const char* kind_of<std::pair<double, double>> = "a pair of numbers";
+inline constexpr const char* kind_of<OpenInterval> = "a pair of numbers; None leaves an end open";
 template <>
 inline constexpr const char* kind_of<std::array<int, 4>> = "four whole numbers";
 

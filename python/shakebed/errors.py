@@ -67,6 +67,10 @@ class CheckFailed(Error):
     results: Any = None
 
 
+class BedWarning(UserWarning):
+    """What is odd about a scene or an argument, though it makes sense: issued by Python's `warnings`."""
+
+
 def check_options(function: str, options: Iterable[str], known: frozenset[str]) -> None:
     """TypeError, as of Python itself, for an option that the function does not have."""
     for name in options:

@@ -17,7 +17,7 @@ import numpy as np
 from . import _core
 from ._place import program as _program_place
 from .errors import CheckFailed, StageError, error_of_code, input_error
-from .quantities import Progress, Quantity, reporter, table_html
+from .quantities import Progress, Quantity, as_json, reporter, table_html
 from .scenes import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
@@ -193,7 +193,8 @@ def load(out: Union[str, "os.PathLike[str]"]) -> Results:
     """
     folder = Path(out)
     if not folder.is_dir():
-        raise input_error(f"{folder}: there is no such folder", str(folder))
+        what = "is a file; pass the folder of the results" if folder.is_file() else "there is no such folder"
+        raise input_error(f"{folder}: {what}", str(folder))
     return Results(folder)
 
 
@@ -241,7 +242,7 @@ def run(
         After Ctrl-C; finished stages are kept and the run can be continued by the same call.
     """
     recipe, out = os.fspath(recipe), os.fspath(out)
-    settings = [f"{pointer}={value if isinstance(value, str) else json.dumps(value)}"
+    settings = [f"{pointer}={value if isinstance(value, str) else as_json(value)}"
                 for pointer, value in (set or {}).items()]
     _core.check_recipe(recipe, settings, preset)
     command = [program(), "run", recipe, "--out", out]
