@@ -1,6 +1,10 @@
 """Trajectories of other programs, and ours in them."""
 
 import json
+import pathlib
+import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -43,20 +47,21 @@ def test_ase_reads_what_we_write(tmp_path):
         assert set(frames[0].arrays["radius"]) == ({0.5} if name == "one" else {0.5, 4 / 6})
 
 
-def test_a_dump_of_lammps_gives_a_profile_by_ase(tmp_path):
-    """As examples/python/your_own_trajectory.py does it; LAMMPS in a plane has y upwards."""
+def test_the_example_fits_a_dump_of_lammps(tmp_path):
+    """An ideal gas of T = 2 in a plane with y upwards; four standard errors are allowed (chance 1 in 16,000)."""
     random = np.random.default_rng(3)
-    places = np.stack([random.uniform(0, 50, (40, 30)), random.exponential(2, (40, 30))], axis=2)
     with open(tmp_path / "bed.lammpstrj", "w") as dump:
-        for step, frame in enumerate(places):
-            dump.write(f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n30\nITEM: BOX BOUNDS pp ff pp\n0 50\n0 60\n-0.5 0.5\n"
-                       "ITEM: ATOMS id type x y z\n")
-            dump.writelines(f"{k + 1} 1 {float(x)!r} {float(y)!r} 0\n" for k, (x, y) in enumerate(frame))
-    frames = ase_io.read(tmp_path / "bed.lammpstrj", index=":")
-    heights = np.array([frame.positions[:, 1] for frame in frames])
-    assert np.allclose(np.sort(heights), np.sort(places[:, :, 1]))
-    profile = shakebed.density_profile(heights, 50, lowest=-4, highest=places[:, :, 1].max() + 4)
-    assert profile.number_density.sum() * 0.25 == pytest.approx(30 / 50, rel=1e-3)
+        for step in range(60):
+            dump.write(f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n90\nITEM: BOX BOUNDS pp ff pp\n0 1000\n0 60\n"
+                       "-0.5 0.5\nITEM: ATOMS id type x y z\n")
+            dump.writelines(f"{k + 1} 1 {x!r} {y!r} 0\n" for k, (x, y) in enumerate(
+                zip(random.uniform(0, 1000, 90).tolist(), random.exponential(2, 90).tolist())))
+    script = pathlib.Path(__file__).resolve().parents[2] / "examples" / "python" / "your_own_trajectory.py"
+    done = subprocess.run([sys.executable, script, tmp_path / "bed.lammpstrj", "1000", "y"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "(60, 90)" in done.stdout
+    t, error = re.search(r"T = ([\d.]+) \+- ([\d.]+)", done.stdout).groups()
+    assert abs(float(t) - 2) < 4 * float(error) < 1
 
 
 def test_heights_may_be_in_the_second_coordinate(tmp_path):
