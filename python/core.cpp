@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <tuple>
 
 #include "fit/profile_fit/answer.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
@@ -35,14 +36,32 @@ py::object from_json(const Json& json) {
 
 Kernel kernel_named(const std::string& text) {
   if (const auto kernel = kernel_from(text)) return *kernel;
-  throw py::value_error(fmt::format(
+  throw Mistake(fmt::format(
       "there is no kernel \"{}\"; write none, gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)", text));
+}
+
+py::dict problem_dict(const pipelines::Problem& problem) {
+  py::dict out;
+  out["file"] = problem.file;
+  out["line"] = problem.at.line;
+  out["column"] = problem.at.column;
+  out["pointer"] = problem.pointer;
+  out["problem"] = problem.what;
+  out["suggestion"] = problem.suggestion;
+  return out;
+}
+
+py::list problem_list(const std::vector<pipelines::Problem>& problems) {
+  py::list out;
+  for (const pipelines::Problem& problem : problems) out.append(problem_dict(problem));
+  return out;
 }
 
 // ------------------------------------------------------------------------------------------------ scenes
 
 // A recipe's stage `simulate`, read and checked.
 struct SceneOfRecipe {
+  std::vector<pipelines::Problem> warnings;  // what is odd about it, though it can be simulated
   pipelines::SceneOptions bed;
   sim::Scene scene;
   sim::MeasureOptions options;
@@ -84,6 +103,8 @@ SceneOfRecipe read_scene(const std::string& text, const std::string& file, const
   const pipelines::Fields::Source source{.file = file, .directory = directory, .problems = &problems};
   const pipelines::JsonNode* node = pipelines::find_pointer(plan.document, stage.pointer);
   SceneOfRecipe out;
+  for (const pipelines::Warning& warning : plan.warnings)
+    if (warning.problem.pointer.starts_with(stage.pointer)) out.warnings.push_back(warning.problem);
   pipelines::Fields fields = pipelines::Fields::decode(*node, stage.pointer, source);
   fields.set_reduced(stage.reduced);
   out.bed.describe(fields);
@@ -215,7 +236,7 @@ class Stepper {
 
   void advance_to(double time) {
     if (!(time >= simulation_->time()) || !std::isfinite(time))
-      throw py::value_error(fmt::format("the bed stands at time {}; it cannot go to {}", simulation_->time(), time));
+      throw Mistake(fmt::format("the bed stands at time {}; it cannot go to {}", simulation_->time(), time));
     Caller caller(py::none{});
     {
       const py::gil_scoped_release release;
@@ -256,48 +277,71 @@ class Stepper {
 
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-std::vector<double> values_of(const std::optional<Doubles>& array) {
-  if (!array) return {};
-  return {array->data(), array->data() + array->size()};
+// The numbers of an array or of what numpy makes one of. They are read here and not in Python: a fit is short.
+Doubles numbers_of(const py::object& values, const char* name) {
+  if (py::hasattr(values, "mask"))
+    throw Mistake(std::string(name) + " is a masked array; pass the values that count, " + name + "[~" + name +
+                  ".mask]");
+  Doubles array = Doubles::ensure(values);
+  if (!array)
+    throw Mistake(std::string(name) + " cannot be read as numbers; pass an array, or a list without gaps in it");
+  return array;
 }
+
+std::string shape_of(const py::array& array) { return py::str(array.attr("shape")).cast<std::string>(); }
+
+std::vector<double> values_of(const Doubles& array) { return {array.data(), array.data() + array.size()}; }
 
 fit::FitOptions fit_options(const py::dict& wanted) {
   fit::FitOptions out;
-  const auto take = [&](const char* name, auto& value) {
-    using Value = std::remove_reference_t<decltype(value)>;
-    if (wanted.contains(name) && !wanted[name].is_none()) value = wanted[name].cast<Value>();
-  };
-  take("model", out.model);
-  take("plateau_density", out.plateau_density);
-  take("plateau_density_free", out.plateau_density_free);
-  take("fixed_temperature", out.fixed_temperature);
-  take("fixed_shift", out.fixed_shift);
-  take("column_number", out.column_number);
-  take("constrain_column", out.constrain_column);
-  take("base", out.base);
-  take("robust", out.robust);
-  take("model_error", out.model_error);
-  take("interval", out.interval);
-  take("sweep", out.sweep);
-  take("compare", out.compare);
-  take("confidence", out.confidence);
-  std::string kernel = "none";
-  take("kernel", kernel);
-  out.kernel = kernel_named(kernel);
-  if (wanted.contains("window") && !wanted["window"].is_none()) {
-    const auto window = wanted["window"].cast<std::pair<double, double>>();
-    out.window.low = window.first, out.window.high = window.second;
+  for (const auto& [key, value] : wanted) {
+    if (value.is_none()) continue;
+    const auto name = key.cast<std::string>();
+    const auto take = [&, &given = value](const char* option, auto& target) {
+      if (name == option) take_option(given, option, target);
+    };
+    take("model", out.model);
+    take("plateau_density", out.plateau_density);
+    take("plateau_density_free", out.plateau_density_free);
+    take("fixed_temperature", out.fixed_temperature);
+    take("fixed_shift", out.fixed_shift);
+    take("column_number", out.column_number);
+    take("constrain_column", out.constrain_column);
+    take("base", out.base);
+    take("robust", out.robust);
+    take("model_error", out.model_error);
+    take("interval", out.interval);
+    take("sweep", out.sweep);
+    take("compare", out.compare);
+    take("confidence", out.confidence);
+    if (name == "kernel") out.kernel = kernel_named(option_as<std::string>(value, "kernel"));
+    if (name == "window") std::tie(out.window.low, out.window.high) = option_as<OpenInterval>(value, "window");
   }
   return out;
 }
 
-fit::Profile profile_of(const Doubles& height, const Doubles& density, const std::optional<Doubles>& error,
-                        const std::optional<Doubles>& covariance, int covariance_samples) {
+fit::Profile profile_of(const py::object& height, const py::object& density, const py::object& error,
+                        const py::object& covariance, int covariance_samples) {
+  const Doubles heights = numbers_of(height, "height"), densities = numbers_of(density, "density");
+  if (heights.ndim() != 1 || densities.ndim() != 1 || heights.size() != densities.size())
+    throw Mistake(fmt::format("height has shape {} and density {}; they must be equal, (heights,)", shape_of(heights),
+                              shape_of(densities)));
   fit::Profile profile;
-  profile.height = values_of(height);
-  profile.number_density = values_of(density);
-  profile.std_error = values_of(error);
-  profile.covariance = values_of(covariance);
+  profile.height = values_of(heights);
+  profile.number_density = values_of(densities);
+  if (!error.is_none()) {
+    const Doubles errors = numbers_of(error, "error");
+    if (errors.ndim() > 1 || (errors.ndim() == 1 && errors.size() != heights.size()))
+      throw Mistake(fmt::format("error has shape {}; it must be {}", shape_of(errors), shape_of(heights)));
+    profile.std_error = errors.ndim() == 1 ? values_of(errors) : std::vector(profile.height.size(), *errors.data());
+  }
+  if (!covariance.is_none()) {
+    const Doubles matrix = numbers_of(covariance, "covariance");
+    const py::ssize_t size = heights.size();
+    if (matrix.ndim() != 2 || matrix.shape(0) != size || matrix.shape(1) != size)
+      throw Mistake(fmt::format("covariance has shape {}; it must be ({}, {})", shape_of(matrix), size, size));
+    profile.covariance = values_of(matrix);
+  }
   profile.covariance_samples = covariance_samples;
   return profile;
 }
@@ -329,17 +373,24 @@ py::dict estimate(const fit::Estimate& value) {
   return out;
 }
 
+// Without an answer there are no numbers: None.
 py::dict answer_of(const fit::Answer& answer) {
   py::dict out;
+<<<<<<< HEAD
   // No number where there is no answer.
   const auto number = [&](double value) -> py::object {
     if (!answer.ok()) return py::none();
     return py::float_(value);
+=======
+  const auto number = [&](const char* name, double value) {
+    out[name] = answer.ok() ? py::object(py::float_(value)) : py::object(py::none());
+>>>>>>> 395c0dff7890e311ce0afbf2f1bf13c0965100ea
   };
   out["status"] = std::string(to_string(answer.status));
   out["verdict"] = std::string(to_string(answer.verdict));
   out["why"] = answer.why;
   out["advice"] = answer.advice;
+<<<<<<< HEAD
   out["temperature"] = number(answer.temperature);
   out["std_error"] = number(answer.std_error);
   out["statistical_error"] = number(answer.statistical_error);
@@ -350,6 +401,18 @@ py::dict answer_of(const fit::Answer& answer) {
   out["high"] = number(answer.interval.high);
   out["confidence"] = answer.interval.confidence;
   out["solid_height"] = estimate(answer.solid_height);
+=======
+  number("temperature", answer.temperature);
+  number("std_error", answer.std_error);
+  number("statistical_error", answer.statistical_error);
+  number("bias_uncertainty", answer.bias_uncertainty);
+  number("contact_duration_uncertainty", answer.contact_duration_uncertainty);
+  number("spread", answer.spread);
+  number("low", answer.interval.low);
+  number("high", answer.interval.high);
+  number("confidence", answer.interval.confidence);
+  out["solid_height"] = answer.ok() ? py::object(estimate(answer.solid_height)) : py::object(py::none());
+>>>>>>> 395c0dff7890e311ce0afbf2f1bf13c0965100ea
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;
   return out;
@@ -365,16 +428,16 @@ void bind_fits(py::module_& m) {
       .def("full", [](const Fit& f) { return f.result.full(); })
       .def("to_dict", [](const Fit& f) { return from_json(pipelines::fit_json(f.result, f.diameter)); })
       .def("curve", [](const Fit& f) { return curve_of(f.result); });
-  m.def("fit_profile", [](const Doubles& height, const Doubles& density, const std::optional<Doubles>& error,
-                          const std::optional<Doubles>& covariance, int covariance_samples, const py::dict& options,
-                          std::optional<double> diameter) {
-    const fit::Profile profile = profile_of(height, density, error, covariance, covariance_samples);
-    const fit::FitOptions wanted = fit_options(options);
-    const py::gil_scoped_release release;
-    return Fit{fit::fit_profile(profile, wanted), diameter};
-  });
-  m.def("find_answer", [](const Doubles& height, const Doubles& density, const std::optional<Doubles>& error,
-                          const std::optional<Doubles>& covariance, int covariance_samples, const std::string& kernel,
+  m.def("fit_profile",
+        [](const py::object& height, const py::object& density, const py::object& error, const py::object& covariance,
+           int covariance_samples, const py::dict& options, std::optional<double> diameter) {
+          const fit::Profile profile = profile_of(height, density, error, covariance, covariance_samples);
+          const fit::FitOptions wanted = fit_options(options);
+          const py::gil_scoped_release release;
+          return Fit{fit::fit_profile(profile, wanted), diameter};
+        });
+  m.def("find_answer", [](const py::object& height, const py::object& density, const py::object& error,
+                          const py::object& covariance, int covariance_samples, const std::string& kernel,
                           std::optional<double> column_number, std::optional<std::pair<double, double>> temperature_x,
                           std::optional<std::pair<double, double>> temperature_z) {
     fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
@@ -421,6 +484,7 @@ void bind_beds(py::module_& m) {
   py::class_<Bed, std::shared_ptr<Bed>>(m, "Bed")
       .def_property_readonly("length_unit", [](const Bed& bed) { return bed.input.bed.length_unit(); })
       .def_property_readonly("time_unit", [](const Bed& bed) { return bed.input.bed.time_unit(); })
+      .def_property_readonly("warnings", [](const Bed& bed) { return problem_list(bed.input.warnings); })
       .def_property_readonly("weightless", [](const Bed& bed) { return bed.input.bed.weightless(); })
       .def_property_readonly("gamma", [](const Bed& bed) { return bed.input.bed.gamma(); })
       .def_property_readonly("column_number",
@@ -448,6 +512,7 @@ void bind_beds(py::module_& m) {
       }))
       .def("advance_to", &Stepper::advance_to)
       .def_property_readonly("time", &Stepper::time)
+      .def_property_readonly("warnings", [](const Stepper& s) { return problem_list(s.input().warnings); })
       .def_property_readonly("length_unit", [](const Stepper& s) { return s.input().bed.length_unit(); })
       .def_property_readonly("time_unit", [](const Stepper& s) { return s.input().bed.time_unit(); })
       .def_property_readonly("width", [](const Stepper& s) { return s.input().scene.box.width; })
@@ -460,12 +525,12 @@ void bind_beds(py::module_& m) {
 }
 
 // Frames of a trajectory file as one array, which is filled while the file is read.
-py::tuple read_trajectory(const std::string& path) {
+py::tuple read_trajectory(const std::string& path, bool y_is_up) {
   Bed bed;
   {
     const py::gil_scoped_release release;
     const std::size_t frames = pipelines::count_frames(path);
-    pipelines::TrajectoryReader reader(path);
+    pipelines::TrajectoryReader reader(path, y_is_up ? pipelines::UpAxis::y : pipelines::UpAxis::z);
     pipelines::TrajectoryFrame frame;
     while (reader.read(frame)) {
       if (bed.times.empty()) {
@@ -496,7 +561,7 @@ py::dict density_profile(const Doubles& z, double width, const std::string& kern
     add_density(grid, kernel, width, {z.data() + k * disks, disks}, 0,
                 std::span(densities.number_density).subspan(k * grid.points, grid.points));
   const fit::FrameAverage average = fit::average_frames(densities);
-  if (average.status != fit::FitStatus::ok) throw py::value_error(average.message);
+  if (average.status != fit::FitStatus::ok) throw Mistake(average.message);
   py::dict out;
   out["height"] = array_of(average.profile.height);
   out["number_density"] = array_of(average.profile.number_density);
@@ -510,17 +575,6 @@ py::dict density_profile(const Doubles& z, double width, const std::string& kern
 
 // ------------------------------------------------------------------------------------------------ errors, recipes
 
-py::dict problem_dict(const pipelines::Problem& problem) {
-  py::dict out;
-  out["file"] = problem.file;
-  out["line"] = problem.at.line;
-  out["column"] = problem.at.column;
-  out["pointer"] = problem.pointer;
-  out["problem"] = problem.what;
-  out["suggestion"] = problem.suggestion;
-  return out;
-}
-
 // The exceptions themselves are classes of shakebed/errors.py: raised by their constructor there.
 void translate_errors() {
   py::register_exception_translator([](std::exception_ptr pointer) {
@@ -531,9 +585,8 @@ void translate_errors() {
     try {
       if (pointer) std::rethrow_exception(pointer);
     } catch (const pipelines::ConfigError& error) {
-      py::list problems;
-      for (const pipelines::Problem& problem : error.problems()) problems.append(problem_dict(problem));
-      raise("recipe_error", py::make_tuple(std::string(error.what()), problems, static_cast<int>(error.code())));
+      raise("recipe_error",
+            py::make_tuple(std::string(error.what()), problem_list(error.problems()), static_cast<int>(error.code())));
     } catch (const pipelines::Error& error) {
       raise("error_of_code", py::make_tuple(std::string(error.what()), static_cast<int>(error.code())));
     }
@@ -546,6 +599,12 @@ void check_recipe(const std::string& file, const std::vector<std::string>& setti
   changes.preset = preset;
   for (const std::string& setting : settings) changes.settings.push_back(pipelines::parse_setting(setting));
   pipelines::read_recipe(file, changes);
+}
+
+// What is odd about a bead of this diameter in m; "" where nothing is.
+std::string odd_bead(double diameter) {
+  const auto odd = pipelines::odd_bead(diameter);
+  return odd ? odd->what + ". " + odd->suggestion : "";
 }
 
 double quantity(const std::string& text, const std::string& kind) {
@@ -563,6 +622,7 @@ double quantity(const std::string& text, const std::string& kind) {
 PYBIND11_MODULE(_core, m) {
   using namespace shakebed::python;
   translate_errors();
+  translate_mistakes();
   bind_beds(m);
   bind_fits(m);
   m.def("read_trajectory", &read_trajectory);
@@ -571,6 +631,7 @@ PYBIND11_MODULE(_core, m) {
     return density_profile(z, width, kernel, {.lowest = lowest, .spacing = spacing, .points = points});
   });
   m.def("check_recipe", &check_recipe);
+  m.def("odd_bead", &odd_bead);
   m.def("quantity", &quantity);
   m.attr("version") = shakebed::pipelines::program_version();
 }

@@ -19,14 +19,16 @@ ingest::Polarity polarity_named(const std::string& name) {
   if (name == "automatic") return ingest::Polarity::automatic;
   if (name == "dark") return ingest::Polarity::dark_beads;
   if (name == "bright") return ingest::Polarity::bright_beads;
-  throw py::value_error("polarity is \"" + name + "\"; it must be automatic, dark or bright");
+  throw Mistake("polarity is \"" + name + "\"; it must be automatic, dark or bright");
 }
 
 // A view of a grey numpy image (rows x columns). What cannot be viewed is refused.
 ingest::ImageView view_of(const py::array& image) {
   if (image.ndim() != 2)
-    throw py::value_error("the image has " + std::to_string(image.ndim()) +
-                          " dimensions; pass a grey image (rows x columns), or one channel of a colour image");
+    throw Mistake("the image has " + std::to_string(image.ndim()) +
+                  " dimensions; pass a grey image (rows x columns), or one channel of a colour image");
+  if (image.size() == 0) throw Mistake("the image is empty");
+  if (py::hasattr(image, "mask")) throw Mistake("the image is a masked array; pass image.filled(level), or image.data");
   ingest::ImageView view;
   view.height = static_cast<int>(image.shape(0));
   view.width = static_cast<int>(image.shape(1));
@@ -40,34 +42,37 @@ ingest::ImageView view_of(const py::array& image) {
   else if (py::isinstance<py::array_t<double>>(image))
     view.type = ingest::PixelType::f64;
   else
-    throw py::value_error("levels must be uint8, uint16, float32 or float64");
+    throw Mistake("levels must be uint8, uint16, float32 or float64");
   if (view.width > 1 && image.strides(1) != image.itemsize())
-    throw py::value_error("the pixels of a row are not side by side in memory: pass numpy.ascontiguousarray(image)");
+    throw Mistake("the pixels of a row are not side by side in memory: pass numpy.ascontiguousarray(image)");
   if (view.height > 1 && image.strides(0) < 0)
-    throw py::value_error("the rows are in reverse order in memory: pass numpy.ascontiguousarray(image)");
+    throw Mistake("the rows are in reverse order in memory: pass numpy.ascontiguousarray(image)");
   view.row_bytes = static_cast<std::size_t>(view.height > 1 ? image.strides(0) : 0);
   return view;
 }
 
-ingest::FindOptions find_options(const py::dict& wanted) {
-  ingest::FindOptions out;
-  if (wanted.contains("polarity")) out.polarity = polarity_named(wanted["polarity"].cast<std::string>());
-  if (wanted.contains("radius")) out.radius_px = wanted["radius"].cast<std::optional<double>>();
-  if (wanted.contains("keep_half_hidden")) out.keep_half_hidden = wanted["keep_half_hidden"].cast<bool>();
-  if (wanted.contains("roi") && !wanted["roi"].is_none()) {
-    const auto roi = wanted["roi"].cast<std::array<int, 4>>();
+// Fills what the key names; `key` is what the caller gave, its value is not None.
+void take_find_option(const std::string& key, py::handle value, ingest::FindOptions& out) {
+  if (key == "polarity") out.polarity = polarity_named(option_as<std::string>(value, "polarity"));
+  if (key == "radius") take_option(value, "radius", out.radius_px);
+  if (key == "keep_half_hidden") take_option(value, "keep_half_hidden", out.keep_half_hidden);
+  if (key == "roi") {
+    const auto roi = option_as<std::array<int, 4>>(value, "roi");
     out.roi = ingest::PixelRectangle{roi[0], roi[1], roi[2], roi[3]};
   }
+}
+
+ingest::FindOptions find_options(const py::dict& wanted) {
+  ingest::FindOptions out;
+  for (const auto& [key, value] : wanted) take_find_option(key.cast<std::string>(), value, out);
   return out;
 }
 
-ingest::MeasureOptions measure_options(const py::dict& wanted) {
-  ingest::MeasureOptions out;
-  const auto take = [&](const char* name, auto& value) {
-    using Value = std::remove_reference_t<decltype(value)>;
-    if (wanted.contains(name) && !wanted[name].is_none()) value = wanted[name].cast<Value>();
+void take_measure_option(const std::string& key, py::handle value, ingest::MeasureOptions& out) {
+  const auto take = [&](const char* name, auto& target) {
+    if (key == name) take_option(value, name, target);
   };
-  out.find = find_options(wanted);
+  take_find_option(key, value, out.find);
   take("diameter", out.bead_diameter_m);
   take("scale", out.scale_m_per_px);
   take("floor", out.floor_px);
@@ -82,11 +87,18 @@ ingest::MeasureOptions measure_options(const py::dict& wanted) {
   take("frame_rate", out.frame_rate_hz);
   take("frequency", out.shaking_frequency_hz);
   take("threads", out.threads);
-  if (wanted.contains("kernel")) {
-    const auto kernel = kernel_from(wanted["kernel"].cast<std::string>());
-    if (!kernel) throw py::value_error("kernel: write gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)");
+  if (key == "kernel") {
+    const auto text = option_as<std::string>(value, "kernel");
+    const auto kernel = kernel_from(text);
+    if (!kernel)
+      throw Mistake("there is no kernel \"" + text + "\"; write gaussian:0.5, top_hat:1 or disk_chord:1 (widths in D)");
     out.kernel = *kernel;
   }
+}
+
+ingest::MeasureOptions measure_options(const py::dict& wanted) {
+  ingest::MeasureOptions out;
+  for (const auto& [key, value] : wanted) take_measure_option(key.cast<std::string>(), value, out);
   return out;
 }
 
@@ -207,6 +219,7 @@ PYBIND11_MODULE(_images, m) {
   using namespace shakebed::python;
   namespace ingest = shakebed::ingest;
   translate_errors();
+  translate_mistakes();
   py::class_<ingest::DisksFound>(m, "Disks")
       .def_property_readonly("status", [](const ingest::DisksFound& f) { return std::string(to_string(f.status)); })
       .def_property_readonly("ok", [](const ingest::DisksFound& f) { return f.ok(); })

@@ -1,7 +1,8 @@
 # %% [markdown]
 # # A trajectory of your own
-# Extended XYZ, as LAMMPS, ASE and OVITO write it, lengths in the diameter of a disk. Name a file and the width of the bed
-# as arguments. Without them, one is written here, of an ideal gas: its density falls as exp(-z/T).
+# Extended XYZ, as ASE and OVITO write it, or a dump of LAMMPS, which ASE reads. Lengths in the diameter of a disk. Name a
+# file, the width of the bed and the coordinate that is the height (z or y) as arguments. Without them, one is written
+# here, of an ideal gas: its density falls as exp(-z/T).
 
 # %%
 import sys
@@ -12,9 +13,9 @@ import numpy as np
 import shakebed
 
 if len(sys.argv) > 1:
-    file, width = sys.argv[1], float(sys.argv[2])
+    file, width, up = sys.argv[1], float(sys.argv[2]), (sys.argv[3:] or ["z"])[0]
 else:
-    width, temperature = 2000.0, 3.0
+    width, temperature, up = 2000.0, 3.0, "z"
     random = np.random.default_rng(4)
     file = str(Path(tempfile.mkdtemp()) / "gas.extxyz")
     with open(file, "w") as out:
@@ -24,9 +25,13 @@ else:
                 out.write(f"A {x} 0 {z}\n")
 
 # %%
-trajectory = shakebed.read_trajectory(file)
-print("frames x disks:", trajectory.array.shape[:2])
-profile = shakebed.density_profile(trajectory.array[:, :, 1], width, highest=15)
+if file.endswith((".xyz", ".extxyz", ".zst")):
+    heights = shakebed.read_trajectory(file, up=up).array[:, :, 1]
+else:
+    import ase.io
+    heights = np.array([frame.positions[:, "xyz".index(up)] for frame in ase.io.read(file, index=":")])
+print("frames x disks:", heights.shape)
+profile = shakebed.density_profile(heights, width, highest=15)
 fit = shakebed.fit_profile(profile.height, profile.number_density, profile.std_error, kernel=profile.kernel)
 print(fit.brief())
 print(fit.full())

@@ -57,7 +57,7 @@ void TrajectoryWriter::write(const TrajectoryFrame& frame) {
       number_text(frame.floor_velocity), number_text(frame.width));
   for (std::size_t i = 0; i < frame.size(); ++i) {
     const double radius = frame.radius.empty() ? 0.5 : frame.radius[i];
-    buffer_ += radius == 0.5 ? "A " : "B ";
+    buffer_ += radius == 0.5 ? "X " : "B ";
     number(frame.x[i]), buffer_ += " 0 ", number(frame.z[i]), buffer_ += ' ';
     number(frame.vx[i]), buffer_ += " 0 ", number(frame.vz[i]), buffer_ += ' ';
     number(radius);
@@ -110,7 +110,7 @@ struct TrajectoryReader::Decompressor {
   ~Decompressor() { ZSTD_freeDCtx(context); }
 };
 
-TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(path.string()) {
+TrajectoryReader::TrajectoryReader(const std::filesystem::path& path, UpAxis up) : path_(path.string()), up_(up) {
   file_ = std::fopen(path_.c_str(), "rbe");
   if (file_ == nullptr) fail_to_read(path_);
   if (path.extension() == ".zst") decompressor_ = std::make_unique<Decompressor>();
@@ -315,8 +315,9 @@ void TrajectoryReader::read_disks(std::size_t count, const Columns& columns, Tra
     values->clear();
   std::vector<double> row(static_cast<std::size_t>(columns.all));
   const auto at = [&](int column) { return row[static_cast<std::size_t>(column)]; };
-  const int height = columns.position + columns.position_size - 1;
-  const int upwards = columns.velocity + columns.velocity_size - 1;
+  const auto upwards = [&](int size) { return size == 3 && up_ == UpAxis::y ? 1 : size - 1; };
+  const int height = columns.position + upwards(columns.position_size);
+  const int velocity = columns.velocity + upwards(columns.velocity_size);
   for (std::size_t i = 0; i < count; ++i) {
     std::string_view text;
     if (!line(text)) fail(fmt::format("the file ends after {} of {} disks", i, count));
@@ -328,7 +329,7 @@ void TrajectoryReader::read_disks(std::size_t count, const Columns& columns, Tra
     }
     frame.x.push_back(at(columns.position)), frame.z.push_back(at(height));
     frame.vx.push_back(columns.velocity >= 0 ? at(columns.velocity) : 0);
-    frame.vz.push_back(columns.velocity >= 0 ? at(upwards) : 0);
+    frame.vz.push_back(columns.velocity >= 0 ? at(velocity) : 0);
     frame.radius.push_back(columns.radius >= 0 ? at(columns.radius) : 0.5);
     if (columns.spin >= 0) frame.spin.push_back(at(columns.spin));
   }

@@ -3,9 +3,10 @@
 // One frame:
 //   337
 //   Lattice="30 0 0 0 1 0 0 0 40" Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1 Time=12.5 Phase=0.25 ...
-//   A 0.5 0 0.5 0.1 0 -0.2 0.5
-// y is the direction across the slab (0), z is up. Comment keys of ours: Time, Phase (of the floor's cycle, 0 to 1),
-// Floor (height of the floor), FloorVelocity, Width, Units ("SI" or "reduced"), pbc.
+//   X 0.5 0 0.5 0.1 0 -0.2 0.5
+// y is the direction across the slab (0), z is up. The species is X for disks of diameter 1 and B for others: ASE takes
+// symbols of elements alone, and X is its atom that is no element, of mass 1. Comment keys of ours: Time, Phase (of the
+// floor's cycle, 0 to 1), Floor (height of the floor), FloorVelocity, Width, Units ("SI" or "reduced"), pbc.
 #pragma once
 
 #include <cstdint>
@@ -47,10 +48,13 @@ class TrajectoryWriter {
   std::string path_, buffer_;
 };
 
+// The coordinate that becomes z where a file holds three. Programs that simulate in a plane have y upwards.
+enum class UpAxis { y, z };
+
 // Reads frame after frame. Throws InputError naming file and line.
 class TrajectoryReader {
  public:
-  explicit TrajectoryReader(const std::filesystem::path& path);
+  explicit TrajectoryReader(const std::filesystem::path& path, UpAxis up = UpAxis::z);
   ~TrajectoryReader();
   // False at the end of the file.
   bool read(TrajectoryFrame& frame);
@@ -68,6 +72,7 @@ class TrajectoryReader {
   std::unique_ptr<Decompressor> decompressor_;
   std::FILE* file_ = nullptr;
   std::string path_, buffer_;
+  UpAxis up_;
   std::size_t position_ = 0;
   std::size_t line_number_ = 0;
   bool at_end_ = false;

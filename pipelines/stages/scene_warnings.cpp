@@ -17,6 +17,9 @@ constexpr double least_gamma = 1, most_gamma = 50;
 constexpr double largest_bead = 0.1, smallest_bead = 1e-6;  // [m]
 // Narrower boxes hold little but the disks next to their walls.
 constexpr double least_width = 5;  // [D]
+// Cells of experiments are some cm to a metre wide; in a wider one, fewer disks than one a diameter of width are no
+// bed.
+constexpr double widest_cell = 5;  // [m]
 // A bed forgets its start over tens of periods; fewer than ten are certainly too few.
 constexpr double least_settle_periods = 10;
 // A width so near n D, or (n + 1/2) D where rows alternate, lets rows of disks lock between hard sides. The second
@@ -116,6 +119,11 @@ void SceneOptions::warn_of_size(Fields& fields) const {
                             "depends on the sides as much as on the disks",
                             width),
                 fmt::format("Make it {} or wider", length_text(least_width * length_unit())));
+  if (gravity_ && !reduced_ && box_.width >= widest_cell && disks_.count < width)
+    fields.warn("wide box", "/box/width",
+                fmt::format("the box is {} wide, {:.4g} diameters, and holds {} disks: they hardly ever meet",
+                            length_text(box_.width), width, disks_.count),
+                fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", box_.width));
   const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
   const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion);
   const double top = height_at_rest() * length_unit() + (sine != nullptr ? sine->amplitude : 0);

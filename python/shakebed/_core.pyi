@@ -9,6 +9,7 @@ Array = NDArray[np.float64]
 version: str
 
 class Bed:
+    warnings: list[dict[str, Any]]
     length_unit: float
     time_unit: float
     weightless: bool
@@ -31,6 +32,7 @@ class Bed:
     def full(self) -> str: ...
 
 class Stepper:
+    warnings: list[dict[str, Any]]
     time: float
     length_unit: float
     time_unit: float
@@ -56,11 +58,11 @@ class Fit:
 
 def simulate(text: str, file: str, directory: str, progress: Optional[Callable[[float], None]]) -> Bed: ...
 def fit_profile(
-    height: Array, density: Array, error: Optional[Array], covariance: Optional[Array],
+    height: Any, density: Any, error: Any, covariance: Any,
     covariance_samples: int, options: dict[str, Any], diameter: Optional[float],
 ) -> Fit: ...
 def find_answer(
-    height: Array, density: Array, error: Optional[Array], covariance: Optional[Array],
+    height: Any, density: Any, error: Any, covariance: Any,
     covariance_samples: int, kernel: str, column_number: Optional[float],
     temperature_x: Optional[tuple[float, float]], temperature_z: Optional[tuple[float, float]],
 ) -> dict[str, Any]: ...
@@ -72,9 +74,10 @@ def gamma_to_temperature(
     gamma: float, frequency: float, gravity: float, diameter: float, initial_height: float, plateau_density: float,
     restitution: float, equation: str,
 ) -> dict[str, Any]: ...
-def read_trajectory(path: str) -> tuple[Array, Array, Array, Array, Array]: ...
+def read_trajectory(path: str, y_is_up: bool) -> tuple[Array, Array, Array, Array, Array]: ...
 def density_profile(
     z: Array, width: float, kernel: str, lowest: float, spacing: float, points: int
 ) -> dict[str, Any]: ...
 def check_recipe(file: str, settings: list[str], preset: Optional[str]) -> None: ...
+def odd_bead(diameter: float) -> str: ...
 def quantity(text: str, kind: str) -> float: ...

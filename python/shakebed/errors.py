@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import difflib
+import re
+from typing import Any, Iterable
 
 
 class Error(RuntimeError):
@@ -65,6 +67,19 @@ class CheckFailed(Error):
     results: Any = None
 
 
+class BedWarning(UserWarning):
+    """What is odd about a scene or an argument, though it makes sense: issued by Python's `warnings`."""
+
+
+def check_options(function: str, options: Iterable[str], known: frozenset[str]) -> None:
+    """TypeError, as of Python itself, for an option that the function does not have."""
+    for name in options:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            raise TypeError(f"{function}() has no option {name!r}; {meant}it has {', '.join(sorted(known))}")
+
+
 def recipe_error(message: str, problems: list[dict[str, Any]], code: int = 3) -> Error:
     """The exception for a list of problems (called by the compiled module)."""
     error: Error = RecipeError(message) if code == 3 else InputError(message)
@@ -85,11 +100,18 @@ def input_error(message: str, file: str) -> Error:
     return error
 
 
+# "profile.csv:3: ...", how messages about a file begin.
+_place = re.compile(r"(?P<file>\S[^:\n]*):(?:(?P<line>\d+):)? ")
+
+
 def error_of_code(message: str, code: int) -> BaseException:
     """The exception for an exit code (called by the compiled module)."""
     if code == 130:
         return KeyboardInterrupt()
     for kind in (UsageError, RecipeError, InputError, StageError, CheckFailed):
         if kind.exit_code == code:
-            return kind(message)
+            error = kind(message)
+            if place := _place.match(message) if kind is InputError else None:
+                error.file, error.line = place["file"], int(place["line"] or 0)
+            return error
     return StageError(message)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 import numpy as np
 
 from . import _core
-from .errors import UsageError
-from .quantities import Number, Quantity, in_diameters, in_si, table_html
+from .errors import UsageError, check_options
+from .quantities import Number, Quantity, in_diameters, in_si, number, table_html
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -117,19 +117,9 @@ class Fit:
         return table_html(f"fit: {self._numbers.get('model', '')}", rows, self.warnings)
 
 
-def _arrays(height: Any, density: Any, error: Any, covariance: Any) -> tuple[Array, Array, Optional[Array], Optional[Array]]:
-    height, density = np.atleast_1d(np.asarray(height, float)), np.atleast_1d(np.asarray(density, float))
-    if height.ndim != 1 or height.shape != density.shape:
-        raise UsageError(f"height has shape {height.shape} and density {density.shape}; they must be equal, (heights,)")
-    if error is not None:
-        error = np.asarray(error, float)
-        if error.shape != height.shape:
-            raise UsageError(f"error has shape {error.shape}; it must be {height.shape}")
-    if covariance is not None:
-        covariance = np.ascontiguousarray(covariance, float)
-        if covariance.shape != (height.size, height.size):
-            raise UsageError(f"covariance has shape {covariance.shape}; it must be {(height.size, height.size)}")
-    return height, density, error, covariance
+_fit_options = frozenset({
+    "base", "column_number", "compare", "confidence", "constrain_column", "fixed_shift", "fixed_temperature", "interval",
+    "model", "model_error", "plateau_density", "plateau_density_free", "robust", "sweep", "window"})
 
 
 def fit_profile(
@@ -149,8 +139,8 @@ def fit_profile(
     ----------
     height, density : array_like, shape (heights,)
         Heights in D above the mean position of the floor, and n D^2.
-    error : array_like, shape (heights,), optional
-        Standard errors of the densities.
+    error : array_like, shape (heights,), or float, optional
+        Standard errors of the densities; one number: of all.
     covariance : array_like, shape (heights, heights), optional
         Of the densities, in place of `error`.
     covariance_samples : int
@@ -162,7 +152,8 @@ def fit_profile(
         D ("2.99 mm", or in m), for T/(m g) as a length.
     **options
         model ("enskog-rectangle", "hydrostatic:<equation of state>", "fermi", "rectangle"), plateau_density,
-        plateau_density_free, column_number, constrain_column, fixed_temperature, fixed_shift, window (low, high), base,
+        plateau_density_free, column_number, constrain_column, fixed_temperature, fixed_shift, window (low, high; None
+        leaves an end to the rule), base,
         robust, model_error, interval, sweep, compare, confidence.
 
     Returns
@@ -170,14 +161,20 @@ def fit_profile(
     Fit
         What is wrong with the data is in its status and message; nothing is raised for it.
     """
-    known = {"model", "plateau_density", "plateau_density_free", "column_number", "constrain_column",
-             "fixed_temperature", "fixed_shift", "window", "base", "robust", "model_error", "interval", "sweep",
-             "compare", "confidence"}
-    if unknown := set(options) - known:
-        raise TypeError(f"fit_profile() has no option {sorted(unknown)[0]!r}; it has {', '.join(sorted(known))}")
+    check_options("fit_profile", options, _fit_options)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
-    arrays = _arrays(height, density, error, covariance)
-    return Fit(_core.fit_profile(*arrays, covariance_samples, {**options, "kernel": kernel}, length))
+    return Fit(_core.fit_profile(height, density, error, covariance, int(covariance_samples),
+                                 options | {"kernel": kernel}, length))
+
+
+def _estimate(given: Any, name: str) -> Optional[tuple[float, float]]:
+    if given is None:
+        return None
+    try:
+        value, error = (given, 0.0) if np.ndim(given) == 0 else (given[0], given[1])
+        return float(value), float(error or 0.0)
+    except (TypeError, ValueError, IndexError):
+        raise UsageError(f"{name} is {given!r}; it must be a Quantity, (value, standard error), or a number") from None
 
 
 def find_answer(
@@ -189,19 +186,26 @@ def find_answer(
     covariance_samples: int = 0,
     kernel: str = "none",
     column_number: Optional[float] = None,
-    temperature_x: Optional[Quantity] = None,
-    temperature_z: Optional[Quantity] = None,
+    temperature_x: Union[None, Quantity, tuple[float, float], Number] = None,
+    temperature_z: Union[None, Quantity, tuple[float, float], Number] = None,
 ) -> dict[str, Any]:
     """One temperature from all thermometers, with its whole uncertainty and a verdict (see docs/thermometer.md).
 
     Parameters are those of `fit_profile`; temperature_x and temperature_z are the kinetic temperatures in m g D, where
     velocities are known. Returns a dict with verdict, why, advice, temperature, std_error, low, high
-    (m g D), solid_height, thermometer, model, status. The numbers are None where the verdict is "temperature not
-    determined" and no interval is known: why and advice say the reason.
+    (m g D), solid_height, thermometer, model, status. Where the status is not "ok", the numbers are None, and why and
+    advice say the reason.
     """
-    arrays = _arrays(height, density, error, covariance)
-    kinetic = [None if t is None else (t.value, t.std_error or 0.0) for t in (temperature_x, temperature_z)]
-    return _core.find_answer(*arrays, covariance_samples, kernel, column_number, *kinetic)
+    return _core.find_answer(height, density, error, covariance, int(covariance_samples), kernel,
+                             None if column_number is None else number(column_number, "column_number"),
+                             _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"))
+
+
+def _checked_plateau(plateau_density: Any) -> float:
+    density = number(plateau_density, "plateau_density")
+    if not 0 < density <= close_packing_density * (1 + 1e-12):
+        raise UsageError(f"plateau_density is {density}; it must be above 0 and at most 2/sqrt 3")
+    return density
 
 
 def theory(
@@ -233,20 +237,19 @@ def theory(
     dict
         As ``shakebed theory --json`` prints it.
     """
+    plateau_density = _checked_plateau(plateau_density)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
     if initial_height is not None and column_number is not None:
         raise UsageError("initial_height and column_number say the same thing: give one")
     height = None if initial_height is None else in_diameters(initial_height, length, "initial_height")
     if column_number is not None:
-        height = column_number / plateau_density
+        height = number(column_number, "column_number") / plateau_density
     t = None if temperature is None else in_diameters(temperature, length, "temperature")
     for name, value in (("initial_height", height), ("temperature", t)):
         if value is not None and not value > 0:
             raise UsageError(f"{name} is {value}; it must be above 0")
     if t is not None and height is None:
         raise UsageError("temperature: T/T_c also needs initial_height or column_number")
-    if not 0 < plateau_density <= close_packing_density * (1 + 1e-12):
-        raise UsageError(f"plateau_density is {plateau_density}; it must be above 0 and at most 2/sqrt 3")
     return _core.theory(equation_of_state, plateau_density, length, height, t)
 
 
@@ -290,6 +293,8 @@ def gamma_to_temperature(
         if amplitude is None:
             raise UsageError("give gamma or amplitude, one of the two")
         gamma = in_si(amplitude, "length", "amplitude") * (2 * math.pi * f) * (2 * math.pi * f) / g
+    gamma, restitution = number(gamma, "gamma"), number(restitution, "restitution")
+    plateau_density = _checked_plateau(plateau_density)
     values = {"frequency": f, "gravity": g, "diameter": length, "initial_height": height, "gamma": gamma}
     for name, value in values.items():
         if not (value > 0 and math.isfinite(value)):

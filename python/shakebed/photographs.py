@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Sequence, Union
 
 import numpy as np
 
-from .errors import StageError, UsageError
+from .errors import StageError, UsageError, check_options
 from .quantities import Number, Progress, in_si, reporter, table_html
 from .scenes import Profile, profile_from
 
@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_find_options = {"polarity", "radius", "roi", "keep_half_hidden"}
+_find_options = frozenset({"polarity", "radius", "roi", "keep_half_hidden"})
 _measure_options = _find_options | {"scale", "floor", "floor_slope", "left_wall", "right_wall", "pixel_aspect",
                                     "lens_radial", "spacing", "lowest", "highest", "frame_rate", "frequency", "kernel"}
 
 
-def _checked(options: dict[str, Any], known: set[str], function: str) -> dict[str, Any]:
-    if unknown := set(options) - known:
-        raise TypeError(f"{function}() has no option {sorted(unknown)[0]!r}; it has {', '.join(sorted(known))}")
+def _checked(options: dict[str, Any], known: frozenset[str], function: str) -> dict[str, Any]:
+    check_options(function, options, known)
     return {name: value for name, value in options.items() if value is not None}
 
 
@@ -127,10 +126,20 @@ def find_disks(image: NDArray[Any], **options: Any) -> Disks:
     wanted = _checked(options, _find_options, "find_disks")
     from . import _images
 
-    found = _images.find_disks(np.asarray(image), wanted)
+    levels = image if isinstance(image, np.ndarray) else np.asarray(image)
+    found = _images.find_disks(levels, wanted)
     if found.status == "bad input":
         raise UsageError(found.message)
+    if not found.ok:
+        _refuse_unit_range([levels])
     return Disks(found)
+
+
+def _refuse_unit_range(images: Sequence[NDArray[Any]]) -> None:
+    """Other packages scale floating-point images from 0 to 1: where nothing is found, that is said."""
+    if all(image.dtype.kind == "f" and image.max() <= 1 for image in images):
+        raise UsageError("levels of floating-point images run from 0 to 255, and the highest here is not above 1: "
+                         "multiply them by 255")
 
 
 class MeasuredBed:
@@ -203,6 +212,15 @@ class MeasuredBed:
 Frames = Union[str, "os.PathLike[str]", Sequence[Any], "NDArray[Any]"]
 
 
+def _listed(frames: Any) -> Any:
+    if isinstance(frames, np.ndarray) and frames.ndim == 2:
+        raise UsageError("frames is one image; pass [image], or an array (frames, rows, columns)")
+    try:
+        return frames if hasattr(frames, "__len__") else list(frames)
+    except TypeError:
+        raise UsageError(f"frames is {frames!r}; it must be files or images") from None
+
+
 def measure_bed(
     frames: Frames, diameter: Union[str, Number], *, threads: int = 1, progress: Progress = None, **options: Any
 ) -> MeasuredBed:
@@ -240,12 +258,17 @@ def measure_bed(
 
     call, close = reporter(progress, "finding disks")
     try:
+        if not isinstance(frames, (str, os.PathLike)):
+            frames = _listed(frames)
         if isinstance(frames, (str, os.PathLike)):
             bed = _images.measure_files([os.fspath(frames)], wanted, call)
         elif len(frames) > 0 and isinstance(frames[0], (str, os.PathLike)):
             bed = _images.measure_files([os.fspath(f) for f in frames], wanted, call)
         else:
-            bed = _images.measure_arrays([np.asarray(f) for f in frames], wanted, call)
+            frames = [f if isinstance(f, np.ndarray) else np.asarray(f) for f in frames]
+            bed = _images.measure_arrays(frames, wanted, call)
+            if bed.status == "no beads":
+                _refuse_unit_range(frames)
     finally:
         close()
     if bed.status == "bad input":

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import html
+import json
+import os
+import warnings
 from typing import Any, Callable, NamedTuple, Optional, Union
 
+import numpy as np
+
 from . import _core
-from .errors import UsageError
+from .errors import BedWarning, UsageError
 
 Number = Union[int, float]
 Progress = Union[None, bool, Callable[[float], None]]
@@ -22,10 +27,31 @@ class Quantity(NamedTuple):
     def __float__(self) -> float:
         return float(self.value)
 
+    # As a tuple it would be repeated or joined.
+    def __add__(self, other: Any) -> Any:
+        raise TypeError("a Quantity is a number with its error and unit; calculate with its value: float(quantity)")
+
+    def __radd__(self, other: Any) -> Any:
+        return self.__add__(other)
+
+    def __mul__(self, other: Any) -> Any:
+        return self.__add__(other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self.__add__(other)
+
     def __str__(self) -> str:
         error = "" if self.std_error is None else f" +- {self.std_error:.2g}"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.value:.6g}{error}{unit}"
+
+
+def number(value: Any, name: str) -> float:
+    """A plain number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name} is {value!r}; it must be a number") from None
 
 
 def in_si(value: Union[str, Number], kind: str, name: str) -> float:
@@ -35,10 +61,27 @@ def in_si(value: Union[str, Number], kind: str, name: str) -> float:
     """
     if isinstance(value, str):
         try:
-            return _core.quantity(value, kind)
+            found = _core.quantity(value, kind)
         except ValueError as error:
             raise UsageError(f"{name}: {error}") from None
-    return float(value)
+    else:
+        found = number(value, name)
+    if name == "diameter" and found > 0 and (odd := _core.odd_bead(found)):
+        warnings.warn(f"{name}: {odd}", BedWarning, stacklevel=3)
+    return found
+
+
+def as_json(content: Any) -> str:
+    """JSON of a dict whose values may also be numbers and arrays of numpy, and paths."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, (np.generic, np.ndarray)):
+            return value.tolist()
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        raise UsageError(f"{value!r} ({type(value).__name__}) has no place in a recipe")
+
+    return json.dumps(content, default=plain)
 
 
 def in_diameters(value: Union[str, Number], diameter: Optional[float], name: str) -> float:

@@ -16,8 +16,8 @@ import numpy as np
 
 from . import _core
 from ._place import program as _program_place
-from .errors import CheckFailed, InputError, StageError, error_of_code
-from .quantities import Progress, Quantity, reporter, table_html
+from .errors import CheckFailed, StageError, error_of_code, input_error
+from .quantities import Progress, Quantity, as_json, reporter, table_html
 from .scenes import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
@@ -111,8 +111,8 @@ class StageResults:
         """One CSV, by its name without .csv."""
         path = self.folder / f"{name}.csv"
         if not path.is_file():
-            raise InputError(f"{path}: there is no such table; there are "
-                             f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}")
+            raise input_error(f"{path}: there is no such table; there are "
+                              f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}", str(path))
         return Table(path)
 
     def __getitem__(self, name: str) -> Any:
@@ -123,7 +123,8 @@ class StageResults:
         for name in ("trajectory.extxyz.zst", "trajectory.extxyz"):
             if (self.folder / name).is_file():
                 return read_trajectory(self.folder / name)
-        raise InputError(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"")
+        raise input_error(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"",
+                          str(self.folder))
 
     def __repr__(self) -> str:
         return f"<shakebed.StageResults {self.folder.name}>"
@@ -148,9 +149,10 @@ class Results:
             content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             return content
         except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}; is it a folder of results?") from None
+            raise input_error(f"{path}: cannot be read: {error.strerror}; is it a folder of results?",
+                              str(path)) from None
         except ValueError as error:
-            raise InputError(f"{path}: is no JSON: {error}") from None
+            raise input_error(f"{path}: is no JSON: {error}", str(path)) from None
 
     @property
     def answer(self) -> Optional[dict[str, Any]]:
@@ -191,7 +193,8 @@ def load(out: Union[str, "os.PathLike[str]"]) -> Results:
     """
     folder = Path(out)
     if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder")
+        what = "is a file; pass the folder of the results" if folder.is_file() else "there is no such folder"
+        raise input_error(f"{folder}: {what}", str(folder))
     return Results(folder)
 
 
@@ -239,7 +242,7 @@ def run(
         After Ctrl-C; finished stages are kept and the run can be continued by the same call.
     """
     recipe, out = os.fspath(recipe), os.fspath(out)
-    settings = [f"{pointer}={value if isinstance(value, str) else json.dumps(value)}"
+    settings = [f"{pointer}={value if isinstance(value, str) else as_json(value)}"
                 for pointer, value in (set or {}).items()]
     _core.check_recipe(recipe, settings, preset)
     command = [program(), "run", recipe, "--out", out]

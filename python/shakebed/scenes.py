@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Dict, NamedTuple, Optional, Union
+from typing import TYPE_CHECKING, Any, Dict, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
 from . import _core
-from .errors import InputError, RecipeError, UsageError
-from .quantities import Progress, Quantity, reporter, table_html
+from .errors import BedWarning, RecipeError, UsageError, input_error, recipe_error
+from .quantities import Progress, Quantity, as_json, reporter, table_html
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 Scene = Union[Dict[str, Any], str, "os.PathLike[str]"]
 
 _stage_pointer = "/stages/0"
+_most_heights = 100_000  # of a profile
 
 
 class Profile(NamedTuple):
@@ -94,12 +96,28 @@ class Trajectory(NamedTuple):
         return self.array[:, :, 2:4]
 
 
-def read_trajectory(path: Union[str, "os.PathLike[str]"]) -> Trajectory:
+def read_trajectory(path: Union[str, "os.PathLike[str]"], *, up: str = "z") -> Trajectory:
     """Read a trajectory in extended XYZ (also compressed, .zst), ours or that of another program.
 
-    Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
+    Parameters
+    ----------
+    path : str or path
+        Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
+    up : "z" or "y"
+        The coordinate that is the height, where positions have three. Programs that simulate in a plane often have y.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, or all heights are 0.
     """
-    return Trajectory(*_core.read_trajectory(os.fspath(path)))
+    if up not in ("y", "z"):
+        raise UsageError(f"up is {up!r}; it must be \"z\" or \"y\"")
+    file = os.fspath(path)
+    trajectory = Trajectory(*_core.read_trajectory(file, up == "y"))
+    if trajectory.array.size > 0 and not trajectory.array[:, :, 1].any():
+        raise input_error(f"{file}: all heights (coordinate {up}) are 0; where y points upwards, pass up=\"y\"", file)
+    return trajectory
 
 
 def density_profile(
@@ -137,6 +155,8 @@ def density_profile(
     if not high > low:
         raise UsageError(f"highest is {high}, not above lowest, {low}")
     points = int(np.floor((high - low) / spacing)) + 1
+    if points > _most_heights:
+        raise UsageError(f"spacing {spacing} makes {points} heights; take at most {_most_heights}")
     return profile_from(_core.density_profile(z, float(width), kernel, low, float(spacing), points))
 
 
@@ -151,6 +171,8 @@ class _Document(NamedTuple):
 def _document(scene: Scene, seed: Optional[int]) -> _Document:
     """The recipe of a scene: a dict, JSON text or a file, of a stage or of a whole recipe."""
     file, directory, text = "scene", os.getcwd(), None
+    if not isinstance(scene, (dict, str, os.PathLike)):
+        raise UsageError(f"a scene is a dict, JSON text or a file, not {type(scene).__name__}")
     if not isinstance(scene, dict):
         text = os.fspath(scene)
         if not text.lstrip().startswith("{"):
@@ -158,7 +180,7 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
             try:
                 text = path.read_text(encoding="utf-8")
             except OSError as error:
-                raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+                raise input_error(f"{path}: cannot be read: {error.strerror}", str(path)) from None
             file, directory = str(path), str(path.resolve().parent)
         try:
             content = json.loads(text)
@@ -169,31 +191,40 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
     if not isinstance(content, dict):
         raise UsageError("a scene is an object, the options of a stage \"simulate\", or a whole recipe")
     if "stages" in content and seed is None:
-        return _Document(text if text is not None else json.dumps(content), file, directory, False, text is not None)
+        return _Document(text if text is not None else as_json(content), file, directory, False, text is not None)
     if "stages" in content:
         stages = [dict(s, seed=seed) if s.get("stage") == "simulate" else s for s in content["stages"]]
-        return _Document(json.dumps(dict(content, stages=stages)), file, directory, False, False)
+        return _Document(as_json(dict(content, stages=stages)), file, directory, False, False)
     stage: dict[str, Any] = {"stage": "simulate", "id": "bed", "replicas": 1, **content}
     if seed is not None:
         stage["seed"] = seed
     recipe = {"name": "scene", "stages": [stage]}
-    return _Document(json.dumps(recipe), file, directory, True, False)
+    return _Document(as_json(recipe), file, directory, True, False)
+
+
+def _at_user(problem: dict[str, Any], document: _Document) -> str:
+    """A problem's sentence; its place becomes that in what the user passed."""
+    if document.wrapped and problem["pointer"].startswith(_stage_pointer):
+        problem["pointer"] = problem["pointer"][len(_stage_pointer):]
+    if not document.has_lines or document.wrapped:
+        problem["line"] = problem["column"] = 0
+    return " ".join(p for p in (f"{problem['file']}: {problem['pointer']}: {problem['problem']}.", problem["suggestion"])
+                    if p)
+
+
+def _warned(problems: list[dict[str, Any]], document: _Document) -> list[str]:
+    """The sentences of the scene's warnings, issued as BedWarning."""
+    sentences = [_at_user(problem, document) for problem in problems]
+    for sentence in sentences:
+        warnings.warn(sentence, BedWarning, stacklevel=3)
+    return sentences
 
 
 def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
     """The same mistakes at their places in what the user passed."""
     if document.has_lines and not document.wrapped:
         return error
-    lines = []
-    for problem in error.problems:
-        if document.wrapped and problem["pointer"].startswith(_stage_pointer):
-            problem["pointer"] = problem["pointer"][len(_stage_pointer):]
-        if not document.has_lines:
-            problem["line"] = problem["column"] = 0
-        lines.append(" ".join(p for p in (f"{problem['file']}: {problem['pointer']}: {problem['problem']}.",
-                                          problem["suggestion"]) if p))
-    from .errors import recipe_error
-
+    lines = [_at_user(problem, document) for problem in error.problems]
     found = recipe_error("\n".join(lines), error.problems, error.exit_code)
     return found  # type: ignore[return-value]
 
@@ -201,8 +232,14 @@ def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
 class Bed:
     """A bed that was simulated and measured. Reduced units: D, m, g (weightless: D, m and the initial T)."""
 
-    def __init__(self, bed: _core.Bed) -> None:
+    def __init__(self, bed: _core.Bed, warnings_of_scene: Sequence[str] = ()) -> None:
         self._bed = bed
+        self._warnings = list(warnings_of_scene)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd about the scene, as ``shakebed run`` says it."""
+        return self._warnings
 
     @property
     def profile(self) -> Profile:
@@ -288,7 +325,7 @@ class Bed:
         return f"<shakebed.Bed: {self.brief()}>"
 
     def _repr_html_(self) -> str:
-        return table_html("simulated bed", self.observables, [self.brief()])
+        return table_html("simulated bed", self.observables, [self.brief(), *self.warnings])
 
 
 def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = None) -> Bed:
@@ -315,6 +352,11 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
     KeyboardInterrupt
         After Ctrl-C, within about 0.1 s.
 
+    Warns
+    -----
+    BedWarning
+        Of what is odd about the scene (Gamma below 1, a width that locks rows), as ``shakebed run`` does.
+
     Notes
     -----
     One bed is measured: its errors hold for this bed, not for the next one. The same scene with ``"replicas": 1`` gives
@@ -323,11 +365,12 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
     document = _document(scene, seed)
     call, close = reporter(progress, "simulating")
     try:
-        return Bed(_core.simulate(document.text, document.file, document.directory, call))
+        bed = _core.simulate(document.text, document.file, document.directory, call)
     except RecipeError as error:
         raise _at_scene(error, document) from None
     finally:
         close()
+    return Bed(bed, _warned(bed.warnings, document))
 
 
 class Simulation:
@@ -358,6 +401,7 @@ class Simulation:
             self._stepper = _core.Stepper(document.text, document.file, document.directory)
         except RecipeError as error:
             raise _at_scene(error, document) from None
+        self.warnings = _warned(self._stepper.warnings, document)
 
     def advance_to(self, time: float) -> None:
         """Run to this time since the start. Releases the GIL; stops on Ctrl-C."""

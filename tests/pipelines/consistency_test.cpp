@@ -87,6 +87,7 @@ const Odd odd[] = {
     {"bead-in-metres", "/stages/0/disks/diameter: a bead of 3 m", "did you mean \"3 mm\"?"},
     {"short-settle", "/stages/0/settle", "4 periods of the floor"},
     {"narrow-box", "/stages/0/box/width", "3.33 diameters wide"},
+    {"box-in-metres", "/stages/0/box/width: the box is 30.9 m wide, 1.03e+04 diameters", "did you mean \"30.9 mm\"?"},
     {"low-lid", "/stages/0/box/lid/height", "the bed is squeezed"},
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},

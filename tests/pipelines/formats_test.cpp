@@ -420,6 +420,18 @@ TEST(Trajectory, ReadsTwoDimensionalPositionsAndUnknownColumns) {
   EXPECT_EQ(frame.radius, (std::vector<double>{0.5, 0.5}));
 }
 
+TEST(Trajectory, OfAProgramWithYUpwardsKeepsItsHeights) {
+  ScratchFolder folder;
+  write_text(folder / "t.extxyz", "1\nProperties=species:S:1:pos:R:3:velo:R:3 Time=3\nAr 0.5 0.7 0 1 2 0\n");
+  TrajectoryReader reader(folder / "t.extxyz", UpAxis::y);
+  TrajectoryFrame frame;
+  ASSERT_TRUE(reader.read(frame));
+  EXPECT_EQ(frame.x, std::vector<double>{0.5});
+  EXPECT_EQ(frame.z, std::vector<double>{0.7});
+  EXPECT_EQ(frame.vx, std::vector<double>{1});
+  EXPECT_EQ(frame.vz, std::vector<double>{2});
+}
+
 TEST(Bed, DescriptionComesBackTheSame) {
   BedDescription bed;
   bed.count = 337, bed.diameter = 2.99e-3, bed.gravity = 9.81, bed.width = 89.7e-3, bed.amplitude = 2.5e-3,
