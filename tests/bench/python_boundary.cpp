@@ -2,7 +2,6 @@
 // the processor time of each pair gives a ratio, and the median over the pairs is printed with its quartiles.
 //
 //   python_boundary FOLDER_OF_THE_MODULE [PAIRS]
-//   python_boundary FOLDER_OF_THE_MODULE cpp|python FITS      for valgrind --tool=callgrind: fits from one side alone
 #include <pybind11/embed.h>
 #include <pybind11/numpy.h>
 #include <time.h>
@@ -65,12 +64,7 @@ void compare_find_disks(const char* name, const shakebed::ingest::GrayFrame& fra
       name, pairs, [&] { shakebed::ingest::find_disks(view); }, [&] { module.attr("find_disks")(array); });
 }
 
-struct FitCase {
-  shakebed::fit::Profile profile;
-  py::array_t<double> height, density, error;
-};
-
-FitCase fit_case() {
+void compare_fits(std::size_t pairs, const py::object& module) {
   namespace fit = shakebed::fit;
   const auto truth = fit::HydrostaticProfile::of_column(fit::enskog(), 0.5, fit::column_from_initial_height(10.2, 1.1));
   fit::Profile profile;
@@ -82,22 +76,17 @@ FitCase fit_case() {
   const auto array = [](const std::vector<double>& values) {
     return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
   };
-  return {profile, array(profile.height), array(profile.number_density), array(profile.std_error)};
-}
-
-void compare_fits(std::size_t pairs, const py::object& module) {
-  namespace fit = shakebed::fit;
-  const FitCase one = fit_case();
+  const py::array_t<double> height = array(profile.height), density = array(profile.number_density),
+                            error = array(profile.std_error);
   compare(
-      "fit_profile", pairs, [&] { fit::fit_profile(one.profile); },
-      [&] { module.attr("fit_profile")(one.height, one.density, one.error); });
+      "fit_profile", pairs, [&] { fit::fit_profile(profile); },
+      [&] { module.attr("fit_profile")(height, density, error); });
   const fit::FitOptions quick{.sweep = false, .compare = false};
   const auto python = [&] {
-    module.attr("fit_profile")(one.height, one.density, one.error, py::arg("sweep") = false,
-                               py::arg("compare") = false);
+    module.attr("fit_profile")(height, density, error, py::arg("sweep") = false, py::arg("compare") = false);
   };
   compare(
-      "fit_profile, the fit alone", 20 * pairs, [&] { fit::fit_profile(one.profile, quick); }, python);
+      "fit_profile, the fit alone", 20 * pairs, [&] { fit::fit_profile(profile, quick); }, python);
 }
 
 }  // namespace
@@ -107,19 +96,10 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: python_boundary FOLDER_OF_THE_MODULE [PAIRS]\n");
     return 2;
   }
-  const std::string side = count > 3 ? arguments[2] : "";
-  const std::size_t pairs = count > 2 && side.empty() ? std::strtoul(arguments[2], nullptr, 10) : 31;
+  const std::size_t pairs = count > 2 ? std::strtoul(arguments[2], nullptr, 10) : 31;
   const py::scoped_interpreter interpreter;
   py::module_::import("sys").attr("path").attr("insert")(0, arguments[1]);
   const py::object module = py::module_::import("shakebed");
-  if (!side.empty()) {
-    const FitCase one = fit_case();
-    for (std::size_t k = 0; k < std::strtoul(arguments[3], nullptr, 10); ++k) {
-      if (side == "cpp") shakebed::fit::fit_profile(one.profile);
-      if (side == "python") module.attr("fit_profile")(one.height, one.density, one.error);
-    }
-    return 0;
-  }
 
   namespace ingest = shakebed::ingest;
   const auto disks = ingest::make_synthetic_bed(
