@@ -33,4 +33,12 @@ for name in temperature-by-height temperature-by-phase contact-duration profiles
 done
 "$shakebed" reproduce --until figure --out reproduced --quiet
 as_png reproduced/figure/profile.gp "$here/reproduced-figure.png"
+
+# The pages of reports, where Chromium and node are installed; the photographs are rendered ones.
+if command -v chromium >/dev/null && command -v node >/dev/null; then
+  "$shakebed" fit-images starter/render/frames --diameter "3 mm" --out photographs --quiet
+  "$shakebed" reproduce --out main --quiet
+  node "$here/../../tests/pipelines/browser/screenshots.mjs" "$(command -v chromium)" "$here" 1300 \
+    main=main/report.html photographs=photographs/report.html
+fi
 ls -l "$here"

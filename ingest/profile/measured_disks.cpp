@@ -27,8 +27,8 @@ std::string disk_details_csv_rows(const std::vector<MeasuredDisk>& disks) {
   char line[256];
   for (const MeasuredDisk& disk : disks) {
     const double x = std::sqrt(std::max(0.0, disk.variance_x)), y = std::sqrt(std::max(0.0, disk.variance_y));
-    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.5f,%.5f,%.4f,%.4f,%d,%d,%d,%.4f\n", disk.frame, disk.x_px, disk.y_px,
-                  x, y, x * y > 0 ? disk.covariance_xy / (x * y) : 0.0, disk.contrast, disk.cut ? 1 : 0,
+    std::snprintf(line, sizeof line, "%zu,%.4f,%.4f,%.5f,%.5f,%.4f,%.4f,%d,%d,%d,%.4f\n", disk.frame, disk.x_px,
+                  disk.y_px, x, y, x * y > 0 ? disk.covariance_xy / (x * y) : 0.0, disk.contrast, disk.cut ? 1 : 0,
                   disk.half_hidden ? 1 : 0, disk.species, disk.probability);
     text += line;
   }
