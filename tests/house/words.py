@@ -22,6 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of the code, which is read as code
 # Long sentences of these are counted and do not fail; all other rules hold for them.
 SENTENCES_REPORTED = {"docs/thermometer.md", "docs/python.md", "docs/library.md", "docs/kumaran.md"}
+CODE_ROOMS = ("statistics", "sim", "ingest", "fit", "pipelines", "python")
 EASY = ("README.md", "docs/tutorial/")
 
 GREEK = ("alpha beta gamma delta zeta eta theta lambda mu nu xi phi chi psi sigma tau omega Gamma Delta Lambda Sigma "
@@ -209,26 +210,45 @@ def misspelled(root, files, parsed):
         print("SKIPPED: aspell is not installed (Debian: aspell, aspell-en): the spelling is not checked")
 
 
-def code_words(root, rows):
-    """What the code says: strings of .cpp files and comments of .hpp files. Counted, not failed."""
-    counts, examples = collections.Counter(), []
-    for room in ("statistics", "sim", "ingest", "fit", "pipelines"):
+def code_pieces(file):
+    """(line, text) of what the code says: strings of a .cpp, comments of a .hpp by paragraphs, lists line by line."""
+    text = file.read_text()
+    if file.suffix == ".cpp":
+        text = re.sub(r'R"\w*\(.*?\)\w*"', lambda raw: "\n" * raw.group(0).count("\n"), text, flags=re.DOTALL)
+        text = re.sub(r'"(?:[^"\\\n]|\\.)*"|//.*|#include.*', lambda m: m.group(0) if m.group(0)[0] == '"' else "", text)
+        for group in re.finditer(r'"(?:[^"\\\n]|\\.)*"(?:\s+"(?:[^"\\\n]|\\.)*")*', text):
+            string = "".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', group.group(0))).replace('\\"', '"')
+            for piece in string.split("\\n"):
+                yield text.count("\n", 0, group.start()) + 1, piece
+        return
+    held, first, depth = [], 0, 0
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        comment = re.match(r"\s*//( *)(.*)", line)
+        said = comment.group(2) if comment else ""
+        indent = len(comment.group(1)) if comment else 0
+        # A line of code, of a formula or of a list that stands alone.
+        alone = indent > 2 and (indent <= depth or depth <= 2 or re.search(r"[;{},>]$", held[-1] if held else ";"))
+        if held and (not said or alone or (indent <= 2 < depth)):
+            yield first, " ".join(held)
+            held = []
+        if said:
+            if not held:
+                first, depth = number, indent
+            held.append(said)
+
+
+def code_faults(root, rows):
+    """Faults of the strings and header comments of the code: (file, line, kind, what)."""
+    for room in CODE_ROOMS:
         for file in sorted((root / room).rglob("*.[ch]pp")):
-            text = file.read_text()
-            if file.suffix == ".cpp":
-                pieces = [" ".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', group)) for group in
-                          re.findall(r'"(?:[^"\\\n]|\\.)*"(?:\s+"(?:[^"\\\n]|\\.)*")*', re.sub(r"//.*|#include.*", "", text))]
-            else:
-                pieces = [" ".join(re.findall(r"//\s?(.*)", group)) for group in
-                          re.findall(r"(?:^[ \t]*//.*\n)+", text, re.MULTILINE)]
-            for piece in pieces:
-                for pattern, _ in rows:
-                    if hit := pattern.search(piece):
-                        counts["dialect"] += 1
-                        examples.append(f"{file.relative_to(root)}: \"{hit.group(0)}\"")
-                if any(len(words(s)) > LONGEST_SENTENCE for s in sentences(piece)):
-                    counts["long"] += 1
-    return counts, examples
+            name = file.relative_to(root).as_posix()
+            for line, piece in code_pieces(file):
+                for pattern, instead in rows:
+                    for hit in pattern.finditer(piece):
+                        yield name, line, "dialect", f"\"{hit.group(0)}\": write {instead}"
+                for sentence in sentences(piece):
+                    if len(words(sentence)) > LONGEST_SENTENCE:
+                        yield name, line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
 
 
 def notices_faults(rows):
