@@ -15,8 +15,8 @@
 // Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
-// A periodic floor motion z(theta) = Gamma s(theta) [g/w^2], as a Fourier series. s is scaled so that the largest |s''|
-// is 1: Gamma is then the peak acceleration in units of g for any shape.
+// A periodic floor motion z(theta) = Gamma s(theta) [g/w^2], as a Fourier series. The scale of s makes the largest
+// |s''| equal to 1. So Gamma is the peak acceleration in units of g for any shape.
 class WaveForm {
  public:
   struct Harmonic {
@@ -97,8 +97,10 @@ struct BounceStatistics {
 };
 BounceStatistics bounce(double gamma, const BounceOptions& options, const WaveForm& wave = WaveForm::sine());
 
-// Stability of the period-1 mode n of a bouncing ball on a sine floor, e < 1: it exists from
-// Gamma = n pi (1-e)/(1+e) and is stable up to sqrt(that^2 + [2 (1+e^2)/(1+e)^2]^2).
+// Stability of the period-1 mode n of a bouncing ball on a sine floor, e < 1. It exists from
+//   Gamma_n = n pi (1-e)/(1+e)
+// and is stable up to
+//   sqrt(Gamma_n^2 + [2 (1+e^2)/(1+e)^2]^2).
 struct ModeRange {
   double exists_from = 0.0;
   double stable_to = 0.0;

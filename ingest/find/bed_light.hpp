@@ -25,7 +25,7 @@ double mean_background(const LightField& light);
 std::vector<float> level_deciles(const GrayFrame& frame);
 
 // Sums over a tile of 32 x 32 px, for the regression of the flattened frame on the model: flat = beta + gamma model.
-// beta and gamma are polynomials over the frame. u and v run from -1 to 1 over the frame.
+// Both beta and gamma are polynomials over the frame. The coordinates u and v run from -1 to 1 over the frame.
 struct TileSums {
   double u = 0, v = 0;
   double count = 0, model = 0, model_model = 0, flat = 0, flat_model = 0;

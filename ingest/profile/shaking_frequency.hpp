@@ -26,9 +26,9 @@ struct FoundFrequency {
 };
 
 // By a periodogram (Lomb's, since frames may be missing). Its lines are compared with their neighbourhood, a power law
-// of the frequency: so slow irregular motion, such as sloshing, is no line. With a level from m neighbours, chance
-// exceeds it z-fold at (1 + z/m)^-m of the frequencies tried. Then by least squares with two overtones. The error
-// follows from the residuals in the neighbourhood.
+// of the frequency: so slow irregular motion, such as sloshing, is no line. The level comes from m neighbours. By
+// chance, a share (1 + z/m)^-m of the frequencies tried exceeds z times that level. Then by least squares with two
+// overtones. The error follows from the residuals in the neighbourhood.
 constexpr double most_false_alarm = 1e-4;
 FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places);
 

@@ -1,5 +1,6 @@
-// JSON in and out. In: a tree that remembers where each value stood, so that a mistake can be shown at its place. Out:
-// ordered, numbers with as many digits as give the same double back, and the same bytes for the same values.
+// Reading and writing JSON. Reading gives a tree that holds the place of each value in the file, so that a mistake can
+// be shown there. Writing is ordered, with enough digits to restore the same double. The same values give the same
+// bytes.
 #pragma once
 
 #include <filesystem>

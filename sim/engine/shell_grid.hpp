@@ -66,8 +66,9 @@ static_assert(sizeof(NarrowCell) == 64);
 template <class Cell>
 class ShellGrid {
  public:
-  // disks: the array of disk structs. reach: the largest distance of centres that can make a pair, and the width of a
-  // cell. width, height: of the periodic box, or of the region to grid where the box is not periodic.
+  // `disks`: the array of disk structs. The largest distance of centres that can make a pair is `reach`; a cell is that
+  // wide. The size `width`, `height` is that of the periodic box, or of the region to grid where the box is not
+  // periodic.
   void reset(const Disk* disks, double reach, double width, double height) {
     disks_ = disks;
     columns_ = std::max(1, static_cast<int>(std::min(width / reach, 30'000.0)));

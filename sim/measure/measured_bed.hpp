@@ -63,8 +63,8 @@ LookPlan plan_looks(const Scene& scene, const MeasureOptions& options);
 LookPlan plan_looks(double floor_period, const MeasureOptions& options);  // 0: the floor stands still
 // The period of the floor's motion; 0 when it stands still.
 double floor_period(const Scene& scene);
-// Heights from below the lowest place of the floor to above the most expanded bed. hottest_bath: the highest
-// temperature that the scene's bath will have, where that is above its present one.
+// Heights from below the lowest place of the floor to above the most expanded bed. The highest temperature that the
+// scene's bath will have is `hottest_bath`, where that is above its present one.
 HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options, double hottest_bath = 0);
 
 // The heights of a profile from the lowest to the highest that holds anything: first to last - 1. Below 1e-12/D^2 there
