@@ -332,7 +332,8 @@ class Matcher {
     const double range = high() - low();
     if (best_ - low() < 1e-9 * range || high() - best_ < 1e-9 * range) {
       result_.status = FitStatus::unresolved_temperature;
-      result_.message = "the best temperature is an end of the library: its range does not hold the measurement";
+      result_.message =
+          "the best temperature is at an end of the library: the measured bed may lie outside the library's range";
     }
     if (is_poor()) {
       result_.warnings.emplace_back(
@@ -341,7 +342,7 @@ class Matcher {
     }
     if (result_.interpolation_error > result_.temperature.std_error && nodes_.size() > 2) {
       result_.warnings.emplace_back(
-          "the library is coarse: its interpolation moves the temperature by more than its error");
+          "the library has too few temperatures: interpolation between them changes T by more than its error");
     }
   }
 

@@ -141,7 +141,7 @@ class BeadLearner {
         continue;
       }
       keep_good_beads(round);
-      if (!(beads_->spread < hopeless)) return refused("no bead and no light make up the frame");
+      if (!(beads_->spread < hopeless)) return refused("no model of bead and light describes the frame");
       const bool enough = round + 1 >= first_round + least_rounds && settled_;
       if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_rounds || enough) break;
       if (options_.learn_profile || round < 2) learn_bead(round);
@@ -331,7 +331,7 @@ class BeadLearner {
     CalibrationResult& result = all_.result;
     if (spread * spread > noise * noise + most_left * most_left) {
       result.why_not =
-          "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not make up the frame";
+          "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not explain the frame";
       return std::move(all_);
     }
     FinderCalibration& calibration = result.calibration;
@@ -349,8 +349,9 @@ class BeadLearner {
     result.beads = beads_;
     constexpr std::size_t few = 5;
     if (total < few)
-      calibration.warnings.push_back("Only " + std::to_string(total) +
-                                     " disks to learn the bead from: its radius is uncertain.");
+      calibration.warnings.push_back(
+          "Only " + std::to_string(total) +
+          " disks were found, from which the shape of a bead is learned: its radius is uncertain. Use more frames.");
     all_.unexplained = unexplained_of(*beads_->fits.front(), light_);
     all_.one_sided = profile_.asymmetry != nullptr;
     all_.complete = spread < 1.5 * noise + 0.03;

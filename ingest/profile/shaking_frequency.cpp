@@ -180,7 +180,7 @@ FoundFrequency line_near(const Series& series, double frequency) {
   FoundFrequency found;
   const LineFit fit = fit_line(series, frequency);
   if (!fit.good || std::abs(fit.frequency - frequency) > 1.5 / series.length) {
-    found.why_not = "the line seen at first is none when fitted";
+    found.why_not = "the line of the periodogram disappears in the fit";
     return found;
   }
   found.known = true;
@@ -227,7 +227,7 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
   if (!(highest > 0)) {
     char text[200];
     std::snprintf(text, sizeof text,
-                  "the clearest line, at %.4f cycles a frame, would come by chance with a probability of %.2g",
+                  "the strongest line, at %.4f cycles per frame, arises by chance with a probability of %.2g",
                   likeliest_at, likeliest);
     found.why_not = text;
     found.false_alarm = likeliest;

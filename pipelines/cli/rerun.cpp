@@ -59,7 +59,7 @@ int rerun(const Call& call, const RerunArguments& given) {
   const fs::path before = given.folder;
   const Json manifest = read_json(before / "manifest.json");
   if (!manifest.contains("document") || !manifest.contains("stages"))
-    throw InputError((before / "manifest.json").string() + ": is not a manifest of ours");
+    throw InputError((before / "manifest.json").string() + ": is not a manifest written by shakebed");
   const fs::path directory = manifest["recipe"].value("directory", std::string("."));
   const Plan plan =
       make_plan(to_node(manifest["document"]), (before / "manifest.json").string() + " (document)", directory);
@@ -69,7 +69,8 @@ int rerun(const Call& call, const RerunArguments& given) {
   options.force = true;
   options.command_line = call.command_line;
   std::error_code error;
-  if (fs::equivalent(options.out, before, error)) throw UsageError("--out: a rerun needs a folder of its own");
+  if (fs::equivalent(options.out, before, error))
+    throw UsageError("--out: a rerun must not write into the folder that it repeats; name another folder");
   Console console(level_of(call));
   install_interrupt_handler();
   if (plan.sweep) return rerun_sweep(plan, options, before, console);

@@ -86,7 +86,7 @@ void describe_frames(Fields& fields, ExtractOptions& o) {
 void check(Fields& fields, const ExtractOptions& o) {
   const bool from_render = fields.has_upstream("render");
   fields.require(from_render != fields.has("images"), from_render ? "images" : "",
-                 from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
+                 from_render ? "frames come both from the render stage in \"from\" and from \"images\""
                              : "there are no frames: neither \"images\" nor a render stage in \"from\"",
                  "Give one of the two");
   fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
@@ -151,7 +151,7 @@ class Extract : public Stage {
       if (!gravity_) gravity_ = bed.gravity;
     }
     if (!gravity_) gravity_ = standard_gravity;
-    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: how large is a bead?",
+    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: the diameter of a bead gives the scale",
                    "Write \"diameter\": \"2.99 mm\"");
     options_.diameter = diameter_.value_or(1), options_.gravity = *gravity_;
   }

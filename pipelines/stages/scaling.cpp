@@ -125,8 +125,9 @@ void check_fit(Fields& fields, const ScalingFit& fit) {
     return one.id == fit.from || (fit.from.empty() && from.size() == 1);
   });
   if (study == from.end())
-    return fields.problem("/from", fit.from.empty() ? "which study is it? \"from\" of the stage names several"
-                                                    : "\"" + fit.from + "\" is not in the \"from\" of this stage");
+    return fields.problem("/from", fit.from.empty()
+                                       ? "\"from\" of the stage names several studies: name the one that is meant"
+                                       : "\"" + fit.from + "\" is not in the \"from\" of this stage");
   const StatedTable* table = study->results != nullptr ? study->results->find_table("table.csv") : nullptr;
   if (table == nullptr) return;
   const auto check = [&](const std::string& where, const std::string& column) {
