@@ -68,9 +68,9 @@ inline constexpr std::array<JumpHeight, 4> jump_heights{JumpHeight::relative_max
                                                         JumpHeight::above_mean_floor, JumpHeight::above_highest_floor};
 std::string_view to_string(JumpHeight kind);  // the names as in the enum
 
-// H_0 [g/w^2] of a dead ball (restitution 0) that rests on the floor until the floor falls away faster than g, in a
-// single flight. 0 with status ok for Gamma <= 1 (the ball never leaves). For a wave with several launches in a period,
-// the highest.
+// H_0 [g/w^2] of a ball without rebound (restitution 0), in a single flight. It rests on the floor until the floor
+// falls faster than g. 0 with status ok for Gamma <= 1 (the ball never leaves). For a wave with several launches in a
+// period, the highest.
 Value jump_height(JumpHeight kind, double gamma, const WaveForm& wave = WaveForm::sine());
 // The inverse: the Gamma >= 1 whose H_0 is `height` [g/w^2].
 Value gamma_for_jump_height(JumpHeight kind, double height, const WaveForm& wave = WaveForm::sine());

@@ -13,7 +13,7 @@
 // A curve seen through a kernel. Internal to fit.
 namespace shakebed::fit {
 
-// A kernel made ready for integration: the whole window as a fixed rule, and what panels of it need.
+// A kernel prepared for integration: the whole window as a fixed rule, and what panels of it need.
 //
 // The variable of integration is the offset s of the curve's height from the bin's. For the chord of a disk it is the
 // angle with s = (w/2) sin(angle), K ds = (2/pi) cos^2(angle) d(angle).

@@ -1,5 +1,5 @@
 #pragma once
-// Beads by their faces or by their rims, whichever makes up the frame.
+// Beads by their faces or by their rims, whichever explains the frame.
 //
 // A survey may have determined what the beads are (FindOptions::seen). The finder by faces then starts from there. It
 // is used when it finds what the rims show and little else; then it is the more accurate one. Otherwise beads are found

@@ -158,8 +158,9 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
                    "draw what would be found in the first frame, with the command for each alternative, and stop");
   command.add_option("--second-diameter", image.second_diameter, "diameter of beads of another size, to be found too");
   command.add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
-  command.add_option("--lens", image.lens,
-                     "how far the lens moves the corners, in half diagonals, a barrel positive (default: found)");
+  command.add_option(
+      "--lens", image.lens,
+      "distortion of the lens: shift of the corners in half diagonals, a barrel positive (default: found)");
   command.add_option("--bead-number", image.bead_number, "how many beads there are in view, to be checked");
 }
 

@@ -56,7 +56,7 @@ std::optional<JsonNode> parse_json(std::string_view text, const std::string& fil
 
 // The same from a file. Throws InputError when it cannot be read, ConfigError when it is no good JSON.
 JsonNode read_json_node(const std::filesystem::path& path);
-// A result file of ours or of the user. Throws InputError.
+// Reads a result file, written by shakebed or by the user. Throws InputError.
 Json read_json(const std::filesystem::path& path);
 
 JsonNode to_node(const Json& json);

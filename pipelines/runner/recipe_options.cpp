@@ -36,7 +36,7 @@ void describe_report(Fields& fields, ReportOptions& report) {
   fields.text("title", report.title, {.help = "headline of report.html"});
   fields.texts("text", report.text, {.help = "paragraphs under the headline"});
   fields.array<PublishedNumber>("published", report.published, describe_published,
-                                {.help = "published numbers to stand beside ours"});
+                                {.help = "published numbers to be compared with our numbers"});
   fields.array<AssumedInput>("assumed", report.assumed,
                              [](Fields& f, AssumedInput& input) {
                                f.text("input", input.pointer, {.help = "pointer into this recipe", .required = true});

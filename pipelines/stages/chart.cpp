@@ -410,8 +410,8 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.number("fit_least", p.fit_least, {.help = "smallest x that fits and comparisons use"});
   fields.number("fit_most", p.fit_most, {.help = "largest x that fits and comparisons use"});
   fields.integer("pool", p.pool,
-                 {.help = "errors become the root mean square of those of so many neighbouring points (errors from few "
-                          "replicas are themselves uncertain)",
+                 {.help = "number of neighbouring points over which errors are averaged (root mean square), because "
+                          "errors from few replicas are themselves uncertain",
                   .range = from_to(1, 1000)});
   fields.text("against", p.against, {.help = "a curve of this chart: chi2 of the points about it"});
   fields.numbers("levels", p.levels, {.help = "values of y whose first crossing x is found (linear between points)"});

@@ -31,7 +31,7 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
       "pixel_aspect", o.pixel_aspect,
       {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
   fields.number("lens", o.lens_radial,
-                {.help = "the lens's bend: how far the frame's corners truly lie further out, in half diagonals (a "
+                {.help = "distortion of the lens: true outward shift of the frame's corners, in half diagonals (a "
                          "barrel is positive); found on the beads' rims if left out",
                  .range = from_to(-0.3, 0.3)});
 }

@@ -118,10 +118,10 @@ void Infer::describe_search(Fields& fields) {
         f.number("reduced_temperature", curve.reduced_temperature,
                  {.help = "T/T_c", .required = true, .range = positive});
         f.text("reading", curve.reading,
-               {.help = "a reading of the map", .required = true, .example = "\"eq6/relative_max/printed\""});
-        f.text("label", curve.label, {.help = "name of the target in the picture"});
+               {.help = "a formula of the stage map", .required = true, .example = "\"eq6/relative_max/printed\""});
+        f.text("label", curve.label, {.help = "name of the curve in the picture"});
       },
-      {.help = "draws Gamma against frequency where a reading of the map gives this T/T_c"});
+      {.help = "draws Gamma against frequency where a formula of the stage map gives this T/T_c"});
   fields.text(
       "stored", options_.stored,
       {.help =

@@ -117,7 +117,7 @@ class BedRun {
   Clock::time_point last_saved_, kept_at_, keep_after_;
 };
 
-// What a run is gone on from after a kill: a state behind its hash.
+// Writes the state from which a killed run continues, behind its hash.
 void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
 
 // Does nothing while the simulation is precise (sim/measure/observables.hpp). Else it writes the last state with

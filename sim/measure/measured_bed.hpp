@@ -52,7 +52,7 @@ struct MeasureOptions {
   [[nodiscard]] std::vector<Problem> problems(double floor_period) const;
 };
 
-// When the bed is looked at, and which of the looks are kept as frames.
+// When the bed is sampled, and which of the samples ("looks") are kept as frames.
 struct LookPlan {
   MeasurementSchedule schedule;
   std::uint64_t frame_stride = 0;  // in looks; no factor in common with `phases`, so that frames visit every phase

@@ -5,8 +5,8 @@ correct spelling, README and tutorial easy to read.
 usage: words.py REPOSITORY   (exit 1: something is wrong; what was skipped is printed)
 
 The dialect is in dialect.txt (a regular expression and, behind a tab, what to write). Words that a spell checker does
-not know are in known_words.txt. Both lists grow. Strings and header comments of the code are read as well and counted
-at the end; they do not fail the test.
+not know are in known_words.txt. Both lists grow. Strings and header comments of the code are read as well: dialect and
+long sentences are faults there, too. CODE_ALLOWED names the files that may still have some.
 """
 import collections
 import pathlib
@@ -14,14 +14,25 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 
 LONGEST_SENTENCE = 30  # words
 LEAST_EASE = 50.0      # Flesch reading ease
 
 HERE = pathlib.Path(__file__).resolve().parent
 GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of the code, which is read as code
-# Long sentences of these are counted and do not fail; all other rules hold for them.
-SENTENCES_REPORTED = {"docs/thermometer.md", "docs/python.md", "docs/library.md", "docs/kumaran.md"}
+# Files whose strings or header comments still have faults, with their number. It may only shrink.
+CODE_ALLOWED = {
+    "fit/profile_fit/answer.cpp": 2, "fit/profile_fit/answer.hpp": 1, "fit/profile_fit/bins.cpp": 1,
+    "fit/profile_fit/fit_profile.hpp": 9, "ingest/profile/floor.hpp": 1, "ingest/profile/measure_bed.hpp": 1,
+    "pipelines/stages/extract_images.cpp": 1, "pipelines/stages/extract_report.cpp": 1,
+    "pipelines/stages/figure.cpp": 1, "pipelines/stages/film.hpp": 1, "pipelines/stages/fit.cpp": 3,
+    "pipelines/stages/fit_report.cpp": 1, "pipelines/stages/scene_options.cpp": 2,
+    "pipelines/stages/simulate_run.cpp": 1, "sim/engine/engine.hpp": 3, "sim/engine/engine_checks.hpp": 1,
+    "sim/engine/engine_contacts.hpp": 2, "sim/engine/engine_loop.hpp": 2, "sim/engine/engine_rest.hpp": 5,
+    "sim/engine/lanes.hpp": 1, "sim/engine/simulation.hpp": 1, "sim/measure/flights.hpp": 2,
+    "sim/measure/observables.hpp": 3, "sim/scene/scene.hpp": 1,
+}
 CODE_ROOMS = ("statistics", "sim", "ingest", "fit", "pipelines", "python")
 EASY = ("README.md", "docs/tutorial/")
 
@@ -251,6 +262,17 @@ def code_faults(root, rows):
                         yield name, line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
 
 
+def beyond_allowed(found, allowed):
+    """Faults of the code without those that are allowed. A number that is too high is a fault as well: it must shrink."""
+    number = collections.Counter(name for name, *_ in found)
+    for name, line, kind, text in found:
+        if number[name] > allowed.get(name, 0):
+            yield f"{name}:{line}: {kind}: {text}"
+    for name, most in allowed.items():
+        if number[name] < most:
+            yield f"tests/house/words.py: CODE_ALLOWED says {most} of {name}, which has {number[name]}: write that"
+
+
 def notices_faults(rows):
     """The rules themselves: each must find the fault that it is for."""
     bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows, <v>.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
@@ -261,6 +283,16 @@ def notices_faults(rows):
     good = Prose("# A\n\nThe bed has T. It is 3 high, with `remembers` and eq. (5) as code.\n")
     assert not list(faults_of("x.md", good, rows, {"T"})), list(faults_of("x.md", good, rows, {"T"}))
     assert reading_ease(Prose("The cat sat on the mat. The dog ran to me.\n")) > 100
+    with tempfile.TemporaryDirectory() as folder:
+        code = pathlib.Path(folder) / "sim"
+        code.mkdir()
+        long = "word " * 31 + "end."
+        (code / "a.cpp").write_text('// remembers\n#include "remembers"\nsay("The bed "\n    "remembers.");\n' + f'say("{long}");\n')
+        (code / "a.hpp").write_text(f"// Steps:\n//   {'word ' * 20}\n//   {'word ' * 20}\n//\n// {long}\nint remembers;\n")
+        found = list(code_faults(pathlib.Path(folder), rows))
+    assert [fault[:3] for fault in found] == [("sim/a.cpp", 3, "dialect"), ("sim/a.cpp", 5, "long"), ("sim/a.hpp", 5, "long")], found
+    assert len(list(beyond_allowed(found, {}))) == 3 and len(list(beyond_allowed(found, {"sim/a.cpp": 1}))) == 3
+    assert len(list(beyond_allowed(found, {"sim/a.cpp": 2, "sim/a.hpp": 2}))) == 1
     assert reading_ease(Prose("Institutional considerations necessitate interdisciplinary communication.\n")) < 0
 
 
@@ -271,14 +303,11 @@ def main():
     files = documents(root)
     parsed = {file: Prose(file.read_text()) for file in files}
     symbols = glossary_symbols((root / "GLOSSARY.md").read_text())
-    faults, reported = [], collections.Counter()
+    faults = []
     for file in files:
         name = file.relative_to(root).as_posix()
         for line, kind, text in [*faults_of(name, parsed[file], rows, symbols), *dead_links(root, file, parsed[file], parsed)]:
-            if kind == "long" and name in SENTENCES_REPORTED:
-                reported[name] += 1
-            else:
-                faults.append(f"{name}:{line}: {kind}: {text}")
+            faults.append(f"{name}:{line}: {kind}: {text}")
     faults += misspelled(root, files, parsed)
     for file in files:
         name = file.relative_to(root).as_posix()
@@ -287,13 +316,7 @@ def main():
             print(f"Flesch reading ease of {name}: {ease:.0f}")
             if ease < LEAST_EASE:
                 faults.append(f"{name}: reading ease {ease:.1f}, must be at least {LEAST_EASE}: shorter sentences and words")
-    for name, number in sorted(reported.items()):
-        print(f"not failed: {name}: {number} sentences of more than {LONGEST_SENTENCE} words")
-    counts, examples = code_words(root, rows)
-    print(f"not failed: strings and header comments of the code: {counts['dialect']} with dialect, {counts['long']} with a "
-          f"sentence of more than {LONGEST_SENTENCE} words")
-    for example in examples[:10]:
-        print(f"  {example}")
+    faults += beyond_allowed(list(code_faults(root, rows)), CODE_ALLOWED)
     print("\n".join(faults))
     print(f"{len(files)} documents, {len(symbols)} symbols, {len(faults)} faults")
     return 1 if faults else 0
