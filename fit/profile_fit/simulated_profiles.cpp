@@ -231,8 +231,8 @@ double greatest_density(const Profile& profile) {
   return greatest;
 }
 
-// The bins in the window. A bin empty in both profiles, without an error, is no evidence of infinite weight: a floor
-// for every variance.
+// The bins in the window. Every variance has a lower bound: a bin that is empty in both profiles has no error, but must
+// not get infinite weight.
 Target target_of(const Profile& measured, const MatchOptions& options) {
   const double least_variance = std::pow(least_error * greatest_density(measured), 2);
   Target target;

@@ -104,6 +104,9 @@ struct Start {
 };
 
 // Learns all there is to learn but the radius behind the tone curve (see tell_radius).
+// Light and profile are learned in turns. In a crystal one can imitate the other: too much light between the beads
+// looks like a wider rim. So the rounds go on until the light settles within the noise, or does not settle. In the
+// latter case the frame holds more than beads and light.
 //
 // Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
 // between the beads passes for a wider rim. So it goes on until the light settles within what noise allows, or does not
@@ -463,8 +466,8 @@ class StartChooser {
     return best.result;
   }
 
-  // It may as well be a packed bed seen from its voids. The likelier is tried first; unless it explains the frame
-  // nearly down to its noise, so is the other. What was not seen at first is believed only when it does.
+  // It may also be a packed bed whose voids look like beads. The likelier case is tried first. Unless it explains the
+  // frame nearly down to its noise, the other is tried, too. The second case is accepted only when it does explain it.
   [[nodiscard]] CalibrationResult packed_or_as_seen() const {
     const Start packed{estimate_.packed_radius_px, estimate_.packed_polarity};
     const auto convinces = [](const Learned& learned) {

@@ -15,8 +15,8 @@
 namespace shakebed::ingest {
 
 double radius_error(const FinderCalibration& calibration, double spread, double beads, double doubt) {
-  // The rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per px^2; 0.002 px is what the
-  // model is good to.
+  // The rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per px^2. The model is accurate
+  // to 0.002 px.
   const double information = beads * 2 * 3.14159265 * calibration.rim_radius_px /
                              (2 * std::sqrt(3.14159265) * std::max(0.3, calibration.edge_width_px));
   return std::hypot(spread / std::sqrt(information), 0.002, doubt);
@@ -210,7 +210,7 @@ class RadiusFromRims {
     doubt_ = choice.rim.std_error_px;
   }
 
-  // Rims add up where beads touch: in light, or in levels as recorded. The one that makes up the frame is the camera's.
+  // Rims add up where beads touch: in light, or in recorded levels. The camera's is the one that explains the frame.
   void read_in_light() {
     const ReadingInLight reading(calibration_, beads_);
     constexpr double clearly_less = 0.9, clearly_more = 1.03, fair = 2;

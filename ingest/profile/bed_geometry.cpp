@@ -13,7 +13,7 @@ namespace {
 
 // Of the diameter: a scale given may differ by this from what the frames show without a warning.
 constexpr double fair_scale = 0.02;
-// D: beads that reach farther beyond the frame's side are cut, so the bed goes on there.
+// In D: beads that reach farther beyond the frame's side are cut, so the bed extends beyond it.
 constexpr double clearly_cut = 0.02;
 
 class GeometryFinder {

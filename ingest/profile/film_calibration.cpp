@@ -147,7 +147,7 @@ class FilmLearner {
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
   void learn_lens() {
-    // Rims alone are too coarse for it, and where other things pass for beads, a lens would fit those.
+    // Rims alone are too coarse for it. Where other things are mistaken for beads, the lens would be fitted to those.
     if (calibrated_.calibration.by_rims || calibrated_.calibration.rims_to_be_checked) return;
     if (film_.options.pixel_aspect && film_.options.lens_radial) return;
     for (int round = 0; round < lens_rounds; ++round) {

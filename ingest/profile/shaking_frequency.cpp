@@ -210,7 +210,7 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
                to = 0.5 - 1.5 / series.length;
   std::vector<double> powers;
   for (double frequency = from; frequency < to; frequency += step) powers.push_back(power_at(series, frequency));
-  // Each line is held against its own neighbourhood; of those that are none by chance the strongest is the first tone.
+  // Each line is compared with its own neighbourhood. The strongest line that is significant is the first tone.
   double likeliest = 1, likeliest_at = 0, false_alarm = 1;
   for (std::size_t k = 0; k < powers.size(); ++k) {
     if ((k > 0 && powers[k - 1] > powers[k]) || (k + 1 < powers.size() && powers[k + 1] >= powers[k])) continue;

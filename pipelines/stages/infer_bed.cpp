@@ -23,7 +23,7 @@ constexpr std::uint64_t events_between_questions = 200'000;
 
 enum Number : std::size_t { fitted, shift, solid, density, kinetic_x, kinetic_z, kinetic_z_local, rise, number_count };
 
-// Sees the looks at one phase only, as the single phase of a period.
+// Passes on the samples of one phase only, as if it were the single phase of a period.
 class AtPhase final : public sim::RunObserver {
  public:
   AtPhase(sim::Observing<sim::BedObserver>::Make make, std::uint32_t phase) : bed_(std::move(make)), phase_(phase) {}

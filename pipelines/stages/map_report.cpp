@@ -1,4 +1,4 @@
-// What the page shows of a map stage: the readings of Gamma → T/T_c, and what simulated beds say.
+// The page of a map stage: the formulas Gamma → T/T_c, and the temperature from simulated beds.
 #include <fmt/format.h>
 
 #include "pipelines/formats/markup.hpp"
