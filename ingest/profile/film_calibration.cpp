@@ -260,7 +260,7 @@ class FilmLearner {
       char text[200];
       std::snprintf(text, sizeof text,
                     "The beads are not circles of one size. Pixels are therefore taken as %.4f times as wide as high, "
-                    "and the corners as shifted by the lens by %+.4f half diagonals.",
+                    "and the lens as shifting the corners by %+.4f half diagonals.",
                     lens_.pixel_aspect, lens_.radial);
       film_.warnings.emplace_back(text);
     }

@@ -161,7 +161,7 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
   command.add_option(
       "--lens", image.lens,
       "distortion of the lens: shift of the corners in half diagonals, a barrel positive (default: found)");
-  command.add_option("--bead-number", image.bead_number, "how many beads there are in view, to be checked");
+  command.add_option("--bead-number", image.bead_number, "number of beads in view, for a check");
 }
 
 // What is known of the bed, and how it is measured.

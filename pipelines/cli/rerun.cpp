@@ -51,7 +51,7 @@ int rerun_sweep(const Plan& plan, const RunOptions& options, const fs::path& bef
   const int code = run_sweep_command(plan, options, whole, report_pages(), console);
   if (code != exit_ok && code != exit_check_failed) return code;
   const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
-  print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
+  print(same ? "identical: sweep.csv has the same bytes\n" : "sweep.csv differs\n");
   return same ? exit_ok : exit_check_failed;
 }
 
@@ -80,10 +80,9 @@ int rerun(const Call& call, const RerunArguments& given) {
   const auto [files, different] = compare(manifest, options.out);
   for (const std::string& name : different)
     if (!call.json) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
-  print(call.json ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
-        : different.empty()
-            ? fmt::format("the same: all {} files of {} came out byte for byte\n", files, before.string())
-            : fmt::format("{} of {} files differ\n", different.size(), files));
+  print(call.json           ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
+        : different.empty() ? fmt::format("identical: all {} files of {} have the same bytes\n", files, before.string())
+                            : fmt::format("{} of {} files differ\n", different.size(), files));
   return different.empty() ? exit_ok : exit_check_failed;
 }
 

@@ -58,7 +58,7 @@ void describe_top(Fields& fields, RecipeTop& top) {
       {.help = "name of the pipeline; results go to results/<name>", .required = true, .example = "\"my-bed\""});
   fields.text("description", top.description, {.help = "what it is for"});
   fields.object<ReportOptions>("report", top.report, describe_report,
-                               {.help = "what report.html says beside the results"});
+                               {.help = "text of report.html beside the results"});
   fields.object<SweepOptions>("sweep", top.sweep, describe_sweep, {.help = "run the pipeline at many points"});
   fields.any("presets", top.presets,
              {.help = "named sets of changes for --preset NAME: {\"quick\": {\"/stages/bed/measure\": \"2 s\"}}"});

@@ -74,7 +74,10 @@ void Infer::describe_targets(Fields& fields) {
                   else
                     g.number(key, *number, {.help = help});
                 }
-                g.text("at", target.at, {.help = "or where a stage in \"from\" has it: /fit/temperature_over_mg"});
+                g.text(
+                    "at", target.at,
+                    {.help =
+                         "instead of a value, a pointer to a number of a stage in \"from\": /fit/temperature_over_mg"});
                 if (!g.decoding()) return;
                 g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
                 g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value", "it must be above 0");
@@ -93,20 +96,20 @@ void Infer::describe_search(Fields& fields) {
                           "the average; 0: they show the average",
                   .range = from_to(0, 64)});
   fields.number("average", options_.average,
-                {.help = "with moments: the prior chance that the average is shown", .range = zero_to_one});
+                {.help = "with moments: the prior probability that the average is shown", .range = zero_to_one});
   fields.number(
       "phase", options_.phase,
       {.help = "the photographs show this phase of the shaking, 0 to 1 (0: the floor passes its mean height upwards)",
        .range = {.low = 0, .high = 1, .below_high = true}});
   fields.integer("first", options_.first, {.help = "beds all over the prior", .range = from_to(8, 100'000)});
   fields.integer("rounds", options_.rounds,
-                 {.help = "rounds of further beds where the posterior is", .range = from_to(0, 20)});
+                 {.help = "rounds of further beds in the region of the posterior", .range = from_to(0, 20)});
   fields.integer("each", options_.each, {.help = "beds of each round", .range = from_to(1, 10'000)});
   fields.integer("best", options_.best, {.help = "most probable beds that are run again", .range = from_to(0, 20)});
   fields.integer("best_replicas", options_.replicas,
                  {.help = "runs of each of them, each with its own seed", .range = from_to(2, 1000)});
   fields.quantity("best_measure", options_.best_measure, dimension::time,
-                  {.help = "time over which they are measured; 0: as the others", .range = non_negative});
+                  {.help = "measuring time of these beds; 0: that of the others", .range = non_negative});
   fields.integer("draws", options_.draws, {.help = "rows of posterior.csv", .range = from_to(100, 100'000)});
   fields.integer("calibration", options_.calibration,
                  {.help = "beds with parameters drawn from the prior, measured and inferred: how often the intervals "
@@ -135,7 +138,7 @@ void Infer::describe(Fields& fields) {
   fields.quantity("measure", options_.bed.measure, dimension::time,
                   {.help = "time over which each bed is measured", .required = true, .range = positive});
   fields.integer("phases", options_.bed.phases,
-                 {.help = "moments of each period that the average is taken over", .range = from_to(1, 4096)});
+                 {.help = "moments of each period over which the average is taken", .range = from_to(1, 4096)});
   fields.number("kernel_width", options_.bed.kernel_width,
                 {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
   fields.number(
@@ -545,8 +548,8 @@ void Infer::run(RunContext& context) const {
 StageRow infer_stage() {
   return {.name = "infer",
           .summary =
-              "which parameters of a scene give what was measured: a posterior, by beds all over the prior and a "
-              "surrogate of them",
+              "infers parameters of a scene from measured numbers: a posterior, from simulated beds over the whole "
+              "prior and a surrogate of them",
           .accepts = {"fit", "extract", "simulate"},
           .most_inputs = 3,
           .uses_seed = true,

@@ -48,14 +48,16 @@ class Map : public Stage {
           f.text("temperature", c.temperature, {.help = "column that is T, in m g D"});
           f.texts(
               "axes", c.axes,
-              {.help = "what the table is over: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
+              {.help = "parameters of the table: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
                        "among gamma, frequency (Hz), restitution and friction (of the beads), initial_height"});
         },
         {.help = "how the table is read"});
-    fields.number("bead_restitution", bead_restitution_,
-                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
-    fields.number("bead_friction", bead_friction_,
-                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
+    fields.number(
+        "bead_restitution", bead_restitution_,
+        {.help = "restitution of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
+    fields.number(
+        "bead_friction", bead_friction_,
+        {.help = "friction of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
     if (!fields.decoding()) return;
     if (fit::find_equation_of_state(equation_) == nullptr) {
       try {

@@ -167,7 +167,7 @@ Number taken(const Collected& c, const fs::path& path) {
 void describe_parameter(Fields& f, Parameter& p) {
   f.text("name", p.name, {.help = "name of its column"});
   f.numbers("values", p.values, {.help = "its values", .required = true});
-  f.number("times", p.times, {.help = "what is written into the chain is the value times this"});
+  f.number("times", p.times, {.help = "factor: the value times this number is written into the chain"});
   f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
   f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
 }
@@ -205,10 +205,9 @@ void Study::describe(Fields& fields) {
         f.text("at", c.at,
                {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv with a column", .required = true});
         f.text("column", c.column, {.help = "column of the table of which one number is taken"});
-        f.choice(
-            "take", c.take, takes,
-            {.help = "which: the largest or smallest number, or where it stands (noise makes the largest too large and "
-                     "the smallest too small); or the mean of the rows"});
+        f.choice("take", c.take, takes,
+                 {.help = "which number: the largest or smallest, its place (noise makes the largest too large and the "
+                          "smallest too small), or the mean of the rows"});
         f.text("by", c.by, {.help = "column that says where"});
         f.number("least", c.least, {.help = "smallest place that is used"});
         f.number("most", c.most, {.help = "largest place that is used"});
