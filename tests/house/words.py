@@ -24,14 +24,10 @@ GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of t
 # Files whose strings or header comments still have faults, with their number. It may only shrink.
 CODE_ALLOWED = {
     "fit/profile_fit/answer.cpp": 2, "fit/profile_fit/answer.hpp": 1, "fit/profile_fit/bins.cpp": 1,
-    "fit/profile_fit/fit_profile.hpp": 9, "ingest/profile/floor.hpp": 1, "ingest/profile/measure_bed.hpp": 1,
     "pipelines/stages/extract_images.cpp": 1, "pipelines/stages/extract_report.cpp": 1,
     "pipelines/stages/figure.cpp": 1, "pipelines/stages/film.hpp": 1, "pipelines/stages/fit.cpp": 3,
     "pipelines/stages/fit_report.cpp": 1, "pipelines/stages/scene_options.cpp": 2,
-    "pipelines/stages/simulate_run.cpp": 1, "sim/engine/engine.hpp": 3, "sim/engine/engine_checks.hpp": 1,
-    "sim/engine/engine_contacts.hpp": 2, "sim/engine/engine_loop.hpp": 2, "sim/engine/engine_rest.hpp": 5,
-    "sim/engine/lanes.hpp": 1, "sim/engine/simulation.hpp": 1, "sim/measure/flights.hpp": 2,
-    "sim/measure/observables.hpp": 3, "sim/scene/scene.hpp": 1,
+    "pipelines/stages/simulate_run.cpp": 1, "sim/measure/observables.hpp": 1,
 }
 CODE_ROOMS = ("statistics", "sim", "ingest", "fit", "pipelines", "python")
 EASY = ("README.md", "docs/tutorial/")
@@ -270,7 +266,7 @@ def beyond_allowed(found, allowed):
             yield f"{name}:{line}: {kind}: {text}"
     for name, most in allowed.items():
         if number[name] < most:
-            yield f"tests/house/words.py: CODE_ALLOWED says {most} of {name}, which has {number[name]}: write that"
+            yield f"tests/house/words.py: CODE_ALLOWED says {most} of {name}, which has {number[name]}: lower the number"
 
 
 def notices_faults(rows):
