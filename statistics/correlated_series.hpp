@@ -1,5 +1,5 @@
-// How well the mean of a series, or of many that are sampled together, is known whose values remember those before
-// them. What takes a series takes it from its mean, so that its values add up to 0, but from_mean() and mean_of().
+// The error of the mean of a correlated series, or of many series sampled together. Functions that take a series expect
+// it with its mean subtracted, so that the values add up to 0. Exceptions: from_mean() and mean_of() take it as it is.
 //
 // Any number of threads may call; values own what they hold.
 #pragma once
@@ -17,7 +17,7 @@ std::vector<double> from_mean(std::vector<double> series);
 // independent one. 1 where there is too little to tell.
 double memory_of(std::span<const double> series);
 
-// Values that remember no longer than this are taken for independent.
+// Values whose correlation time is no longer than this are treated as independent.
 inline constexpr double least_memory = 1.2;
 
 // Half of the window that variance_by_windows() asks for: windows are three memories long, but six of them fit in.
@@ -29,8 +29,8 @@ double variance_by_windows(std::span<const double> series, std::size_t window);
 // By what the sum of the squares of those sums, of a series of `count` values, is divided to give it.
 double window_divisor(std::size_t count, std::size_t window);
 
-// The variance by windows of 2 `half`, and by what it must be multiplied: such windows still share some memory with
-// their neighbours, and their halves miss twice as much as they [VatsFlegal2022].
+// The variance by windows of 2 `half`, and the factor that corrects it. Such windows are still correlated with their
+// neighbours. Windows of `half` underestimate the variance by twice as much as they do [VatsFlegal2022].
 struct WindowVariance {
   double variance, correction;
 };
@@ -42,7 +42,7 @@ struct Windows {
   double correction = 1;        // by which what they say of (co)variances must be multiplied
   std::size_t independent = 0;  // independent samples that would tell a variance as well
 };
-// Windows for samples of which `slowest` remembers for longest, for `memory` samples or so.
+// Windows for samples whose slowest series is `slowest`. `memory`: its correlation time, approximately, in samples.
 Windows windows_for(double memory, std::span<const double> slowest);
 
 // The mean of a series as it is, and its error by windows: 0 with fewer than 2 values.

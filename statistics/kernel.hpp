@@ -1,5 +1,5 @@
-// The window through which a density is seen: every measured profile is the true one convolved with a kernel, and a
-// model is put through the same kernel before the two are compared. Lengths in D.
+// The kernel through which a density is measured. Every measured profile is the true one convolved with a kernel. A
+// model is convolved with the same kernel before the two are compared. Lengths in D.
 //
 // Any number of threads may call; values own what they hold.
 #pragma once

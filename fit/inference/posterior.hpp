@@ -50,9 +50,9 @@ struct Posterior {
   }
 };
 
-// By importance sampling: even points of the prior and, where too few of them matter, points from a mixture of normal
-// distributions about those that do, a tenth from the prior, until enough are effective [CappeEtAl2004]. Points where
-// the likelihood is nowhere above 0 give effective = 0.
+// By importance sampling [CappeEtAl2004]. It begins with evenly spread points of the prior. Where too few of them have
+// weight, points follow from a mixture of normal distributions about those that have, a tenth from the prior. It ends
+// when enough are effective. Points where the likelihood is nowhere above 0 give effective = 0.
 Posterior sample_posterior(std::size_t dimensions, const LogLikelihood& log_likelihood, const SamplingOptions& options);
 
 // Numbers of `count` points, each drawn as often as its weight says (systematic resampling).

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-// A surrogate of a simulation: what the runs at some points of the parameters say of runs at any other point, with its
-// own error. A Gaussian process [RasmussenWilliams2006] with a quadratic trend, a length for each parameter, and the
-// scatter between runs as its noise; its few constants are those that make the runs most probable.
+// A surrogate of a simulation: it predicts from runs at some points of the parameters a run at any other point, with
+// its own error. It is a Gaussian process [RasmussenWilliams2006] with a quadratic trend and a length for each
+// parameter. Its noise is the scatter between runs. Its few constants maximise the likelihood of the runs.
 namespace shakebed::fit {
 
 // Runs and what they gave. Several outputs share the lengths and the ratio of signal to scatter, each has its own

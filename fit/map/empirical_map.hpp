@@ -6,8 +6,8 @@
 
 #include "fit/profile_fit/fit_profile.hpp"
 
-// The map that simulated beds make: a table of T at points (Gamma, f, e, friction, ...), interpolated, beside the
-// theory's.
+// The map of simulated beds: a table of T at points (Gamma, f, e, friction, ...), interpolated. It stands beside the
+// maps of theory.
 //
 // A map owns its table; any number of threads may ask one.
 namespace shakebed::fit {

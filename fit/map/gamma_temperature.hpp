@@ -6,8 +6,8 @@
 #include "fit/map/jump_height.hpp"
 #include "fit/theory/expansion.hpp"
 
-// Gamma -> temperature: the single-ball jump equated to the rise of the bed's centre of mass, in every reading the
-// paper allows, and none of them claimed. [QuinnHong2000]
+// Gamma -> temperature: the single-ball jump equated to the rise of the bed's centre of mass. All interpretations that
+// the paper allows are computed, and none is preferred. [QuinnHong2000]
 //
 // Any number of threads may call; values own what they hold.
 namespace shakebed::fit {

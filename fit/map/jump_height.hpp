@@ -15,8 +15,8 @@
 // Any number of threads may call; values own what they hold.
 namespace shakebed::fit {
 
-// A periodic floor motion z(theta) = Gamma s(theta) [g/w^2], as a Fourier series. s is scaled so that the largest |s''|
-// is 1: Gamma is then the peak acceleration in units of g for any shape.
+// A periodic floor motion z(theta) = Gamma s(theta) [g/w^2], as a Fourier series. The scale of s makes the largest
+// |s''| equal to 1. So Gamma is the peak acceleration in units of g for any shape.
 class WaveForm {
  public:
   struct Harmonic {
@@ -68,9 +68,9 @@ inline constexpr std::array<JumpHeight, 4> jump_heights{JumpHeight::relative_max
                                                         JumpHeight::above_mean_floor, JumpHeight::above_highest_floor};
 std::string_view to_string(JumpHeight kind);  // the names as in the enum
 
-// H_0 [g/w^2] of a dead ball (restitution 0) that rests on the floor until the floor falls away faster than g, in a
-// single flight. 0 with status ok for Gamma <= 1 (the ball never leaves). For a wave with several launches in a period,
-// the highest.
+// H_0 [g/w^2] of a ball without rebound (restitution 0), in a single flight. It rests on the floor until the floor
+// falls faster than g. 0 with status ok for Gamma <= 1 (the ball never leaves). For a wave with several launches in a
+// period, the highest.
 Value jump_height(JumpHeight kind, double gamma, const WaveForm& wave = WaveForm::sine());
 // The inverse: the Gamma >= 1 whose H_0 is `height` [g/w^2].
 Value gamma_for_jump_height(JumpHeight kind, double height, const WaveForm& wave = WaveForm::sine());
@@ -97,8 +97,10 @@ struct BounceStatistics {
 };
 BounceStatistics bounce(double gamma, const BounceOptions& options, const WaveForm& wave = WaveForm::sine());
 
-// Stability of the period-1 mode n of a bouncing ball on a sine floor, e < 1: it exists from
-// Gamma = n pi (1-e)/(1+e) and is stable up to sqrt(that^2 + [2 (1+e^2)/(1+e)^2]^2).
+// Stability of the period-1 mode n of a bouncing ball on a sine floor, e < 1. It exists from
+//   Gamma_n = n pi (1-e)/(1+e)
+// and is stable up to
+//   sqrt(Gamma_n^2 + [2 (1+e^2)/(1+e)^2]^2).
 struct ModeRange {
   double exists_from = 0.0;
   double stable_to = 0.0;

@@ -6,8 +6,8 @@
 #include "fit/profile_fit/fit_profile.hpp"
 
 // T_c and T_c' as a simulation measures them: the temperature at which a quantity of the bed crosses a threshold. The
-// bottom row's density falls with T and never quite reaches close packing, so T_c depends on the threshold and is
-// reported against it; the loose crystal's T_c' is the same with the bond order psi_6.
+// bottom row's density falls with T and never quite reaches close packing. So T_c depends on the threshold and is
+// reported with it. The loose crystal's T_c' is the same with the bond order psi_6.
 namespace shakebed::fit {
 
 struct TemperaturePoint {
@@ -22,8 +22,8 @@ struct ThresholdCrossing {
   Estimate temperature;
 };
 
-// The highest temperature at which the value is still above the threshold. Points may be noisy and in any order: they
-// are first made monotone (falling) by pooling neighbours with their weights; between them the crossing is linear; the
+// The highest temperature at which the value is still above the threshold. Points may be noisy and in any order. They
+// are first made monotone (falling) by pooling neighbours with their weights. Between them the crossing is linear. Its
 // error is that of the two neighbours over the slope.
 ThresholdCrossing threshold_temperature(std::span<const TemperaturePoint> points, double threshold);
 

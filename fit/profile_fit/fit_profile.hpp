@@ -12,9 +12,8 @@
 // From a measured density profile to temperature, solid height and plateau density.
 //
 // The headline fit has the temperature T and the shift free and the plateau density phi_0 fixed (2/sqrt 3 in
-// equilibrium, 1.10 for the published experiment). True disks are not an Enskog fluid, so where on the profile the fit
-// is made is part of the method: the window, the rule that chose it, and the temperature against the window are in the
-// result.
+// equilibrium, 1.10 for the published experiment). True disks are not an Enskog fluid, so T depends on the window of
+// the fit. The result therefore holds the window, the rule that chose it, and the temperature against the window.
 //
 // Nothing here throws on data. Whatever is wrong with the profile comes back as a status and a sentence.
 //
@@ -35,12 +34,11 @@ struct Profile {
 // Which bins are used.
 struct WindowOptions {
   // An explicit window, bin centres in [low, high]. Where absent, the rule:
-  //   low:  the lowest height, not below base + floor_exclusion + the kernel's reach (at most 3 D of reach counts), at
-  //         which the profile averaged over one diameter reaches `plateau_fraction` of its greatest value: so floor
-  //         layering and the thinned region over a moving floor stay out;
-  //   high: the last bin, going up, before the density first falls below `lowest_fraction` of its greatest value or
-  //   below
-  //         `lowest_significance` standard errors.
+  //   low:  the lowest height at which the profile averaged over one diameter reaches `plateau_fraction` of its
+  //         maximum. It is not below base + floor_exclusion + the kernel's reach (at most 3 D of reach counts). So
+  //         floor layering and the thinned region over a moving floor stay out.
+  //   high: the last bin, going up, before the density first falls too low: below `lowest_fraction` of its maximum,
+  //         or below `lowest_significance` standard errors.
   std::optional<double> low{};
   std::optional<double> high{};
   // The tail only: low is the first height, going up, above which the density averaged over one diameter stays below
@@ -78,13 +76,13 @@ struct FitOptions {
   bool robust = false;
   double robust_threshold = 1.345;
 
-  // Where the model misses the data by more than their errors allow (chance below 0.1 %), what it misses counts as an
-  // error of its own, equal for every bin and so large that chi2/dof = 1. Without it all errors are stretched alike,
-  // and the bins of a crystal, whose errors are the smallest, decide the temperature by what no equation of state says
-  // of them: at 0.4 T_c a whole Enskog column then gives T 42 % too high instead of 5 %.
+  // The model may miss the data by more than their errors allow (chance below 0.1 %). A systematic error is then added,
+  // equal for every bin and so large that chi2/dof = 1. Without it all errors are enlarged by one factor. The bins of a
+  // crystal, whose errors are the smallest, then determine the temperature, although no equation of state describes
+  // them. Example: at 0.4 T_c a whole Enskog column then gives T 42 % too high instead of 5 %.
   bool model_error = true;
-  // The least of that error where the model is known to miss such profiles, also where the data are too poor to show
-  // it: else poor data weigh the bins otherwise than good ones, and T is off by something else. [1/D^2]
+  // Lower bound of that error, for profiles that the model is known to miss, even where the data are too poor to show
+  // it. Without it poor data would weight the bins differently from good data, and T would have another bias. [1/D^2]
   double least_model_error = 0.0;
 
   // Beyond the fit itself (each costs some more fits).
@@ -224,9 +222,9 @@ struct ProfileFrames {
   std::vector<double> number_density;  // frame by frame
   [[nodiscard]] std::size_t frames() const { return height.empty() ? 0 : number_density.size() / height.size(); }
 };
-// Mean, errors and full covariance of the mean of frames that follow one another in time: by windows as long as three
-// times the area-weighted height remembers [Sokal1997], but six of them fit in. bad_input with fewer than 2 frames or
-// when the sizes disagree.
+// Mean, errors and full covariance of the mean of frames that follow one another in time. By windows of three
+// correlation times of the area-weighted height [Sokal1997], but short enough for six of them. The status is bad_input
+// with fewer than 2 frames or when the sizes disagree.
 struct FrameAverage {
   FitStatus status = FitStatus::ok;
   std::string message;

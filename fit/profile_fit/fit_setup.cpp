@@ -41,7 +41,7 @@ bool is_whole_column(const FitOptions& options) { return options.model.starts_wi
 FitStatus check_plateau(const FitOptions& options, const FitModel& model, FitResult& result) {
   if (options.plateau_density > close_packing_density * (1.0 + rounding)) {
     result.message = "the plateau density " + number(options.plateau_density, 5) +
-                     " is above close packing, 2/sqrt 3 = 1.1547: there are no such disks";
+                     " is above close packing, 2/sqrt 3 = 1.1547, which hard disks cannot exceed";
     return FitStatus::undefined_model;
   }
   if (!is_whole_column(options) && options.plateau_density > model.largest_plateau() * (1.0 + rounding)) {

@@ -99,8 +99,8 @@ std::string why_no_bootstrap(const ProfileFrames& frames, const BootstrapOptions
   return "";
 }
 
-// Weighed by the scatter of single frames, which is well known. By errors from a few windows, what these happen to
-// show little of would weigh much, and scatter little by the same windows.
+// Weighted by the scatter of single frames, which is well known. Errors from a few windows would be too small where
+// these happen to scatter little, and such heights would get too much weight.
 Profile weighed_profile(const ProfileFrames& frames, const Samples& samples) {
   Profile profile;
   profile.height = frames.height;

@@ -250,8 +250,8 @@ class Solver {
     return false;
   }
 
-  // Near the minimum chi2 no longer tells two points apart, by rounding, where its gradient still does: Gauss-Newton
-  // steps, each of which must halve what the next one promises.
+  // Near the minimum, rounding hides differences of chi2, but not of its gradient. So Gauss-Newton steps follow, each
+  // of which must halve the gain that the next one predicts.
   void polish(Solution& solution) {
     if (free_.empty()) return;
     Matrix a;
@@ -320,12 +320,12 @@ class Solver {
     }
   }
 
-  // Weights that are not the inverse of the bins' covariance: the covariance of the estimate is B J^T R J B with B the
-  // inverse of J^T J and R the bins' correlations; chi2 is no longer a chi-squared number, but its mean and variance
-  // are known: tr(P R) and 2 tr(P R P R), P projecting off the tangent plane. The latter is freed of what the few
-  // samples behind R add to it [Srivastava2005]. Where they are too few to weigh by, as if they were twice as many: a
-  // covariance from overlapping windows (sim/measure/statistics.hpp) is that much better known than its size, and what
-  // is left of their noise only makes chi2 look less certain.
+  // Weights that are not the inverse of the bins' covariance. The covariance of the estimate is B J^T R J B, with B the
+  // inverse of J^T J and R the bins' correlations. chi2 is then no chi-squared number, but its mean and variance are
+  // known: tr(P R) and 2 tr(P R P R), where P projects off the tangent plane. The contribution of the few samples
+  // behind R to the latter is subtracted [Srivastava2005]. Where the samples are too few to be used for weights, twice
+  // their number is assumed: a covariance from overlapping windows (sim/measure/statistics.hpp) is that much better
+  // known. The remaining noise only makes chi2 look less certain.
   void through_correlations(const Vector& unit, Matrix& inverse, Solution& solution) const {
     const double naive = inverse(0, 0);
     Matrix weighted = jacobian_ * unit.asDiagonal();

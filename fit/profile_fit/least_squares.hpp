@@ -15,9 +15,9 @@ struct Bins {
   std::vector<double> height, density;
   std::vector<double> inverse_error;  // 1/sigma; used when there is no covariance
   Eigen::MatrixXd whitening;          // lower Cholesky factor of the covariance; empty: diagonal
-  // The covariance of the weighted densities where it is not the identity, because the measured one is known too badly
-  // to weigh by: the weights are then diagonal, or of shrunk correlations, and the errors come through this (the
-  // "sandwich" [White1980]). Empty: none.
+  // The covariance of the weighted densities where it is not the identity. That is so where the measured covariance is
+  // too uncertain to be used for weights. The weights are then diagonal, or of shrunk correlations, and the errors
+  // follow from this matrix (the "sandwich" [White1980]). Empty: none.
   Eigen::MatrixXd correlation;
   int samples = 0;  // independent ones behind covariance or correlation, 0 if not known
   [[nodiscard]] std::size_t size() const { return height.size(); }

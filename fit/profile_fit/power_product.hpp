@@ -19,12 +19,15 @@ struct PowerProduct {
   [[nodiscard]] double at(std::span<const double> x, std::size_t group = 0) const;
 };
 
-// Weighted least squares of ln y against the ln x_k, the error of ln y being error/y [Press et al., Numerical Recipes,
-// 15.4]. Where the points scatter more than their errors say (chi2 > dof), the errors of the exponents are widened by
-// sqrt(chi2/dof) [Particle Data Group, Review, 5.2.2]. x[k] holds the values of x_k at the points. `group`: a number
-// from 0 for every point, with no gap; each group has an amplitude of its own. Empty: all points have one amplitude.
-// Not ok with fewer points than unknowns plus one, with a number or error that is not positive, or where the ln x_k are
-// not independent of one another and of the groups.
+// Weighted least squares of ln y against the ln x_k, with error/y as the error of ln y [Press et al., Numerical
+// Recipes, 15.4]. The points may scatter more than their errors allow (chi2 > dof). Then the errors of the exponents
+// are multiplied by sqrt(chi2/dof) [Particle Data Group, Review, 5.2.2].
+//
+// x[k] holds the values of x_k at the points. `group`: a number from 0 for every point, with no gap; each group has an
+// amplitude of its own. Empty: all points have one amplitude.
+//
+// Not ok with fewer points than unknowns plus one, or with a number or error that is not positive. Not ok either where
+// the ln x_k depend linearly on one another or on the groups.
 [[nodiscard]] PowerProduct fit_power_product(const std::vector<std::vector<double>>& x, std::span<const double> y,
                                              std::span<const double> error, std::span<const std::size_t> group = {});
 

@@ -161,8 +161,8 @@ BlurredProfile blur_rows(const Profile& profile, const Kernel& kernel, double ba
   blurred.number_density = times(weights, profile.number_density);
   blurred.covariance =
       covariance_of(weights, profile.covariance.empty() ? diagonal(profile.std_error) : profile.covariance);
-  // Errors known bin by bin: as from so many samples that they count as normal, but too few to weigh neighbours by
-  // their correlations, which would undo the blur.
+  // Errors known bin by bin: the number of samples is set high enough to count as normal. It is too low for weights
+  // from the correlations of neighbours, which would undo the blur.
   if (profile.covariance.empty() || profile.covariance_samples == 0) blurred.covariance_samples = static_cast<int>(n);
   blurred.std_error.resize(n);
   for (std::size_t i = 0; i < n; ++i) blurred.std_error[i] = std::sqrt(std::max(0.0, blurred.covariance[i * n + i]));

@@ -12,8 +12,8 @@ struct BlurredProfile {
   double rows_seen = 0.0;  // part of the rows' modulation that is left, 0 to 1
 };
 
-// As it is where the window is wide enough, where there are no errors to go with the densities, where heights are
-// farther apart than the blur allows, and for what fit_profile() would refuse. `base`: nothing lies below it [D].
+// The profile unchanged in four cases: the window is wide enough; the densities have no errors; the heights are farther
+// apart than the blur allows; fit_profile() would refuse the profile. `base`: nothing lies below it [D].
 BlurredProfile blur_rows(const Profile& profile, const Kernel& kernel, double base);
 
 }  // namespace shakebed::fit

@@ -231,8 +231,8 @@ double greatest_density(const Profile& profile) {
   return greatest;
 }
 
-// The bins in the window. A bin empty in both profiles, without an error, is no evidence of infinite weight: a floor
-// for every variance.
+// The bins in the window. Every variance has a lower bound: a bin that is empty in both profiles has no error, but must
+// not get infinite weight.
 Target target_of(const Profile& measured, const MatchOptions& options) {
   const double least_variance = std::pow(least_error * greatest_density(measured), 2);
   Target target;
@@ -332,7 +332,8 @@ class Matcher {
     const double range = high() - low();
     if (best_ - low() < 1e-9 * range || high() - best_ < 1e-9 * range) {
       result_.status = FitStatus::unresolved_temperature;
-      result_.message = "the best temperature is an end of the library: its range does not hold the measurement";
+      result_.message =
+          "the best temperature is at an end of the library: the measured bed may lie outside the library's range";
     }
     if (is_poor()) {
       result_.warnings.emplace_back(
@@ -341,7 +342,7 @@ class Matcher {
     }
     if (result_.interpolation_error > result_.temperature.std_error && nodes_.size() > 2) {
       result_.warnings.emplace_back(
-          "the library is coarse: its interpolation moves the temperature by more than its error");
+          "the library has too few temperatures: interpolation between them changes T by more than its error");
     }
   }
 

@@ -10,8 +10,8 @@
 // there.
 namespace shakebed::fit {
 
-// One simulated bed at a known temperature. Runs at the same temperature (to 1e-6 relative) are repeats: their spread
-// is the spread of preparation, and counts as an error of the model.
+// One simulated bed at a known temperature. Runs at the same temperature (to 1e-6 relative) are repeats. Their spread
+// is the spread of preparation, and is part of the error of the model.
 struct SimulatedProfile {
   double temperature = 0.0;   // [m g D]
   Profile profile;            // through the same kernel, above the same floor as the measurement

@@ -18,11 +18,11 @@ constexpr std::array<Thermometer, thermometer_count> table{{
     {"Enskog curve, densities below 0.6", "enskog-rectangle", false, 1.5, 0.6, false},
 }};
 
-// From 480 beds of elastic disks held at T by a bath: 16 widths as they come and 8 into which a crystal fits, 8 to 24
-// rows, 0.3 to 45 T_c (tests/reproduction/thermometer_beds.hpp), measured as the program does, through a Gaussian of
-// 0.5 D. A row holds what beds nearest to its T say: the greatest error of the model of the first thermometer; then, of
-// each thermometer, the mean of ln(T fitted/T) and its scatter from bed to bed beyond the stated errors, the mean's own
-// uncertainty included, and no less than 0.4 %, the resolution of some 40 beds a row. Measured anew by
+// From 480 beds of elastic disks held at T by a bath: 16 widths not chosen for it and 8 into which a crystal fits, 8 to
+// 24 rows, 0.3 to 45 T_c (tests/reproduction/thermometer_beds.hpp), measured as the program does, through a Gaussian of
+// 0.5 D. A row holds the values of the beds nearest to its T: the greatest error of the model of the first thermometer;
+// then, of each thermometer, the mean of ln(T fitted/T) and its scatter from bed to bed beyond the stated errors, the
+// mean's own uncertainty included, and no less than 0.4 %, the resolution of some 40 beds a row. Measured again by
 // `ctest -L study -R ThermometerTable -V`.
 // clang-format off
 constexpr std::array<KnownBiases, 14> biases{{

@@ -29,8 +29,9 @@ struct KnownBias {
 // In the order of preference where two are equally good.
 std::span<const Thermometer> thermometers();
 
-// The known bias of a thermometer at a temperature [m g D]: interpolated in ln T between the measured ones, constant
-// above them; below them the scatter grows as 1/T, as the surface then is thinner than a layer of disks.
+// The known bias of a thermometer at a temperature [m g D]. Between the measured temperatures it is interpolated in ln
+// T; above them it is constant. Below them the scatter grows as 1/T, because the surface is then thinner than one layer
+// of disks.
 KnownBias known_bias(const Thermometer& thermometer, double temperature);
 
 // The greatest error of the model (FitResult::model_error) of a whole column on these beds at a temperature [1/D^2].

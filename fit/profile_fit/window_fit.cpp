@@ -72,7 +72,7 @@ Solution fit_from(const Bins& bins, FitSetup& setup, const std::vector<FitModel:
   return best;
 }
 
-// Weights that are themselves uncertain: the estimate scatters more than its covariance says [Percival2014].
+// The effect of uncertain weights: the estimate scatters more than its covariance says [Percival2014].
 double weight_noise(double samples, double bins, double parameters) {
   const double a = 2.0 / ((samples - bins - 1.0) * (samples - bins - 4.0));
   const double b = (samples - bins - 2.0) / ((samples - bins - 1.0) * (samples - bins - 4.0));
@@ -207,7 +207,7 @@ class ModelErrorSearch {
   double low_ = 0.0, high_ = 0.0, at_low_ = 0.0, at_high_ = 0.0;  // ln(error) and the misfit there
 };
 
-// Of the error of T, by the weights of a fit whose bins hold an error of the model: the part of their measured errors.
+// The part of the measured errors in the error of T, by the weights of a fit whose bins include an error of the model.
 double measured_share_of(const FittedWindow& fitted, FitSetup& setup) {
   if (!setup.least_squares.free[FitModel::temperature]) return 1.0;
   const Solution by_samples = least_squares(with_measured_errors(fitted.bins, fitted.model_error), *setup.model,

@@ -25,8 +25,9 @@ struct FittedWindow {
   double measured_share = 1.0;
 };
 
-// Starts that need no guess: temperatures on a logarithmic grid, each with the place that puts the curve through the
-// profile at half its greatest density; the best few by chi2 on a thinned profile without the kernel.
+// Initial parameters without a guess. Temperatures lie on a logarithmic grid. For each, the curve is placed to pass
+// through the profile at half its greatest density. The best few by chi2 on a thinned profile without the kernel are
+// returned.
 std::vector<FitModel::Parameters> find_starts(const Bins& bins, const FitSetup& setup);
 
 // Fits the window; where the model misses the data, finds the error of the model that makes up for it. The model is

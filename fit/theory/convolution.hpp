@@ -13,9 +13,9 @@
 // A curve seen through a kernel. Internal to fit.
 namespace shakebed::fit {
 
-// A kernel made ready for integration: the whole window as a fixed rule, and what panels of it need.
+// A kernel prepared for integration: the whole window as a fixed rule, and what panels of it need.
 //
-// The variable of integration is the offset s of the curve's height from the bin's, or, for the chord of a disk, the
+// The variable of integration is the offset s of the curve's height from the bin's. For the chord of a disk it is the
 // angle with s = (w/2) sin(angle), K ds = (2/pi) cos^2(angle) d(angle).
 class KernelRule {
  public:
@@ -86,9 +86,9 @@ class KernelRule {
   std::array<double, 48> weights_{};
 };
 
-// What a curve looks like to a quadrature: it begins at `first`, is nothing above `last`, may be broken at `breaks`,
-// and between them is smooth on the scale of `panel_at(height)`: the length of a panel there that 8 Gauss points
-// integrate to 1e-11.
+// What a quadrature knows of a curve. The curve begins at `first`, is zero above `last`, and may be discontinuous at
+// `breaks`. Between them it is smooth on the scale of `panel_at(height)`: 8 Gauss points integrate a panel of that
+// length there to 1e-11.
 template <class PanelAt>
 struct CurveShape {
   double first, last;

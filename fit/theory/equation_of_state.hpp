@@ -64,9 +64,9 @@ class EquationOfState {
   [[nodiscard]] Value stiffness(double number_density) const;
   // f(phi), for phi > 0.
   [[nodiscard]] Value f(double number_density) const;
-  // The inverse: phi from f, to 4 units in the last place. Strictly increasing; across a coexistence (best-of) the
-  // density jumps and the fluid side is returned at the exact f of the jump. outside_range above the largest f; exp
-  // underflow gives phi = 0, status ok.
+  // The inverse: phi from f, to 4 units in the last place. Strictly increasing. Across a coexistence (best-of) the
+  // density jumps; at the exact f of the jump the fluid side is returned. Status outside_range above the largest f. An
+  // underflow of exp gives phi = 0, status ok.
   [[nodiscard]] Value density_from_f(double f) const;
   // phi from the scaled pressure p = P/T = phi Z (the bottom density of a column: p = (N D/W)/T).
   [[nodiscard]] Value density_from_scaled_pressure(double scaled_pressure) const;

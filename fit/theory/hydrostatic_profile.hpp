@@ -19,9 +19,9 @@ class HydrostaticProfile {
   // tail has density phi_0 (zeta_F + base); below `base` (a shift may lie there: no solid) the density is 0.
   static HydrostaticProfile tail_over_rectangle(const EquationOfState& equation, double temperature, double shift,
                                                 double plateau_density, double base = 0.0);
-  // The whole column with N D/W conserved: below T_c a rectangle of density phi_0 and its tail; from T_c on no
-  // rectangle, and the bottom density solves T phi Z(phi) = N D/W. For an equation with a pole, phi_0 is never reached
-  // and there is no rectangle at any T.
+  // The whole column with N D/W conserved. Below T_c it is a rectangle of density phi_0 and its tail. From T_c on it
+  // has no rectangle, and the bottom density solves T phi Z(phi) = N D/W. For an equation with a pole, phi_0 is never
+  // reached and there is no rectangle at any T.
   static HydrostaticProfile of_column(const EquationOfState& equation, double temperature, const Column& column,
                                       double base = 0.0);
 

@@ -9,8 +9,9 @@
 #include <functional>
 #include <vector>
 
-// phi against F = ln phi + g(phi), to the last digits: polynomials of degree 9 between Chebyshev nodes at which phi is
-// solved for in extended precision, on cells halved until they are exact. Below F = -40 phi = exp(F). Internal to fit.
+// phi against F = ln phi + g(phi), to the last digits. It consists of polynomials of degree 9 between Chebyshev nodes,
+// on cells halved until they are exact. At the nodes phi is solved for in extended precision. Below F = -40 phi =
+// exp(F). Internal to fit.
 namespace shakebed::fit {
 
 class InverseTable {

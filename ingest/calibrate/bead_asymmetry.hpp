@@ -29,8 +29,8 @@ class BeadAsymmetry {
  private:
   Harmonics harmonics_;
   double reach_ = 0;
-  // Sampled `finer_` times as fine as pixels, columns of one phase beside one another: row j, phase p, place k hold the
-  // value at dx = k - side_ - p/finer_, dy = j/finer_ - side_.
+  // Sampled `finer_` times as finely as pixels, columns of one phase beside one another. Row j, phase p, place k hold
+  // the value at dx = k - side_ - p/finer_, dy = j/finer_ - side_.
   int finer_ = 4, side_ = 0;
   std::vector<float> samples_;
   [[nodiscard]] const float* line(int j, int phase) const;

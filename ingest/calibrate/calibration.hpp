@@ -12,9 +12,9 @@ namespace shakebed::ingest {
 
 enum class Polarity { automatic, dark_beads, bright_beads };
 
-// The bead as seen by the camera, shared by all beads of a film: contrast p(r) in units of the bead's own contrast
-// (1 inside a flat bead, 0 far outside), and a fourth harmonic p4(r) cos(4 theta) by which square pixels betray
-// themselves at sharp edges. Sampled at r = 0, step_px, 2 step_px, ...
+// The bead as seen by the camera, shared by all beads of a film. Its contrast p(r) is in units of the bead's own
+// contrast (1 inside a flat bead, 0 far outside). Square pixels cause a fourth harmonic p4(r) cos(4 theta) at sharp
+// edges. Both are sampled at r = 0, step_px, 2 step_px, ...
 struct BeadProfile {
   double step_px = 0;
   std::vector<float> level;                        // p(r)

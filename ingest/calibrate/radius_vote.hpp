@@ -1,6 +1,6 @@
 #pragma once
-// Radii of circles in a picture, by votes of its edges: every edge pixel votes for a centre one radius along its
-// gradient, and the radii whose votes gather most sharply are looked at in full.
+// Radii of circles in a picture, by votes of its edges. Every edge pixel votes for a centre one radius along its
+// gradient. The radii with the sharpest concentrations of votes are then examined in full.
 
 #include <cstddef>
 #include <vector>

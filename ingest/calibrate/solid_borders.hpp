@@ -15,9 +15,9 @@ inline constexpr bool unseen(float level) { return level > brightest_seen; }
 
 enum class FrameSide { bottom, top, left, right };
 
-// An even area along one side of the frame. Its inner end lies `depth_px + slope * place` px inside that side's
-// outermost pixels, place being x_px for bottom and top, y_px for left and right; it reaches from place `from` to place
-// `to`.
+// An even area along one side of the frame. Its inner end lies `depth_px + slope * place` px inside the outermost
+// pixels of that side. `place` is x_px for bottom and top, y_px for left and right. The area reaches from place `from`
+// to place `to`.
 struct SolidBorder {
   FrameSide side = FrameSide::bottom;
   double depth_px = 0, slope = 0;

@@ -9,8 +9,9 @@
 
 namespace shakebed::ingest {
 
-// What the residuals of all beads have in common beyond the radial profile: the asymmetry of `current` with that added;
-// none when `current` has none and there is no more than noise and small flaws of the model would give.
+// The asymmetry of a bead: what the residuals of all beads have in common beyond the radial profile, added to the
+// asymmetry of `current`. None when `current` has none and the residuals are no larger than noise and small errors of
+// the model.
 struct AsymmetryFit {
   double radius_px = 0;
   double noise = 0;  // contrast units
@@ -23,8 +24,9 @@ std::shared_ptr<const BeadAsymmetry> learn_asymmetry(const std::vector<const Joi
 // The same bead seen from a point (by_x, by_y) px beside its centre. `profile` has an asymmetry.
 BeadProfile recentred(const BeadProfile& profile, double by_x, double by_y);
 
-// The circle on which a bead ends, whatever its shading: edges along 32 radii, each of a blurred disk whose light is
-// even, falls like a sphere's and grows with the distance, in shares of its own. `profile` has an asymmetry.
+// The circle on which a bead ends, whatever its shading. Edges are fitted along 32 radii. Each edge is that of a
+// blurred disk whose light is a sum of three parts: even, falling like a sphere's, growing with the distance. `profile`
+// has an asymmetry.
 struct Outline {
   bool good = false;
   double x_px = 0, y_px = 0;  // its middle, from the profile's centre
@@ -44,8 +46,8 @@ struct RimFit {
 // An evenly bright disk with a Gaussian edge.
 BeadProfile ideal_profile(double radius_px, double edge_px, double reach_px);
 
-// Least squares of p(r), a cubic spline with knots `knot_px` apart that vanishes from `reach_px` on, over all pixels
-// within reach of any bead of any frame, overlaps taken into account. `fits` hold the residuals with `current` as the
+// Least squares of p(r), a cubic spline with knots `knot_px` apart that vanishes from `reach_px` on. All pixels within
+// reach of any bead of any frame are used, and overlaps are included. `fits` hold the residuals with `current` as the
 // model of `disks`.
 struct ProfileFit {
   double reach_px = 0, knot_px = 0, radius_px = 0;
@@ -71,10 +73,10 @@ struct RimConditions {
   bool linear_only = false;                     // levels grow as light does: do not try an encoded camera
 };
 
-// The same as fit_rim, with care: the profile's own errors follow from the noise of a pixel, the number of beads and
-// the knots, several shadings are tried (flat; sphere, parabola, cone, quartic and pairs of them), each as recorded and
-// in light if levels were encoded for display (see below), and the radius is the mean of what explains the profile
-// equally well, its error their scatter and each one's own.
+// The same as fit_rim, with error estimates. The profile's errors follow from the noise of a pixel, the number of beads
+// and the knots. Several shadings are tried: flat, sphere, parabola, cone, quartic, and pairs of them. Each is tried in
+// recorded levels and, if levels were encoded for display, in light (see below). The radius is the mean over the models
+// that explain the profile equally well. Its error combines their scatter and the error of each.
 struct RimChoice {
   RimFit rim;
   double exponent = 1;  // of the likeliest; radius and error go over both
@@ -84,11 +86,11 @@ RimChoice choose_rim(const BeadProfile& profile, const RimConditions& conditions
 // What a camera that encodes for display makes of light: recorded level = light^0.45.
 constexpr double display_exponent = 0.45;
 
-// The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides; one
-// that encodes for display (exponent 0.45) draws the dark side steep and the bright side long, and puts the edge at
-// another place. For rims of flat beads that neither explains down to the noise (clipped levels, glare): both readings,
-// each by how well a blurred flat disk fits in it, and the radius as their mean, with an error that holds both unless
-// one of them is clearly out. Levels are recorded grey levels; level 0 is taken as no light.
+// The camera's tone curve: recorded level = light^exponent. A linear camera blurs an edge evenly on its two sides. One
+// that encodes for display (exponent 0.45) makes the dark side steep and the bright side long, and shifts the edge.
+// Some rims of flat beads fit neither model down to the noise (clipped levels, glare). Both models are then fitted, and
+// each is weighted by how well a blurred flat disk fits. The radius is their mean. Its error covers both, unless one of
+// them is clearly excluded. Levels are recorded grey levels; level 0 means no light.
 struct ToneFit {
   bool open = false;          // both were tried: the bead is flat, and the linear fit leaves something to explain
   RimFit linear, encoded;     // `encoded` is in light, not in recorded level

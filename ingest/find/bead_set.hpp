@@ -50,8 +50,8 @@ struct StepRules {
   int sweeps = 0;                 // at most
 };
 
-// A Newton step of all beads together that are not still yet, then sweeps for the few that have a longer way to go (cut
-// ones outside the frame) and those they touch. True when nothing moves by more than the tolerance any more.
+// One Newton step of all beads that still move. Then sweeps for the few that have a longer way to go (those cut by the
+// frame's edge) and for those they touch. True when nothing moves by more than the tolerance any more.
 bool step_all(JointFit& fit, const GrayFrame& flat, std::vector<ModelDisk>& disks, const StepRules& rules);
 
 }  // namespace shakebed::ingest

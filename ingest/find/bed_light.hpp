@@ -24,8 +24,8 @@ double mean_background(const LightField& light);
 // 10 %, 20 % .. 90 % of the levels of a frame.
 std::vector<float> level_deciles(const GrayFrame& frame);
 
-// Sums over a tile of 32 x 32 px, for the regression of the flattened frame on the model: flat = beta + gamma model,
-// beta and gamma polynomials over the frame. u and v run from -1 to 1 over the frame.
+// Sums over a tile of 32 x 32 px, for the regression of the flattened frame on the model: flat = beta + gamma model.
+// Both beta and gamma are polynomials over the frame. The coordinates u and v run from -1 to 1 over the frame.
 struct TileSums {
   double u = 0, v = 0;
   double count = 0, model = 0, model_model = 0, flat = 0, flat_model = 0;
@@ -45,9 +45,9 @@ std::vector<TileSums> open_background(const GrayFrame& flat, const std::vector<M
 // Levels below this lie beyond the background, seen from the beads (contrast units).
 constexpr double well_beyond_background = -0.05;
 
-// A packed bed shows little background, and the voids between its beads, blurred, pass for it. If the open background
-// lies well beyond what was assumed behind the beads, the light is set right; beads keep their level. Whether it
-// was so.
+// A packed bed shows little background, and the blurred voids between its beads can be mistaken for it. If the open
+// background differs clearly from the level assumed behind the beads, the light is corrected. The beads keep their
+// level. Returns whether it was corrected.
 bool correct_background(LightField& light, const GrayFrame& flat, const std::vector<TileSums>& open,
                         const std::vector<ModelDisk>& disks);
 

@@ -10,8 +10,7 @@ namespace shakebed::ingest {
 
 namespace {
 
-// The frame the map is made of: reduced, and smoothed where noise asks for it and disks are wide enough to bear it.
-// (Smoothing blurs the rims that separate a bead from the darkness around it.)
+// The frame from which the map is made: reduced, and smoothed where it is noisy and the disks are wide enough.
 GrayFrame map_frame(const GrayFrame& flat, double radius, double noise) {
   const int factor = map_reduction(radius);
   constexpr double noisy = 0.04;  // contrast units, after reduction

@@ -11,8 +11,8 @@ namespace shakebed::ingest {
 // Two beads of one film are never seen nearer than this share of a diameter (beads a little in front of one another).
 constexpr double least_separation = 0.72;
 
-// Beyond this edge width, in radii, touching beads run into one another so much that the ideal disk's map no longer
-// separates them from the voids between them; the learned profile's does.
+// Beyond this edge width, in radii, the images of touching beads overlap strongly. The map of the ideal disk then no
+// longer separates beads from the voids between them. The map of the learned profile does.
 constexpr double strong_blur = 0.14;
 
 // Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.

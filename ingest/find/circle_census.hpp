@@ -1,10 +1,10 @@
 #pragma once
 // Which circles a picture is made of, if any: radii, polarities and channels compete, and so does "none".
 //
-// Every hypothesis is scored by the length of edges that lie on its circles' rims, less a cost for each circle's three
-// numbers, weighted by contrast: what a description by circles saves. The same search on a copy stretched along one
-// axis, where no circle is left, tells what chance explains (target and decoy, as in protein identification
-// [EliasGygi]); what it finds there is subtracted, and "none" wins unless much more is found in the picture itself.
+// Every hypothesis is scored by the length of edges on its circles' rims, weighted by contrast. A cost is subtracted
+// for each circle's three numbers. So the score is what a description by circles saves. The same search on a copy
+// stretched along one axis, where no circle is left, shows what chance explains (target and decoy, as in protein
+// identification [EliasGygi]). That is subtracted. "None" wins unless much more is found in the picture itself.
 
 #include <cstddef>
 #include <optional>

@@ -1,6 +1,6 @@
 #pragma once
-// Circles in a map of edges: every edge votes for centres one radius along its gradient; what many vote for is looked
-// at along rays, and its centre and radius are fitted to the edges met there.
+// Circles in a map of edges. Every edge votes for centres one radius along its gradient. Places with many votes are
+// examined along rays, and centre and radius are fitted to the edges met there.
 
 #include <cstdint>
 #include <vector>
@@ -28,8 +28,8 @@ struct RimRays {
   int count = 32;
   double reach = 0.2;       // radii, how far from the rim an edge is first looked for
   double tolerance = 0.07;  // radii, how far from it an edge may lie in the end (at least 0.6 px)
-  // Share of the median slope from which an edge begins to count for centre and radius: where beads touch, their rims
-  // run into one another, are faint and seem to lie farther in. 0: all count alike.
+  // An edge counts for centre and radius if its slope is at least this share of the median slope. Where beads touch,
+  // their rims merge: they are faint and seem to lie farther in. 0: all edges count alike.
   double faint = 0;
 };
 

@@ -1,8 +1,9 @@
 #pragma once
 // Disks in a frame, to a hundredth of a pixel, with nothing to guess.
 //
-// Flatten -> chi-squared map of an ideal disk -> interior test -> joint least squares over touching neighbours with the
-// bead's own radial profile, learned from the frames, the radius and the edge width fitted [ShattuckChiSquared].
+// Steps: flatten -> chi-squared map of an ideal disk -> interior test -> joint least squares over touching neighbours.
+// The joint fit uses the bead's own radial profile, learned from the frames, with fitted radius and edge width
+// [ShattuckChiSquared].
 //
 // Any number of threads may call; values own what they hold.
 

@@ -79,9 +79,9 @@ class JointFit {
   // they are. Returns the largest move, at most `largest_step` px.
   double step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
                        double still = 0);
-  // Covariances of the centres under white noise of one contrast unit a pixel, their neighbours' places being unknown
-  // as well: where blur makes touching beads share pixels, a bead alone would seem better known than it is. From the
-  // curvatures of the last step. (Of neighbours of neighbours each is eliminated by itself.)
+  // Covariances of the centres under white noise of one contrast unit per pixel, with the neighbours' places unknown as
+  // well. Blur makes touching beads share pixels: with known neighbours the errors would be too small. From the
+  // curvatures of the last step. (Neighbours of neighbours are eliminated one by one.)
   [[nodiscard]] std::vector<CentreCovariance> covariances(const std::vector<ModelDisk>& disks) const;
   // Fills explained, amplitude, rim_explained of each bead, within `radius` px of its centre.
   void judge(std::vector<ModelDisk>& disks, double radius) const;

@@ -189,23 +189,23 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
   char text[300];
   if (support < plainly_seen) {
     std::snprintf(text, sizeof text,
-                  "Beads were found by their rims alone, and on average only %.0f %% of a rim is seen: beads may be "
-                  "missed, and centres may be off by a tenth of a radius. Look at the overlays.",
+                  "Beads were found by their rims alone. On average only %.0f %% of a rim is visible: beads may be "
+                  "missed, and centres may be wrong by a tenth of a radius. Look at the overlays.",
                   100 * support);
     calibration.warnings.emplace_back(text);
   }
   const double share = explained / std::max(1.0, rims.edge_length_px);
   if (share < well_explained) {
     std::snprintf(text, sizeof text,
-                  "The rims of the beads found are only %.0f %% of the edges in the picture: more beads, or beads of "
-                  "other sizes, may be there. Look at the overlays.",
+                  "The rims of the beads found explain only %.0f %% of the edges in the picture. More beads, or beads "
+                  "of other sizes, may be present. Look at the overlays.",
                   100 * share);
     calibration.warnings.emplace_back(text);
   }
   if (others > 0) {
     std::snprintf(text, sizeof text,
-                  "Beads of several sizes were found, with radii from %.1f to %.1f px: %.0f of the first frame's %zu "
-                  "are not of the most frequent size, to which the diameter refers.",
+                  "Beads of several sizes were found, with radii from %.1f to %.1f px. In the first frame %.0f of %zu "
+                  "beads do not have the most frequent size, to which the diameter refers.",
                   smallest, largest, others, seen.disks.size());
     calibration.warnings.emplace_back(text);
   }

@@ -1,9 +1,9 @@
 #pragma once
-// Beads by their faces or by their rims, whichever makes up the frame.
+// Beads by their faces or by their rims, whichever explains the frame.
 //
-// Where a survey has shown what the beads are (FindOptions::seen), the finder by faces starts from there, and is
-// believed when it finds what the rims show and little else; then it is the more accurate one. Otherwise beads are
-// found by their rims alone. Without a survey this is learn_finder() and find_disks().
+// A survey may have determined what the beads are (FindOptions::seen). The finder by faces then starts from there. It
+// is used when it finds what the rims show and little else; then it is the more accurate one. Otherwise beads are found
+// by their rims alone. Without a survey this is learn_finder() and find_disks().
 
 #include "ingest/find/find_disks.hpp"
 #include "ingest/find/rim_finder.hpp"

@@ -104,6 +104,9 @@ struct Start {
 };
 
 // Learns all there is to learn but the radius behind the tone curve (see tell_radius).
+// Light and profile are learned in turns. In a crystal one can imitate the other: too much light between the beads
+// looks like a wider rim. So the rounds go on until the light settles within the noise, or does not settle. In the
+// latter case the frame holds more than beads and light.
 //
 // Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
 // between the beads passes for a wider rim. So it goes on until the light settles within what noise allows, or does not
@@ -141,7 +144,7 @@ class BeadLearner {
         continue;
       }
       keep_good_beads(round);
-      if (!(beads_->spread < hopeless)) return refused("no bead and no light make up the frame");
+      if (!(beads_->spread < hopeless)) return refused("no model of bead and light describes the frame");
       const bool enough = round + 1 >= first_round + least_rounds && settled_;
       if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_rounds || enough) break;
       if (options_.learn_profile || round < 2) learn_bead(round);
@@ -331,7 +334,7 @@ class BeadLearner {
     CalibrationResult& result = all_.result;
     if (spread * spread > noise * noise + most_left * most_left) {
       result.why_not =
-          "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not make up the frame";
+          "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not explain the frame";
       return std::move(all_);
     }
     FinderCalibration& calibration = result.calibration;
@@ -349,8 +352,9 @@ class BeadLearner {
     result.beads = beads_;
     constexpr std::size_t few = 5;
     if (total < few)
-      calibration.warnings.push_back("Only " + std::to_string(total) +
-                                     " disks to learn the bead from: its radius is uncertain.");
+      calibration.warnings.push_back(
+          "Only " + std::to_string(total) +
+          " disks were found, from which the shape of a bead is learned: its radius is uncertain. Use more frames.");
     all_.unexplained = unexplained_of(*beads_->fits.front(), light_);
     all_.one_sided = profile_.asymmetry != nullptr;
     all_.complete = spread < 1.5 * noise + 0.03;
@@ -462,8 +466,8 @@ class StartChooser {
     return best.result;
   }
 
-  // It may as well be a packed bed seen from its voids. The likelier is tried first; unless it explains the frame
-  // nearly down to its noise, so is the other. What was not seen at first is believed only when it does.
+  // It may also be a packed bed whose voids look like beads. The likelier case is tried first. Unless it explains the
+  // frame nearly down to its noise, the other is tried, too. The second case is accepted only when it does explain it.
   [[nodiscard]] CalibrationResult packed_or_as_seen() const {
     const Start packed{estimate_.packed_radius_px, estimate_.packed_polarity};
     const auto convinces = [](const Learned& learned) {

@@ -51,8 +51,8 @@ class Nearby {
     return any_near(x, y, [](std::size_t) { return true; });
   }
 
-  // visit(i, j) for all pairs nearer to one another than `distance`, i the higher up (smaller y), both in the order of
-  // heights; the rest of i's pairs is left out once it returns true.
+  // visit(i, j) for all pairs nearer to one another than `distance`, i the higher one (smaller y). Both run in the
+  // order of heights. Once visit returns true, the remaining pairs of i are left out.
   template <class Visit>
   void pairs(const Visit& visit) const {
     std::vector<std::size_t> first(columns_.size(), 0), ranks;  // the first of a column that comes after this place

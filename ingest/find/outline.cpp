@@ -362,7 +362,7 @@ std::string Roundness::why_not() const {
   if (outlines == 0) return {};
   if (on_circle < least_on_circle)
     return text_of("the outlines are not round: only %.0f %% of a typical one lies on its circle", 100 * on_circle);
-  if (gap > largest_gap) return text_of("the outlines are open: %.0f %% of the turn is missing", 100 * gap);
+  if (gap > largest_gap) return text_of("the outlines are open: %.0f %% of the circumference is missing", 100 * gap);
   if (common_elongation > largest_common_elongation || harmonic[2] > common_elongation + largest_own_elongation)
     return text_of("the outlines are oval, their axes in the ratio %.2f", (1 + harmonic[2]) / (1 - harmonic[2]));
   for (std::size_t q = 3; q <= highest_harmonic; ++q)

@@ -1,11 +1,12 @@
 #pragma once
 // Are the things round to which circles were fitted?
 //
-// Around each circle the closed path along the steepest edges is found among all star-shaped ones (dynamic programming
-// in polar coordinates [AminiSnakes]), with no preference for a circle, and its radius is developed in harmonics of the
-// direction. Disks have none but for noise and for what touching neighbours hide; ovals have the second, triangles the
-// third, squares the fourth. What is no closed outline, as the end of a rod, leaves a gap that no neighbour explains.
-// Each number is a median over the disks: it holds for the kind, not for one of them.
+// Around each circle the closed path along the steepest edges is found among all star-shaped ones, by dynamic
+// programming in polar coordinates [AminiSnakes]. It has no preference for a circle. The path's radius is expanded in
+// harmonics of the direction. Disks have none, apart from noise and the parts hidden by touching neighbours. Ovals have
+// the second harmonic, triangles the third, squares the fourth. What is no closed outline, such as the end of a rod,
+// leaves a gap that no neighbour explains. Each number is a median over the disks: it holds for the kind, not for a
+// single disk.
 
 #include <array>
 #include <cstddef>

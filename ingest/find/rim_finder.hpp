@@ -1,10 +1,10 @@
 #pragma once
 // Beads by their rims alone, whatever their faces look like: fringes, highlights, two colours, shade.
 //
-// The frame is reduced until a bead is 8 to 16 px in radius, circles of the beads' radius are searched in its edges,
-// and each is given the probability that it is a bead. That probability follows from the share of the rim that is seen:
-// the same search on copies of the frame stretched along one axis, where no bead is round any more, shows how
-// many circles so well supported chance makes up (target and decoy [EliasGygi]).
+// The frame is reduced until a bead is 8 to 16 px in radius. Circles of the beads' radius are searched in its edges.
+// Each circle gets a probability that it is a bead, from the visible share of its rim. The same search on copies of the
+// frame stretched along one axis, where no bead is round, counts the chance circles of each share (target and decoy
+// [EliasGygi]).
 
 #include <optional>
 #include <vector>
@@ -25,8 +25,8 @@ struct RimModel {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   double radius_std_error_px = 0;
-  // The radius towards sides where no neighbour is near, if enough of them are seen, else the above: where beads touch,
-  // blur moves the rims inwards (by 2 to 8 % at radii of 7 to 13 px).
+  // The radius towards sides without a near neighbour, if enough such sides are seen; else radius_px. Where beads
+  // touch, blur moves the rims inwards (by 2 to 8 % at radii of 7 to 13 px).
   double open_radius_px = 0;
   double radius_spread = 0;         // standard deviation of single radii over their mean
   double contrast = 0;              // median step across a rim, grey levels

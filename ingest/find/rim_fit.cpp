@@ -211,8 +211,8 @@ RimData rim_data(const BeadProfile& profile, double radius, double edge) {
   return data;
 }
 
-// The weights of a profile's points: pixels at one distance, and what its learning is good to. At a sharp edge square
-// pixels see every direction differently.
+// The weights of a profile's points: from the number of pixels at one distance and the accuracy of the learned profile.
+// At a sharp edge square pixels see every direction differently.
 void weigh(RimData& data, const RimConditions& conditions) {
   constexpr double sharp = 0.6;
   const double learning = conditions.edge_px < sharp ? 3e-3 : 3e-4;
@@ -255,7 +255,7 @@ void try_shadings(const RimData& levels, double exponent, const RimConditions& c
       RimTerms{true, false, false, false, true, true},  RimTerms{true, true, true, false, false, true},
       RimTerms{true, false, true, true, false, true},   RimTerms{true, false, true, false, true, true}};
   for (const RimTerms& family : families) {
-    // What bends a rim a little passes for a tone curve if the shading is free enough.
+    // With too free a shading, a small change of the rim's shape looks like a tone curve.
     const bool pair = family[1] + family[2] + family[3] + family[4] > 1;
     if (pair && exponent != 1) continue;
     const RimFit rim = fit_rim_with(levels, conditions.radius_px, conditions.edge_px, family);
@@ -265,7 +265,7 @@ void try_shadings(const RimData& levels, double exponent, const RimConditions& c
   }
 }
 
-// Of chi^2: what a term must bring to be believed, what an odd shape must, and what a tone curve must.
+// Reductions of chi^2 that are required to accept a term, an unusual shape, and a tone curve.
 constexpr double price_of_term = 6, price_of_oddity = 12, price_of_curve = 12;
 
 // Shapes and tone curves that do as well each have their say; in the error, odd ones as much as any other.
@@ -373,8 +373,8 @@ RimFit fit_rim(const BeadProfile& profile, double radius_guess_px, double edge_g
       chosen = use;
     }
   }
-  // In a crystal hardly any background is left to tell the level outside by, and a profile that ends a few thousandths
-  // too low passes for a larger bead. An offset beyond that is something else: light between the beads, a halo.
+  // In a crystal hardly any background is left to determine the level outside. A profile that ends a few thousandths
+  // too low looks like a larger bead. An offset beyond that has another cause: light between the beads, a halo.
   constexpr double largest_offset = 0.006;
   if (best.good) {
     chosen[5] = true;

@@ -17,12 +17,12 @@ namespace {
 constexpr double gap_reach = 2;       // radii: so far from a bead's rim a circle's rim may be
 constexpr double nearest_rims = 0.8;  // sums of radii: two circles nearer than that overlap
 constexpr double same_radius = 0.12;  // of the beads' radius, either way
-// Of the beads' radius; at half of it, fringes in photoelastic disks pass for beads.
+// In radii of the beads; at half of it, fringes in photoelastic disks are mistaken for beads.
 constexpr double smallest_other = 0.6, largest_other = 1.67;
 constexpr double faintest_support = 0.3;   // share of the rim
 constexpr double least_probability = 0.5;  // of a circle that is reported
 constexpr int most_rounds = 8;             // of circles beside circles
-// Other sizes are believed when so many are expected, and so large a share of the beads.
+// Other sizes are accepted when at least this number is expected, and this share of the beads.
 constexpr double fewest_others = 3, least_share_of_others = 0.05;
 
 // Where a place of the map is in the picture that the beads were found in.

@@ -1,9 +1,9 @@
 #pragma once
 // Beads that are known by where they are: circles beside beads already found, which overlap none of them.
 //
-// Chance makes up circles everywhere, but beads lie beside beads. Among the few places that are left there, a rim that
-// is seen in part is more likely a bead's than it is elsewhere; how much more follows from copies of the picture, as
-// for the first look (rim_probability.hpp), searched at the same places. Radii of half to twice the beads' are
+// Chance makes up circles everywhere, but beads lie beside beads. Few places remain beside the beads found. There a
+// partly visible rim is more likely a bead's than it is elsewhere. How much more follows from copies of the picture,
+// searched at the same places, as in the first search (rim_probability.hpp). Radii of half to twice the beads' are
 // searched too: several sizes, or a spread of sizes.
 
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
-// How likely a circle is a bead, by the share of its rim that is seen: circles of the picture against those that the
-// same search makes up in copies of it where no bead is round (target and decoy [EliasGygi]).
+// The probability that a circle is a bead, by the visible share of its rim. Circles of the picture are compared with
+// those of copies in which no bead is round, found by the same search (target and decoy [EliasGygi]).
 
 #include <vector>
 
@@ -8,10 +8,10 @@
 
 namespace shakebed::ingest {
 
-// Classes of support in which no circle is seen belong to the next better one, which makes it more doubtful; of
-// `few_circles`, most classes are empty, and they are left apart.
-// For support 0, 1/20, 2/20 .. 1. `copies`: the circles of each copy. Better support is never less likely a bead's:
-// neighbouring classes that say otherwise are put together (isotonic regression [Barlow]).
+// The probability for support 0, 1/20, 2/20 .. 1 (the visible share of the rim). `copies`: the circles of each copy. A
+// class of support without a circle is joined to the next better one, which lowers that one's probability. With
+// `few_circles` most classes are empty, and they stay separate. The probability never falls with the support:
+// neighbouring classes that violate this are pooled (isotonic regression [Barlow]).
 std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
                                              const std::vector<std::vector<Circle>>& copies, bool few_circles = false);
 

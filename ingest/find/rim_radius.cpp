@@ -15,8 +15,8 @@
 namespace shakebed::ingest {
 
 double radius_error(const FinderCalibration& calibration, double spread, double beads, double doubt) {
-  // The rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per px^2; 0.002 px is what the
-  // model is good to.
+  // The rim of each disk, 2 pi R px long, sees its level change by 1/(2 sqrt(pi) edge) per px^2. The model is accurate
+  // to 0.002 px.
   const double information = beads * 2 * 3.14159265 * calibration.rim_radius_px /
                              (2 * std::sqrt(3.14159265) * std::max(0.3, calibration.edge_width_px));
   return std::hypot(spread / std::sqrt(information), 0.002, doubt);
@@ -186,9 +186,9 @@ class RadiusFromRims {
     lie_between_readings(as_packed);
     if (calibration_.tone_exponent != 1)
       calibration_.warnings.push_back(
-          "Rims fall steeper on their dark side, as in pictures encoded for display: the radius is measured in "
-          "light, " +
-          std::to_string(calibration_.radius_px) + " px; taken from the recorded levels it would be " +
+          "The rims are steeper on their dark side, as in pictures encoded for display. The radius was therefore "
+          "measured in light: " +
+          std::to_string(calibration_.radius_px) + " px. From the recorded levels it would be " +
           std::to_string(rim_radius_) + " px.");
     calibration_.radius_std_error_px = radius_error(calibration_, spread_, total_, doubt_);
   }
@@ -210,7 +210,7 @@ class RadiusFromRims {
     doubt_ = choice.rim.std_error_px;
   }
 
-  // Rims add up where beads touch: in light, or in levels as recorded. The one that makes up the frame is the camera's.
+  // Rims add up where beads touch: in light, or in recorded levels. The camera's is the one that explains the frame.
   void read_in_light() {
     const ReadingInLight reading(calibration_, beads_);
     constexpr double clearly_less = 0.9, clearly_more = 1.03, fair = 2;
@@ -275,9 +275,9 @@ class RadiusFromRims {
     if (weight <= 1 - believed || weight >= believed) return;
     char text[400];
     std::snprintf(text, sizeof text,
-                  "The rims do not show whether levels grow as light does (radius %.2f px) or are encoded for "
-                  "display (%.2f px): the radius is taken between the two, with an error that holds both; a "
-                  "scale of your own would settle it.",
+                  "The rims do not show whether grey levels are proportional to light (radius %.2f px) or encoded for "
+                  "display (%.2f px). The radius lies between the two, and its error covers both. Give the length of a "
+                  "pixel to remove this doubt.",
                   tone.linear.radius_px, tone.encoded.radius_px);
     calibration_.warnings.emplace_back(text);
   }

@@ -1,9 +1,9 @@
 #pragma once
 // Which channel of a colour picture to measure in, once a survey knows what the beads are.
 //
-// The survey judges channels by rims. Where rims alone find beads, their faces may stand out in another channel, in
-// which nearly all beads are found: photoelastic disks are crossed by fringes in one colour and plain in the next. So
-// the finder itself is tried in each channel.
+// The survey judges channels by rims. Where beads are found by rims alone, another channel may show their faces
+// clearly, and nearly all beads are found there. Example: photoelastic disks have fringes in one colour and are plain
+// in another. So the finder itself is tried in each channel.
 
 #include "ingest/find/survey.hpp"
 

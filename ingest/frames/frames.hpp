@@ -1,8 +1,8 @@
 #pragma once
 // Frames: grey images in memory, and a stream of them from files, folders, globs and films.
 //
-// Pixel-centre convention, everywhere in ingest: the centre of the top-left pixel is (0, 0), x_px grows to the right
-// and y_px grows downwards; the frame covers -0.5 .. width - 0.5 by -0.5 .. height - 0.5.
+// Pixel-centre convention, everywhere in ingest: the centre of the top-left pixel is (0, 0). x_px grows to the right,
+// y_px grows downwards. The frame covers -0.5 .. width - 0.5 by -0.5 .. height - 0.5.
 //
 // A frame owns its levels. A stream belongs to one thread at a time; what decode() does of its items may run in
 // several.
@@ -57,9 +57,9 @@ struct FrameOrigin {
   std::size_t page = 0;
 };
 
-// What is taken for the level of a colour pixel. `automatic` takes the one of red, green and blue with the best
-// contrast in the first colour frame, for the whole stream; `background_distance` is the distance from the most
-// frequent colour of the first colour frame, `saturation` the largest component less the smallest.
+// The level computed from a colour pixel. `automatic`: red, green or blue, whichever has the best contrast in the first
+// colour frame, for the whole stream. `background_distance`: the distance from the most frequent colour of the first
+// colour frame. `saturation`: the largest component less the smallest.
 enum class Channel { automatic = -1, red = 0, green = 1, blue = 2, grey = 3, saturation = 4, background_distance = 5 };
 const char* name_of(Channel channel);
 

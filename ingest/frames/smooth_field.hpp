@@ -12,8 +12,8 @@ namespace shakebed::ingest {
 std::size_t polynomial_terms(int order);
 void polynomial_values(double u, double v, int order, double* values);
 
-// Solves A x = b for a symmetric positive definite A (size x size, row by row, lower triangle read): x in `right`, the
-// Cholesky factor in the lower triangle of `matrix`. False when A is not positive definite.
+// Solves A x = b for a symmetric positive definite A (size x size, row by row, lower triangle read). The solution x is
+// written to `right`, the Cholesky factor to the lower triangle of `matrix`. False when A is not positive definite.
 bool solve_symmetric(std::vector<double>& matrix, std::vector<double>& right, std::size_t size);
 
 // The frame averaged over factor x factor px. Pixel (i, j) has its centre at factor (i + 1/2) - 1/2 of the frame's px.

@@ -13,7 +13,7 @@ namespace {
 
 // Of the diameter: a scale given may differ by this from what the frames show without a warning.
 constexpr double fair_scale = 0.02;
-// D: beads that reach farther beyond the frame's side are cut, so the bed goes on there.
+// In D: beads that reach farther beyond the frame's side are cut, so the bed extends beyond it.
 constexpr double clearly_cut = 0.02;
 
 class GeometryFinder {
@@ -98,7 +98,7 @@ class GeometryFinder {
       warnings_.emplace_back("The side walls could not be determined from the disks: the whole frame's width is used.");
     }
     if (bed_.walls_are_frame_sides)
-      warnings_.emplace_back("The bed goes on beyond the frame: the profile is that of the part in view.");
+      warnings_.emplace_back("The bed extends beyond the frame: the profile is that of the visible part.");
   }
 
   // Where beads go on beyond the frame, only centres a radius inside are counted, so that each of them is seen whole.

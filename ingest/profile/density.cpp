@@ -44,7 +44,7 @@ DensityProfile average_profile(const std::vector<std::vector<double>>& densities
   for (std::size_t bin = 0; bin < bins.count; ++bin)
     profile.area_fraction[bin] = 0.25 * std::numbers::pi * profile.number_density[bin];
 
-  // The bed's height, which breathes, remembers longest, and a temperature hangs on it.
+  // The bed's height oscillates and has the longest correlation time. A fitted temperature depends on it.
   std::vector<double> height(frames, 0.0);
   for (std::size_t f = 0; f < frames; ++f)
     for (std::size_t bin = 0; bin < bins.count; ++bin) height[f] += bins.middle(bin) * densities[f][bin];
@@ -58,8 +58,8 @@ DensityProfile average_profile(const std::vector<std::vector<double>>& densities
   for (std::size_t bin = 0; bin < bins.count; ++bin) {
     double& variance = profile.covariance[bin * bins.count + bin];
     if (frames == 1) variance = std::max(profile.number_density[bin], 0.0) * kernel_density(kernel, 0);
-    // A bin in which hardly anything was ever seen still is uncertain by about one bead in all frames: `densities`
-    // carry the bed's width, the smallest step seen in a bin tells one bead's share.
+    // A bin in which hardly any bead was seen is still uncertain by about one bead in all frames. The bed's width is
+    // contained in `densities`, so the smallest step seen in a bin is the share of one bead.
     double step = 0;
     for (const auto& frame : densities)
       if (frame[bin] > 0 && (step == 0 || frame[bin] < step)) step = frame[bin];

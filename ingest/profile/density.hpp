@@ -42,9 +42,10 @@ struct DensityProfile {
   std::size_t independent_samples = 0;  // behind the covariance, about
 };
 
-// Mean, errors and covariance of per-frame densities that follow one another in time (frames x bins): by windows of
-// frames as long as three times the bed's height remembers, but six of them fit in. `scale_relative_std_error` is that
-// of D in px, added to the covariance as a common factor (density goes as D^2).
+// Mean, errors and covariance of per-frame densities that follow one another in time (frames x bins). By windows of
+// frames, three correlation times of the bed's height long, but short enough for six of them.
+// `scale_relative_std_error` is that of D in px. It is added to the covariance as a common factor (density is
+// proportional to D^2).
 DensityProfile average_profile(const std::vector<std::vector<double>>& densities, const HeightBins& bins,
                                const Kernel& kernel, double scale_relative_std_error = 0);
 

@@ -71,8 +71,8 @@ class FilmLearner {
     if (enlargement_ > 1) {
       char text[200];
       std::snprintf(text, sizeof text,
-                    "The pictures were enlarged %.2f times by repeating pixels; they were smoothed, and the errors of "
-                    "the centres are those of the smaller picture.",
+                    "The pictures were enlarged %.2f times by repeating pixels. They were smoothed. The errors of the "
+                    "centres are those of the smaller picture.",
                     enlargement_);
       film_.warnings.emplace_back(text);
     }
@@ -147,7 +147,7 @@ class FilmLearner {
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
   void learn_lens() {
-    // Rims alone are too coarse for it, and where other things pass for beads, a lens would fit those.
+    // Rims alone are too coarse for it. Where other things are mistaken for beads, the lens would be fitted to those.
     if (calibrated_.calibration.by_rims || calibrated_.calibration.rims_to_be_checked) return;
     if (film_.options.pixel_aspect && film_.options.lens_radial) return;
     for (int round = 0; round < lens_rounds; ++round) {
@@ -221,10 +221,10 @@ class FilmLearner {
       film_.second = std::move(result.calibration);
     else
       film_.warnings.push_back("No beads of the second diameter were found: " +
-                               (result.found
-                                    ? "what there is has a radius of " + std::to_string(result.calibration.radius_px) +
-                                          " px instead of " + std::to_string(expected) + " px."
-                                    : result.why_not + "."));
+                               (result.found ? "the beads found instead have a radius of " +
+                                                   std::to_string(result.calibration.radius_px) + " px instead of " +
+                                                   std::to_string(expected) + " px."
+                                             : result.why_not + "."));
   }
 
   static bool is_second(const CalibrationResult& one, double expected) {
@@ -259,8 +259,8 @@ class FilmLearner {
     if (!(options.pixel_aspect && options.lens_radial)) {
       char text[200];
       std::snprintf(text, sizeof text,
-                    "Beads are no circles of one size in these frames: pixels are taken to be %.4f times as wide as "
-                    "high, and the lens to bend by %+.4f at the corners.",
+                    "The beads are not circles of one size. Pixels are therefore taken as %.4f times as wide as high, "
+                    "and the lens as shifting the corners by %+.4f half diagonals.",
                     lens_.pixel_aspect, lens_.radial);
       film_.warnings.emplace_back(text);
     }

@@ -40,8 +40,8 @@ struct FloorMotion {
   std::size_t touching = 0;  // beads
 };
 
-// A bottom counts in full while it is below the floor or no more than a tolerance above; the tolerance shrinks, so that
-// what is left in the end are the beads that touch. Known only if such beads are seen all around the period.
+// A bottom counts in full while it is below the floor or at most a tolerance above it. The tolerance shrinks, so that
+// only the touching beads remain at the end. Known only if such beads are seen all around the period.
 FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double diameter_px, double turns_per_frame);
 
 }  // namespace shakebed::ingest

@@ -1,5 +1,6 @@
 #pragma once
-// Pixels that are not square and lenses that bend: frames made such that a bead is a circle of one size everywhere.
+// Pixels that are not square and lenses that distort. Frames are corrected such that a bead is a circle of one size
+// everywhere.
 //
 // Any number of threads may call; values own what they hold.
 
@@ -11,9 +12,9 @@
 
 namespace shakebed::ingest {
 
-// What turns recorded places into true ones: columns are stretched by `pixel_aspect` (the length a pixel spans across
-// over the length it spans upwards), then a point at distance r from the middle moves to r (1 + radial (r/h)^2), h half
-// the diagonal: positive undoes a barrel, negative a pincushion; the corners move by h * radial.
+// The map from recorded places to true ones. First columns are stretched by `pixel_aspect`: the length a pixel spans
+// across over the length it spans upwards. Then a point at distance r from the middle moves to r (1 + radial (r/h)^2),
+// with h half the diagonal. Positive `radial` corrects a barrel, negative a pincushion; the corners move by h * radial.
 struct Lens {
   double pixel_aspect = 1;
   double radial = 0;
@@ -47,8 +48,8 @@ class LensMap {
   double middle_x_ = 0, middle_y_ = 0, half_diagonal_ = 1;  // stretched, without the margin
 };
 
-// What is left of aspect and radial term in frames that were taken for plain, from the beads' own rims: least squares
-// of the residual on how rims would move, over all whole disks.
+// The remaining aspect and radial term in frames that were assumed undistorted, from the beads' own rims. Least
+// squares, over all whole disks, of the residual on the shift of the rims that each term would cause.
 struct LensEstimate {
   bool known = false;  // enough disks
   Lens lens;

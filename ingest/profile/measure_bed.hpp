@@ -145,8 +145,8 @@ struct Measurement {
   std::vector<std::string> warnings;  // plain sentences
 };
 
-// Reads the stream once (its first frames twice). Throws std::invalid_argument for options that make no sense,
-// InputError when no frame at all could be read or no frame shows a disk; single bad frames are reported in `frames`
+// Reads the stream once (its first frames twice). Throws std::invalid_argument for options that make no sense. Throws
+// InputError when no frame at all could be read or no frame shows a disk. Single bad frames are reported in `frames`
 // instead.
 Measurement measure_bed(FrameSource& source, const MeasureOptions& options);
 

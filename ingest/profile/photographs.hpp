@@ -22,7 +22,7 @@ namespace shakebed::ingest {
 
 enum class PixelType { u8, u16, f32, f64 };
 
-// A grey image that somebody else holds: row by row, levels of 0 .. 255 (u8, floating point) or 0 .. 65535 (u16).
+// A view of a grey image that the caller owns: row by row, levels of 0 .. 255 (u8, floating point) or 0 .. 65535 (u16).
 struct ImageView {
   int width = 0, height = 0;
   const void* pixels = nullptr;

@@ -91,8 +91,8 @@ void Shaking::take_found(BedCalibration& bed) {
   }
   char text[400];
   std::snprintf(text, sizeof text,
-                "The shaking's frequency was not given; the lowest beads move at %.6g +- %.2g Hz, taken for it. A "
-                "shaker faster than half the frame rate would look slower: %.6g Hz would look the same.",
+                "The shaking frequency was not given. The lowest beads move at %.6g +- %.2g Hz, which is used. A "
+                "shaker faster than half the frame rate appears slower: %.6g Hz would look the same.",
                 bed.shaking_frequency_hz, bed.shaking_frequency_std_error_hz, rate - bed.shaking_frequency_hz);
   warnings_.emplace_back(text);
 }
@@ -109,8 +109,8 @@ void Shaking::compare_with_given() {
   const double rate = *options_.frame_rate_hz;
   char text[400];
   std::snprintf(text, sizeof text,
-                "The lowest beads move at %.6g +- %.2g Hz, not at the %.6g Hz given, which are used all the same: are "
-                "frequency and frame rate right?",
+                "The lowest beads move at %.6g +- %.2g Hz, but %.6g Hz was given. The given frequency is used. Check "
+                "the frequency and the frame rate.",
                 in_film_.cycles_per_frame * rate, in_film_.std_error * rate, *options_.shaking_frequency_hz);
   warnings_.emplace_back(text);
 }

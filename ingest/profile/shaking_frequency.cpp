@@ -180,7 +180,7 @@ FoundFrequency line_near(const Series& series, double frequency) {
   FoundFrequency found;
   const LineFit fit = fit_line(series, frequency);
   if (!fit.good || std::abs(fit.frequency - frequency) > 1.5 / series.length) {
-    found.why_not = "the line seen at first is none when fitted";
+    found.why_not = "the line of the periodogram disappears in the fit";
     return found;
   }
   found.known = true;
@@ -210,7 +210,7 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
                to = 0.5 - 1.5 / series.length;
   std::vector<double> powers;
   for (double frequency = from; frequency < to; frequency += step) powers.push_back(power_at(series, frequency));
-  // Each line is held against its own neighbourhood; of those that are none by chance the strongest is the first tone.
+  // Each line is compared with its own neighbourhood. The strongest line that is significant is the first tone.
   double likeliest = 1, likeliest_at = 0, false_alarm = 1;
   for (std::size_t k = 0; k < powers.size(); ++k) {
     if ((k > 0 && powers[k - 1] > powers[k]) || (k + 1 < powers.size() && powers[k + 1] >= powers[k])) continue;
@@ -227,7 +227,7 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
   if (!(highest > 0)) {
     char text[200];
     std::snprintf(text, sizeof text,
-                  "the clearest line, at %.4f cycles a frame, would come by chance with a probability of %.2g",
+                  "the strongest line, at %.4f cycles per frame, arises by chance with a probability of %.2g",
                   likeliest_at, likeliest);
     found.why_not = text;
     found.false_alarm = likeliest;

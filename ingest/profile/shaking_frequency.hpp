@@ -25,10 +25,10 @@ struct FoundFrequency {
   std::string why_not;     // a sentence unless known
 };
 
-// By a periodogram (Lomb's, since frames may be missing), whose lines are held against their neighbourhood, a
-// power of the frequency, so that what is slow and irregular, a bed that sloshes, is no line: z times the level that m
-// neighbours tell comes by chance once in (1 + z/m)^m of the frequencies tried. Then by least squares with two
-// overtones, the error from the neighbourhood of what they leave.
+// By a periodogram (Lomb's, since frames may be missing). Its lines are compared with their neighbourhood, a power law
+// of the frequency: so slow irregular motion, such as sloshing, is no line. The level comes from m neighbours. By
+// chance, a share (1 + z/m)^-m of the frequencies tried exceeds z times that level. Then by least squares with two
+// overtones. The error follows from the residuals in the neighbourhood.
 constexpr double most_false_alarm = 1e-4;
 FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places);
 

@@ -226,12 +226,15 @@ class StepStatistics {
   void warn() {
     if (result_.linked_share < 0.9)
       result_.warnings.emplace_back("Only " + std::to_string(static_cast<int>(100 * result_.linked_share)) +
-                                    " % of the disks could be followed: the frames follow too slowly for velocities.");
+                                    " % of the disks could be followed: the frame rate is too low for velocities.");
     if (result_.mean_step > 0.25)
-      result_.warnings.emplace_back("Disks move by " + std::to_string(result_.mean_step) +
-                                    " D between frames on average: fast ones are lost and T is too low.");
+      result_.warnings.emplace_back(
+          "Disks move by " + std::to_string(result_.mean_step) +
+          " D between frames on average: fast disks are lost and T is too low. Use a higher frame rate.");
     if (result_.horizontal.finite_time_factor > 1.5 || result_.vertical.finite_time_factor > 1.5)
-      result_.warnings.emplace_back("Velocities change much between frames: T leans on the finite-time correction.");
+      result_.warnings.emplace_back(
+          "Velocities change much between frames: T depends strongly on the finite-time correction. Use a higher frame "
+          "rate.");
   }
 
   const std::vector<MeasuredDisk>& disks_;

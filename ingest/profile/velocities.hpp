@@ -40,15 +40,15 @@ struct VelocityMeasurement {
 // Links each disk to the only one nearer than largest_step in the next frame, if both agree that they are nearest.
 std::vector<Link> link_disks(const Measurement& measurement, double largest_step);
 
-// T_x and T_z of the linked disks. The flow of each height bin in each pair of frames is removed (with the loss of one
-// degree of freedom a bin restored); the localisation error's share, by the stated variances, is subtracted; the
-// finite-time loss follows from the velocity's own correlation between successive steps, C(dt)/C(0) = exp(-dt/tau), for
-// which the mean over dt of a velocity with that memory has 2 (x - 1 + exp(-x))/x^2 of the variance, x = dt/tau.
-// Throws std::invalid_argument without a frame rate.
+// T_x and T_z of the linked disks. The flow of each height bin in each pair of frames is subtracted; the lost degree of
+// freedom per bin is restored. The localisation error's share, by the stated variances, is subtracted. The finite-time
+// loss follows from the velocity's own correlation between successive steps, C(dt)/C(0) = exp(-dt/tau). The mean over
+// dt of such a velocity has 2 (x - 1 + exp(-x))/x^2 of the variance, x = dt/tau. Throws std::invalid_argument without a
+// frame rate.
 VelocityMeasurement measure_velocities(const Measurement& measurement, const VelocityOptions& options);
 
-// The same while frames come in, in bounded memory: stretches of `stretch_frames` frames are measured one after another
-// (each begins with the last frame of the one before), T is their mean, its error by windows of them.
+// The same while frames arrive, in bounded memory. Stretches of `stretch_frames` frames are measured one after another,
+// each beginning with the last frame of the one before. T is their mean; its error is by windows of them.
 class VelocityMeter {
  public:
   // `bead_diameter_m`: D in metres.

@@ -1,10 +1,15 @@
 #pragma once
 // Frames drawn from disks whose centres are known: a camera's view of a bed, with every imperfection under control.
 //
-// The chain is that of a camera: radiance of background and beads (shading) -> average over the exposure (motion blur)
-// -> optical blur (Gaussian) -> integral over each square pixel -> illumination (gradient, vignette) -> shot and read
-// noise -> JPEG -> rounding to 8 bits. Pixel integrals are exact for sharp disks and by Gauss-Legendre quadrature for
-// blurred ones: centres drawn without noise are true to 1e-3 px.
+// The chain is that of a camera:
+//   radiance of background and beads (shading)
+//   -> average over the exposure (motion blur)
+//   -> optical blur (Gaussian)
+//   -> integral over each square pixel
+//   -> illumination (gradient, vignette)
+//   -> shot and read noise -> JPEG -> rounding to 8 bits.
+// Pixel integrals are exact for sharp disks and by Gauss-Legendre quadrature for blurred ones. Centres drawn without
+// noise are true to 1e-3 px.
 //
 // A value owns what it holds. Any number of threads may draw, also with one renderer.
 
@@ -55,8 +60,8 @@ struct Camera {
 // What was drawn of each disk given.
 enum class DrawnAs : std::uint8_t { opaque, transparent, missing };
 
-// Draws frames. Construction prepares the light, dust and edge tables; render() is const and thread-safe, and its
-// result depends only on camera, disks and frame_index (noise and choices are drawn from seed and frame_index).
+// Draws frames. Construction prepares the light, dust and edge tables. render() is const and thread-safe. Its result
+// depends only on camera, disks and frame_index (noise and choices are drawn from seed and frame_index).
 class FrameRenderer {
  public:
   // Throws std::invalid_argument for sizes or levels out of range.
@@ -78,10 +83,10 @@ class FrameRenderer {
 // The same, for one frame.
 GrayFrame render_frame(const std::vector<RenderedDisk>& disks, const Camera& camera, std::uint64_t frame_index = 0);
 
-// A bed to test on: `rows` hexagonal rows of touching disks resting on the line y_px = floor_px between the walls
-// x_px = left_wall_px and right_wall_px (as many as fit in a row), and above it `gas_count` disks at random that touch
-// nothing, at heights with an exponential law of mean `gas_height_px`. Small random displacements `jitter_px` (kept
-// from overlapping) break the lattice.
+// A bed to test on. `rows` hexagonal rows of touching disks rest on the line y_px = floor_px. They fill the width
+// between the walls x_px = left_wall_px and right_wall_px. Above them are `gas_count` disks at random that touch
+// nothing. Their heights follow an exponential law of mean `gas_height_px`. Small random displacements `jitter_px`
+// (without overlaps) break the lattice.
 struct SyntheticBed {
   double left_wall_px = 0, right_wall_px = 0, floor_px = 0;
   double radius_px = 10;

@@ -70,7 +70,7 @@ int clean(const Call& call, const CleanArguments& given) {
   for (const fs::path& path : results_in(folder)) {
     if (age_of(path) < age) continue;
     if (!given.dry_run) {
-      const FolderLock lock(path);  // nobody works in it
+      const FolderLock lock(path);  // no process uses it
       fs::remove_all(path, error);
       if (error) throw StageError(fmt::format("{}: cannot be removed: {}", path.string(), error.message()));
     }

@@ -146,7 +146,7 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       ->delimiter(',')
       ->expected(4);
   command.add_option("--polarity", image.polarity, "automatic, dark or bright beads")->check(CLI::IsMember(polarities));
-  command.add_option("--radius", image.radius, "radius of a bead in pixels, good to a quarter (default: found)")
+  command.add_option("--radius", image.radius, "radius of a bead in pixels, within 25 % (default: found)")
       ->check(CLI::PositiveNumber);
   command.add_option("--channel", image.channel, "part of a colour picture that is used (default: found)")
       ->check(CLI::IsMember(channels));
@@ -156,24 +156,27 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       ->check(CLI::IsMember(shapes));
   command.add_flag("--preview", image.preview,
                    "draw what would be found in the first frame, with the command for each alternative, and stop");
-  command.add_option("--second-diameter", image.second_diameter, "of beads of another size, to be found too");
+  command.add_option("--second-diameter", image.second_diameter, "diameter of beads of another size, to be found too");
   command.add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
-  command.add_option("--lens", image.lens,
-                     "how far the lens moves the corners, in half diagonals, a barrel positive (default: found)");
-  command.add_option("--bead-number", image.bead_number, "how many beads there are in view, to be checked");
+  command.add_option(
+      "--lens", image.lens,
+      "distortion of the lens: shift of the corners in half diagonals, a barrel positive (default: found)");
+  command.add_option("--bead-number", image.bead_number, "number of beads in view, for a check");
 }
 
 // What is known of the bed, and how it is measured.
 void add_bed_options(CLI::App& command, ImageArguments& image) {
   command.add_option("--plateau-density", image.plateau_density, plateau_help);
   command.add_option("--model", image.model, "model of the fit (default enskog-rectangle)");
-  command.add_option("--frequency", image.frequency,
-                     "of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
+  command.add_option(
+      "--frequency", image.frequency,
+      "frequency of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
   command.add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
-  command.add_option("--frame-rate", image.frame_rate,
-                     "of a film: \"500 Hz\": velocities; and profiles by phase if the bed shakes");
+  command.add_option(
+      "--frame-rate", image.frame_rate,
+      "frame rate of a film, such as \"500 Hz\": gives velocities, and profiles by phase if the bed shakes");
   command.add_option("--kernel", image.kernel,
-                     "density is measured through: gaussian:0.5 (default), top_hat:1, disk_chord:1");
+                     "kernel of the density: gaussian:0.5 (default), top_hat:1, disk_chord:1");
   command.add_option("--initial-height", image.initial_height,
                      "height mu of the bed at rest, in D or a length (default: from the beads counted between the "
                      "walls)");

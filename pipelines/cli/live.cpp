@@ -37,7 +37,7 @@ void require_free(const fs::path& file) {
   if (!fs::exists(file, error)) return;
   if (!fs::is_regular_file(file, error) || read_file(file).substr(0, 200).find(mark) == std::string::npos)
     throw UsageError(
-        fmt::format("{} exists and is no page of shakebed live; name another file with --out", file.string()));
+        fmt::format("{} exists and was not written by shakebed live; name another file with --out", file.string()));
 }
 
 int live(const Call& call) {
@@ -54,7 +54,7 @@ int live(const Call& call) {
 }  // namespace
 
 void add_live(Program& program) {
-  CLI::App& command = program.add({"live", "write a page in which a bed is simulated as one watches",
+  CLI::App& command = program.add({"live", "write a page that simulates a bed live in the browser",
                                    "  shakebed live\n  shakebed live --out bed.html"},
                                   live);
   command.get_option("--out")->description("the page (default bed.html)")->type_name("FILE.html");

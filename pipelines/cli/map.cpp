@@ -49,7 +49,7 @@ MapQuestion question_of(const MapArguments& given) {
 void add_map(Program& program) {
   const auto given = std::make_shared<MapArguments>();
   CLI::App& command =
-      program.add({"map", "Gamma → temperature, by every named reading",
+      program.add({"map", "Gamma → temperature, by every formula that the paper allows",
                    "  shakebed map --gamma 4 --frequency \"20 Hz\" --diameter \"2.99 mm\" --initial-height 10.2 "
                    "--plateau-density 1.10"},
                   [given](const Call& call) {
@@ -58,13 +58,14 @@ void add_map(Program& program) {
                     return exit_ok;
                   });
   command.add_option("--gamma", given->gamma, "peak acceleration in g");
-  command.add_option("--amplitude", given->amplitude, "of the floor, instead of --gamma");
+  command.add_option("--amplitude", given->amplitude, "amplitude of the floor, instead of --gamma");
   command.add_option("--frequency", given->frequency, "of the floor")->required();
   command.add_option("--diameter", given->diameter, "D")->required();
   command.add_option("--initial-height", given->initial_height, initial_height_help)->required();
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
   command.add_option("--gravity", given->gravity, "default \"9.81 m/s^2\"");
-  command.add_option("--restitution", given->restitution, "of the single ball (default 0: one flight of a dead ball)");
+  command.add_option("--restitution", given->restitution,
+                     "restitution of the single ball (default 0: one flight, no rebound)");
   command.add_option("--eos", given->equation, "equation of state (default enskog)");
   command.add_option("--temperature", given->temperature,
                      "a measured T, mapped back to Gamma: T/(m g) as a length, or T in m g D");

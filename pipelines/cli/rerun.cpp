@@ -51,7 +51,7 @@ int rerun_sweep(const Plan& plan, const RunOptions& options, const fs::path& bef
   const int code = run_sweep_command(plan, options, whole, report_pages(), console);
   if (code != exit_ok && code != exit_check_failed) return code;
   const bool same = read_file(before / "sweep.csv") == read_file(options.out / "sweep.csv");
-  print(same ? "the same: sweep.csv came out byte for byte\n" : "sweep.csv differs\n");
+  print(same ? "identical: sweep.csv has the same bytes\n" : "sweep.csv differs\n");
   return same ? exit_ok : exit_check_failed;
 }
 
@@ -59,7 +59,7 @@ int rerun(const Call& call, const RerunArguments& given) {
   const fs::path before = given.folder;
   const Json manifest = read_json(before / "manifest.json");
   if (!manifest.contains("document") || !manifest.contains("stages"))
-    throw InputError((before / "manifest.json").string() + ": is not a manifest of ours");
+    throw InputError((before / "manifest.json").string() + ": is not a manifest written by shakebed");
   const fs::path directory = manifest["recipe"].value("directory", std::string("."));
   const Plan plan =
       make_plan(to_node(manifest["document"]), (before / "manifest.json").string() + " (document)", directory);
@@ -69,7 +69,8 @@ int rerun(const Call& call, const RerunArguments& given) {
   options.force = true;
   options.command_line = call.command_line;
   std::error_code error;
-  if (fs::equivalent(options.out, before, error)) throw UsageError("--out: a rerun needs a folder of its own");
+  if (fs::equivalent(options.out, before, error))
+    throw UsageError("--out: a rerun must not write into the folder that it repeats; name another folder");
   Console console(level_of(call));
   install_interrupt_handler();
   if (plan.sweep) return rerun_sweep(plan, options, before, console);
@@ -79,10 +80,9 @@ int rerun(const Call& call, const RerunArguments& given) {
   const auto [files, different] = compare(manifest, options.out);
   for (const std::string& name : different)
     if (!call.json) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
-  print(call.json ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
-        : different.empty()
-            ? fmt::format("the same: all {} files of {} came out byte for byte\n", files, before.string())
-            : fmt::format("{} of {} files differ\n", different.size(), files));
+  print(call.json           ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
+        : different.empty() ? fmt::format("identical: all {} files of {} have the same bytes\n", files, before.string())
+                            : fmt::format("{} of {} files differ\n", different.size(), files));
   return different.empty() ? exit_ok : exit_check_failed;
 }
 

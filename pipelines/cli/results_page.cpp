@@ -95,13 +95,11 @@ std::string results_page(const std::vector<ShippedRecipe>& recipes) {
   std::string out =
       "# Published results, reproduced\n\nWritten by `shakebed reproduce --results`; a test compares. The numbers are "
       "those of the full presets (`docs/results/<recipe>.json`). Each recipe has a page of its own, with its scene, "
-      "its "
-      "figure, all its claims and what differs.\n\nA claim holds where the whole interval of the measured number lies "
-      "within what is claimed, and does not hold where all of it lies outside; else it is open. The interval is 3 "
+      "its figure, all its claims and what differs.\n\nA claim holds where the whole interval of the measured number "
+      "lies within what is claimed, and does not hold where all of it lies outside; else it is open. The interval is 3 "
       "standard errors wide to each side, 1.96 in the recipes of Quinn and Hong. Standard errors are those over "
-      "replicas. A published number that nobody here has read in print gives no verdict. Where a paper states no "
-      "error, "
-      "the tolerance is ours and said to be.\n\n| recipe | main claim | claimed | measured | verdict | all claims "
+      "replicas. A published number that was not read in print gives no verdict. Where a paper states no error, the "
+      "tolerance is ours and is marked so.\n\n| recipe | main claim | claimed | measured | verdict | all claims "
       "|\n|---|---|---|---|---|---|\n";
   for (const ShippedRecipe& recipe : recipes) {
     const ShownRecipe one = shown(recipe);

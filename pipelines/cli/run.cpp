@@ -32,7 +32,7 @@ void add_run(Program& program) {
 }
 
 void add_explain(Program& program) {
-  add(program, {"explain", "what a run would do, a sentence a stage", "  shakebed explain bed.json --out o"}, true);
+  add(program, {"explain", "what a run would do, one sentence per stage", "  shakebed explain bed.json --out o"}, true);
 }
 
 }  // namespace shakebed::pipelines

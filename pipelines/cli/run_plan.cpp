@@ -118,9 +118,7 @@ Answer sweep(const Call& call, const RunArguments& run, const Plan& plan, const 
 }  // namespace
 
 void add_preset(CLI::App& command, RunArguments& run) {
-  command
-      .add_option("--preset", run.preset,
-                  "changes that the recipe carries under this name (\"quick\", say); before --set")
+  command.add_option("--preset", run.preset, "preset of the recipe, such as \"quick\"; applied before --set")
       ->type_name("NAME");
 }
 
@@ -128,9 +126,9 @@ void add_run_options(CLI::App& command, RunArguments& run) {
   command.add_option("--set", run.settings, "change the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
       ->type_name("POINTER=VALUE");
   command.add_option("--only", run.only, "only this stage")->type_name("STAGE");
-  command.add_option("--from", run.from, "this stage and those that follow from it")->type_name("STAGE");
-  command.add_option("--until", run.until, "this stage and those it needs")->type_name("STAGE");
-  command.add_flag("--force", run.force, "run also what is up to date");
+  command.add_option("--from", run.from, "run this stage and those that depend on it")->type_name("STAGE");
+  command.add_option("--until", run.until, "run this stage and those it needs")->type_name("STAGE");
+  command.add_flag("--force", run.force, "run stages that are up to date, too");
   command.add_flag("--dry-run", run.dry_run, "say what would run, and why, without running it");
   command.add_option("--jobs,-j", run.jobs, "threads (default: all processors)")
       ->type_name("N")

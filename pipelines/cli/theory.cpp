@@ -20,7 +20,7 @@ TheoryQuestion question_of(const TheoryArguments& given) {
   question.plateau_density = plateau_argument(given.plateau_density);
   if (given.diameter) question.diameter = diameter_argument(*given.diameter);
   if (given.initial_height && given.column_number)
-    throw UsageError("--initial-height and --column-number say the same thing: give one");
+    throw UsageError("--initial-height and --column-number are equivalent: give one");
   if (given.initial_height)
     question.initial_height = diameters_argument("--initial-height", *given.initial_height, question.diameter);
   if (given.column_number) question.initial_height = *given.column_number / question.plateau_density;

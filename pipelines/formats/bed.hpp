@@ -1,6 +1,6 @@
-// What is known of a bed: stated once, by the stage that makes it (simulate) or that measures it (extract, for the
-// user's own photographs), and carried in bed.json beside every trajectory, frame set and profile. Later stages read it
-// from there; one that states another value is refused (see same_as_bed).
+// The description of a bed. The stage that makes the bed (simulate) or measures it (extract, for the user's own
+// photographs) states it once. It is stored in bed.json beside every trajectory, frame set and profile. Later stages
+// read it there. A stage that states another value is refused (see same_as_bed).
 #pragma once
 
 #include <cstdint>

@@ -17,10 +17,11 @@
 //     fields.require(options.noise < 128, "noise", "noise above 127 leaves no image", "Choose less");
 //   }
 //
-// The same function runs in three modes. decode: each call reads its key, or leaves the default; every mistake goes to
-// the list of problems with file, line, pointer, what was expected and what to do, and reading goes on. schema: each
-// call adds a property to a JSON Schema (draft-07). encode: each call writes the value, so that what comes out names
-// every option (resolved.json, the cache key).
+// The same function runs in three modes:
+//   decode: each call reads its key, or leaves the default. Every mistake is added to the list of problems with file,
+//           line, pointer, what was expected and what to do. Reading goes on.
+//   schema: each call adds a property to a JSON Schema (draft-07).
+//   encode: each call writes the value. So the output names every option (resolved.json, the cache key).
 #pragma once
 
 #include <cstdint>
@@ -120,8 +121,8 @@ class Fields {
   const std::string& pointer() const { return pointer_; }
   const Source& source() const { return source_; }
 
-  // In a stage with "units": "reduced" every quantity is a plain number (lengths in D, masses in m, g or the starting T
-  // equal to 1) and a string with a unit is a mistake. Options structs then hold reduced numbers instead of SI.
+  // In a stage with "units": "reduced" every quantity is a plain number: lengths in D, masses in m, g or the starting T
+  // equal to 1. A string with a unit is then a mistake. Options structs then hold reduced numbers instead of SI.
   bool reduced() const { return reduced_; }
   void set_reduced(bool reduced) { reduced_ = reduced; }
 

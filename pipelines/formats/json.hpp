@@ -1,5 +1,6 @@
-// JSON in and out. In: a tree that remembers where each value stood, so that a mistake can be shown at its place. Out:
-// ordered, numbers with as many digits as give the same double back, and the same bytes for the same values.
+// Reading and writing JSON. Reading gives a tree that holds the place of each value in the file, so that a mistake can
+// be shown there. Writing is ordered, with enough digits to restore the same double. The same values give the same
+// bytes.
 #pragma once
 
 #include <filesystem>
@@ -55,7 +56,7 @@ std::optional<JsonNode> parse_json(std::string_view text, const std::string& fil
 
 // The same from a file. Throws InputError when it cannot be read, ConfigError when it is no good JSON.
 JsonNode read_json_node(const std::filesystem::path& path);
-// A result file of ours or of the user. Throws InputError.
+// Reads a result file, written by shakebed or by the user. Throws InputError.
 Json read_json(const std::filesystem::path& path);
 
 JsonNode to_node(const Json& json);

@@ -33,9 +33,9 @@ std::string size_text(std::uint64_t bytes);
 // An SVG file as part of a page: without its prolog, its ids made its own by the number. "" when it is none.
 std::string inline_svg(const std::filesystem::path& path, int number);
 
-// A drawn figure: the SVG for paper, print and browsers without scripts; its numbers, where NAME.plot.json is beside
-// it, for the script that draws them again; NAME.pdf to download, where there is one. The caption is HTML. "" where
-// there is no SVG.
+// A drawn figure with three files. The SVG serves paper, print and browsers without scripts. NAME.plot.json, where it
+// exists, holds the numbers for the script that draws it again. NAME.pdf, where it exists, is offered for download. The
+// caption is HTML. "" where there is no SVG.
 std::string figure_html(const std::filesystem::path& svg, int number, std::string_view caption);
 
 // A row of a table that stacks on a narrow screen: cells (HTML) with the names of their columns.

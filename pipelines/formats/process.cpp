@@ -24,7 +24,8 @@ ProcessResult run_process(const std::vector<std::string>& arguments, const std::
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  // At once, not only when the program is found and begins: if we are killed meanwhile, nobody holds our lock on OUT.
+  // Now, not only when the program is found and begins: if this process is killed meanwhile, no child holds the lock on
+  // OUT.
   posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
   posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
   std::vector<char*> argv;

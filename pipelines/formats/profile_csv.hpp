@@ -32,13 +32,13 @@ struct ProfileTable {
 // Writes NAME.csv and NAME.csv-metadata.json below a stage's output folder.
 void write_profile_csv(const std::filesystem::path& path, const ProfileTable& profile);
 
-// Reads any CSV with a header that names at least height (or z, zeta) and number_density (or phi, density), or
-// area_fraction (nu); cells separated by commas, semicolons, tabs or blanks; std_error (error, sigma, stderr),
-// area_fraction and samples (count) are optional. Kernel and column number come from the metadata beside the file, else
-// from lines "# kernel: gaussian:0.5" and "# column_number: 10.2". Rows are sorted by height.
+// Reads any CSV with a header that names a height (height, z, zeta) and a density. The density is number_density (phi,
+// density) or area_fraction (nu). Cells are separated by commas, semicolons, tabs or blanks. Optional columns:
+// std_error (error, sigma, stderr), area_fraction, samples (count). Kernel and column number come from the metadata
+// beside the file, else from lines "# kernel: gaussian:0.5" and "# column_number: 10.2". Rows are sorted by height.
 //
-// Where some rows have no standard error (an empty cell or 0) and others do, each such row takes the error of the
-// nearest height that has one (the larger of two), and one note names the rows. Throws InputError naming the line.
+// Some rows may have no standard error (an empty cell or 0) while others do. Each such row takes the error of the
+// nearest height that has one (the larger of two). One note names the rows. Throws InputError naming the line.
 ProfileTable read_profile_csv(const std::filesystem::path& path);
 
 // Covariance of the densities of a profile, row by row, from covariance.csv: height_i,height_j,covariance for j >= i.

@@ -1,6 +1,7 @@
-// Tables that a run writes: a CSV file whose first line is its header and whose cells are plain numbers or words, and
-// beside it NAME.csv-metadata.json (W3C CSV on the Web [W3C2015]) with what the columns mean, their units and what else
-// must be said of the table. numpy.genfromtxt(names=True) and pandas.read_csv read the CSV without options.
+// Tables that a run writes: a CSV file and its metadata. The first line of the CSV is its header; its cells are plain
+// numbers or words. The metadata file NAME.csv-metadata.json (W3C CSV on the Web [W3C2015]) holds the meaning of the
+// columns, their units and notes on the table. numpy.genfromtxt(names=True) and pandas.read_csv read the CSV without
+// options.
 #pragma once
 
 #include <cstdint>

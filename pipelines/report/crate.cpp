@@ -205,7 +205,7 @@ Json crate_json(const Plan& plan, const SweepOutcome& sweep) {
     graph.push_back(std::move(entity));
   };
   for (const auto& [name, description] :
-       {std::pair("sweep.csv", "a row a point: its values and the numbers gathered, in SI"),
+       {std::pair("sweep.csv", "one row per point: its values and the gathered numbers, in SI"),
         std::pair("sweep.csv-metadata.json", "the columns of sweep.csv, as CSV on the Web says it"),
         std::pair("resolved.json", "the recipe with every option written out"),
         std::pair("report.html", "figures, maps and the table of points on one page"),

@@ -1,7 +1,7 @@
-// ro-crate-metadata.json: what was made from what, as RO-Crate 1.1 (JSON-LD) says it, so that a repository or a journal
-// can read it [https://www.researchobject.org/ro-crate/1.1/]. The same run has the same bytes: files that hold times
-// (manifest.json, report.html, summary.md) are named without size and hash, and datePublished is the day of the
-// program's source, whose results these are.
+// ro-crate-metadata.json: the inputs and outputs of a run as RO-Crate 1.1 (JSON-LD), for a repository or a journal
+// [https://www.researchobject.org/ro-crate/1.1/]. The same run has the same bytes. Files that hold times
+// (manifest.json, report.html, summary.md) are therefore named without size and hash. For the same reason datePublished
+// is the day of the program's source that made the results.
 #pragma once
 
 #include <string_view>

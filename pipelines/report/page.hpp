@@ -1,5 +1,5 @@
-// What every page of ours begins and ends with. Style and scripts are the files of report/page/, part of the program: a
-// page is one file and asks nobody for anything.
+// The beginning and the end of every HTML page that shakebed writes. Style and scripts are the files of report/page/,
+// part of the program. A page is one file and loads nothing.
 #pragma once
 
 #include <string>

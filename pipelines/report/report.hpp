@@ -1,9 +1,9 @@
-// report.html: one file that shows everything, without a network: the answer first, the figure that shows it, the
-// warnings, the bed and its film, the figures, the numbers beside the published ones, what was assumed, the stages with
-// their times, and where it all came from. What it shows
-// of a stage is the stage's own (StagePages).
+// report.html: one file that shows everything, without a network. The order is: the answer; the figure that shows it;
+// the warnings; the bed and its film. Then: the figures; the numbers beside the published ones; the assumptions; the
+// stages with their times; the sources. The pages of a stage are the stage's own (StagePages).
 //
 // What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md: without these
+// What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md. Without these
 // blocks the pages of two runs with the same seeds are equal byte for byte.
 #pragma once
 

@@ -25,8 +25,9 @@ FolderLock::FolderLock(const fs::path& folder) : path_(folder / ".lock") {
       char owner[256] = {};
       const ssize_t size = ::read(descriptor_, owner, sizeof owner - 1);
       ::close(descriptor_);
-      throw StageError(fmt::format("{}: another shakebed works there{}{}; wait for it, or choose another --out",
-                                   folder.string(), size > 0 ? ": " : "", size > 0 ? owner : ""));
+      throw StageError(
+          fmt::format("{}: another shakebed process uses this folder{}{}; wait until it ends, or choose another --out",
+                      folder.string(), size > 0 ? ": " : "", size > 0 ? owner : ""));
     }
     // The file may have been removed between opening and locking: then this lock is on nothing.
     struct stat held {

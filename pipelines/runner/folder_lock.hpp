@@ -7,7 +7,7 @@ namespace shakebed::pipelines {
 // An exclusive lock on a folder, held by the kernel for as long as this process lives: a killed run leaves none behind.
 class FolderLock {
  public:
-  // Throws StageError naming the process that works there.
+  // Throws StageError naming the process that uses the folder.
   explicit FolderLock(const std::filesystem::path& folder);
   FolderLock(FolderLock&& other) noexcept : descriptor_(other.descriptor_), path_(other.path_) {
     other.descriptor_ = -1;

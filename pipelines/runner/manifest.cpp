@@ -144,7 +144,7 @@ VerifyResult verify_output(const fs::path& out) {
     }
     for (const Json& entry : manifest.at("outputs")) check(entry);
   } catch (const nlohmann::json::exception&) {
-    throw InputError((out / "manifest.json").string() + ": is not a manifest of ours");
+    throw InputError((out / "manifest.json").string() + ": is not a manifest written by shakebed");
   }
   return result;
 }

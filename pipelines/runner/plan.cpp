@@ -135,7 +135,7 @@ class PlanBuilder {
   void read_stage(const JsonNode& item, std::size_t index) {
     const std::string pointer = pointer_join("/stages", index);
     if (problems_.size() >= most_problems) {
-      problem(item, pointer, fmt::format("more than {} mistakes: the rest is not looked at", most_problems));
+      problem(item, pointer, fmt::format("more than {} mistakes: the rest is not checked", most_problems));
       throw_problems();
     }
     if (!item.is_object())

@@ -22,8 +22,8 @@ std::vector<std::string> preset_names(const JsonNode& document);
 // Adds to `problems` where the presets are not objects of pointers. Their values are checked when they are applied.
 void check_presets(const JsonNode& document, const std::string& file, std::vector<Problem>& problems);
 
-// Where a problem of a changed document is to be shown: the pointer that was changed (with the number of the stage in
-// place of its id), and the pointer at which the change is written.
+// Where a problem of a changed document is shown. First: the pointer that was changed, with the number of the stage in
+// place of its id. Second: the pointer at which the change is written.
 using Relocation = std::pair<std::string, std::string>;
 // "/stages/bed/seed" → "/stages/0/seed"; as it is where no stage has this id.
 std::string numbered_pointer(const JsonNode& document, const std::string& pointer);

@@ -17,8 +17,8 @@ struct RecipeChanges {
   std::optional<std::string> data{};  // of --data: a CSV for every figure stage
 };
 
-// Throws ConfigError with every mistake, also those that only another preset or a point of the sweep has; InputError
-// when the file cannot be read, UsageError when a change cannot be applied.
+// Throws ConfigError with every mistake, also with those in another preset or in one point of the sweep only. Throws
+// InputError when the file cannot be read, UsageError when a change cannot be applied.
 Plan read_recipe(const std::filesystem::path& file, const RecipeChanges& changes = {});
 // From text already here (a built-in recipe): `file` names it in messages.
 Plan read_recipe_text(const std::string& text, const std::string& file, const std::filesystem::path& directory,

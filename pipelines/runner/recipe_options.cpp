@@ -18,12 +18,12 @@ void describe_common(Fields& fields, CommonOptions& common, const StageRow& row)
 namespace {
 
 void describe_published(Fields& f, PublishedNumber& number) {
-  f.text("number", number.pointer, {.help = "where ours is: /<stage id>/<name in its result>", .required = true});
+  f.text("number", number.pointer, {.help = "our number: /<stage id>/<name in its result>", .required = true});
   f.text("label", number.label, {.help = "what it is called", .required = true});
   f.text("value", number.value, {.help = "as published, with its unit", .required = true});
   f.text("place", number.place, {.help = "where it is printed"});
   f.number("relative", number.relative,
-           {.help = "nearer than this part of it counts as agreement", .range = non_negative});
+           {.help = "relative difference up to which the numbers agree", .range = non_negative});
   if (!f.decoding()) return;
   try {
     if (!number.value.empty()) parse_quantity(number.value);
@@ -36,7 +36,7 @@ void describe_report(Fields& fields, ReportOptions& report) {
   fields.text("title", report.title, {.help = "headline of report.html"});
   fields.texts("text", report.text, {.help = "paragraphs under the headline"});
   fields.array<PublishedNumber>("published", report.published, describe_published,
-                                {.help = "published numbers to stand beside ours"});
+                                {.help = "published numbers to be compared with our numbers"});
   fields.array<AssumedInput>("assumed", report.assumed,
                              [](Fields& f, AssumedInput& input) {
                                f.text("input", input.pointer, {.help = "pointer into this recipe", .required = true});
@@ -53,11 +53,12 @@ void describe_report(Fields& fields, ReportOptions& report) {
 void describe_top(Fields& fields, RecipeTop& top) {
   fields.text("$schema", top.schema, {.help = "where editors find the schema"});
   fields.integer("format", top.format, {.help = "of the recipe"});
-  fields.text("name", top.name,
-              {.help = "of the pipeline; results go to results/<name>", .required = true, .example = "\"my-bed\""});
+  fields.text(
+      "name", top.name,
+      {.help = "name of the pipeline; results go to results/<name>", .required = true, .example = "\"my-bed\""});
   fields.text("description", top.description, {.help = "what it is for"});
   fields.object<ReportOptions>("report", top.report, describe_report,
-                               {.help = "what report.html says beside the results"});
+                               {.help = "text of report.html beside the results"});
   fields.object<SweepOptions>("sweep", top.sweep, describe_sweep, {.help = "run the pipeline at many points"});
   fields.any("presets", top.presets,
              {.help = "named sets of changes for --preset NAME: {\"quick\": {\"/stages/bed/measure\": \"2 s\"}}"});

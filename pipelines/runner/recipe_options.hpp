@@ -14,7 +14,7 @@ namespace shakebed::pipelines {
 // The newest recipe format this program reads ("format" in a recipe).
 inline constexpr int recipe_format = 1;
 
-// A number that was published, to stand beside ours in the report.
+// A published number, to be compared with our number in the report.
 struct PublishedNumber {
   std::string pointer;  // "/fit/temperature_over_mg": where ours is
   std::string label;

@@ -80,11 +80,11 @@ void check_inputs_stayed(const StageWork& work, const fs::path& out) {
     const fs::path path = external ? fs::path(stage.input_files[i - first_external].second) : out / was.file;
     std::error_code error;
     const auto bytes = fs::file_size(path, error);
-    if (error) throw StageError(fmt::format("{}: vanished while it was read; run again", path.string()));
+    if (error) throw StageError(fmt::format("{}: was deleted while it was read; run again", path.string()));
     if (external && work.stamps[i - first_external] && stamp_of(path) == work.stamps[i - first_external]) continue;
     if (bytes != was.bytes || fast_hash_of_file(path) != was.fast)
       throw StageError(
-          fmt::format("{}: changed while it was read, or is not what its record says; run again", path.string()));
+          fmt::format("{}: changed while it was read, or differs from its record; run again", path.string()));
   }
 }
 

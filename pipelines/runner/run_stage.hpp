@@ -13,9 +13,9 @@
 
 namespace shakebed::pipelines {
 
-// When a file was last touched. Equal stamps mean equal bytes, without reading a film of many GB a second time: writing
+// When a file was last changed. Equal stamps mean equal bytes, so a film of many GB is not read a second time: writing
 // sets both times, and the second one (ctime) cannot be set back. A clock's tick (2 s at most, on FAT) could hide a
-// change right after another one, so a file touched just before, or in a clock's future, has no stamp.
+// change right after another one. So a file changed just before, or in a clock's future, has no stamp.
 struct Stamp {
   dev_t device;
   ino_t inode;

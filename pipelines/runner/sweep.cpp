@@ -65,7 +65,7 @@ class SweepRun {
         pointers_(collected(plan)),
         shared_(options.out, options.force) {
     if (arguments.gather && arguments.shard)
-      throw UsageError("--gather: looks at the whole sweep, so there is no --shard");
+      throw UsageError("--gather works on the whole sweep and excludes --shard: give one of the two");
     if (all_.empty()) throw UsageError("the sweep has no points");
   }
 
@@ -279,7 +279,7 @@ class SweepRun {
                                        .warnings = warnings_.lines(),
                                        .complete = !interrupted_ && there_ == all_.size()});
     } catch (const StageError& error) {
-      console_.warning(fmt::format("the sweep is done, but its report is not: {}", error.what()));
+      console_.warning(fmt::format("the sweep is complete, but its report could not be written: {}", error.what()));
     }
   }
 
@@ -287,7 +287,7 @@ class SweepRun {
     for (const std::string& warning : warnings_.lines()) console_.warning(warning);
     for (const std::string& failure : failures_) console_.error(failure);
     if (failed_ > failures_.size()) console_.error(fmt::format("and {} more points", failed_ - failures_.size()));
-    if (busy_ > 0) console_.warning(fmt::format("{} points are being run by somebody else", busy_.load()));
+    if (busy_ > 0) console_.warning(fmt::format("{} points are being run by another process", busy_.load()));
   }
 
   ExitCode exit_code() const {

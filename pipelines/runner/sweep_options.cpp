@@ -197,7 +197,7 @@ void describe_sweep(Fields& fields, SweepOptions& sweep) {
   fields.integer("count", sweep.count, {.help = "number of random points", .range = non_negative});
   fields.integer("seed", sweep.seed, {.help = "of the random points"});
   fields.integer("replicas", sweep.replicas,
-                 {.help = "runs of each point, each with seeds of its own", .range = from_to(1, 1e6)});
+                 {.help = "runs of each point, each with its own seeds", .range = from_to(1, 1e6)});
   fields.texts("collect", sweep.collect, {.help = "numbers to gather into sweep.csv: pointers into the results"});
   if (fields.decoding()) SweepReader(fields, sweep).read();
 }

@@ -24,8 +24,8 @@ inline constexpr std::string_view verdict_column = "verdict";
 // "Verdicts: 3 one temperature, 2 no single temperature" of points by verdict; "" where there are none.
 std::string verdicts_text(const std::map<std::string, std::size_t>& verdicts);
 
-// From what was gathered: point, replica, status, the values of the axes as they stand in the recipe, then value and
-// standard error of every collected number, and the verdict of the point's answer.
+// The table of a sweep. Its columns are point, replica, status and the values of the axes as they stand in the recipe.
+// Then come value and standard error of every collected number, and the verdict of the point's answer.
 Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
                   const std::vector<std::vector<std::string>>& rows);
 

@@ -7,11 +7,11 @@
 
 namespace shakebed::pipelines {
 
-// <figure> with the frames (and their density profiles) for the script of the page, and a still picture where scripts
-// do not run; "" when the file holds no frame or too many disks (more than 5000). At most 96 frames are shown. `period`
-// is that of the floor in the trajectory's unit of time, sqrt(D/g); 0 when it stands still. Frames farther apart than
-// an eighth of it are played in the order of the floor's phase, as a stroboscope shows them, and the caption says so.
-// Throws InputError when the file is damaged.
+// <figure> with the frames (and their density profiles) for the script of the page, and a still picture for browsers
+// without scripts. "" when the file holds no frame or too many disks (more than 5000). At most 96 frames are shown.
+// `period` is that of the floor in the trajectory's unit of time, sqrt(D/g); 0 when it stands still. Frames farther
+// apart than an eighth of it are played in the order of the floor's phase, as a stroboscope shows them. The caption
+// then says so. Throws InputError when the file is damaged.
 std::string animation_html(const std::filesystem::path& trajectory, double period);
 
 }  // namespace shakebed::pipelines

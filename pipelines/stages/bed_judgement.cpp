@@ -81,12 +81,11 @@ class Judge {
   void contact_duration() {
     const auto effect = number_at(joined_, "/contact_duration_effect/value");
     if (!effect || !(*effect > allowed_contact_effect) || as_real_contacts()) return;
-    object(
-        "contact duration too long",
-        fmt::format("T may be too high by about {:.2g} %, or more, by the contact duration t_c, which makes {:.2g} % "
-                    "of the contacts elastic",
-                    100 * *effect, 100 * number_at(joined_, "/elastic_share/value").value_or(0)),
-        "Take a shorter \"contact_duration\", see the warning");
+    object("contact duration too long",
+           fmt::format("T may be too high by about {:.2g} %, or more: the contact duration t_c makes {:.2g} % of the "
+                       "contacts elastic",
+                       100 * *effect, 100 * number_at(joined_, "/elastic_share/value").value_or(0)),
+           "Take a shorter \"contact_duration\", see the warning");
   }
 
   void drift() {
@@ -102,19 +101,18 @@ class Judge {
   void between_beds() {
     const auto found = notable_spread(joined_, beds_);
     if (!found) return;
-    object(
-        "beds differ",
-        fmt::format("the {} beds differ by more than chance, {} by {:.2g} where each states {:.2g}: it depends on how "
-                    "the bed was filled, and the error allows for it",
-                    beds_, found->what, found->spread, found->within),
-        "More \"replicas\" lessen the error");
+    object("beds differ",
+           fmt::format("the {} beds differ by more than chance: {} scatters by {:.2g}, and each bed states {:.2g}. It "
+                       "depends on how the bed was filled; the stated error includes this",
+                       beds_, found->what, found->spread, found->within),
+           "More \"replicas\" reduce the error");
   }
 
   void one_bed() {
     if (beds_ > 1 || !bed_.dissipates()) return;
     object("one bed",
-           "the errors are those of one bed by itself: another seed or another start may differ by more, since a dense "
-           "bed keeps for long how it was filled",
+           "the errors are those of a single bed. Another seed or another start may differ by more, because a dense "
+           "bed keeps the effect of its filling for long",
            "Run several \"replicas\" (4 by default)");
   }
 

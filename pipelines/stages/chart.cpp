@@ -348,7 +348,7 @@ void check_points(Fields& fields, const PointsOptions& p) {
     for (const StatedStage& one : from) ids.push_back(one.id);
     const std::string nearest = nearest_name(p.from, ids);
     fields.problem("/from",
-                   p.from.empty() ? "which stage's table is it? \"from\" of the stage names several"
+                   p.from.empty() ? "\"from\" of the stage names several stages: name the one whose table is meant"
                                   : fmt::format("\"{}\" is not in the \"from\" of this stage", p.from),
                    nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
                                    : fmt::format("Did you mean \"{}\"?", nearest));
@@ -391,7 +391,8 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.text("y", p.y, {.help = "column", .required = true});
   fields.text("error", p.error, {.help = "column of the errors of y; left out, y_error or std_error; \"none\""});
   fields.choice("look", p.look, looks, {.help = "how it is drawn; none: only its numbers are found"});
-  fields.integer("color", p.color, {.help = "of the palette, 0 to 6; left out, one after the other"});
+  fields.integer("color", p.color,
+                 {.help = "number of the colour in the palette, 0 to 6; left out, one after the other"});
   fields.number("times", p.times, {.help = "factor of y"});
   fields.number("plus", p.plus, {.help = "added to y after the factor"});
   fields.number("power_of_x", p.power_of_x,
@@ -409,12 +410,11 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.number("fit_least", p.fit_least, {.help = "smallest x that fits and comparisons use"});
   fields.number("fit_most", p.fit_most, {.help = "largest x that fits and comparisons use"});
   fields.integer("pool", p.pool,
-                 {.help = "errors become the root mean square of those of so many neighbouring points (errors from few "
-                          "replicas are themselves uncertain)",
+                 {.help = "number of neighbouring points over which errors are averaged (root mean square), because "
+                          "errors from few replicas are themselves uncertain",
                   .range = from_to(1, 1000)});
   fields.text("against", p.against, {.help = "a curve of this chart: chi2 of the points about it"});
-  fields.numbers("levels", p.levels,
-                 {.help = "values of y: at which x are they first crossed (linear between points)"});
+  fields.numbers("levels", p.levels, {.help = "values of y whose first crossing x is found (linear between points)"});
   fields.boolean("residuals", p.residuals, {.help = "differences from \"against\" in a panel below"});
   if (!fields.decoding()) return;
   p.where.clear();
@@ -424,8 +424,9 @@ void describe_points(Fields& fields, PointsOptions& p) {
   } else {
     fields.problem("/where", "expected an object: column → text");
   }
-  fields.require(!p.residuals || p.look != Look::none, "residuals", "what is not drawn has no residuals to draw");
-  fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals from what? \"against\" names no curve");
+  fields.require(!p.residuals || p.look != Look::none, "residuals",
+                 "a curve that is not drawn cannot have residuals drawn");
+  fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals need a curve, and \"against\" names none");
   check_points(fields, p);
 }
 
@@ -528,7 +529,7 @@ void Chart::describe(Fields& fields) {
         f.text("caption", chart.caption, {.help = "below it in the report"});
         f.text("x_label", chart.x_label, {.help = "with the unit", .required = true});
         f.text("y_label", chart.y_label, {.help = "with the unit", .required = true});
-        f.text("residual_label", chart.residual_label, {.help = "of the panel of residuals"});
+        f.text("residual_label", chart.residual_label, {.help = "label of the panel of residuals"});
         f.number("x_low", chart.x_low, {.help = "where the axis begins"});
         f.number("x_high", chart.x_high, {.help = "where it ends"});
         f.number("y_low", chart.y_low, {.help = "where the axis begins"});

@@ -39,7 +39,7 @@ void check_map(Fields& fields, const MapOptions& map) {
   });
   if (stage == from.end())
     return fields.problem("/from", map.from.empty()
-                                       ? "which stage's table is it? \"from\" of the stage names several"
+                                       ? "\"from\" of the stage names several stages: name the one whose table is meant"
                                        : fmt::format("\"{}\" is not in the \"from\" of this stage", map.from));
   if (stage->results == nullptr) return;
   if (const auto misfit = misfit_of_table(*stage, map.file))
@@ -134,7 +134,7 @@ void describe_map(Fields& fields, MapOptions& map) {
   fields.text("caption", map.caption, {.help = "below it in the report"});
   fields.text("x_label", map.x_label, {.help = "with the unit", .required = true});
   fields.text("y_label", map.y_label, {.help = "with the unit", .required = true});
-  fields.text("value_label", map.value_label, {.help = "of the colours, with the unit", .required = true});
+  fields.text("value_label", map.value_label, {.help = "label of the colours, with the unit", .required = true});
   fields.number("value_low", map.value_low, {.help = "where the colours begin"});
   fields.number("value_high", map.value_high, {.help = "where they end"});
   fields.boolean("logarithmic_x", map.logarithmic_x, {.help = "decades along x"});

@@ -176,7 +176,7 @@ void describe_claim(Fields& f, Claim& c) {
   f.number("tolerance", c.tolerance, {.help = "of the claimed value", .range = non_negative});
   f.number("least", c.least, {.help = "claimed lower bound"});
   f.number("most", c.most, {.help = "claimed upper bound"});
-  f.text("note", c.note, {.help = "what else there is to say"});
+  f.text("note", c.note, {.help = "remarks on the claim"});
   f.boolean("main", c.main, {.help = "the report and the list of results begin with it"});
   if (!f.decoding()) return;
   if (!c.published.empty()) take_published(f, c);
@@ -210,8 +210,8 @@ class Claims : public Stage {
     const Given written = given_when("the claim says so");
     list.text(row + "place", "where the claim stands", written);
     list.text(row + "measured_as", "what the number is", written);
-    list.text(row + "over", "where the number is that it is divided by", written);
-    list.text(row + "note", "what else there is to say", written);
+    list.text(row + "over", "pointer to the number by which it is divided", written);
+    list.text(row + "note", "remarks on the claim", written);
     list.text(row + "published", "the published number: paper and name", written);
     list.truth(row + "main", "whether the report begins with it", written);
     list.table({"claims.csv",

@@ -21,7 +21,7 @@ class Critical : public Stage {
     fields.text("order", order_, {.help = "column of the bond order psi_6; \"\": none"});
     fields.numbers("orders", orders_, {.help = "T_c' is where the crystal's bond order falls below these"});
     if (!fields.decoding()) return;
-    fields.require(!density_.empty() || !order_.empty(), "density", "neither a density nor an order is looked at");
+    fields.require(!density_.empty() || !order_.empty(), "density", "neither a density nor an order is named");
     for (const double d : densities_)
       fields.require(d > 0 && d <= fit::close_packing_density * (1 + 1e-12), "densities",
                      fmt::format("a threshold lies between 0 and close packing, 1.1547, not {}", d));

@@ -21,7 +21,8 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
                   {.help = "length of a pixel; found from the diameter if left out", .range = positive});
   fields.number("floor", o.floor,
                 {.help = "row of the floor's surface at the left edge, pixels from the top; found if left out"});
-  fields.number("floor_slope", o.floor_slope, {.help = "pixels down per pixel right", .range = from_to(-1, 1)});
+  fields.number("floor_slope", o.floor_slope,
+                {.help = "slope of the floor: pixels down per pixel right", .range = from_to(-1, 1)});
   fields.number("left_wall", o.left_wall,
                 {.help = "column of the left wall's inner face in pixels; found if left out"});
   fields.number("right_wall", o.right_wall,
@@ -31,7 +32,7 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
       "pixel_aspect", o.pixel_aspect,
       {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
   fields.number("lens", o.lens_radial,
-                {.help = "the lens's bend: how far the frame's corners truly lie further out, in half diagonals (a "
+                {.help = "distortion of the lens: true outward shift of the frame's corners, in half diagonals (a "
                          "barrel is positive); found on the beads' rims if left out",
                  .range = from_to(-0.3, 0.3)});
 }
@@ -41,7 +42,7 @@ void describe_beads(Fields& fields, ExtractOptions& o) {
   fields.choice(
       "polarity", o.polarity,
       {{BeadPolarity::automatic, "automatic"}, {BeadPolarity::dark, "dark"}, {BeadPolarity::bright, "bright"}},
-      {.help = "whether beads are darker or brighter than what is behind them"});
+      {.help = "whether beads are darker or brighter than the background"});
   fields.choice("channel", o.channel,
                 {{BeadChannel::automatic, "automatic"},
                  {BeadChannel::red, "red"},
@@ -66,11 +67,12 @@ void describe_profile(Fields& fields, ExtractOptions& o) {
   fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
   fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
   fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
-  fields.quantity("frequency", o.frequency, dimension::frequency,
-                  {.help = "of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
-                   .range = positive});
+  fields.quantity(
+      "frequency", o.frequency, dimension::frequency,
+      {.help = "frequency of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
+       .range = positive});
   fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
-                  {.help = "of the film as recorded; given, velocities are measured", .range = positive});
+                  {.help = "frame rate of the film as recorded; if given, velocities are measured", .range = positive});
 }
 
 void describe_frames(Fields& fields, ExtractOptions& o) {
@@ -86,7 +88,7 @@ void describe_frames(Fields& fields, ExtractOptions& o) {
 void check(Fields& fields, const ExtractOptions& o) {
   const bool from_render = fields.has_upstream("render");
   fields.require(from_render != fields.has("images"), from_render ? "images" : "",
-                 from_render ? "frames come from the render stage in \"from\" and from \"images\": which?"
+                 from_render ? "frames come both from the render stage in \"from\" and from \"images\""
                              : "there are no frames: neither \"images\" nor a render stage in \"from\"",
                  "Give one of the two");
   fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
@@ -151,7 +153,7 @@ class Extract : public Stage {
       if (!gravity_) gravity_ = bed.gravity;
     }
     if (!gravity_) gravity_ = standard_gravity;
-    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: how large is a bead?",
+    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: the diameter of a bead gives the scale",
                    "Write \"diameter\": \"2.99 mm\"");
     options_.diameter = diameter_.value_or(1), options_.gravity = *gravity_;
   }

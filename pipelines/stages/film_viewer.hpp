@@ -7,8 +7,8 @@
 
 namespace shakebed::pipelines {
 
-// <figure> with the small pictures of film.json, the disks of disks.csv and the density profiles of single frames, for
-// the script of the page (report/page/film.js); `still` (HTML) where scripts do not run. "" where there is no
+// <figure> for the script of the page (report/page/film.js): the small pictures of film.json, the disks of disks.csv,
+// the density profiles of single frames. `still` (HTML) is shown where scripts do not run. "" where there is no
 // film.json. Throws InputError when a file is damaged.
 std::string film_viewer(const FinishedStage& stage);
 

@@ -7,9 +7,10 @@
 
 namespace shakebed::pipelines {
 
-// {"low", "step", "n" (of the heights, in D), "largest", "mean": [n], "now": base64 of a byte a height and frame, 255
-// being the largest}, seen through a Gaussian of 0.5 D. `heights`: of the disks' centres, frame by frame [D]; `width`
-// of the bed [D]; the profile reaches from `low` to `high` [D]. null where there is no frame, or no height.
+// {"low", "step", "n", "largest", "mean": [n], "now"}: the density profiles of single frames, seen through a Gaussian
+// of 0.5 D. `low`, `step` and `n` describe the heights, in D. `now` is base64 of one byte per height and frame; 255
+// means `largest`. `heights`: of the disks' centres, frame by frame [D]. The bed is `width` wide [D]. The profile
+// reaches from `low` to `high` [D]. Result: null where there is no frame, or no height.
 Json frame_profiles(const std::vector<std::vector<double>>& heights, double width, double low, double high);
 
 }  // namespace shakebed::pipelines

@@ -32,7 +32,8 @@ void FrameStore::go_on() {
   if (bytes_ == 0) return start();
   std::error_code error;
   if (fs::file_size(path_, error) < bytes_ || error)
-    throw StageError(fmt::format("{}: the trajectory so far is not there", path_.string()));
+    throw StageError(
+        fmt::format("{}: the part of the trajectory that was written before the restart is missing", path_.string()));
   fs::resize_file(path_, bytes_);
 }
 

@@ -11,8 +11,8 @@
 
 namespace shakebed::pipelines {
 
-// The trajectory while it grows: frames are joined into groups of a fixed number, each of which is written (and
-// compressed) by itself, so that a run that goes on from a checkpoint ends with the same bytes.
+// The trajectory while it grows. Frames are joined into groups of a fixed number. Each group is written (and
+// compressed) separately, so that a run that continues from a checkpoint ends with the same bytes.
 class FrameStore {
  public:
   FrameStore(std::filesystem::path path, std::size_t disks);

@@ -74,7 +74,10 @@ void Infer::describe_targets(Fields& fields) {
                   else
                     g.number(key, *number, {.help = help});
                 }
-                g.text("at", target.at, {.help = "or where a stage in \"from\" has it: /fit/temperature_over_mg"});
+                g.text(
+                    "at", target.at,
+                    {.help =
+                         "instead of a value, a pointer to a number of a stage in \"from\": /fit/temperature_over_mg"});
                 if (!g.decoding()) return;
                 g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
                 g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value", "it must be above 0");
@@ -89,24 +92,24 @@ void Infer::describe_targets(Fields& fields) {
 
 void Infer::describe_search(Fields& fields) {
   fields.integer("moments", options_.moments,
-                 {.help = "the photographs may show one moment of the shaking in place of its average: so many "
-                          "moments, equally spaced, are possible; 0: they show the average",
+                 {.help = "number of equally spaced moments of the shaking that the photographs may show instead of "
+                          "the average; 0: they show the average",
                   .range = from_to(0, 64)});
   fields.number("average", options_.average,
-                {.help = "with moments: the prior chance that the average is shown", .range = zero_to_one});
+                {.help = "with moments: the prior probability that the average is shown", .range = zero_to_one});
   fields.number(
       "phase", options_.phase,
       {.help = "the photographs show this phase of the shaking, 0 to 1 (0: the floor passes its mean height upwards)",
        .range = {.low = 0, .high = 1, .below_high = true}});
   fields.integer("first", options_.first, {.help = "beds all over the prior", .range = from_to(8, 100'000)});
   fields.integer("rounds", options_.rounds,
-                 {.help = "rounds of further beds where the posterior is", .range = from_to(0, 20)});
+                 {.help = "rounds of further beds in the region of the posterior", .range = from_to(0, 20)});
   fields.integer("each", options_.each, {.help = "beds of each round", .range = from_to(1, 10'000)});
   fields.integer("best", options_.best, {.help = "most probable beds that are run again", .range = from_to(0, 20)});
   fields.integer("best_replicas", options_.replicas,
-                 {.help = "runs of each of them, with seeds of their own", .range = from_to(2, 1000)});
+                 {.help = "runs of each of them, each with its own seed", .range = from_to(2, 1000)});
   fields.quantity("best_measure", options_.best_measure, dimension::time,
-                  {.help = "time over which they are measured; 0: as the others", .range = non_negative});
+                  {.help = "measuring time of these beds; 0: that of the others", .range = non_negative});
   fields.integer("draws", options_.draws, {.help = "rows of posterior.csv", .range = from_to(100, 100'000)});
   fields.integer("calibration", options_.calibration,
                  {.help = "beds with parameters drawn from the prior, measured and inferred: how often the intervals "
@@ -118,10 +121,10 @@ void Infer::describe_search(Fields& fields) {
         f.number("reduced_temperature", curve.reduced_temperature,
                  {.help = "T/T_c", .required = true, .range = positive});
         f.text("reading", curve.reading,
-               {.help = "a reading of the map", .required = true, .example = "\"eq6/relative_max/printed\""});
-        f.text("label", curve.label, {.help = "what the picture calls it"});
+               {.help = "a formula of the stage map", .required = true, .example = "\"eq6/relative_max/printed\""});
+        f.text("label", curve.label, {.help = "name of the curve in the picture"});
       },
-      {.help = "draws Gamma against frequency where a reading of the map gives this T/T_c"});
+      {.help = "draws Gamma against frequency where a formula of the stage map gives this T/T_c"});
   fields.text(
       "stored", options_.stored,
       {.help =
@@ -135,7 +138,7 @@ void Infer::describe(Fields& fields) {
   fields.quantity("measure", options_.bed.measure, dimension::time,
                   {.help = "time over which each bed is measured", .required = true, .range = positive});
   fields.integer("phases", options_.bed.phases,
-                 {.help = "moments of each period that the average is taken over", .range = from_to(1, 4096)});
+                 {.help = "moments of each period over which the average is taken", .range = from_to(1, 4096)});
   fields.number("kernel_width", options_.bed.kernel_width,
                 {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
   fields.number(
@@ -143,7 +146,7 @@ void Infer::describe(Fields& fields) {
       {.help = "phi_0 of the fitted profile", .range = {.low = 0, .high = 1.1547005383792517, .above_low = true}});
   fields.map<UnknownParameter>(
       "parameters", options_.parameters, [](Fields& f, UnknownParameter& p) { p.describe(f); },
-      {.help = "what is not known: name → where it stands in the scene, and its prior", .required = true});
+      {.help = "unknown parameters: name → pointer into the scene, and prior", .required = true});
   describe_targets(fields);
   describe_search(fields);
   if (fields.decoding() && fields.problem_count() == 0) check(fields);
@@ -167,7 +170,7 @@ void Infer::check(Fields& fields) {
                  fmt::format("{} phases do not fall on {} equally spaced moments", bed.phases, options_.moments));
   fields.require(
       !options_.phase || std::abs(*options_.phase * bed.phases - std::round(*options_.phase * bed.phases)) < 1e-9,
-      "phase", fmt::format("it is none of the {} phases that are looked at", bed.phases));
+      "phase", fmt::format("it is none of the {} phases at which the bed is sampled", bed.phases));
   fields.require(
       std::any_of(options_.targets.begin(), options_.targets.end(), [](const auto& t) { return t.has_value(); }),
       "targets", "nothing was measured", "Give \"temperature_over_mg\" with its error");
@@ -180,8 +183,7 @@ void Infer::check(Fields& fields) {
       try {
         const auto tokens = split_pointer(pointer);
         if (tokens.empty() || std::find(scene_keys.begin(), scene_keys.end(), tokens.front()) == scene_keys.end())
-          fields.problem(where, "\"" + pointer + "\" leads to nothing of the scene",
-                         "Write for example \"/floor/gamma\"");
+          fields.problem(where, "\"" + pointer + "\" is no option of the scene", "Write for example \"/floor/gamma\"");
       } catch (const UsageError& error) {
         fields.problem(where, error.what());
       }
@@ -460,10 +462,11 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     context.progress(static_cast<double>(i + 1) / static_cast<double>(beds.size()),
                      "inferring the beds of the calibration");
   }
-  if (rows.empty()) throw StageError("none of the beds of the calibration gave all the numbers that are targets");
+  if (rows.empty()) throw StageError("no bed of the calibration gave all target numbers");
   if (incomplete > 0)
-    context.warning(fmt::format("{} of the {} beds of the calibration gave no numbers to infer from, and are not in it",
-                                incomplete, beds.size()));
+    context.warning(fmt::format(
+        "{} of the {} beds of the calibration did not give all target numbers: they are left out of the calibration",
+        incomplete, beds.size()));
   return rows;
 }
 
@@ -478,8 +481,8 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
       }));
   if (given_up > 0)
     sentences.push_back(
-        fmt::format("{} of {} beds made so many contacts that they were given up. The posterior says nothing of "
-                    "parameters like theirs (beds.csv); a narrower range would leave them out",
+        fmt::format("{} of {} beds were stopped because they made too many contacts. The posterior does not cover "
+                    "parameters like theirs (see beds.csv). A narrower range of the parameters excludes them",
                     given_up, all));
   for (const ScaledTarget& target : found.targets) {
     const std::size_t used = surrogate.beds(target.observable);
@@ -492,8 +495,8 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
     if (options.bed.views[v].prior > 0 && !(surrogate.view_prior(v) > 0)) left_out.push_back(options.bed.views[v].name);
   if (!left_out.empty())
     sentences.push_back(
-        fmt::format("at the phases {} of the shaking too many fits failed: that the photographs show one of these was "
-                    "not considered",
+        fmt::format("too many fits failed at the phases {} of the shaking: these were excluded as possible phases of "
+                    "the photographs",
                     fmt::join(left_out, ", ")));
   return sentences;
 }
@@ -545,8 +548,8 @@ void Infer::run(RunContext& context) const {
 StageRow infer_stage() {
   return {.name = "infer",
           .summary =
-              "which parameters of a scene give what was measured: a posterior, by beds all over the prior and a "
-              "surrogate of them",
+              "infers parameters of a scene from measured numbers: a posterior, from simulated beds over the whole "
+              "prior and a surrogate of them",
           .accepts = {"fit", "extract", "simulate"},
           .most_inputs = 3,
           .uses_seed = true,

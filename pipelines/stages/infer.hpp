@@ -20,7 +20,7 @@ struct InferTarget {
   std::string at;                   // or where a stage in "from" has it
 };
 
-// A curve Gamma(f) in the picture: where a reading of the map gives a reduced temperature.
+// A curve Gamma(f) in the picture: where a formula of the stage map gives a reduced temperature.
 struct MapCurve {
   double reduced_temperature = 0;
   std::string reading, label;

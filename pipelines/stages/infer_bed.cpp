@@ -23,7 +23,7 @@ constexpr std::uint64_t events_between_questions = 200'000;
 
 enum Number : std::size_t { fitted, shift, solid, density, kinetic_x, kinetic_z, kinetic_z_local, rise, number_count };
 
-// Sees the looks at one phase only, as the single phase of a period.
+// Passes on the samples of one phase only, as if it were the single phase of a period.
 class AtPhase final : public sim::RunObserver {
  public:
   AtPhase(sim::Observing<sim::BedObserver>::Make make, std::uint32_t phase) : bed_(std::move(make)), phase_(phase) {}
@@ -49,12 +49,12 @@ void UnknownParameter::describe(Fields& f) {
   f.text("unit", unit, {.help = "unit of what is written there; none: a plain number", .example = "\"Hz\""});
   std::optional<double> from = low == high ? std::nullopt : std::optional(low),
                         to = low == high ? std::nullopt : std::optional(high);
-  f.number("low", from, {.help = "least value that is possible"});
-  f.number("high", to, {.help = "greatest value that is possible"});
+  f.number("low", from, {.help = "smallest possible value"});
+  f.number("high", to, {.help = "largest possible value"});
   f.any("values", values, {.help = "in place of low and high: a list of values, all equally likely"});
   f.choice("scale", logarithmic, {{false, "linear"}, {true, "logarithmic"}},
            {.help = "where the prior is even: in the value or in its logarithm"});
-  f.number("mean", mean, {.help = "of a normal prior, cut off at low and high"});
+  f.number("mean", mean, {.help = "mean of a normal prior, cut off at low and high"});
   f.number("std_error", std_error, {.help = "standard deviation of the normal prior", .range = positive});
   f.text("why", why, {.help = "why this range: for the report"});
   if (!f.decoding()) return;

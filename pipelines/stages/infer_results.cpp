@@ -429,7 +429,8 @@ void state_tables(ResultList& list, const InferOptions& options) {
 
 void state_inference(ResultList& list, const InferOptions& options) {
   list.number("/beds", "1", "beds that the surrogate is made from");
-  list.number("/effective_samples", "1", "independent draws that the weighted points of the posterior are worth");
+  list.number("/effective_samples", "1",
+              "effective number of independent draws of the weighted points of the posterior");
   list.quantity("/log_evidence", "1", "natural logarithm of the mean likelihood over the prior");
   for (const auto& [name, parameter] : options.parameters) {
     const std::string at = pointer_join("/parameters", name), unit = unit_of(parameter);
@@ -492,7 +493,8 @@ void state_inference(ResultList& list, const InferOptions& options) {
     const std::string at = pointer_join("/calibration/parameters", name);
     list.number(at + "/within_68", "1", "the same of this parameter", calibrated);
     list.number(at + "/within_95", "1", "the same of this parameter", calibrated);
-    list.number(at + "/rank_chi2_p", "1", "chance that ranks spread evenly are at least so uneven", calibrated);
+    list.number(at + "/rank_chi2_p", "1", "probability that uniformly distributed ranks are at least as uneven",
+                calibrated);
   }
   state_tables(list, options);
 }

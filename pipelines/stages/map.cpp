@@ -25,9 +25,9 @@ class Map : public Stage {
     fields.number("gamma", gamma_,
                   {.help = "peak acceleration in g; left out, that of the simulated bed", .range = positive});
     fields.quantity("frequency", frequency_, dimension::frequency,
-                    {.help = "of the shaking; left out, that of the simulated bed", .range = positive});
+                    {.help = "frequency of the shaking; left out, that of the simulated bed", .range = positive});
     fields.quantity("diameter", diameter_, dimension::length,
-                    {.help = "of a disk; left out, that of the simulated bed", .range = positive});
+                    {.help = "diameter of a disk; left out, that of the simulated bed", .range = positive});
     fields.quantity("gravity", gravity_, dimension::acceleration,
                     {.help = "left out, that of the simulated bed, else 9.81 m/s^2", .range = positive});
     fields.number("initial_height", initial_height_,
@@ -36,7 +36,7 @@ class Map : public Stage {
     fields.number("plateau_density", plateau_density_,
                   {.help = "phi_0 in 1/D^2; left out, that of the fit", .range = positive});
     fields.number("restitution", restitution_,
-                  {.help = "of the single ball; 0: one flight of a dead ball", .range = from_to(0, 0.99)});
+                  {.help = "restitution of the single ball; 0: one flight, no rebound", .range = from_to(0, 0.99)});
     fields.text("equation", equation_, {.help = "equation of state"});
     fields.input_files("table", table_,
                        {.help = "simulated beds of known temperature, as a study writes them (table.csv): T is "
@@ -48,14 +48,16 @@ class Map : public Stage {
           f.text("temperature", c.temperature, {.help = "column that is T, in m g D"});
           f.texts(
               "axes", c.axes,
-              {.help = "what the table is over: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
+              {.help = "parameters of the table: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
                        "among gamma, frequency (Hz), restitution and friction (of the beads), initial_height"});
         },
         {.help = "how the table is read"});
-    fields.number("bead_restitution", bead_restitution_,
-                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
-    fields.number("bead_friction", bead_friction_,
-                  {.help = "of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
+    fields.number(
+        "bead_restitution", bead_restitution_,
+        {.help = "restitution of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
+    fields.number(
+        "bead_friction", bead_friction_,
+        {.help = "friction of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
     if (!fields.decoding()) return;
     if (fit::find_equation_of_state(equation_) == nullptr) {
       try {
@@ -183,19 +185,19 @@ class Map : public Stage {
 
   static void state_readings(ResultList& list, const Given& measured) {
     const std::string row = "/readings/#/";
-    list.text(row + "name", "name of the reading");
+    list.text(row + "name", "name of the formula");
     list.text(row + "jump_height", "how the jump height follows from Gamma");
     list.text(row + "expansion", "how the expansion follows from T");
     list.text(row + "constants", "whose constants");
-    list.text(row + "status", "whether the reading gives a temperature");
+    list.text(row + "status", "whether the formula gives a temperature");
     list.quantity(row + "jump", "D", "jump height of a single ball", {}, true);
     list.quantity(row + "rise", "D", "rise of the centre of mass", {}, true);
     list.quantity(row + "temperature", "m g D", "temperature", {}, true);
     list.quantity(row + "temperature_over_mg", "m", "temperature as T/(m g)", {}, true);
     list.quantity(row + "reduced_temperature", "1", "T/T_c", {}, true);
     list.truth(row + "in_range", "whether its formula applies at this Gamma");
-    list.quantity(row + "gamma_of_measured_temperature", "1", "Gamma that the fitted temperature asks for", measured,
-                  true);
+    list.quantity(row + "gamma_of_measured_temperature", "1", "Gamma at which the formula gives the fitted temperature",
+                  measured, true);
     list.table({"map.csv",
                 "formulas that predict T/T_c from Gamma",
                 {{"name", "", "name of the formula"},
@@ -237,7 +239,7 @@ class Map : public Stage {
     }
     const bool simulated = known != nullptr && known->bed.mass.has_value();
     const auto need = [&](const char* key, bool there) {
-      fields.require(there, key, fmt::format("\"{}\" is missing, and no stage in \"from\" knows it", key));
+      fields.require(there, key, fmt::format("\"{}\" is missing, and no stage in \"from\" states it", key));
     };
     need("gamma", gamma_ || simulated);
     need("frequency", frequency_ || simulated);
@@ -272,8 +274,8 @@ class Map : public Stage {
                                           : axis == "friction"    ? beads.friction
                                                                   : std::optional(question.initial_height);
       if (!value)
-        throw InputError(
-            fmt::format("the table is over {} of the beads, which no bed in \"from\" tells: give bead_{}", axis, axis));
+        throw InputError(fmt::format(
+            "the table varies the {} of the beads, but no bed in \"from\" states it: give bead_{}", axis, axis));
       here.push_back(*value);
     }
     return here;
@@ -305,7 +307,8 @@ class Map : public Stage {
       for (const fit::MapPoint& point : points) levels.insert(point.position[a]);
       if (levels.size() < 3 && !levels.contains(here[a]))
         context.warning(
-            fmt::format("the table has {} values of {}: how T bends between them is not in the interpolation's error",
+            fmt::format("the table has only {} values of {}: the interpolation's error does not include the curvature "
+                        "of T between them",
                         levels.size(), columns_.axes[a]));
     }
   }
@@ -358,7 +361,7 @@ class Map : public Stage {
 
 StageRow map_stage() {
   return {.name = "map",
-          .summary = "maps Gamma to T/T_c by every named reading",
+          .summary = "maps Gamma to T/T_c by every formula that the paper allows",
           .accepts = {"fit", "simulate", "extract", "study"},
           .fewest_inputs = 0,
           .most_inputs = 4,

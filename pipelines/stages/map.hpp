@@ -1,4 +1,4 @@
-// map: Gamma → T/T_c by every named reading, beside the temperature that was measured.
+// map: Gamma → T/T_c by every formula that the paper allows, beside the measured temperature.
 //
 // Files: map.json, map.csv.
 #pragma once

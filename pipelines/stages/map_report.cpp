@@ -1,4 +1,4 @@
-// What the page shows of a map stage: the readings of Gamma → T/T_c, and what simulated beds say.
+// The page of a map stage: the formulas Gamma → T/T_c, and the temperature from simulated beds.
 #include <fmt/format.h>
 
 #include "pipelines/formats/markup.hpp"
@@ -31,13 +31,13 @@ std::string readings_html(const FinishedStage& stage, int&) {
   const Json& map = stage.result;
   if (!map.contains("readings")) return "";
   std::string out = fmt::format(
-      "<h2>Γ → T/T_c ({})</h2>\n<p class=\"soft\">Γ = {}. The paper's relation can be read in several ways; none "
-      "is claimed. A reading out of its formula's range is marked so.</p>\n",
+      "<h2>Γ → T/T_c ({})</h2>\n<p class=\"soft\">Γ = {}. The paper's relation allows several formulas; none is "
+      "preferred. A formula that does not apply at this Γ is marked.</p>\n",
       escape_markup(stage.files.id), map.contains("gamma") ? shown(map["gamma"]) : "?");
   if (map.contains("measured_reduced_temperature"))
     out += fmt::format("<p>Measured T/T_c = <strong>{}</strong></p>\n", shown(map["measured_reduced_temperature"]));
   if (map.contains("simulated")) out += simulated_beds(map["simulated"]);
-  out += "<div class=\"scroll\"><table>\n<tr><th>reading</th><th>H₀ / D</th><th>T/T_c</th><th>in range</th></tr>\n";
+  out += "<div class=\"scroll\"><table>\n<tr><th>formula</th><th>H₀ / D</th><th>T/T_c</th><th>in range</th></tr>\n";
   for (const Json& row : map["readings"]) {
     const bool in_range = row.value("in_range", false);
     const auto cell = [&](const char* key) {

@@ -18,8 +18,9 @@ struct MaterialConstants {
 };
 const MaterialConstants& constants_of(Material material);
 
-// How long two equal elastic spheres touch that meet head on with `speed` [m/s]: 2.868 (m*^2/(R* E*^2 v))^(1/5), with
-// m* = m/2, R* = D/4, E* = E/(2 (1 - nu^2)) [Hertz1882]. Diameter in m; result in s.
+// The contact time of two equal elastic spheres that collide head on with `speed` [m/s] [Hertz1882]:
+//   2.868 (m*^2/(R* E*^2 v))^(1/5), m* = m/2, R* = D/4, E* = E/(2 (1 - nu^2)).
+// Diameter in m; result in s.
 double hertz_contact_time(const MaterialConstants& material, double diameter, double speed);
 
 }  // namespace shakebed::pipelines

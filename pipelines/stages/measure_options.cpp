@@ -17,9 +17,10 @@ void BedMeasureOptions::describe(Fields& fields) {
       "frames", measure_,
       [](Fields& f, sim::MeasureOptions& frames) {
         f.integer("count", frames.frames, {.help = "frames of the trajectory to keep; 0 for none"});
-        f.integer("phases", frames.phases,
-                  {.help = "moments of each period at which the bed is looked at; the frames visit all of them in turn",
-                   .range = from_to(1, 4096)});
+        f.integer(
+            "phases", frames.phases,
+            {.help = "moments of each period at which the bed is sampled; the frames pass through all of them in turn",
+             .range = from_to(1, 4096)});
       },
       {.help = "the trajectory"});
   fields.object<sim::MeasureOptions>(
@@ -48,13 +49,13 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
       fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
                      "Give " + quantity_text(floor_period * time_unit, dimension::time) + " or more");
     if (problem == MeasureProblem::too_many_periods)
-      fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run lives to see",
+      fields.require(false, "measure", "the floor would shake more than 1e12 times: no run can reach that",
                      "Measure shorter, or shake more slowly");
     if (problem == MeasureProblem::too_many_frames)
       fields.require(false, "frames/count",
                      std::to_string(options.frames) + " frames do not fit into the " +
                          std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) +
-                         " moments at which the bed is looked at",
+                         " moments at which the bed is sampled",
                      "Measure longer, or ask for fewer frames");
   }
 }

@@ -1,4 +1,4 @@
-// When a simulated bed is looked at and through which window: the options settle, measure, frames and profile of the
+// When a simulated bed is sampled and through which kernel: the options settle, measure, frames and profile of the
 // stage `simulate`. Their rules are those of the library (sim/measure/measured_bed.hpp).
 #pragma once
 

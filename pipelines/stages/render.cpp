@@ -33,7 +33,7 @@ class Render : public Stage {
     fields.quantity("height", o.height, dimension::length,
                     {.help = "height of the view above the floor's mean position; up to the highest disk if left out",
                      .range = positive});
-    fields.integer("frames", o.frames, {.help = "at most so many frames; 0 for all"});
+    fields.integer("frames", o.frames, {.help = "largest number of frames; 0 for all"});
     fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
                    "Choose another level");
   }

@@ -19,10 +19,11 @@ enum class ReplicaStarts {
   same        // all as the recipe says
 };
 
-// Of observables.json. Quantities become means with their error, the spread between the replicas, and the error that
-// one of them states by itself (`within`); counts become sums; what is neither is the first's. The error is that of
-// the mean of independent beds, never below what the beds state: so wide that 1.96 of it hold the mean of further beds
-// in 95 % of all cases, few as the replicas are (Student's t).
+// Joins the observables.json of replicas. A quantity becomes the mean with its error (`std_error`), the spread between
+// the replicas (`spread`) and the error that a single replica states (`within`). Counts become sums. Other values are
+// those of the first replica. The error is that of the mean of independent beds, never below the error that the beds
+// state. It is scaled by Student's t for the few replicas: 1.96 of it hold the mean of further beds in 95 % of all
+// cases.
 Json joined_results(const std::vector<Json>& results);
 // The first of T_x, T_z and the rise by which n beds differ by more than each of them states.
 struct NotableSpread {

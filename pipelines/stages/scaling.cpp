@@ -102,8 +102,10 @@ void describe_fit(Fields& fields, ScalingFit& fit) {
   fields.text("from", fit.from, {.help = "id of the study; may be left out when there is one"});
   fields.text("y", fit.y, {.help = "column, with its errors beside it", .required = true});
   fields.texts("powers", fit.powers, {.help = "columns whose powers are multiplied", .required = true});
-  fields.texts("each", fit.each,
-               {.help = "columns at every value of which the amplitude is free: only what the powers do there counts"});
+  fields.texts(
+      "each", fit.each,
+      {.help =
+           "columns whose every value has an amplitude of its own, so that only the powers at a fixed value count"});
   fields.texts("series", fit.series, {.help = "series of the study that are used; none: all"});
   fields.map<ColumnLimits>("within", fit.within,
                            [](Fields& f, ColumnLimits& limits) {
@@ -111,8 +113,9 @@ void describe_fit(Fields& fields, ScalingFit& fit) {
                              f.number("most", limits.most, {.help = "largest value that is used"});
                            },
                            {.help = "column → values of the points that are used"});
-  fields.boolean("common_error", fit.common_error,
-                 {.help = "all points get the same relative error, the rms of their own: for few replicas"});
+  fields.boolean(
+      "common_error", fit.common_error,
+      {.help = "give all points the same relative error, the rms of their own errors; useful with few replicas"});
 }
 
 // The study, its columns and series must be there.
@@ -125,8 +128,9 @@ void check_fit(Fields& fields, const ScalingFit& fit) {
     return one.id == fit.from || (fit.from.empty() && from.size() == 1);
   });
   if (study == from.end())
-    return fields.problem("/from", fit.from.empty() ? "which study is it? \"from\" of the stage names several"
-                                                    : "\"" + fit.from + "\" is not in the \"from\" of this stage");
+    return fields.problem("/from", fit.from.empty()
+                                       ? "\"from\" of the stage names several studies: name the one that is meant"
+                                       : "\"" + fit.from + "\" is not in the \"from\" of this stage");
   const StatedTable* table = study->results != nullptr ? study->results->find_table("table.csv") : nullptr;
   if (table == nullptr) return;
   const auto check = [&](const std::string& where, const std::string& column) {

@@ -88,29 +88,30 @@ void Simulate::describe(Fields& fields) {
         f.quantity("temperature", step.temperature, dimension::length,
                    {.help = "T/(m g) of the reservoir", .required = true, .range = positive});
         f.quantity("ramp", step.ramp, dimension::time,
-                   {.help = "time in which T changes linearly to it, from that of the step before (or of the bath)",
+                   {.help = "time in which T changes linearly to this temperature, from that of the previous step (or "
+                            "of the bath)",
                     .range = non_negative});
         f.quantity(
             "hold", step.hold, dimension::time,
-            {.help = "time for which it stays; its second half is averaged for schedule.csv", .range = non_negative});
+            {.help = "time at this temperature; its second half is averaged for schedule.csv", .range = non_negative});
       },
       {.help =
            "annealing: temperatures of the bath, one after the other, before the bed settles; it stays at the last"});
   fields.texts("observe", observe_,
                {.help = "measured only when named: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
-                        "displacement, pressure (by height, with exact averages over time), phases (means by height "
-                        "and phase), species (temperatures of two species)"});
-  fields.integer(
-      "replicas", replicas_,
-      {.help = "beds that are run, each with a seed of its own; results are means, errors hold for the next bed. 4 by "
-               "default where the floor shakes a bed that dissipates and is open above, else 1",
-       .range = from_to(1, 10'000)});
+                        "displacement, pressure (by height, exact time averages), phases (means by height and phase), "
+                        "species (temperatures of two species)"});
+  fields.integer("replicas", replicas_,
+                 {.help = "number of beds, each with its own seed; results are means, errors hold for the next bed. 4 "
+                          "by default where the floor shakes a dissipative bed that is open above, else 1",
+                  .range = from_to(1, 10'000)});
   fields.choice("replica_starts", starts_, {{ReplicaStarts::alternate, "alternate"}, {ReplicaStarts::same, "same"}},
-                {.help = "alternate: on a shaken floor every second bed is filled at random in place of the hexagonal "
-                         "packing, so that the spread shows what the filling does; same: all begin as the first"});
+                {.help = "alternate: on a shaken floor every second bed starts from a random fill instead of the "
+                         "hexagonal packing, so the spread shows this effect; same: all start as the first"});
   fields.number(
       "checkpoint_seconds", checkpoint_seconds_,
-      {.help = "a killed run goes on from a state at most about this old; 0: from none", .range = non_negative});
+      {.help = "interval of checkpoints: a killed run continues from a state at most about this old; 0: no checkpoints",
+       .range = non_negative});
   fields.boolean("compress", compress_, {.help = "trajectory.extxyz.zst instead of .extxyz"});
   if (fields.decoding()) check(fields);
 }
@@ -130,7 +131,7 @@ void Simulate::check(Fields& fields) {
                  "Name a \"bath\": langevin, andersen or thermal_floor");
   for (std::size_t k = 0; k < annealing_.size(); ++k)
     fields.require(annealing_[k].ramp + annealing_[k].hold > 0, "schedule/" + std::to_string(k),
-                   "the step lasts no time", "Give \"ramp\" or \"hold\"");
+                   "the step has no duration", "Give \"ramp\" or \"hold\"");
   fields.require(!ObserveOptions::from(observe_).species || bed_.two_species(), "observe",
                  "the disks are of one species, or of two that are alike",
                  "Give \"disks\" a \"second\" species of another diameter or density");
@@ -284,12 +285,12 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
     return bed_.description().reduced ? fmt::format("{:.2g}", time)
                                       : "\"" + handy_text(two_digits(time * bed_.time_unit()), dimension::time) + "\"";
   };
-  context.warning(fmt::format(
-      "the contact duration t_c = {} makes {:.2g} % of the contacts elastic, and T may be higher by about {:.2g} % "
-      "than with contacts without a duration. t_c is a numerical cut-off, not the time that a real "
-      "contact lasts{}. \"contact_duration\": {} would bring this to about {:.2g} %, with more contacts",
-      text(duration), 100 * results.at("elastic_share").at("value").get<double>(), 100 * effect->get<double>(),
-      contact_time_text(bed_), text(shorter), 100 * allowed_contact_effect));
+  context.warning(
+      fmt::format("the contact duration t_c = {} makes {:.2g} % of the contacts elastic, so T may be about {:.2g} % "
+                  "too high. This t_c is a numerical cut-off, not the time that a real contact lasts{}. "
+                  "\"contact_duration\": {} would reduce this to about {:.2g} %, with more contacts",
+                  text(duration), 100 * results.at("elastic_share").at("value").get<double>(),
+                  100 * effect->get<double>(), contact_time_text(bed_), text(shorter), 100 * allowed_contact_effect));
 }
 
 // The densities of all replicas together, in place of the first's.

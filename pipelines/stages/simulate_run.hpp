@@ -117,11 +117,12 @@ class BedRun {
   Clock::time_point last_saved_, kept_at_, keep_after_;
 };
 
-// What a run is gone on from after a kill: a state behind its hash.
+// Writes the state from which a killed run continues, behind its hash.
 void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);
 
-// Where the simulation has lost its precision (sim/measure/observables.hpp): writes the last sound state, if there is
-// one, and throws StageError, which says what is wrong, when, and where that state is.
+// Does nothing while the simulation is precise (sim/measure/observables.hpp). Else it writes the last state with
+// sufficient precision, if there is one, and throws StageError. The error says what is wrong, when it began, and where
+// that state is.
 void require_precision(const sim::Simulation& simulation, const std::vector<std::uint8_t>& last_sound,
                        const std::filesystem::path& checkpoint);
 

@@ -1,10 +1,10 @@
-// The stages: a table with one row each. Command line, schema, defaults, order, cache and report derive from the row;
-// what is above this folder (runner, report, command line) knows no stage by name.
+// The stages: a table with one row each. Command line, schema, defaults, order, cache and report derive from the row.
+// The folders that use this one (runner, report, command line) know no stage by name.
 //
 // How to add a stage
-//   1. pipelines/stages/<name>.cpp holds the options struct with its defaults, a class derived from Stage whose
-//      describe() names every option once (see config.hpp) and whose run() does the work, and the function that fills
-//      the row:
+//   1. pipelines/stages/<name>.cpp holds a class derived from Stage and the function that fills the row. The members
+//      of the class are the options with their defaults. Its describe() names every option once (see config.hpp). Its
+//      run() does the work.
 //
 //        namespace shakebed::pipelines {
 //        namespace {
@@ -54,9 +54,9 @@
 //
 // Common keys of every stage, read by the plan: "stage", "id", "from", "units", and "seed" where `uses_seed` is set.
 //
-// Result files: JSON with quantities as {"value", "std_error", "unit"} (quantity_json); `result` in the row names the
-// one that summary.json repeats under the stage's id and that "/<id>/..." pointers of a check look into. Times, speeds
-// and the host are no result: they are in OUT/<id>/cost.json (context.timing() adds a number there).
+// Result files are JSON with quantities as {"value", "std_error", "unit"} (quantity_json). `result` in the row names
+// one of them. summary.json repeats that file under the stage's id, and "/<id>/..." pointers of a check refer to it.
+// Times, speeds and the host are no result: they are in OUT/<id>/cost.json (context.timing() adds a number there).
 #pragma once
 
 #include <cstdint>

@@ -167,7 +167,7 @@ Number taken(const Collected& c, const fs::path& path) {
 void describe_parameter(Fields& f, Parameter& p) {
   f.text("name", p.name, {.help = "name of its column"});
   f.numbers("values", p.values, {.help = "its values", .required = true});
-  f.number("times", p.times, {.help = "what is written into the chain is the value times this"});
+  f.number("times", p.times, {.help = "factor: the value times this number is written into the chain"});
   f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
   f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
 }
@@ -205,13 +205,12 @@ void Study::describe(Fields& fields) {
         f.text("at", c.at,
                {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv with a column", .required = true});
         f.text("column", c.column, {.help = "column of the table of which one number is taken"});
-        f.choice(
-            "take", c.take, takes,
-            {.help = "which: the largest or smallest number, or where it stands (noise makes the largest too large and "
-                     "the smallest too small); or the mean of the rows"});
+        f.choice("take", c.take, takes,
+                 {.help = "which number: the largest or smallest, its place (noise makes the largest too large and the "
+                          "smallest too small), or the mean of the rows"});
         f.text("by", c.by, {.help = "column that says where"});
-        f.number("least", c.least, {.help = "smallest place that is looked at"});
-        f.number("most", c.most, {.help = "largest place that is looked at"});
+        f.number("least", c.least, {.help = "smallest place that is used"});
+        f.number("most", c.most, {.help = "largest place that is used"});
         f.number("times", c.times, {.help = "factor"});
         f.number("plus", c.plus, {.help = "added after the factor"});
       },
@@ -224,7 +223,7 @@ void Study::describe(Fields& fields) {
       },
       {.help = "name of a CSV of this stage → the chain's file whose rows are averaged over the replicas in it"});
   fields.integer("replicas", replicas_,
-                 {.help = "runs at every point, each with seeds of its own", .range = from_to(1, 1000)});
+                 {.help = "runs at every point, each with its own seeds", .range = from_to(1, 1000)});
   if (!fields.decoding() || fields.problem_count() > 0) return;
   fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
   fields.require(!collect_.empty(), "collect", "nothing is collected");
@@ -324,7 +323,7 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
       const std::string where = "/collect/" + escape_pointer_token(name);
       const StatedTable* table = table_at(chain, collected.at);
       if (table == nullptr) {
-        fields.problem(where + "/at", "\"" + collected.at + "\" leads to no table of the chain",
+        fields.problem(where + "/at", "\"" + collected.at + "\" names no table of the study's stages",
                        "Write /<stage id>/<file>.csv");
         continue;
       }
@@ -348,7 +347,7 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
     const auto stage = std::find_if(stated.begin(), stated.end(),
                                     [&](const StatedStage& s) { return !tokens.empty() && s.id == tokens.front(); });
     if (tokens.size() != 2 || stage == stated.end()) {
-      fields.problem(where + "/at", "\"" + table.at + "\" leads to no file of the chain",
+      fields.problem(where + "/at", "\"" + table.at + "\" names no file of the study's stages",
                      "Write /<stage id>/<file>.csv");
       continue;
     }
@@ -643,8 +642,8 @@ void Study::run(RunContext& context) const {
   for (const Json& one : kept) found.push_back(kept_numbers(one));
   const Averages averages = average(all, found);
   if (averages.missing > 0)
-    context.warning(fmt::format("{} of {} numbers are missing: the chain did not give them", averages.missing,
-                                all.size() * collect_.size()));
+    context.warning(fmt::format("{} of {} numbers are missing: the stages of the study did not produce them",
+                                averages.missing, all.size() * collect_.size()));
   write_described(context, "table.csv", averages.csv);
   write_described(context, "replicas.csv", replicas_csv(all, found));
   write_tables(context, all, kept);

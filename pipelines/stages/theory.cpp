@@ -318,7 +318,7 @@ std::string why_not_described(const fit::FitResult& result, double misfit) {
   if (result.model != "simulation" && result.critical_status == fit::ValueStatus::ok &&
       result.reduced_temperature.value > 1)
     return fmt::format(
-        "T/T_c = {:.2f} is above 1: by this model there is no solid, and the fitted rectangle means nothing",
+        "T/T_c = {:.2f} is above 1: in this model there is no solid, and the fitted rectangle has no meaning",
         result.reduced_temperature.value);
   return "";
 }

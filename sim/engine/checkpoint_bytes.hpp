@@ -1,6 +1,6 @@
-// The form of an engine's checkpoint: a magic number, the number of disks, the engine's state as visit_state() names it
-// (first how many intervals lie between synchronisations, then how many are done), the random numbers' state, a
-// checksum. The bytes are those of this kind of machine.
+// The form of an engine's checkpoint: a magic number, the number of disks, the engine's state, the state of the random
+// number generator, a checksum. The engine's state follows the order of visit_state(). It begins with the number of
+// intervals between synchronisations and the number done. The bytes hold for machines of this kind only.
 #pragma once
 
 #include <cstddef>

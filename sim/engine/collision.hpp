@@ -1,8 +1,8 @@
 // What a contact does: the collision rules. Reduced units, velocities in the lab frame.
 //
-// A rule is a small struct that says how two disks, or a disk and a wall, exchange momentum. `smooth elastic`,
-// `smooth dissipative` and `rough` are separate types because the engine is specialised for them; what a contact's
-// restitution is (constant, or elastic when the contact clock says so) is decided at run time.
+// A rule is a small struct: it computes how two disks, or a disk and a wall, exchange momentum. `smooth elastic`,
+// `smooth dissipative` and `rough` are separate types because the engine is specialised for them. The restitution of a
+// contact is chosen at run time: constant, or elastic where the contact duration requires it.
 #pragma once
 
 #include <algorithm>
@@ -34,11 +34,16 @@ inline NormalImpulse smooth_impulse(TwoLanes d, TwoLanes dv, double contact_squa
           0.5 * (1 - restitution * restitution) * approach * approach * inverse_distance};
 }
 
-// The Walton rule for rough disks [Walton1993, Luding1998]. (nx, nz) points from the first to the second (or to the
-// wall), the tangent is (-nz, nx), spins count positive from x to z. gn = (v1 - v2).n > 0 for an approach,
-// gt = (v1 - v2).t + R1 w1 + R2 w2; inverse_inertia_ratio: 1/q, q = I/(m R^2).
-// p = -m12 (1+e) gn n - m12 (1+b)/(1+1/q) gt t, b = min(b0, -1 + mu_f (1+e)(1+1/q) |gn|/|gt|).
-// The spins then change by R p_t / I each.
+// The Walton rule for rough disks [Walton1993, Luding1998]. Signs and symbols:
+//   (nx, nz) points from the first disk to the second (or to the wall); the tangent is (-nz, nx);
+//   spins count positive from x to z;
+//   gn = (v1 - v2).n > 0 for an approach;
+//   gt = (v1 - v2).t + R1 w1 + R2 w2;
+//   inverse_inertia_ratio: 1/q, q = I/(m R^2).
+// The momentum exchanged is
+//   p = -m12 (1+e) gn n - m12 (1+b)/(1+1/q) gt t,
+//   b = min(b0, -1 + mu_f (1+e)(1+1/q) |gn|/|gt|).
+// Each spin then changes by R p_t / I.
 struct RoughImpulse {
   double px, pz;      // momentum given to the first, taken from the second (or the wall)
   double tangential;  // p_t

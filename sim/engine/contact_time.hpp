@@ -1,8 +1,8 @@
-// When two things next touch: pure functions of the state now, one for each pair of things. All answer a time from
-// now, in reduced units, 0 for "touching and approaching", `never` for "not".
+// When two things next touch. Pure functions of the present state, one for each pair of things. Each returns a time
+// from now, in reduced units: 0 for "touching and approaching", `never` for no contact.
 //
-// Every root is taken in the form that loses no digits to cancellation: for c + 2 b t + a t^2 = 0 with b < 0 the first
-// root is c / (sqrt(b^2 - a c) - b).
+// Every root is computed in a form without cancellation. For c + 2 b t + a t^2 = 0 with b < 0 the first root is
+//   c / (sqrt(b^2 - a c) - b).
 #pragma once
 
 #include <algorithm>
@@ -56,19 +56,20 @@ inline double time_to_fall(double gap, double vz, double gravity) {
   return vz < 0 ? gap / -vz : never;
 }
 
-// When a disk may leave its shell: a time that is never later than the true exit but for rounding. (ox, oz): offset
-// from the shell's centre, inside it; (vx, vz): velocity in the shell's frame. Gravity bends the path by at most g t^2
-// / 2, so the disk is inside while |o + v t| <= radius - g t^2 / 2, squared: c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0.
-// Without its last term this ends earlier, and has one square root. NaN, which is before nothing, for a disk at rest
-// without gravity. Number: double, or TwoLanes for two disks side by side.
+// When a disk may leave its shell: a time that is never later than the true exit, but for rounding. (ox, oz): offset
+// from the shell's centre, inside the shell. (vx, vz): velocity in the shell's frame. Gravity bends the path by at most
+// g t^2 / 2. So the disk is inside while |o + v t| <= radius - g t^2 / 2, squared:
+//   c + 2 b t + a t^2 - g^2 t^4 / 4 <= 0.
+// Without its last term this gives an earlier time, and needs one square root. The result is NaN, which compares false
+// with every time, for a disk at rest without gravity. Number: double, or TwoLanes for two disks side by side.
 template <class Number>
 Number time_to_leave_shell(Number ox, Number oz, Number vx, Number vz, Number radius, double gravity) {
   const Number a = fused(vx, vx, gravity > 0 ? fused(vz, vz, gravity * radius) : vz * vz);
   const Number b = fused(ox, vx, oz * vz);
   const Number c = not_above_zero(fused(ox, ox, fused(oz, oz, -(radius * radius))));
   const Number root = sqrt_lanes(fused(b, b, -(a * c)));
-  // Close to the edge this loses digits, but of a length that is then below 1e-15 of the shell's; and it has no branch,
-  // and a division that need not wait for the root.
+  // Close to the edge this form loses digits, but the length is then below 1e-15 of the shell's. It has no branch, and
+  // its division does not depend on the square root.
   return (root - b) * (1 / a);
 }
 

@@ -19,8 +19,8 @@ enum Partner : std::int32_t {
   lid_above = -6,
 };
 
-// Bits of Disk::near: what the disk could touch while it stays in its shell, and whether a neighbour could be on the
-// other side of a periodic box's edge, so that nearest images must be found.
+// Bits of Disk::near. They tell what the disk could touch while it stays in its shell. They also tell whether a
+// neighbour could be on the other side of a periodic box's edge, so that nearest images must be found.
 enum Near : std::uint8_t {
   near_left_wall = 1,
   near_right_wall = 2,

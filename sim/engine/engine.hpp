@@ -1,21 +1,17 @@
 // The event loop. One class template, specialised by run_scene.cpp for what the
 // scene names.
 //
-// Every disk has one next event, kept in its record: with another disk, with a
-// wall, or with the edge of its shell. It is predicted when something happens
-// to the disk, and only then. A pair's contact is taken when it is earlier than
-// the partner's own next event; the partner's former partner is left as it is, it
-// finds out when its old time comes and then predicts anew. Between events
-// disks fly freely: straight lines in pairs' relative coordinates, gravity or
-// not. What was predicted is written down only when the next event has begun,
-// unless that could change it (Pending, waits_for(), settle()).
+// Every disk has one next event, kept in its struct: with another disk, with a wall, or with the edge of its shell. It
+// is predicted when something happens to the disk, and only then. A pair's contact is accepted when it is earlier than
+// the partner's own next event. The partner's former partner is not changed: when its old time comes, it finds the
+// event void and predicts anew. Between events disks fly freely: straight lines in pairs' relative coordinates, with or
+// without gravity. A prediction is written down only when the next event has begun, unless that could change it
+// (Pending, waits_for(), settle()).
 //
-// Time is counted from the last rebasing, so its resolution does not fade in
-// long runs. At fixed moments (every `synchronisation interval`) the engine
-// brings all disks to one time, rebases it by a whole number of floor periods
-// and predicts everything from scratch: its state there is nothing but
-// positions, velocities, spins and contact clocks, so a run continued from a
-// checkpoint taken there gives the same bytes as one that was never stopped.
+// Time is counted from the last rebasing, so its resolution does not fade in long runs. At fixed moments (every
+// `synchronisation interval`) the engine brings all disks to one time, rebases it by a whole number of floor periods
+// and predicts everything from scratch. Its state there is nothing but positions, velocities, spins and contact clocks.
+// So a run continued from a checkpoint taken there gives the same bytes as one that was never stopped.
 //
 // Large periodic beds go on tile by tile: engine_tiles.hpp. Beds that lie on the floor rest there: engine_rest.hpp.
 #pragma once
@@ -59,7 +55,7 @@
 
 namespace shakebed::sim {
 
-// A time or a distance that rounding alone may take from what it must be, in asserts [sqrt(D/g), D]; a thousand times
+// Bound on what rounding alone may do to a time or a distance, used in asserts [sqrt(D/g), D]. It is a thousand times
 // what hard cases show (1e-12 at speeds of 1000 sqrt(g D)).
 inline constexpr double asserted_rounding = 1e-9;
 

@@ -3,9 +3,9 @@
 
 namespace shakebed::sim {
 
-// By how much a prediction made now may come before the one that stands, by rounding [sqrt(D/g)]: places are rounded by
-// 1e-15 D, which at the slowest approaches of a bed at rest (1e-6 sqrt(g D)) is 1e-9. No event of 750 random stacks was
-// beyond it.
+// Bound on how much, by rounding, a new prediction may be earlier than the valid one [sqrt(D/g)]. Places are rounded by
+// 1e-15 D. At the slowest approaches of a bed at rest (1e-6 sqrt(g D)) this is 1e-9. No event of 750 random stacks
+// exceeded it.
 inline constexpr double prediction_rounding = 1e-8;
 
 // Is there an event of i or of its partner no later than each contact that i will make? Nothing is pending.

@@ -21,9 +21,9 @@ bool Engine<Space, Rule, Sizes>::too_soon(std::uint32_t i, std::uint32_t j) {
   return elastic;
 }
 
-// Writes down what a contact would have dissipated that the clock made elastic; of a chain of them only the first that
-// would have dissipated anything, since the others keep the same energy again. A disk is in a counted chain as long as
-// its latest contact is the one noted here: nothing has to be undone by contacts that dissipate.
+// Adds up the energy that contacts made elastic by the clock would have dissipated. Of a chain of such contacts only
+// the first that would have dissipated anything counts, since the others withhold the same energy again. A disk is in a
+// counted chain as long as its latest contact is the one noted here. So dissipative contacts have nothing to undo.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach,
                                           const Contact& surface) {
@@ -250,10 +250,9 @@ bool Engine<Space, Rule, Sizes>::locked() {
   return passed < 1e-12;
 }
 
-// Lets every contact without a gap lose its approach (a perfectly plastic
-// impulse, momentum kept, the energy written down as dissipated), again and
-// again until nothing approaches: what physics does to a locked row in a real
-// contact's time.
+// Removes the approach of every contact without a gap, by a perfectly plastic impulse: momentum is kept, and the energy
+// is counted as dissipated. This is repeated until nothing approaches. Physically it happens to a locked row within the
+// time of a real contact.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::relieve() {
   constexpr double touching = 1e-11;

@@ -12,10 +12,10 @@ template <class Space, class Rule, class Sizes>
   fetch(&lists_.first_block(b));
 }
 
-// Prefetches what will be read soon: first the neighbour lists of disks that will collide, some events later the
-// neighbours' records, the contact clocks, and the cells round a disk that will leave its shell. (The records of disks
-// that come up at all are sent for by the queue, a bucket ahead; half of those events will be dead before their turn,
-// so no more than that.)
+// Prefetches what will be read soon. First the neighbour lists of disks that will collide. Some events later the
+// neighbours' structs, the contact clocks, and the cells round a disk that will leave its shell. (The queue prefetches
+// the structs of the disks themselves, a bucket ahead. Half of those events will be void before their turn, so no more
+// is prefetched.)
 template <class Space, class Rule, class Sizes>
 [[gnu::noinline]] void Engine<Space, Rule, Sizes>::fetch_for_upcoming() const {
   constexpr std::size_t neighbours_ahead = 4;

@@ -3,9 +3,9 @@
 
 namespace shakebed::sim {
 
-// Contact times of one disk, whose record is that of now_, with four others, ids 0 and 1 and the two from `beyond` on;
-// `never` where there is none or where the other has something earlier to do. If others may be ahead of now_, the
-// record may be an earlier one, and contacts before the others' flights began are left out.
+// Contact times of one disk with four others: ids 0 and 1 and the two from `beyond` on. The disk's struct is that of
+// now_. The time is `never` where there is no other disk or where the other's next event is earlier. If others may be
+// ahead of now_, the disk's struct may be an earlier one. Contacts before the others' flights began are then left out.
 template <class Space, class Rule, class Sizes>
 template <bool images, bool others_ahead>
 [[gnu::always_inline]] inline Lanes Engine<Space, Rule, Sizes>::contact_times(const std::uint32_t* ids,

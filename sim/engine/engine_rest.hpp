@@ -1,18 +1,19 @@
 // A bed at rest on the floor. Included by engine.hpp only.
 //
-// Hard disks know no lasting contact. Between landing and take-off, or on a floor that stands still, a bed carries its
-// weight by ever more and ever smaller contacts, without end. Once it has come to rest it need not: its disks then
-// rest, which is to say that they move with the floor until this falls away faster than a disk does.
+// Hard disks have no lasting contacts. Between landing and take-off, or on a floor that stands still, a bed carries its
+// weight by ever more and ever smaller contacts, without end. A bed that has come to rest is spared these. Its disks
+// then rest: they move with the floor until the floor falls faster than a disk does.
 //
-// They do so by hops. All disks at rest are thrown up together, with the velocity that brings them back to their
-// heights above the floor at the hop's end, and fly freely like every other disk; neither the floor nor they themselves
-// touch them meanwhile. A disk that still moves meets them as it meets any other, but pushes them off the floor, which
-// does not give way: only a quick one wakes a disk at rest, and with it those that lose their support. Snapshots give
-// them the floor's velocity, which is their mean over a hop, and where some disks move the place in their flight (2e-5
-// D above that of rest): there they touch no disk.
+// The disks at rest move in hops. All of them are thrown up together and fly freely like every other disk. Their
+// velocity brings them back to their heights above the floor at the hop's end. Meanwhile they touch neither the floor
+// nor one another. A disk that still moves collides with them as with any other disk. It does not push them off the
+// floor, which does not give way: only a fast disk wakes a disk at rest, and with it those that lose their support.
+// Snapshots give the disks at rest the floor's velocity, which is their mean over a hop. Where some disks move,
+// snapshots give them their place in flight (2e-5 D above that of rest): there they touch no disk.
 //
-// Rest is judged by what the disks do, not from a balance of forces: a bed that slides or spreads under its weight is
-// too quick for it until it has done so. In beds that never look calm nothing is changed, not even by rounding.
+// Rest follows from the motion of the disks, not from a balance of forces. A bed that slides or spreads under its
+// weight is too fast to be at rest until it has done so. Beds that are never calm are not changed at all, not even by
+// rounding.
 #pragma once
 
 namespace shakebed::sim {

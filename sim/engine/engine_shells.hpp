@@ -47,8 +47,8 @@ void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
   disk.shell_z = static_cast<float>(here[1]);
 }
 
-// Fills nearby_ with the disks whose shells the largest shell of i's would reach and, if it is asked how near they are,
-// reached_by_ with how large a shell of i's would just reach theirs.
+// Fills nearby_ with the disks whose shells overlap the largest shell that disk i may have. With `how_near` it also
+// fills reached_by_: the size of i's shell that would just touch theirs.
 template <class Space, class Rule, class Sizes>
 template <bool how_near, class Grid>
 void Engine<Space, Rule, Sizes>::look_round(const Grid& grid, std::uint32_t i) {

@@ -1,22 +1,22 @@
-// How a large periodic bed goes on tile by tile. Included by engine.hpp only.
+// Event processing of a large periodic bed tile by tile. Included by engine.hpp only.
 //
-// In the order of time one event of a bed that is far larger than the caches has nothing to do with the next, and each
-// waits for memory. But the order matters only where one event can feel the other. So time goes on by short windows,
-// of about one event a disk. In a window every tile's events are taken for themselves, while its disks are in the
-// cache: only those in the tile's inside, which shrinks as the window goes on, since what happens beyond the border
-// makes itself felt ever farther inside. Then the rest is taken in the order of time.
+// The bed is far larger than the caches. In the order of time, one event is far from the next in space, so each waits
+// for memory. But the order matters only where one event can influence the other. So time advances by short windows of
+// about one event per disk. In a window the events of each tile are processed together, while its disks are in the
+// cache. Only the inside of a tile is processed, and it shrinks during the window: influences from beyond the border
+// reach ever farther inside. The remaining events are then processed in the order of time.
 //
-// What shrinks is no strict bound: a row of quick disks may carry a push farther. So what is taken early is taken on
-// trust. Contacts in tiles are logged; a disk's record tells its flight since its last contact, which nothing but a
-// contact changes. Whoever is behind looks for contacts along the earlier flights, too, of neighbours that are ahead,
-// and when it meets one there, or when anything else comes to a disk that is ahead, the disk goes back to that moment:
-// its later contacts are taken back, and those of its partners, and so on, and all of them look anew. The history that
-// results is that of the order of time, up to rounding.
+// The shrinking inside is no strict bound: a row of fast disks may carry a push farther. So early processing is
+// optimistic, and may have to be rolled back. Contacts in tiles are logged. A disk's struct describes its flight since
+// its last contact, and nothing but a contact changes it. A disk that is behind also looks for contacts along the
+// earlier flights of neighbours that are ahead. When it finds one, or when anything else reaches a disk that is ahead,
+// that disk is rolled back to this moment. Its later contacts are undone, then those of its partners, and so on. All of
+// them predict their contacts anew. The resulting history is that of the order of time, up to rounding.
 //
-// Two disks that are ahead in different tiles never have to do with each other, because tiles keep margins: whoever is
-// ahead is a reach (of two shells) at most beyond what an event's own disk must keep from the border, and two such are
-// a reach apart. Shells are drawn anew in a tile only if all that the disk did in the window fits into the new one as
-// well, so that neighbour lists hold for whatever is taken back.
+// Two disks that are ahead in different tiles never interact, because tiles keep margins. An event's own disk must keep
+// a distance from the border. A disk that is ahead is at most one reach (of two shells) beyond that distance. Two such
+// disks of different tiles are a reach apart. A shell is drawn anew in a tile only if everything that the disk did in
+// the window fits into the new shell as well. So neighbour lists hold for whatever is rolled back.
 #pragma once
 
 namespace shakebed::sim {
@@ -163,8 +163,8 @@ void Engine<Space, Rule, Sizes>::predict_in_window(std::uint32_t i) {
   }
 }
 
-// The next contact of disk i, whose record is `me`, with another disk; with what the others did from now on before they
-// fly as they do now, too, if they may be ahead.
+// The next contact of disk i, whose struct is `me`, with another disk. If others may be ahead, their earlier flights
+// from now on are examined before their present ones.
 template <class Space, class Rule, class Sizes>
 template <bool others_ahead>
 [[gnu::noinline]] auto Engine<Space, Rule, Sizes>::next_contact_of(std::uint32_t i, const Disk& me) const -> Candidate {

@@ -1,16 +1,13 @@
 // Which disk has the next event: a ring of coarse time buckets.
 //
-// An entry holds an event's time and its pair of disks. The truth about a
-// disk's next event stands in its own record (Disk::event_time); an entry of
-// which neither disk has an event at its time any more is worthless, so nothing
-// is ever deleted. A bucket is sorted when it becomes the current one. The
-// order is exact: by time, then by the order of insertion. Events of a later
-// turn of the ring are not written down at all: the disks' records know them,
-// and are looked through when that turn begins.
+// An entry holds an event's time and its pair of disks. The valid event of a disk is the one in its own struct
+// (Disk::event_time). An entry whose time is no longer the event time of either disk is ignored, so nothing is ever
+// deleted. A bucket is sorted when it becomes the current one. The order is exact: by time, then by the order of
+// insertion. Events of a later turn of the ring are not written down. The disks' structs hold them, and are searched
+// when that turn begins.
 //
-// Where the ring would be far larger than the caches it holds no more than two
-// stretches of the turn; what comes later is written down by stretches, and put
-// into the ring's buckets shortly before a stretch begins.
+// Where the ring would be far larger than the caches, it holds at most two stretches of the turn. Later events are kept
+// in one list per stretch. They go into the ring's buckets shortly before their stretch begins.
 #pragma once
 
 #include <algorithm>
@@ -131,9 +128,9 @@ class EventQueue {
   }
   void push(const EventEntry& entry) { push(entry.time, entry.first(), entry.second()); }
 
-  // The earliest valid event at or before `until`: its disk, that with which it was pushed (itself when alone), and its
-  // time in disks[disk].event_time. False if none. The owner may leave events that it knows of unwritten as long as
-  // owner.waits_for(time, disk, with) is false for the event that would come up: else it must settle() them first.
+  // The earliest valid event at or before `until`. Results: its disk, the disk with which it was pushed (itself when
+  // alone), and its time in disks[disk].event_time. False if there is none. The owner may keep known events unwritten
+  // as long as owner.waits_for(time, disk, with) is false for the next event. Else it must settle() them first.
   template <class Owner>
   bool pop(double until, std::uint32_t& disk, std::uint32_t& with, Owner& owner) {
     for (;;) {

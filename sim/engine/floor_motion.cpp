@@ -118,9 +118,9 @@ FloorMotion::FloorMotion(const TabulatedFloor& floor)
   note_bounds();
 }
 
-// Each touches the floor at its part's beginning and bends as little as it may. What it must bend to be above the floor
-// at `later` is the mean of the floor's acceleration until then, weighed by 2 (1 - t/later): with `later` that changes
-// by a third of the jerk at most.
+// Each parabola touches the floor at its part's beginning and has the least curvature that keeps it above the floor.
+// The curvature needed at `later` is a mean of the floor's acceleration until then, weighted by 2 (1 - t/later). It
+// changes with `later` by at most a third of the jerk.
 void FloorMotion::note_bounds() {
   constexpr std::int64_t looks = 4;  // at the floor, in a part
   const double rounding = 1e-10 * (highest_ - lowest_);

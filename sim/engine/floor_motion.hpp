@@ -28,16 +28,16 @@ class FloorMotion {
   double lowest() const { return lowest_; }    // none lies below
   double largest_upward_acceleration() const { return largest_acceleration_; }
 
-  // The first time t in [0, horizon], from `now`, at which a point that flies freely from height `bottom` with upward
-  // velocity vz meets the floor from above; `never` if none. A point at the floor or, by rounding, just below it counts
-  // as touching: it meets the floor at 0 if it approaches, else at its next fall.
+  // The first time t in [0, horizon], from `now`, at which a freely flying point meets the floor from above; `never` if
+  // there is none. The point starts at height `bottom` with upward velocity vz. A point at the floor or, by rounding,
+  // just below it counts as touching. It meets the floor at 0 if it approaches, else at its next fall.
   //
-  // Most points stay above parabolas that the floor does not reach (bounds_) until the horizon, or for a while: then no
-  // sine is asked for. From there on, the gap F(t) = bottom + vz t - g t^2/2 - floor(t) has F'' >= -M, M = g + max
-  // floor'' over the step. From any t with F >= 0 the parabola F + F' h - M h^2/2 lies below the gap, so its root can
-  // never step over a crossing; near a simple root the steps converge like Newton's or better, as M nears F'', and near
-  // a tangent one they crawl past it on the safe side. At the answer the gap is 0 but for rounding. A point that
-  // touches the floor while this falls faster than the point does leaves it: that is no contact.
+  // Most points stay above parabolas that the floor does not reach (bounds_), until the horizon or for a while: no sine
+  // is computed there. From there on the gap is F(t) = bottom + vz t - g t^2/2 - floor(t). It has F'' >= -M, with M = g
+  // + max floor'' over the step. From any t with F >= 0 the parabola F + F' h - M h^2/2 lies below the gap. So its root
+  // can never step over a crossing. Near a simple root the steps converge like Newton's or better, as M nears F''. Near
+  // a tangent root they approach it slowly from the safe side. At the result the gap is 0 but for rounding. A touching
+  // point leaves the floor where the floor falls faster than the point: that is no contact.
   double time_to_contact(double bottom, double vz, double gravity, double now, double horizon) const;
 
  private:

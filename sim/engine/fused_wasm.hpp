@@ -1,6 +1,6 @@
-// a b + c rounded once, where there is no instruction for it: WebAssembly. Two at a time, in the plain arithmetic of
-// doubles, and the same bytes as the instruction of other machines; four times as fast as the library's function, which
-// computes with integers. Included by lanes.hpp only.
+// a b + c rounded once, for WebAssembly, which has no instruction for it. It computes two values at a time with
+// ordinary doubles. The bytes equal those of the instruction on other machines. It is four times as fast as the
+// library's function, which computes with integers. Included by lanes.hpp only.
 #pragma once
 
 #include <wasm_simd128.h>

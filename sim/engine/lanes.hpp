@@ -1,7 +1,6 @@
-// Two or four doubles at a time, in the compilers' own vector types: one instruction
-// each where the machine has it, the same bytes where it has not (add,
-// subtract, multiply, divide, square root and fused multiply-add are all
-// correctly rounded).
+// Two or four doubles at a time, in the compilers' own vector types. Each operation is one instruction where the
+// machine has it. Other machines give the same bytes: add, subtract, multiply, divide, square root and fused
+// multiply-add are all correctly rounded.
 #pragma once
 
 #include <array>

@@ -1,10 +1,9 @@
-// Who can touch whom soon. Every disk lives in a shell, a circle round the
-// place where the disk was when the shell was last drawn; while all disks stay
-// in their shells, only pairs whose shells' centres are closer than the disks'
-// contact distance plus the two shells' radii can touch, and those stand in
-// each other's lists. A disk that leaves its shell draws a new one, as large as
-// it can be without more than eight neighbours: large in a gas, small in a
-// crystal. Here are the lists; where the shells are is in shell_grid.hpp.
+// Neighbour lists: which disks can touch soon. Every disk lives in a shell, a circle round the place where the disk was
+// when the shell was last drawn. While all disks stay in their shells, only near pairs can touch. A pair is near when
+// the distance of its shells' centres is below the contact distance plus the two shells' radii. Near pairs stand in
+// each other's lists. A disk that leaves its shell draws a new one. The new shell is as large as it can be with at most
+// eight neighbours: large in a gas, small in a crystal. This file holds the lists; shell_grid.hpp holds the places of
+// the shells.
 #pragma once
 
 #include <algorithm>
@@ -66,8 +65,8 @@ class NeighbourLists {
     });
   }
 
-  // Makes neighbours of i and those `found` whose number is lower, in both their lists: by rounding the two might not
-  // agree whether they reach each other, so the higher one decides for both.
+  // Makes disk i and those of `found` with lower numbers neighbours, in the lists of both. By rounding the two might
+  // disagree whether they reach each other, so the higher number decides for both.
   void list(std::uint32_t i, std::span<const std::uint32_t> found) {
     for (std::uint32_t k : found) {
       if (k > i) continue;

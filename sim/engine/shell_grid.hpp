@@ -1,6 +1,6 @@
-// Where the disks' shells are (see neighbour_lists.hpp): their centres are filed in a grid of cells that wraps round in
-// both directions (for open boxes too: a far cell shared by chance only costs a distance check), so there is no event
-// for crossing a cell and no edge to the world.
+// The places of the disks' shells (see neighbour_lists.hpp). The shells' centres are filed in a grid of cells that
+// wraps round in both directions, for open boxes too. A far cell that shares an index by chance only costs a distance
+// check. So there is no event for crossing a cell, and the grid has no edge.
 #pragma once
 
 #include <algorithm>
@@ -66,8 +66,9 @@ static_assert(sizeof(NarrowCell) == 64);
 template <class Cell>
 class ShellGrid {
  public:
-  // disks: the records. reach: the largest distance of centres that can make a pair; cells are that wide. width,
-  // height: of the periodic box, or of the region to grid when it is not.
+  // `disks`: the array of disk structs. The largest distance of centres that can make a pair is `reach`; a cell is that
+  // wide. The size `width`, `height` is that of the periodic box, or of the region to grid where the box is not
+  // periodic.
   void reset(const Disk* disks, double reach, double width, double height) {
     disks_ = disks;
     columns_ = std::max(1, static_cast<int>(std::min(width / reach, 30'000.0)));
@@ -107,8 +108,8 @@ class ShellGrid {
     cell.set_reach(static_cast<unsigned>(__builtin_ctz(cell.places_of(i))), reach);
   }
 
-  // Calls visit(x, z, reach, disk) for every shell whose centre may be within reach of i's, i's own too if filed: eight
-  // at a time, some of them nobody's, whose x is NaN.
+  // Calls visit(x, z, reach, disk) for every shell whose centre may be within reach of i's, also for i's own if it is
+  // filed. Each call passes eight shells. Empty places among them have x = NaN.
   template <class Visit>
   [[gnu::always_inline]] void each_eight_round(std::uint32_t i, Visit visit) const {
     if constexpr (Cell::places > 4) {

@@ -90,9 +90,9 @@ class Simulation {
   virtual bool foresees_contacts() const = 0;
   virtual std::size_t bytes() const = 0;  // memory held
   // The engine canonicalises its state at moments that only the run itself decides (see engine.hpp). checkpoint() gives
-  // everything needed to go on to the same bytes from there; it may be called only when time() is such a moment, right
-  // after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not of this
-  // scene.
+  // everything that is needed to continue from there to the same bytes. It may be called only when time() is such a
+  // moment, right after advance_to(next_synchronisation()). restore() throws std::invalid_argument if the bytes are not
+  // of this scene.
   virtual double next_synchronisation() const = 0;
   virtual std::vector<std::uint8_t> checkpoint() const = 0;
   virtual void restore(const std::vector<std::uint8_t>& bytes) = 0;

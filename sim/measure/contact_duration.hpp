@@ -14,9 +14,9 @@ namespace shakebed::sim {
 struct ContactDurationEffect {
   double elastic_share = 0;   // of the contacts
   double withheld_share = 0;  // energy withheld over energy dissipated
-  // How much too high T_x and T_z are, about, as a part of them: within a factor of two up to 0.05 where disks are
-  // smooth; too much in rough, strongly dissipating beds, whose contacts are mostly those of its landing; a lower bound
-  // above 0.1.
+  // The approximate relative excess of T_x and T_z. Smooth disks: right within a factor of two up to 0.05. Rough,
+  // strongly dissipating beds: too large, because most of their contacts are those of the bed's landing. Above 0.1: a
+  // lower bound.
   double temperature = 0;
 };
 

@@ -17,10 +17,10 @@ struct LayerGrid {
   std::size_t count = 0;
 };
 
-// Between two events every disk flies on a parabola, so the time it spends in a layer and the integrals of its momentum
-// and kinetic energy there are known in closed form: density, temperatures and kinetic pressure are integrals over all
-// time, not sums over looks. The contacts' part of the pressure is that of [IrvingKirkwood1950]: each momentum handed
-// on counts in the layers through which the line from centre to centre (or to the floor) leads, in proportion. The
+// Between two events every disk flies on a parabola. So the time it spends in a layer and the integrals of its momentum
+// and kinetic energy there are known in closed form. Density, temperatures and kinetic pressure are integrals over all
+// time, not sums over samples. The contacts' part of the pressure is that of [IrvingKirkwood1950]. Each transferred
+// momentum counts in the layers that the line from centre to centre (or to the floor) crosses, in proportion. The
 // momentum balance P_zz(z) = weight above z then holds exactly in the mean over a long time.
 class FlightObserver final : public Watcher {
  public:

@@ -1,11 +1,13 @@
-// The loop that measures a bed: it settles, is looked at by stated phases of its period, and observers see each look.
+// The loop that measures a bed. The bed settles, is then sampled at stated phases of its period, and observers receive
+// each sample.
 //
 //   Observing<BedObserver> bed([&](const DiskProperties& disks) { return BedObserver(scene, disks, ...); });
 //   measure(scene, schedule, {&bed});
 //   bed->temperature_x();
 //
-// A run may be stopped between any two events and go on from its latest kept state to the same bytes; replicas are runs
-// of the same bed with seeds of their own, and their results do not depend on the number of threads. Reduced units.
+// A run may be stopped between any two events. It continues from its latest stored state and ends with the same bytes.
+// Replicas are runs of the same bed, each with its own seed. Their results do not depend on the number of threads.
+// Reduced units.
 //
 // Observers belong to the caller, each to one run at a time, and are called from the thread that called measure(). The
 // result owns its simulation. Any number of threads may measure, each with observers of its own.

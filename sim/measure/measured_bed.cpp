@@ -114,7 +114,7 @@ std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& o
     case Problem::duration:
       return formatted("duration is %g; it must be above 0", options.duration);
     case Problem::phases:
-      return "phases is 0; the bed must be looked at once a period at least";
+      return "phases is 0; the bed must be sampled at least once per period";
     case Problem::spacing:
       return formatted("spacing is %g; it must be above 0", options.spacing);
     case Problem::kernel:
@@ -125,7 +125,7 @@ std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& o
       return formatted("the floor would shake %g times; measure at most %g periods", options.duration / floor_period,
                        most_periods);
     case Problem::too_many_frames:
-      return formatted("%llu frames do not fit into %llu looks; measure longer or keep fewer",
+      return formatted("%llu frames do not fit into %llu samples; measure longer or keep fewer frames",
                        static_cast<unsigned long long>(options.frames),
                        static_cast<unsigned long long>(plan_looks(floor_period, options).schedule.looks()));
   }

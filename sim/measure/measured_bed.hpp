@@ -52,7 +52,7 @@ struct MeasureOptions {
   [[nodiscard]] std::vector<Problem> problems(double floor_period) const;
 };
 
-// When the bed is looked at, and which of the looks are kept as frames.
+// When the bed is sampled, and which of the samples ("looks") are kept as frames.
 struct LookPlan {
   MeasurementSchedule schedule;
   std::uint64_t frame_stride = 0;  // in looks; no factor in common with `phases`, so that frames visit every phase
@@ -63,8 +63,8 @@ LookPlan plan_looks(const Scene& scene, const MeasureOptions& options);
 LookPlan plan_looks(double floor_period, const MeasureOptions& options);  // 0: the floor stands still
 // The period of the floor's motion; 0 when it stands still.
 double floor_period(const Scene& scene);
-// Heights from below the lowest place of the floor to above the loosest bed. hottest_bath: the highest temperature that
-// the scene's bath will be given, where that is above its own.
+// Heights from below the lowest place of the floor to above the most expanded bed. The highest temperature that the
+// scene's bath will have is `hottest_bath`, where that is above its present one.
 HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options, double hottest_bath = 0);
 
 // The heights of a profile from the lowest to the highest that holds anything: first to last - 1. Below 1e-12/D^2 there

@@ -21,8 +21,8 @@ struct Profile {
   std::uint64_t samples = 0;           // snapshots
 };
 
-// Height of the centre of mass of count equal disks packed hexagonally on a floor at 0: rows of floor(width), in a hard
-// box alternately one less where half a diameter is missing.
+// Height of the centre of mass of count equal disks packed hexagonally on a floor at 0. The rows hold floor(width)
+// disks. In a hard box every second row has one disk less where half a diameter is missing.
 double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
 double ideal_centre_of_mass(const Scene& scene);
 
@@ -51,8 +51,8 @@ class BedObserver {
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
   Measured temperature_z_local() const;  // without the mean velocity of each layer of 1 D at each phase
   Measured spin_temperature() const;     // I <w^2>; 0 for smooth disks
-  // P V/(N T) = 1 + virial rate/(2 N T) of a box that is periodic both ways, T from the kinetic energy of the N - 1
-  // free momenta. virial_rate: of the contacts, per unit of time.
+  // P V/(N T) = 1 + virial rate/(2 N T) of a box that is periodic both ways. T is from the kinetic energy of the N - 1
+  // free momenta. `virial_rate`: of the contacts, per unit of time.
   Measured compressibility_factor(const Measured& virial_rate) const;
   // The second half of the periods less the first: what still changes while the bed is measured. The error is not a
   // number with fewer than four periods.

@@ -22,8 +22,9 @@ struct BondOrder {
   std::vector<std::uint8_t> neighbours;
   std::vector<double> psi6_re,
       psi6_im;  // psi_6 = mean over neighbours of exp(6 i angle) [HalperinNelson1978]; 0 without any
-  // Sites where a disk of the largest size is missing: at a contact distance from a disk, where no centre is closer
-  // than 0.8 of it and at least five are within reach of it. The surface has none: it is seen by four at most.
+  // Vacancies: sites where a disk of the largest size is missing. A site is a contact distance away from a disk. No
+  // centre is closer to it than 0.8 of that distance, and at least five centres are within reach. The surface has none:
+  // a site there has at most four.
   std::vector<double> vacancy_x, vacancy_z;
 };
 // period_x, period_z: 0 where the box is not periodic.

@@ -59,7 +59,8 @@ class BlockedCovariance {
   std::size_t blocks() const { return blocks_.size(); }
   // Of the means of the quantities first to last-1, row by row, by windows of blocks.
   std::vector<double> of_means(std::size_t first, std::size_t last) const;
-  // By what of the quantities' sum and their first moment (sum of i x_i) remembers longer, corrected for the latter.
+  // From the more slowly decaying of two series, and corrected for it: the sum of the quantities and their first moment
+  // (sum of i x_i).
   statistics::Windows windows() const;
 
   template <class Archive>

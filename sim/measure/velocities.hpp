@@ -48,8 +48,8 @@ class VelocityObserver {
 
   // Of all disks; of the whole bed's velocities, its mean v_z at each moment taken away.
   Measured fourth_cumulant_of_all() const;
-  // The same from <c^4> and <c^2>^2 layer by layer and phase by phase, weighted by the disks in them: a bed whose T
-  // varies is not taken for one that is not Gaussian.
+  // The same from <c^4> and <c^2>^2 layer by layer and phase by phase, weighted by the number of disks. So a bed whose
+  // T varies is not mistaken for a bed with velocities that are not Gaussian.
   double fourth_cumulant_local() const;
 
   const LayerGrid& grid() const { return grid_; }
@@ -90,9 +90,9 @@ class VelocityObserver {
   std::vector<double> histogram_x_, histogram_z_;
 };
 
-// Mean squares of displacements over lags of 1, 2, 4, ... looks, each from origins that lag apart: independent enough
-// for their spread to be an error, and N numbers a lag of memory. Displacements are followed across periodic sides, so
-// the time between looks must be shorter than what a disk needs for half the box.
+// Mean square displacements over lags of 1, 2, 4, ... samples. The origins are one lag apart: independent enough for
+// their spread to be an error. Memory: N numbers per lag. Displacements are followed across periodic sides. So the time
+// between samples must be shorter than the time in which a disk crosses half the box.
 class DisplacementObserver {
  public:
   DisplacementObserver(const Scene& scene, std::size_t disks);

@@ -82,7 +82,7 @@ class Check {
     // Beyond it a place is known to no better than 1e-7 D, and cells are more than can be counted.
     constexpr double most = 1e9;
     require(!(b.width > most) && !(std::isfinite(height()) && height() > most), "/box",
-            "the box is larger than 1e9 D: places so far apart have no digits for 1e-7 D");
+            "the box is larger than 1e9 D: double precision does not resolve 1e-7 D at such distances");
     const bool periodic = std::holds_alternative<PeriodicSides>(b.sides);
     const double least = 2 * largest + 3;  // a disk must never meet two images of one neighbour
     require(!periodic || b.width >= least, "/box/width",
@@ -150,9 +150,9 @@ class Check {
     } else if (const auto* w = std::get_if<WhiteNoiseBath>(&scene_.bath)) {
       positive(w->heating, "heating");
       positive(w->interval, "interval");
-      require(
-          scene_.disks.contact.restitution < 1, "/bath",
-          "white noise heats without end what does not dissipate: with restitution 1 there is no temperature to reach");
+      require(scene_.disks.contact.restitution < 1, "/bath",
+              "white noise heats a bed without dissipation without limit: with restitution 1 there is no steady "
+              "temperature");
     } else if (const auto* t = std::get_if<ThermalFloor>(&scene_.bath)) {
       positive(t->temperature, "temperature");
       require(!periodic_upwards(), "/bath", "a thermal floor needs a floor, but the box is periodic upwards");

@@ -82,8 +82,8 @@ struct ThermalFloor {
 using Bath = std::variant<NoBath, LangevinBath, AndersenBath, WhiteNoiseBath, ThermalFloor>;
 
 // --- start
-// Rows of a hexagonal packing from the floor up (or filling a periodic box), each gap `spacing` diameters (0: chosen
-// so that every row holds as many disks as fit, alternately n and n or n and n-1).
+// Rows of a hexagonal packing from the floor up (or filling a periodic box). Each gap is `spacing` diameters. With 0 it
+// is chosen so that every row holds as many disks as fit, alternately n and n or n and n-1.
 struct HexagonalStart {
   std::uint32_t disks_a_row = 0;  // 0: as many as fit
   double spacing = 0;

@@ -5,8 +5,8 @@ correct spelling, README and tutorial easy to read.
 usage: words.py REPOSITORY   (exit 1: something is wrong; what was skipped is printed)
 
 The dialect is in dialect.txt (a regular expression and, behind a tab, what to write). Words that a spell checker does
-not know are in known_words.txt. Both lists grow. Strings and header comments of the code are read as well and counted
-at the end; they do not fail the test.
+not know are in known_words.txt. Both lists grow. Strings and header comments of the code are read as well: dialect and
+long sentences are faults there, too. CODE_ALLOWED names the files that may still have some.
 """
 import collections
 import pathlib
@@ -14,14 +14,22 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 
 LONGEST_SENTENCE = 30  # words
 LEAST_EASE = 50.0      # Flesch reading ease
 
 HERE = pathlib.Path(__file__).resolve().parent
 GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of the code, which is read as code
-# Long sentences of these are counted and do not fail; all other rules hold for them.
-SENTENCES_REPORTED = {"docs/thermometer.md", "docs/python.md", "docs/library.md", "docs/kumaran.md"}
+# Files whose strings or header comments still have faults, with their number. It may only shrink.
+CODE_ALLOWED = {
+    "fit/profile_fit/answer.cpp": 2, "fit/profile_fit/answer.hpp": 1, "fit/profile_fit/bins.cpp": 1,
+    "pipelines/stages/extract_images.cpp": 1, "pipelines/stages/extract_report.cpp": 1,
+    "pipelines/stages/figure.cpp": 1, "pipelines/stages/film.hpp": 1, "pipelines/stages/fit.cpp": 3,
+    "pipelines/stages/fit_report.cpp": 1, "pipelines/stages/scene_options.cpp": 2,
+    "pipelines/stages/simulate_run.cpp": 1, "sim/measure/observables.hpp": 1,
+}
+CODE_ROOMS = ("statistics", "sim", "ingest", "fit", "pipelines", "python")
 EASY = ("README.md", "docs/tutorial/")
 
 GREEK = ("alpha beta gamma delta zeta eta theta lambda mu nu xi phi chi psi sigma tau omega Gamma Delta Lambda Sigma "
@@ -209,26 +217,56 @@ def misspelled(root, files, parsed):
         print("SKIPPED: aspell is not installed (Debian: aspell, aspell-en): the spelling is not checked")
 
 
-def code_words(root, rows):
-    """What the code says: strings of .cpp files and comments of .hpp files. Counted, not failed."""
-    counts, examples = collections.Counter(), []
-    for room in ("statistics", "sim", "ingest", "fit", "pipelines"):
+def code_pieces(file):
+    """(line, text) of what the code says: strings of a .cpp, comments of a .hpp by paragraphs, lists line by line."""
+    text = file.read_text()
+    if file.suffix == ".cpp":
+        text = re.sub(r'R"\w*\(.*?\)\w*"', lambda raw: "\n" * raw.group(0).count("\n"), text, flags=re.DOTALL)
+        text = re.sub(r'"(?:[^"\\\n]|\\.)*"|//.*|#include.*', lambda m: m.group(0) if m.group(0)[0] == '"' else "", text)
+        for group in re.finditer(r'"(?:[^"\\\n]|\\.)*"(?:\s+"(?:[^"\\\n]|\\.)*")*', text):
+            string = "".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', group.group(0))).replace('\\"', '"')
+            for piece in string.split("\\n"):
+                yield text.count("\n", 0, group.start()) + 1, piece
+        return
+    held, first, depth = [], 0, 0
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        comment = re.match(r"\s*//( *)(.*)", line)
+        said = comment.group(2) if comment else ""
+        indent = len(comment.group(1)) if comment else 0
+        # A line of code, of a formula or of a list that stands alone.
+        alone = indent > 2 and (indent <= depth or depth <= 2 or re.search(r"[;{},>]$", held[-1] if held else ";"))
+        if held and (not said or alone or (indent <= 2 < depth)):
+            yield first, " ".join(held)
+            held = []
+        if said:
+            if not held:
+                first, depth = number, indent
+            held.append(said)
+
+
+def code_faults(root, rows):
+    """Faults of the strings and header comments of the code: (file, line, kind, what)."""
+    for room in CODE_ROOMS:
         for file in sorted((root / room).rglob("*.[ch]pp")):
-            text = file.read_text()
-            if file.suffix == ".cpp":
-                pieces = [" ".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', group)) for group in
-                          re.findall(r'"(?:[^"\\\n]|\\.)*"(?:\s+"(?:[^"\\\n]|\\.)*")*', re.sub(r"//.*|#include.*", "", text))]
-            else:
-                pieces = [" ".join(re.findall(r"//\s?(.*)", group)) for group in
-                          re.findall(r"(?:^[ \t]*//.*\n)+", text, re.MULTILINE)]
-            for piece in pieces:
-                for pattern, _ in rows:
-                    if hit := pattern.search(piece):
-                        counts["dialect"] += 1
-                        examples.append(f"{file.relative_to(root)}: \"{hit.group(0)}\"")
-                if any(len(words(s)) > LONGEST_SENTENCE for s in sentences(piece)):
-                    counts["long"] += 1
-    return counts, examples
+            name = file.relative_to(root).as_posix()
+            for line, piece in code_pieces(file):
+                for pattern, instead in rows:
+                    for hit in pattern.finditer(piece):
+                        yield name, line, "dialect", f"\"{hit.group(0)}\": write {instead}"
+                for sentence in sentences(piece):
+                    if len(words(sentence)) > LONGEST_SENTENCE:
+                        yield name, line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
+
+
+def beyond_allowed(found, allowed):
+    """Faults of the code without those that are allowed. A number that is too high is a fault as well: it must shrink."""
+    number = collections.Counter(name for name, *_ in found)
+    for name, line, kind, text in found:
+        if number[name] > allowed.get(name, 0):
+            yield f"{name}:{line}: {kind}: {text}"
+    for name, most in allowed.items():
+        if number[name] < most:
+            yield f"tests/house/words.py: CODE_ALLOWED says {most} of {name}, which has {number[name]}: lower the number"
 
 
 def notices_faults(rows):
@@ -241,6 +279,16 @@ def notices_faults(rows):
     good = Prose("# A\n\nThe bed has T. It is 3 high, with `remembers` and eq. (5) as code.\n")
     assert not list(faults_of("x.md", good, rows, {"T"})), list(faults_of("x.md", good, rows, {"T"}))
     assert reading_ease(Prose("The cat sat on the mat. The dog ran to me.\n")) > 100
+    with tempfile.TemporaryDirectory() as folder:
+        code = pathlib.Path(folder) / "sim"
+        code.mkdir()
+        long = "word " * 31 + "end."
+        (code / "a.cpp").write_text('// remembers\n#include "remembers"\nsay("The bed "\n    "remembers.");\n' + f'say("{long}");\n')
+        (code / "a.hpp").write_text(f"// Steps:\n//   {'word ' * 20}\n//   {'word ' * 20}\n//\n// {long}\nint remembers;\n")
+        found = list(code_faults(pathlib.Path(folder), rows))
+    assert [fault[:3] for fault in found] == [("sim/a.cpp", 3, "dialect"), ("sim/a.cpp", 5, "long"), ("sim/a.hpp", 5, "long")], found
+    assert len(list(beyond_allowed(found, {}))) == 3 and len(list(beyond_allowed(found, {"sim/a.cpp": 1}))) == 3
+    assert len(list(beyond_allowed(found, {"sim/a.cpp": 2, "sim/a.hpp": 2}))) == 1
     assert reading_ease(Prose("Institutional considerations necessitate interdisciplinary communication.\n")) < 0
 
 
@@ -251,14 +299,11 @@ def main():
     files = documents(root)
     parsed = {file: Prose(file.read_text()) for file in files}
     symbols = glossary_symbols((root / "GLOSSARY.md").read_text())
-    faults, reported = [], collections.Counter()
+    faults = []
     for file in files:
         name = file.relative_to(root).as_posix()
         for line, kind, text in [*faults_of(name, parsed[file], rows, symbols), *dead_links(root, file, parsed[file], parsed)]:
-            if kind == "long" and name in SENTENCES_REPORTED:
-                reported[name] += 1
-            else:
-                faults.append(f"{name}:{line}: {kind}: {text}")
+            faults.append(f"{name}:{line}: {kind}: {text}")
     faults += misspelled(root, files, parsed)
     for file in files:
         name = file.relative_to(root).as_posix()
@@ -267,13 +312,7 @@ def main():
             print(f"Flesch reading ease of {name}: {ease:.0f}")
             if ease < LEAST_EASE:
                 faults.append(f"{name}: reading ease {ease:.1f}, must be at least {LEAST_EASE}: shorter sentences and words")
-    for name, number in sorted(reported.items()):
-        print(f"not failed: {name}: {number} sentences of more than {LONGEST_SENTENCE} words")
-    counts, examples = code_words(root, rows)
-    print(f"not failed: strings and header comments of the code: {counts['dialect']} with dialect, {counts['long']} with a "
-          f"sentence of more than {LONGEST_SENTENCE} words")
-    for example in examples[:10]:
-        print(f"  {example}")
+    faults += beyond_allowed(list(code_faults(root, rows)), CODE_ALLOWED)
     print("\n".join(faults))
     print(f"{len(files)} documents, {len(symbols)} symbols, {len(faults)} faults")
     return 1 if faults else 0

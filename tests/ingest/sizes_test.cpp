@@ -96,7 +96,7 @@ TEST(Sizes, BeadsOfTwoSizesAreFoundEachWithItsRadius) {
   const auto& warnings = learned.calibration.warnings;
   EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const std::string& one) {
     return one.find("several sizes") != std::string::npos &&
-           one.find("30 of the first frame's 60") != std::string::npos;
+           one.find("In the first frame 30 of 60 beads") != std::string::npos;
   }));
   EXPECT_LT(learned.calibration.expected_missed, 0.02);
 }

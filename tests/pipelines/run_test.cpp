@@ -317,7 +317,7 @@ TEST_F(Pipeline, ARunningPipelineHoldsTheFolderAndADeadOneDoesNot) {
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   const ProgramResult second = run_recipe();
   EXPECT_EQ(second.exit_code, 5);
-  EXPECT_THAT(second.err, HasSubstr("another shakebed works there"));
+  EXPECT_THAT(second.err, HasSubstr("another shakebed process uses this folder"));
   EXPECT_THAT(second.err, HasSubstr(std::to_string(process)));
   ::kill(process, SIGKILL);
   EXPECT_EQ(wait_for(process), 128 + SIGKILL);
