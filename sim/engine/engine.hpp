@@ -50,6 +50,7 @@
 #include "sim/engine/neighbour_lists.hpp"
 #include "sim/engine/overlap.hpp"
 #include "sim/engine/policies.hpp"
+#include "sim/engine/pressed_bed.hpp"
 #include "sim/engine/random.hpp"
 #include "sim/engine/restitution.hpp"
 #include "sim/engine/shell_grid.hpp"
@@ -232,6 +233,21 @@ class Engine final : public Simulation {
   bool is_at_rest(std::uint32_t i) const { return rest_height_[i] < never; }
   double energy_of(std::uint32_t i, TwoLanes velocity) const;
 
+  // --- press
+  void plan_press(const Scene& scene);
+  void check_press();
+  void begin_press();
+  void set_press_time(double tau);
+  void start_press();
+  void stop_press();
+  void write_pressed();
+  bool press_until(double until);
+  Motion motion_now(std::uint32_t i) const {
+    if (!is_pressed_) return motion_at(disks_[i], now_);
+    const PressedDisk d = pressed_.at(i, now_ - pressed_to_);
+    return {TwoLanes{d.x, d.z}, TwoLanes{d.vx, d.vz}};
+  }
+
   // --- tiles
   static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
   void choose_tiles();
@@ -326,6 +342,16 @@ class Engine final : public Simulation {
   double rest_period_ = 1;
   std::uint64_t contacts_at_look_ = 0;
 
+  // --- press
+  PressedBed pressed_;
+  bool is_pressed_ = false, presses_ = false, press_wanted_ = false;
+  double press_step_ = 0, pressed_to_ = 0, press_energy_ = 0, press_began_ = 0, quiet_since_ = never;
+  double press_checked_at_ = -1, press_speed_ = 1, press_tau_ = 0.007;
+  std::uint64_t contacts_at_press_check_ = 0, events_to_press_ = 1;
+ public:
+  std::uint64_t press_steps_ = 0;
+ private:
+
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
   bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
@@ -353,6 +379,7 @@ class Engine final : public Simulation {
 #include "sim/engine/engine_loop.hpp"
 #include "sim/engine/engine_prediction.hpp"
 #include "sim/engine/engine_rest.hpp"
+#include "sim/engine/engine_press.hpp"
 #include "sim/engine/engine_shells.hpp"
 #include "sim/engine/engine_state.hpp"
 #include "sim/engine/engine_synchronise.hpp"

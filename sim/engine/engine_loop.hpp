@@ -46,11 +46,13 @@ template <class Space, class Rule, class Sizes>
     if (now_ < until) return false;
     events_to_return_ = 1;  // of the events at `until` none is left to the next call
   }
-  const std::uint64_t events = std::min(events_to_check_, events_to_return_);
+  if (rests_apply && events_to_press_ == 0) check_press();
+  const std::uint64_t events = std::min({events_to_check_, events_to_return_, events_to_press_});
   events_to_check_ -= events;
+  events_to_press_ -= events;
   events_to_return_ -= events;
   events_to_pause_ = events + 1;
-  return true;
+  return !press_wanted_;
 }
 
 // False where it returns for its number of events.
@@ -78,6 +80,7 @@ bool Engine<Space, Rule, Sizes>::process_until(double until) {
   settle();
   now_ = until;
   events_to_check_ += events_to_pause_;  // what was not used
+  events_to_press_ += events_to_pause_;
   events_to_return_ += events_to_pause_;
   return true;
 }
@@ -177,10 +180,18 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
     if (!(goal > now_)) return true;
     const double until = std::min({goal, synchronise_at_, bath_at_, rest_at_});
     bool arrived = true;
-    if (tiles_.empty()) {
+    if (is_pressed_) {
+      arrived = press_until(until);
+      if (arrived && now_ < until) continue;
+    } else if (tiles_.empty()) {
       arrived = watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
     } else if constexpr (tiles_apply) {
       arrived = process_tiles_until(until);
+    }
+    if (press_wanted_) {
+      press_wanted_ = false;
+      start_press();
+      continue;
     }
     if (!arrived) return false;
     if constexpr (rests_apply) {

@@ -38,7 +38,7 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.vz.resize(count_);
   out.spin.resize(spins_.size());
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Motion motion = motion_at(disks_[i], now_);
+    const Motion motion = motion_now(i);
     const std::uint32_t label = labels_[i];
     out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x()) : motion.x();
     out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
@@ -69,7 +69,7 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::kinetic_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Motion motion = motion_at(disks_[i], now_);
+    const Motion motion = motion_now(i);
     const long double vx = motion.vx(), vz = motion.vz();
     sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
     if constexpr (Rule::spins) {
@@ -83,7 +83,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
 template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
-  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z();
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_now(i).z();
   return static_cast<double>(sum);
 }
 

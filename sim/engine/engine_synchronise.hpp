@@ -9,6 +9,8 @@ inline constexpr double longest_interval = 64;  // between synchronisations, unl
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::synchronise() {
   ++counters_.synchronisations;
+  const bool was_pressed = std::exchange(is_pressed_, false);
+  if (was_pressed) write_pressed();
   for (std::uint32_t i = 0; i < count_; ++i) {
     bring_forward(i);
     disks_[i].own_time = 0;
@@ -33,6 +35,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   if (events_a_disk < 150 && elapsed * 2 <= longest_interval) intervals_ *= 2;
   if (events_a_disk > 1000 && intervals_ > 1) intervals_ /= 2;
   begin_interval();
+  if (was_pressed) begin_press();
 }
 
 // Numbers the disks along a space-filling curve. Sorting what is sorted changes
@@ -92,6 +95,9 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   checked_at_ = -1;
   crawls_ = 0;
   events_to_check_ = events_between_checks();
+  events_to_press_ = static_cast<std::uint64_t>(press_parameters.every * count_);
+  press_checked_at_ = now_;
+  contacts_at_press_check_ = counters_.collisions();
   if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
