@@ -18,6 +18,7 @@
 // checkpoint taken there gives the same bytes as one that was never stopped.
 //
 // Large periodic beds go on tile by tile: engine_tiles.hpp. Beds that lie on the floor rest there: engine_rest.hpp.
+// Beds that are pressed on it go on as soft disks: engine_press.hpp.
 #pragma once
 
 #include <algorithm>
@@ -81,6 +82,7 @@ class Engine final : public Simulation {
   EnergyLedger energy() const override;
   Counters counters() const override { return counters_; }
   [[gnu::cold]] double largest_overlap() const override;
+  double allowed_overlap() const override;
   bool foresees_contacts() const override;
   [[gnu::cold]] std::size_t bytes() const override;
   [[gnu::cold]] std::vector<std::uint8_t> checkpoint() const override;
@@ -217,6 +219,7 @@ class Engine final : public Simulation {
   // --- rest: engine_rest.hpp
   static constexpr bool rests_apply = Space::falls && Rule::dissipates;
   void plan_rest(bool wanted);
+  void look_again();
   void act_rest();
   bool is_calm(const FloorMotion::Motion& floor);
   void lay_down(const FloorMotion::Motion& floor);
@@ -233,19 +236,23 @@ class Engine final : public Simulation {
   bool is_at_rest(std::uint32_t i) const { return rest_height_[i] < never; }
   double energy_of(std::uint32_t i, TwoLanes velocity) const;
 
-  // --- press
-  void plan_press(const Scene& scene);
-  void check_press();
+  // --- press: engine_press.hpp
+  static constexpr bool press_applies = rests_apply && !Rule::spins && Sizes::equal;
+  void plan_press(bool wanted);
+  void ask_press();
+  std::optional<double> approach_of_neighbours() const;
   void begin_press();
-  void set_press_time(double tau);
-  void start_press();
-  void stop_press();
-  void write_pressed();
+  void go_on_pressed();
+  void write_down_pressed();
+  void end_press();
+  void check_press(const FloorMotion::Motion& floor);
   bool press_until(double until);
+  FloorMotion::Motion press_on(const FloorMotion::Motion& before, double next);
+  void tell_pressed(double step) const;
   Motion motion_now(std::uint32_t i) const {
     if (!is_pressed_) return motion_at(disks_[i], now_);
-    const PressedDisk d = pressed_.at(i, now_ - pressed_to_);
-    return {TwoLanes{d.x, d.z}, TwoLanes{d.vx, d.vz}};
+    const PressedBed::State state = pressed_.at(i, now_ - pressed_to_);
+    return {TwoLanes{state.x, state.z}, TwoLanes{state.vx, state.vz}};
   }
 
   // --- tiles
@@ -339,18 +346,21 @@ class Engine final : public Simulation {
   std::uint32_t resting_ = 0;
   bool woken_ = false;                        // a disk has lost its rest, and others perhaps their support
   double rest_at_ = never, look_at_ = never;  // the next hop or look; the next look
+  bool rests_ = false;
   double rest_period_ = 1;
   std::uint64_t contacts_at_look_ = 0;
 
   // --- press
-  PressedBed pressed_;
-  bool is_pressed_ = false, presses_ = false, press_wanted_ = false;
-  double press_step_ = 0, pressed_to_ = 0, press_energy_ = 0, press_began_ = 0, quiet_since_ = never;
-  double press_checked_at_ = -1, press_speed_ = 1, press_tau_ = 0.007;
-  std::uint64_t contacts_at_press_check_ = 0, events_to_press_ = 1;
- public:
-  std::uint64_t press_steps_ = 0;
- private:
+  PressedBed pressed_;  // while is_pressed_ the disks are there; their records are of no use
+  bool presses_ = false, is_pressed_ = false, is_asleep_ = false;
+  bool press_wanted_ = false;  // events end here
+  double pressed_to_ = 0;      // the end of the last step
+  double press_contact_time_ = 1;
+  double released_at_ = never;      // since when the floor has fallen away, since the start
+  double energy_when_pressed_ = 0;  // when pressed_ was begun, and its springs
+  double step_error_ = 0;           // of the ledger, before that
+  double asked_at_ = 0;
+  std::uint64_t contacts_when_asked_ = 0, floor_contacts_when_asked_ = 0, events_to_ask_ = 1;
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
@@ -378,8 +388,8 @@ class Engine final : public Simulation {
 #include "sim/engine/engine_flight.hpp"
 #include "sim/engine/engine_loop.hpp"
 #include "sim/engine/engine_prediction.hpp"
-#include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_press.hpp"
+#include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_shells.hpp"
 #include "sim/engine/engine_state.hpp"
 #include "sim/engine/engine_synchronise.hpp"

@@ -9,6 +9,12 @@ void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   if constexpr (tiles_apply) {  // a watcher is given everything in the order of time
     if (watcher != nullptr && !tiles_.empty()) leave_tiles();
   }
+  if constexpr (press_applies) {
+    if (is_pressed_ && watcher != nullptr) {
+      tell_pressed(0);
+      return;
+    }
+  }
   tell_all();
 }
 
@@ -89,7 +95,18 @@ double Engine<Space, Rule, Sizes>::potential_energy() const {
 
 template <class Space, class Rule, class Sizes>
 EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
-  return {initial_energy_, kinetic_energy(), potential_energy(), dissipated_, floor_work_, bath_work_};
+  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,
+                      dissipated_,     step_error_,      floor_work_,        bath_work_};
+  if (!is_pressed_) return ledger;
+  const double later = now_ - pressed_to_;
+  const double work =
+      pressed_.floor_work() + pressed_.floor_force() * (floor_.position(now_) - floor_.position(pressed_to_));
+  const double damped = pressed_.damped() + pressed_.loss_rate() * later;
+  ledger.compressed = pressed_.compressed();
+  ledger.floor_work += work;
+  ledger.dissipated += damped;
+  ledger.step_error += energy_when_pressed_ + work - damped - (ledger.kinetic + ledger.potential + ledger.compressed);
+  return ledger;
 }
 
 template <class Space, class Rule, class Sizes>
@@ -97,6 +114,11 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
   Snapshot here;
   snapshot(here);
   return sim::largest_overlap(here, properties().radius, period_x_.length, period_z_.length);
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::allowed_overlap() const {
+  return is_pressed_ || step_error_ != 0 ? soft_overlap : hard_overlap;
 }
 
 template <class Space, class Rule, class Sizes>

@@ -1,328 +1,427 @@
 #include "sim/engine/pressed_bed.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <numbers>
 
 namespace shakebed::sim {
 
 namespace {
-PressedBed::Spring spring_of(const Surface& s, double contact_time) {
-  const double beta = -std::log(std::max(s.restitution, 0.05)) / contact_time, omega = std::numbers::pi / contact_time;
-  return {omega * omega + beta * beta, 2 * beta};
+
+using State = PressedBed::State;
+
+constexpr double radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
+constexpr double far_off = -100;             // where the sentinels are: they touch nothing
+// A pair is asked until the next check if it would touch within so many times that many steps at the speed it has, or
+// at that which is usual.
+constexpr double foresight = 6;
+// By how much more than its overlap a pair is moved apart: rows that fill the box come apart in a tenth of the sweeps.
+constexpr double overdone = 1.6;
+
+// Part of its energy that a contact loses whose contact time is 1 and whose velocity would fall by exp(-damping), mean
+// over the moments within a step at which it may begin.
+double share_lost(double damping) {
+  constexpr int moments = 64;
+  constexpr double dt = 1 / PressedBed::steps_a_contact;
+  const double stiffness = std::numbers::pi * std::numbers::pi + damping * damping;
+  double sum = 0;
+  for (int moment = 0; moment < moments; ++moment) {
+    double gap = dt * (moment + 0.5) / moments, v = -1, a = 0;
+    bool touched = false;
+    do {
+      gap += dt * (v + 0.5 * dt * a);
+      const double next = gap < 0 ? -stiffness * gap - 2 * damping * (v + dt * a) : 0;
+      v += 0.5 * dt * (a + next);
+      a = next;
+      touched = touched || gap < 0;
+    } while (!touched || gap < 0);
+    sum += v * v;
+  }
+  return 1 - sum / moments;
 }
-inline Lanes load4(const PressedDisk& d) { return *reinterpret_cast<const Lanes*>(&d); }
-[[gnu::always_inline]] inline void differences(const PressedDisk* disks, const std::uint32_t* i, const std::uint32_t* k,
-                                               Lanes& dx, Lanes& dz, Lanes& dvx, Lanes& dvz) {
-  const Lanes d0 = load4(disks[k[0]]) - load4(disks[i[0]]), d1 = load4(disks[k[1]]) - load4(disks[i[1]]),
-              d2 = load4(disks[k[2]]) - load4(disks[i[2]]), d3 = load4(disks[k[3]]) - load4(disks[i[3]]);
+
+// Differences of four pairs, second less first.
+struct Differences {
+  Lanes x, z, vx, vz;
+};
+Lanes state_at(const State* disks, std::uint32_t place) {
+  Lanes state;
+  std::memcpy(&state, reinterpret_cast<const char*>(disks) + place, sizeof state);
+  return state;
+}
+[[gnu::always_inline]] inline Differences differences(const State* disks, const std::uint32_t* i,
+                                                      const std::uint32_t* k) {
+  const Lanes d0 = state_at(disks, k[0]) - state_at(disks, i[0]), d1 = state_at(disks, k[1]) - state_at(disks, i[1]),
+              d2 = state_at(disks, k[2]) - state_at(disks, i[2]), d3 = state_at(disks, k[3]) - state_at(disks, i[3]);
   const Lanes a01 = __builtin_shufflevector(d0, d1, 0, 4, 2, 6), b01 = __builtin_shufflevector(d0, d1, 1, 5, 3, 7);
   const Lanes a23 = __builtin_shufflevector(d2, d3, 0, 4, 2, 6), b23 = __builtin_shufflevector(d2, d3, 1, 5, 3, 7);
-  dx = __builtin_shufflevector(a01, a23, 0, 1, 4, 5);
-  dz = __builtin_shufflevector(b01, b23, 0, 1, 4, 5);
-  dvx = __builtin_shufflevector(a01, a23, 2, 3, 6, 7);
-  dvz = __builtin_shufflevector(b01, b23, 2, 3, 6, 7);
+  return {__builtin_shufflevector(a01, a23, 0, 1, 4, 5), __builtin_shufflevector(b01, b23, 0, 1, 4, 5),
+          __builtin_shufflevector(a01, a23, 2, 3, 6, 7), __builtin_shufflevector(b01, b23, 2, 3, 6, 7)};
 }
+Lanes nearest_image(Lanes dx, double period) {
+  const Lanes large = all_lanes(0x1.8p52);
+  return fused(all_lanes(-period), fused(dx, all_lanes(1 / period), large) - large, dx);
+}
+double sum_of(Lanes lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
+
+std::uint32_t place_of(std::uint32_t i) { return i * static_cast<std::uint32_t>(sizeof(State)); }
+
 }  // namespace
 
-void PressedBed::set_up(const Box& box, const Surface& disks, const Surface& sides, const Surface& floor,
-                        const Surface& lid, double contact_time, double step) {
+PressedBed::Spring PressedBed::spring_of(const Surface& surface) {
+  const double e = surface.restitution;
+  double low = 0, high = e < 1 ? 1 - 2 * std::log(e) : 0;
+  for (int halving = 0; halving < 50; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (share_lost(middle) < 1 - e * e ? low : high) = middle;
+  }
+  return {std::numbers::pi * std::numbers::pi + low * low, 2 * low};
+}
+
+void PressedBed::set_up(const Box& box, const Surfaces& surfaces) {
   box_ = box;
-  surfaces_[0] = disks, surfaces_[1] = sides, surfaces_[2] = floor, surfaces_[3] = lid;
-  soften(contact_time);
-  step_ = step;
+  const Spring pair = spring_of(surfaces.disks);
+  const Spring half{0.5 * pair.stiffness, 0.5 * pair.damping};  // of their reduced mass
+  of_unit_time_ =
+      std::array<Spring, 4>{half, spring_of(surfaces.sides), spring_of(surfaces.floor), spring_of(surfaces.lid)};
 }
 
 void PressedBed::soften(double contact_time) {
-  contact_time_ = contact_time;
-  pair_ = spring_of(surfaces_[0], contact_time);
-  side_ = spring_of(surfaces_[1], contact_time);
-  floor_ = spring_of(surfaces_[2], contact_time);
-  lid_ = spring_of(surfaces_[3], contact_time);
-}
-double PressedBed::approach() const {
-  const double touching = touching_[0] + touching_[1] + touching_[2] + touching_[3];
-  return std::sqrt((damped_lanes_[0] + damped_lanes_[1] + damped_lanes_[2] + damped_lanes_[3]) /
-                   (0.5 * pair_.damping * std::max(touching, 1.0)));
+  const auto soft = [contact_time](const Spring& spring) {
+    return Spring{spring.stiffness / (contact_time * contact_time), spring.damping / contact_time};
+  };
+  pair_ = soft(of_unit_time_[0]);
+  side_ = soft(of_unit_time_[1]);
+  floor_ = soft(of_unit_time_[2]);
+  lid_ = soft(of_unit_time_[3]);
 }
 
-void PressedBed::begin(std::vector<PressedDisk> disks, const FloorMotion& floor, double now) {
+void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time) {
   disks_ = std::move(disks);
   count_ = static_cast<std::uint32_t>(disks_.size());
-  disks_.push_back({-100, -100, 0, 0});
-  disks_.push_back({-200, -200, 0, 0});
-  force_.assign(2 * (count_ + 2), 0);
-  next_.assign(2 * (count_ + 2), 0);
-  const FloorMotion::Motion f = floor.motion(now);
-  list_pairs(f.position);
-  forces(f.position, f.velocity);
-  damped_lanes_ = Lanes{};
+  halfway_.resize(2 * std::size_t{count_});
+  for (std::uint32_t i = 0; i < count_; ++i) put_pair(&halfway_[2 * i], pair_at(&disks_[i].vx));
+  last_step_ = 0;
+  disks_.push_back({far_off, far_off, 0, 0});
+  disks_.push_back({2 * far_off, 2 * far_off, 0, 0});
+  force_.assign(4 * disks_.size(), 0);
+  floor_work_ = damped_ = usual_approach_ = 0;
+  fastest_ = mean_square_speed_ = never;
+  soften(contact_time);
+  list_pairs(floor.position);
+  add_forces(floor);
 }
 
+auto PressedBed::at(std::uint32_t i, double later) const -> State {
+  const TwoLanes a = pair_at(&force_[4 * i]) + TwoLanes{0, -1};
+  const TwoLanes v = fused(both(0.5 * last_step_), a, pair_at(&halfway_[2 * i]));
+  const TwoLanes place = fused(both(later), fused(both(0.5 * later), a, v), pair_at(&disks_[i].x));
+  const TwoLanes velocity = fused(both(later), a, v);
+  return {place[0], place[1], velocity[0], velocity[1]};
+}
+
+// ------------------------------------------------------------------------------------------------
+// neighbours
+
+TwoLanes PressedBed::gap_of(std::uint32_t i, std::uint32_t k) const {
+  TwoLanes d = pair_at(&disks_[k].x) - pair_at(&disks_[i].x);
+  if (box_.period > 0) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
+  return d;
+}
+
+// All pairs within the skin, by columns of disks in the order of height.
 void PressedBed::list_pairs(double floor) {
-  ++rebuilds;
+  const double reach = 2 * radius + skin;
+  const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(box_.width / reach)));
+  std::vector<std::vector<std::uint32_t>> column(columns);
+  listed_.resize(2 * std::size_t{count_});
   first_.clear();
   second_.clear();
-  for (auto* l : {&near_left_, &near_right_, &near_floor_, &near_lid_}) l->clear();
-  listed_x_.resize(count_);
-  listed_z_.resize(count_);
-  const double reach = 1 + skin_;
-  double low = 1e300, high = -1e300;
-  for (std::uint32_t i = 0; i < count_; ++i) low = std::min(low, disks_[i].z), high = std::max(high, disks_[i].z);
-  const auto columns = std::max<std::int64_t>(1, static_cast<std::int64_t>(box_.width / reach));
-  const double cell_x = box_.width / static_cast<double>(columns);
-  const auto rows = static_cast<std::int64_t>(std::min((high - low) / reach + 1, 4.0 * count_));
-  const double cell_z = std::max(reach, (high - low) / static_cast<double>(rows) * (1 + 1e-12));
-  std::vector<std::uint32_t> start(static_cast<std::size_t>(columns * rows) + 1, 0), order(count_), cell(count_);
-  const auto column_of = [&](double x) {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(x / cell_x)), 0, columns - 1);
-  };
   for (std::uint32_t i = 0; i < count_; ++i) {
-    if (box_.period > 0) disks_[i].x -= box_.period * std::floor(disks_[i].x / box_.period);
-    const std::int64_t row =
-        std::clamp<std::int64_t>(static_cast<std::int64_t>((disks_[i].z - low) / cell_z), 0, rows - 1);
-    cell[i] = static_cast<std::uint32_t>(row * columns + column_of(disks_[i].x));
-    ++start[cell[i] + 1];
-    listed_x_[i] = disks_[i].x;
-    listed_z_[i] = disks_[i].z - floor;
+    State& disk = disks_[i];
+    if (box_.period > 0) disk.x -= box_.period * std::floor(disk.x / box_.period);
+    put_pair(&listed_[2 * i], pair_at(&disk.x) - TwoLanes{0, floor});
+    const double at =
+        std::clamp(disk.x / box_.width * static_cast<double>(columns), 0.0, static_cast<double>(columns - 1));
+    column[static_cast<std::size_t>(at)].push_back(i);
   }
-  for (std::size_t c = 1; c < start.size(); ++c) start[c] += start[c - 1];
-  std::vector<std::uint32_t> fill(start.begin(), start.end() - 1);
-  for (std::uint32_t i = 0; i < count_; ++i) order[fill[cell[i]]++] = i;
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    const auto row = static_cast<std::int64_t>(cell[i]) / columns, column = static_cast<std::int64_t>(cell[i]) % columns;
-    for (std::int64_t r = std::max<std::int64_t>(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
-      for (std::int64_t dc = -1; dc <= 1; ++dc) {
-        std::int64_t c = column + dc;
-        if (box_.period > 0) {
-          c = (c + columns) % columns;
-        } else if (c < 0 || c >= columns) {
-          continue;
-        }
-        const auto at = static_cast<std::size_t>(r * columns + c);
-        for (std::uint32_t o = start[at]; o < start[at + 1]; ++o) {
-          const std::uint32_t k = order[o];
-          if (k <= i) continue;
-          double dx = disks_[k].x - disks_[i].x, dz = disks_[k].z - disks_[i].z;
-          if (box_.period > 0) dx -= box_.period * std::nearbyint(dx / box_.period);
-          if (dx * dx + dz * dz < reach * reach) first_.push_back(i), second_.push_back(k);
+  const auto lower = [this](std::uint32_t a, std::uint32_t b) { return disks_[a].z < disks_[b].z; };
+  for (auto& one : column) std::stable_sort(one.begin(), one.end(), lower);
+  for (std::size_t c = 0; c < columns; ++c) {
+    for (std::size_t other : {c, c + 1}) {
+      if (other == columns && !(box_.period > 0)) continue;
+      const auto& beside = column[other % columns];
+      std::size_t from = 0;
+      for (const std::uint32_t i : column[c]) {
+        while (from < beside.size() && disks_[beside[from]].z < disks_[i].z - reach) ++from;
+        for (std::size_t o = from; o < beside.size() && disks_[beside[o]].z < disks_[i].z + reach; ++o) {
+          const std::uint32_t k = beside[o];
+          if (other == c && k <= i) continue;
+          const TwoLanes d = gap_of(i, k);
+          if (!(d[0] * d[0] + d[1] * d[1] < reach * reach)) continue;
+          first_.push_back(place_of(i));
+          second_.push_back(place_of(k));
         }
       }
     }
-    const double near = 0.5 + 0.5 * skin_;
-    if (box_.period <= 0 && disks_[i].x < near) near_left_.push_back(i);
-    if (box_.period <= 0 && disks_[i].x > box_.width - near) near_right_.push_back(i);
-    if (disks_[i].z - floor < near) near_floor_.push_back(i);
-    // lid left out in the prototype
   }
-  while (first_.size() % 4 != 0) first_.push_back(count_), second_.push_back(count_ + 1);
-  until_check_ = 8;
-  active_first_ = first_;
-  active_second_ = second_;
+  interleave();
+  list_walls(floor);
+  until_check_ = steps_a_check;
 }
 
-void PressedBed::wall(std::vector<std::uint32_t>& near, double nx, double nz, double at, double wall_v, const Spring& s,
-                      bool is_floor) {
-  // (nx, nz) points from the wall into the box; at: its place along that
-  double total = 0, lost = 0;
-  for (std::uint32_t i : near) {
-    const PressedDisk& d = disks_[i];
-    const double gap = d.x * nx + d.z * nz - at - 0.5;
-    if (!(gap < 0)) continue;
-    const double v = d.vx * nx + d.vz * nz - wall_v;
-    const double f = -s.stiffness * gap - s.damping * v;
-    force_[2 * i] += f * nx;
-    force_[2 * i + 1] += f * nz;
-    total += f;
-    lost += s.damping * v * v;
+// Pairs of one disk stand apart: the sum of its forces need not wait for the pair before. And whole blocks of four.
+void PressedBed::interleave() {
+  constexpr std::size_t parts = 16;
+  const std::size_t pairs = first_.size(), part = (pairs + parts - 1) / parts;
+  active_first_.clear();
+  active_second_.clear();
+  for (std::size_t k = 0; k < part; ++k) {
+    for (std::size_t q = k; q < pairs; q += part) {
+      active_first_.push_back(first_[q]);
+      active_second_.push_back(second_[q]);
+    }
   }
-  if (is_floor) floor_force = total;
-  damped_lanes_[0] += lost;
+  while (active_first_.size() % 4 != 0) {
+    active_first_.push_back(place_of(count_));
+    active_second_.push_back(place_of(count_ + 1));
+  }
+  first_ = active_first_;
+  second_ = active_second_;
 }
 
-void PressedBed::forces(double floor, double floor_velocity) {
-  box_.period > 0 ? pair_forces<true>() : pair_forces<false>();
-  if (box_.period <= 0) {
-    wall(near_left_, 1, 0, 0, 0, side_, false);
-    wall(near_right_, -1, 0, -box_.width, 0, side_, false);
+void PressedBed::list_walls(double floor) {
+  const double near = radius + skin / 2;
+  for (auto* list : {&near_left_, &near_right_, &near_floor_, &near_lid_}) list->clear();
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const State& disk = disks_[i];
+    if (!(box_.period > 0) && disk.x < near) near_left_.push_back(i);
+    if (!(box_.period > 0) && disk.x > box_.width - near) near_right_.push_back(i);
+    if (disk.z - floor < near) near_floor_.push_back(i);
+    if (disk.z > box_.lid - near - 2 * skin) near_lid_.push_back(i);  // places are listed above the floor, which moves
   }
-  wall(near_floor_, 0, 1, floor, floor_velocity, floor_, true);
 }
+
+// Of all neighbours those that may touch before the next check.
+void PressedBed::choose_active(double dt) {
+  const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
+  const std::size_t pairs = first_.size();
+  const Lanes contact = all_lanes(4 * radius * radius);
+  active_first_.resize(pairs + 4);
+  active_second_.resize(pairs + 4);
+  std::size_t active = 0;
+  Lanes approaches{};
+  for (std::size_t p = 0; p < pairs; p += 4) {
+    Differences d = differences(disks_.data(), &first_[p], &second_[p]);
+    if (box_.period > 0) d.x = nearest_image(d.x, box_.period);
+    const Lanes squared = fused(d.x, d.x, d.z * d.z), closing = fused(d.x, d.vx, d.z * d.vz);
+    const LaneMask near = fused(all_lanes(-2 * margin), all_lanes(1), squared) < contact;
+    const LaneMask comes = fused(all_lanes(2 * ahead), closing, squared) < contact;
+    approaches += closing * closing;
+    for (std::size_t q = 0; q < 4; ++q) {
+      active_first_[active] = first_[p + q];
+      active_second_[active] = second_[p + q];
+      active += static_cast<std::size_t>((near[q] | comes[q]) & 1);
+    }
+  }
+  for (; active % 4 != 0; ++active) {
+    active_first_[active] = place_of(count_);
+    active_second_[active] = place_of(count_ + 1);
+  }
+  active_first_.resize(active);
+  active_second_.resize(active);
+  usual_approach_ = std::sqrt(sum_of(approaches) / static_cast<double>(std::max<std::size_t>(pairs, 1)));
+}
+
+void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
+  until_check_ = steps_a_check;
+  double farthest = 0, fastest = 0, squares = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const TwoLanes moved = pair_at(&disks_[i].x) - TwoLanes{0, floor.position} - pair_at(&listed_[2 * i]);
+    const TwoLanes speed = pair_at(&disks_[i].vx) - TwoLanes{0, floor.velocity};
+    farthest = std::max(farthest, moved[0] * moved[0] + moved[1] * moved[1]);
+    const double square = speed[0] * speed[0] + speed[1] * speed[1];
+    fastest = std::max(fastest, square);
+    squares += square;
+  }
+  fastest_ = std::sqrt(fastest);
+  mean_square_speed_ = squares / count_;
+  if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
+    list_pairs(floor.position);
+  } else {
+    choose_active(dt);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------
+// forces and steps
+
 template <bool periodic>
-void PressedBed::pair_forces() {
-  std::fill(force_.begin(), force_.end(), 0.0);
+void PressedBed::add_pair_forces() {
   const std::size_t pairs = active_first_.size();
-  const PressedDisk* const disks = disks_.data();
-  double* const force = force_.data();
-  const Lanes stiffness = all_lanes(0.5 * pair_.stiffness), damping = all_lanes(0.5 * pair_.damping);
-  const Lanes one = all_lanes(1);
-  Lanes lost = damped_lanes_, count{};
-  [[maybe_unused]] const double period = box_.period, inverse = period > 0 ? 1 / period : 0;
+  const State* const disks = disks_.data();
+  char* const force = reinterpret_cast<char*>(force_.data());
+  const Lanes stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping), one = all_lanes(1);
+  Lanes squares{}, count{};
+  const auto add = [force](std::uint32_t first, std::uint32_t second, TwoLanes f) {
+    auto* const a = reinterpret_cast<double*>(force + first);
+    auto* const b = reinterpret_cast<double*>(force + second);
+    put_pair(a, pair_at(a) - f);
+    put_pair(b, pair_at(b) + f);
+  };
   for (std::size_t p = 0; p < pairs; p += 4) {
     const std::uint32_t *i = &active_first_[p], *k = &active_second_[p];
-    Lanes dx, dz, dvx, dvz;
-    differences(disks, i, k, dx, dz, dvx, dvz);
-    if constexpr (periodic) {
-      const Lanes large = all_lanes(0x1.8p52);
-      dx = fused(all_lanes(-period), fused(dx, all_lanes(inverse), large) - large, dx);
-    }
-    const Lanes squared = fused(dx, dx, dz * dz);
-    const LaneMask touch = squared < one;
-    if (_mm256_testz_si256(reinterpret_cast<__m256i>(touch), reinterpret_cast<__m256i>(touch))) continue;
-    // of r = sqrt(1 - u), u small: 1 - r and 1 / r
-    const Lanes u = one - squared;
-    const Lanes overlap = u * fused(u, fused(u, fused(u, all_lanes(5.0 / 128), all_lanes(1.0 / 16)), all_lanes(0.125)), all_lanes(0.5));
-    const Lanes away = fused(u, fused(u, fused(u, fused(u, all_lanes(35.0 / 128), all_lanes(0.3125)), all_lanes(0.375)), all_lanes(0.5)), one);
-    const Lanes nx = dx * away, nz = dz * away;
-    const Lanes v = fused(dvx, nx, dvz * nz);
-    const Lanes fd = damping * v;
-    const Lanes f = unless(~touch, stiffness * overlap - fd);
-    lost += unless(~touch, fd * v);
+    Differences d = differences(disks, i, k);
+    if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
+    const Lanes u = one - fused(d.x, d.x, d.z * d.z);  // 1 - r^2
+    const LaneMask touch = u > all_lanes(0);
+    if (!any_of(touch)) continue;
+    // 1 - r and 1 / r of r = sqrt(1 - u), to 1e-10 for overlaps of 0.01 D
+    const Lanes overlap =
+        u * fused(u, fused(u, fused(u, all_lanes(5.0 / 128), all_lanes(1.0 / 16)), all_lanes(0.125)), all_lanes(0.5));
+    const Lanes inverse = fused(
+        u, fused(u, fused(u, fused(u, all_lanes(35.0 / 128), all_lanes(5.0 / 16)), all_lanes(0.375)), all_lanes(0.5)),
+        one);
+    const Lanes nx = d.x * inverse, nz = d.z * inverse, v = fused(d.vx, nx, d.vz * nz);
+    const Lanes f = unless(~touch, fused(stiffness, overlap, -(damping * v)));
+    squares += unless(~touch, v * v);
     count += unless(~touch, one);
     const Lanes fx = f * nx, fz = f * nz;
-    const Lanes low = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), high = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
-    const TwoLanes f0 = __builtin_shufflevector(low, low, 0, 1), f2 = __builtin_shufflevector(low, low, 2, 3),
-                   f1 = __builtin_shufflevector(high, high, 0, 1), f3 = __builtin_shufflevector(high, high, 2, 3);
-    const auto add = [force](std::uint32_t a, std::uint32_t b, TwoLanes f_) {
-      put_pair(force + 2 * a, pair_at(force + 2 * a) - f_);
-      put_pair(force + 2 * b, pair_at(force + 2 * b) + f_);
-    };
-    add(i[0], k[0], f0);
-    add(i[1], k[1], f1);
-    add(i[2], k[2], f2);
-    add(i[3], k[3], f3);
+    const Lanes even = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), odd = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
+    add(i[0], k[0], __builtin_shufflevector(even, even, 0, 1));
+    add(i[1], k[1], __builtin_shufflevector(odd, odd, 0, 1));
+    add(i[2], k[2], __builtin_shufflevector(even, even, 2, 3));
+    add(i[3], k[3], __builtin_shufflevector(odd, odd, 2, 3));
   }
-  damped_lanes_ = lost;
-  touching_ = count;
+  touching_ = sum_of(count);
+  pair_squares_ = sum_of(squares);
 }
 
-void PressedBed::step(const FloorMotion& floor, double now, double dt) {
-  ++steps;
-  const FloorMotion::Motion after = floor.motion(now, dt), before = floor.motion(now);
-  const TwoLanes weight = {0, -1}, dt2 = both(dt), half = both(0.5 * dt);
+auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
+                            TwoLanes velocity) const -> WallContacts {
+  const TwoLanes along = inward * pair_at(&disks_[i].x), flow = inward * velocity;
+  const double gap = along[0] + along[1] - place - radius;
+  if (!(gap < 0)) return {};
+  const double v = flow[0] + flow[1] - speed;
+  return {-spring.stiffness * gap - spring.damping * v, spring.damping * v * v};
+}
+
+// inward: from the wall into the box; place and speed of the wall that way.
+auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
+                                 const Spring& spring) -> WallContacts {
+  WallContacts contacts;
+  for (const std::uint32_t i : near) {
+    const WallContacts one = wall_force(i, inward, place, speed, spring, velocity_of(i));
+    put_pair(&force_[4 * i], fused(both(one.force), inward, pair_at(&force_[4 * i])));
+    contacts.force += one.force;
+    contacts.lost += one.lost;
+  }
+  return contacts;
+}
+
+void PressedBed::add_forces(const FloorMotion::Motion& floor) {
+  std::fill(force_.begin(), force_.end(), 0.0);
+  box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
+  loss_rate_ = pair_.damping * pair_squares_;
+  loss_rate_ += add_wall_forces(near_left_, TwoLanes{1, 0}, 0, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_right_, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_lid_, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
+  const WallContacts on_floor = add_wall_forces(near_floor_, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
+  loss_rate_ += on_floor.lost;
+  floor_force_ = on_floor.force;
+  floor_at_ = floor;
+}
+
+void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt) {
+  assert(dt > 0);
+  const TwoLanes weight = {0, -1}, half = both(0.5 * dt), halves = both(0.5 * (last_step_ + dt)), whole = both(dt);
   for (std::uint32_t i = 0; i < count_; ++i) {
-    double* const d = &disks_[i].x;
-    const TwoLanes a = pair_at(&force_[2 * i]) + weight, v = pair_at(d + 2);
-    put_pair(d, fused(dt2, fused(half, a, v), pair_at(d)));
-    put_pair(d + 2, fused(dt2, a, v));
+    double* const disk = &disks_[i].x;
+    const TwoLanes a = pair_at(&force_[4 * i]) + weight, v = fused(halves, a, pair_at(&halfway_[2 * i]));
+    put_pair(&halfway_[2 * i], v);
+    put_pair(disk, fused(whole, v, pair_at(disk)));
+    put_pair(disk + 2, fused(half, a, v));
   }
-  std::swap(force_, next_);
-  if (--until_check_ == 0) {
-    until_check_ = 8;
-    double farthest = 0, fastest = 0, sum = 0;
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      const PressedDisk& d = disks_[i];
-      const double dx = d.x - listed_x_[i], dz = d.z - after.position - listed_z_[i], vz = d.vz - after.velocity;
-      farthest = std::max(farthest, dx * dx + dz * dz);
-      fastest = std::max(fastest, d.vx * d.vx + vz * vz);
-      sum += d.vx * d.vx + vz * vz;
-    }
-    if (std::sqrt(farthest) + 8 * dt * std::sqrt(fastest) > 0.5 * skin_) list_pairs(after.position);
-    choose_active(dt, std::sqrt(sum / count_));
-  }
-  const double force_before = floor_force;
-  damped_lanes_ = Lanes{};
-  forces(after.position, after.velocity);
-  damped += dt * (damped_lanes_[0] + damped_lanes_[1] + damped_lanes_[2] + damped_lanes_[3]);
-  floor_work += 0.5 * (force_before + floor_force) * (after.position - before.position);
+  last_step_ = dt;
+  if (--until_check_ == 0) check(after, dt);
+  const double force_before = floor_force_, loss_before = loss_rate_;
+  add_forces(after);
+  floor_work_ += 0.5 * (force_before + floor_force_) * (after.position - before.position);
+  damped_ += 0.5 * (loss_before + loss_rate_) * dt;
+}
+
+void PressedBed::lie(const FloorMotion::Motion& floor) {
+  last_step_ = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    double* const d = &disks_[i].x;
-    put_pair(d + 2, fused(half, pair_at(&force_[2 * i]) - pair_at(&next_[2 * i]), pair_at(d + 2)));
+    const TwoLanes velocity = {0, floor.velocity};
+    put_pair(&halfway_[2 * i], velocity);
+    put_pair(&disks_[i].vx, velocity);
+    put_pair(&force_[4 * i], TwoLanes{0, 1 + floor.acceleration});
   }
+  floor_force_ = count_ * (1 + floor.acceleration);
+  loss_rate_ = 0;
 }
 
-void PressedBed::choose_active(double dt, double fastest) {
-  const double ahead = 2 * 8 * dt;
-  const double closer = ahead * fastest;
-  active_first_.resize(first_.size() + 4);
-  active_second_.resize(first_.size() + 4);
-  std::size_t n = 0;
-  const double period = box_.period, inverse = period > 0 ? 1 / period : 0;
-  for (std::size_t p = 0; p < first_.size(); p += 4) {
-    Lanes dx, dz, dvx, dvz;
-    differences(disks_.data(), &first_[p], &second_[p], dx, dz, dvx, dvz);
-    const Lanes large = all_lanes(0x1.8p52);
-    dx = fused(all_lanes(-period), fused(dx, all_lanes(inverse), large) - large, dx);
-    const Lanes squared = fused(dx, dx, dz * dz), closing = fused(dx, dvx, dz * dvz);
-    // r^2 later, if both fly on, and a margin
-    const LaneMask near = fused(all_lanes(2 * ahead), closing, squared) < all_lanes(1 + 2 * closer);
-    const LaneMask near_now = squared < all_lanes(1 + 2 * closer);
-    const int bits = _mm256_movemask_pd(reinterpret_cast<Lanes>(near | near_now));
-    for (unsigned q = 0; q < 4; ++q) {
-      active_first_[n] = first_[p + q];
-      active_second_[n] = second_[p + q];
-      n += bits >> q & 1;
-    }
-  }
-  while (n % 4 != 0) active_first_[n] = count_, active_second_[n] = count_ + 1, ++n;
-  active_first_.resize(n);
-  active_second_.resize(n);
-  active_total += n;
+void PressedBed::carry(const FloorMotion::Motion& before, const FloorMotion::Motion& after) {
+  const double rise = after.position - before.position;
+  for (std::uint32_t i = 0; i < count_; ++i) disks_[i].z += rise;
+  floor_work_ += count_ * (rise + 0.5 * (after.velocity * after.velocity - before.velocity * before.velocity));
+  floor_at_ = after;
+  lie(after);
 }
 
-std::uint32_t PressedBed::touching() const {
-  std::uint32_t n = 0;
+void PressedBed::wake(const FloorMotion::Motion& floor) {
+  list_pairs(floor.position);
+  add_forces(floor);
+}
+
+double PressedBed::approach() const { return std::sqrt(pair_squares_ / std::max(touching_, 1.0)); }
+
+double PressedBed::compressed() const {
+  double sum = 0;
+  const auto add = [&sum](double overlap, const Spring& spring) {
+    if (overlap > 0) sum += 0.5 * spring.stiffness * overlap * overlap;
+  };
   for (std::size_t p = 0; p < first_.size(); ++p) {
-    double dx = disks_[second_[p]].x - disks_[first_[p]].x, dz = disks_[second_[p]].z - disks_[first_[p]].z;
-    if (box_.period > 0) dx -= box_.period * std::nearbyint(dx / box_.period);
-    n += dx * dx + dz * dz < 1;
+    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+    if (i >= count_) continue;
+    const TwoLanes d = gap_of(i, k);
+    add(2 * radius - std::sqrt(d[0] * d[0] + d[1] * d[1]), pair_);
   }
-  return n;
-}
-double PressedBed::largest_overlap() const {
-  double worst = 0;
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    double dx = disks_[second_[p]].x - disks_[first_[p]].x, dz = disks_[second_[p]].z - disks_[first_[p]].z;
-    if (box_.period > 0) dx -= box_.period * std::nearbyint(dx / box_.period);
-    worst = std::max(worst, 1 - std::sqrt(dx * dx + dz * dz));
-  }
-  return worst;
+  for (const std::uint32_t i : near_left_) add(radius - disks_[i].x, side_);
+  for (const std::uint32_t i : near_right_) add(disks_[i].x + radius - box_.width, side_);
+  for (const std::uint32_t i : near_lid_) add(disks_[i].z + radius - box_.lid, lid_);
+  for (const std::uint32_t i : near_floor_) add(floor_at_.position + radius - disks_[i].z, floor_);
+  return sum;
 }
 
-// moves apart what overlaps
-void PressedBed::separate(double floor) {
-  for (int sweep = 0; sweep < 1000; ++sweep) {
+void PressedBed::separate(double floor, double most, int sweeps) {
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
     double worst = 0;
-    for (std::uint32_t i : near_floor_) {
-      const double o = floor + 0.5 - disks_[i].z;
-      if (o > 0) disks_[i].z += o, worst = std::max(worst, o);
-    }
-    for (std::uint32_t i : near_left_) {
-      const double o = 0.5 - disks_[i].x;
-      if (o > 0) disks_[i].x += o, worst = std::max(worst, o);
-    }
-    for (std::uint32_t i : near_right_) {
-      const double o = disks_[i].x + 0.5 - box_.width;
-      if (o > 0) disks_[i].x -= o, worst = std::max(worst, o);
-    }
+    const auto excess = [&worst](double overlap) {
+      worst = std::max(worst, overlap);
+      return std::max(overlap, 0.0);
+    };
+    for (const std::uint32_t i : near_floor_) disks_[i].z += excess(floor + radius - disks_[i].z);
+    for (const std::uint32_t i : near_lid_) disks_[i].z -= excess(disks_[i].z + radius - box_.lid);
+    for (const std::uint32_t i : near_left_) disks_[i].x += excess(radius - disks_[i].x);
+    for (const std::uint32_t i : near_right_) disks_[i].x -= excess(disks_[i].x + radius - box_.width);
     for (std::size_t p = 0; p < first_.size(); ++p) {
-      PressedDisk &a = disks_[first_[p]], &b = disks_[second_[p]];
-      double dx = b.x - a.x;
-      const double dz = b.z - a.z;
-      if (box_.period > 0) dx -= box_.period * std::nearbyint(dx / box_.period);
-      const double s = dx * dx + dz * dz;
-      if (s >= 1) continue;
-      const double r = std::sqrt(s), o = 1 - r;
-      worst = std::max(worst, o);
-      const double m = 0.5 * (o + 1e-15) / r;
-      a.x -= m * dx, a.z -= m * dz, b.x += m * dx, b.z += m * dz;
+      const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+      if (i >= count_) continue;
+      const TwoLanes d = gap_of(i, k);
+      const double squared = d[0] * d[0] + d[1] * d[1];
+      if (squared >= 4 * radius * radius) continue;
+      const double distance = std::sqrt(squared);
+      const TwoLanes move = both(0.5 * overdone * excess(2 * radius - distance) / distance) * d;
+      put_pair(&disks_[i].x, pair_at(&disks_[i].x) - move);
+      put_pair(&disks_[k].x, pair_at(&disks_[k].x) + move);
     }
-    if (worst < 1e-13) break;
+    if (worst <= most) return;
   }
 }
 
 }  // namespace shakebed::sim
-namespace shakebed::sim {
-double PressedBed::stored() const {
-  double sum = 0;
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    double dx = disks_[second_[p]].x - disks_[first_[p]].x, dz = disks_[second_[p]].z - disks_[first_[p]].z;
-    if (box_.period > 0) dx -= box_.period * std::nearbyint(dx / box_.period);
-    const double o = std::max(0.0, 1 - std::sqrt(dx * dx + dz * dz));
-    sum += 0.5 * 0.5 * pair_.stiffness * o * o;
-  }
-  for (std::uint32_t i : near_left_) { const double o = std::max(0.0, 0.5 - disks_[i].x); sum += 0.5 * side_.stiffness * o * o; }
-  for (std::uint32_t i : near_right_) { const double o = std::max(0.0, disks_[i].x + 0.5 - box_.width); sum += 0.5 * side_.stiffness * o * o; }
-  return sum;
-}
-}
