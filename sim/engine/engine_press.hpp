@@ -209,15 +209,20 @@ bool Engine<Space, Rule, Sizes>::press_until(double until) {
   return true;
 }
 
-// What a watcher is told of a step: the momenta of its contacts, and flights from where it ends.
+// What a watcher is told of a step: the momenta of its contacts, and flights from where it ends. In a sleeping bed all
+// forces are as large as the floor's.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::tell_pressed(double step) const {
   if (is_pressed_) {
+    double on_floor = 0;
+    pressed_.each_wall_contact(
+        [&](std::uint32_t, bool is_floor, TwoLanes force) { on_floor += is_floor ? force[1] : 0; });
+    if (is_asleep_ && on_floor > 0) step *= pressed_.floor_force() / on_floor;
     pressed_.each_contact([&](TwoLanes place, TwoLanes to, TwoLanes force) {
       watcher_->pressed(time(), place[0], place[1], to[0], to[1], step * force[0], step * force[1]);
     });
-    pressed_.each_wall_contact([&](std::uint32_t i, bool on_floor, TwoLanes force) {
-      watcher_->touched_wall(time(), labels_[i], on_floor, pressed_.at(i, 0).z, step * force[0], step * force[1]);
+    pressed_.each_wall_contact([&](std::uint32_t i, bool is_floor, TwoLanes force) {
+      watcher_->touched_wall(time(), labels_[i], is_floor, pressed_.at(i, 0).z, step * force[0], step * force[1]);
     });
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
