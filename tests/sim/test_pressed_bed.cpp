@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <numbers>
+#include <stdexcept>
 #include <vector>
 
 #include "sim/engine/pressed_bed.hpp"
@@ -304,6 +305,29 @@ TEST(PressedBed, LeavesWellShakenBedsAlone) {
     b->advance_to(20 * period);
     expect_same_bytes(*a, *b);
   }
+}
+
+// The last frame of a bed may be the start of another one.
+TEST(PressedBed, MayBeTheStartOfAnotherBed) {
+  Scene scene = pressed_scene(1.6);
+  const auto bed = simulate(scene);
+  Snapshot at;
+  double overlap = 0;
+  for (double time = 10 * period; overlap < 1e-6; time += 0.05) {
+    bed->advance_to(time);
+    bed->snapshot(at);
+    overlap = bed->largest_overlap();
+  }
+  PlacedStart start;
+  for (std::size_t i = 0; i < at.x.size(); ++i)
+    start.disks.push_back({at.x[i], at.z[i] - at.floor_position, at.vx[i], at.vz[i], 0, 0});
+  scene.start = start;
+  const auto next = simulate(scene);
+  EXPECT_LT(next->largest_overlap(), 1e-12);
+  start.disks[0].x = start.disks[1].x;
+  start.disks[0].z = start.disks[1].z + 0.9;
+  scene.start = start;
+  EXPECT_THROW(simulate(scene), std::runtime_error);
 }
 
 }  // namespace
