@@ -12,14 +12,15 @@
 
 namespace shakebed::sim {
 
-// What was measured: 500 disks, e = 0.9, Gamma = 1.5, 30.6 D wide; soft spheres of 7e-4 have T_x = 0.0075 m g D, events
-// alone 0.0080. tests/bench/README.md has the tables.
+// What was measured: T_x [m g D] of 500 disks, e = 0.9, Gamma = 1.5, 30.6 D wide. Soft spheres with contacts of 7e-4
+// have 0.0074(1) to 0.0076(2), events alone 0.0080(2). tests/bench/README.md has the tables.
 
-// The longest contact time of a pressed bed [sqrt(D/g)]; 100 us for 2 mm disks. 0.0035 gives T_x 0.0081 for 0.0083, and
-// costs half as much again; at Gamma = 1.2 both give what soft spheres do.
+// The longest contact time of a pressed bed [sqrt(D/g)]; 100 us for 2 mm disks.
 inline constexpr double pressed_contact_time = 0.007;
-// How far disks move in a contact time [D] while it is shorter than that. With 2e-4 the bed is 10 % hotter.
-inline constexpr double pressed_travel = 1.4e-4;
+// How far disks approach in a contact time [D], while it is shorter than that: T_x 0.0080(2) for 0.0090(2) with 2e-4.
+inline constexpr double pressed_travel = 1e-4;
+// How far they move against the floor in a contact time [D]: 0.0080(2) for 0.0085(3) with 5e-4.
+inline constexpr double pressed_drift = 3e-4;
 // Contacts quicker than this are left to events; so they are in a bed's first period, a packing that the floor hits.
 inline constexpr double least_contact_time = 2e-4, least_contact_time_at_start = 1e-3;
 // Contacts a disk and contact time from which on a bed on the floor is taken for pressed, and one anywhere: rows that
@@ -154,9 +155,12 @@ void Engine<Space, Rule, Sizes>::end_press() {
 // Sleeps, wakes, softens or ends, by what the bed does. After a step.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
-  const double quickest = pressed_travel / std::max(pressed_.approach(), pressed_travel / pressed_contact_time);
-  if (quickest > press_contact_time_) {
-    press_contact_time_ = std::min(quickest, softening * press_contact_time_);
+  const double approach = pressed_.approach(), speed = std::sqrt(pressed_.mean_square_speed());
+  double contact_time = pressed_contact_time;
+  if (approach * contact_time > pressed_travel) contact_time = pressed_travel / approach;
+  if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
+  if (contact_time > press_contact_time_) {
+    press_contact_time_ = std::min(contact_time, softening * press_contact_time_);
     pressed_.soften(press_contact_time_);
   }
   const bool falls_away = floor.acceleration + gravity_ < 0 && pressed_.floor_force() == 0;
