@@ -21,8 +21,10 @@ inline constexpr double pressed_contact_time = 0.007;
 inline constexpr double pressed_travel = 1e-4;
 // How far they move against the floor in a contact time [D]: 0.0080(2) for 0.0085(3) with 5e-4.
 inline constexpr double pressed_drift = 3e-4;
-// Contacts quicker than this are left to events; so they are in a bed's first period, a packing that the floor hits.
-inline constexpr double least_contact_time = 2e-4, least_contact_time_at_start = 1e-3;
+// Quicker contacts are left to events, unless rows have locked; so they are in a bed's first period, a packing that the
+// floor hits.
+inline constexpr double least_contact_time = 3e-4, least_contact_time_at_start = 1e-3,
+                        least_contact_time_of_locked = 1e-4;
 // Contacts a disk and contact time from which on a bed on the floor is taken for pressed, and one anywhere: rows that
 // lock have thousands of them. With 0.2 on the floor the bed is 5 % hotter, as hard disks are while they land.
 inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
@@ -92,15 +94,16 @@ void Engine<Space, Rule, Sizes>::ask_press() {
   const auto on_floor = static_cast<double>(counters_.floor_collisions - floor_contacts_when_asked_);
   contacts_when_asked_ = counters_.collisions();
   floor_contacts_when_asked_ = counters_.floor_collisions;
-  const bool lies = on_floor >= least_on_floor * width_ && gravity_ + floor_.motion(now_).acceleration > 0;
-  const double crowd = lies ? pressed_crowd : locked_crowd;
-  if (contacts * pressed_contact_time < crowd * count_ * passed) return;
+  const auto crowded = [&](double contact_time, double crowd) {
+    return contacts * contact_time >= crowd * count_ * passed;
+  };
+  if (!crowded(pressed_contact_time, pressed_crowd)) return;
   const std::optional<double> approach = approach_of_neighbours();
   if (!approach) return;
   const double contact_time = std::min(pressed_contact_time, pressed_travel / *approach);
-  if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time) ||
-      contacts * contact_time < crowd * count_ * passed)
-    return;
+  const bool lies = on_floor >= least_on_floor * width_ && gravity_ + floor_.motion(now_).acceleration > 0;
+  if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time_of_locked)) return;
+  if (!crowded(contact_time, lies && contact_time >= least_contact_time ? pressed_crowd : locked_crowd)) return;
   press_contact_time_ = contact_time;
   press_wanted_ = true;
 }
