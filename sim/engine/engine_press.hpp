@@ -97,11 +97,13 @@ void Engine<Space, Rule, Sizes>::ask_press() {
   const auto crowded = [&](double contact_time, double crowd) {
     return contacts * contact_time >= crowd * count_ * passed;
   };
-  if (!crowded(pressed_contact_time, pressed_crowd)) return;
+  const bool pushed = on_floor >= least_on_floor * width_;
+  if (!crowded(pressed_contact_time, pushed ? pressed_crowd : locked_crowd)) return;
+  const bool lies = pushed && gravity_ + floor_.motion(now_).acceleration > 0;
+  if (!crowded(pressed_contact_time, lies ? pressed_crowd : locked_crowd)) return;
   const std::optional<double> approach = approach_of_neighbours();
   if (!approach) return;
   const double contact_time = std::min(pressed_contact_time, pressed_travel / *approach);
-  const bool lies = on_floor >= least_on_floor * width_ && gravity_ + floor_.motion(now_).acceleration > 0;
   if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time_of_locked)) return;
   if (!crowded(contact_time, lies && contact_time >= least_contact_time ? pressed_crowd : locked_crowd)) return;
   press_contact_time_ = contact_time;

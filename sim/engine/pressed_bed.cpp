@@ -73,8 +73,8 @@ std::uint32_t place_of(std::uint32_t i) { return i * static_cast<std::uint32_t>(
 
 PressedBed::Spring PressedBed::spring_of(const Surface& surface) {
   const double e = surface.restitution;
-  double low = 0, high = e < 1 ? 1 - 2 * std::log(e) : 0;
-  for (int halving = 0; halving < 50; ++halving) {
+  double low = 0, high = 1 - 2 * std::log(e);
+  for (int halving = 0; e < 1 && halving < 50; ++halving) {
     const double middle = 0.5 * (low + high);
     (share_lost(middle) < 1 - e * e ? low : high) = middle;
   }
@@ -85,8 +85,11 @@ void PressedBed::set_up(const Box& box, const Surfaces& surfaces) {
   box_ = box;
   const Spring pair = spring_of(surfaces.disks);
   const Spring half{0.5 * pair.stiffness, 0.5 * pair.damping};  // of their reduced mass
+  const auto spring_on = [&](const Surface& wall) {
+    return wall.restitution == surfaces.disks.restitution ? pair : spring_of(wall);
+  };
   of_unit_time_ =
-      std::array<Spring, 4>{half, spring_of(surfaces.sides), spring_of(surfaces.floor), spring_of(surfaces.lid)};
+      std::array<Spring, 4>{half, spring_on(surfaces.sides), spring_on(surfaces.floor), spring_on(surfaces.lid)};
 }
 
 void PressedBed::soften(double contact_time) {
