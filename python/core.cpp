@@ -186,7 +186,9 @@ py::dict ledger(const sim::EnergyLedger& energy) {
   out["initial"] = energy.initial;
   out["kinetic"] = energy.kinetic;
   out["potential"] = energy.potential;
+  out["compressed"] = energy.compressed;
   out["dissipated"] = energy.dissipated;
+  out["step_error"] = energy.step_error;
   out["floor_work"] = energy.floor_work;
   out["bath_work"] = energy.bath_work;
   out["imbalance"] = energy.imbalance();

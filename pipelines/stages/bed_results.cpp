@@ -94,13 +94,16 @@ class BedStatement {
   void counts() {
     const std::string ledger = "/energy_ledger/";
     list_.text(ledger + "unit", "unit of the energies");
-    const std::pair<const char*, const char*> terms[] = {{"initial", "energy at the start"},
-                                                         {"kinetic", "kinetic energy at the end"},
-                                                         {"potential", "potential energy at the end"},
-                                                         {"dissipated", "energy lost in contacts"},
-                                                         {"floor_work", "work of the floor"},
-                                                         {"bath_work", "work of the bath"},
-                                                         {"imbalance", "what the ledger does not account for"}};
+    const std::pair<const char*, const char*> terms[] = {
+        {"initial", "energy at the start"},
+        {"kinetic", "kinetic energy at the end"},
+        {"potential", "potential energy at the end"},
+        {"compressed", "energy of springs in a pressed bed at the end"},
+        {"dissipated", "energy lost in contacts"},
+        {"step_error", "energy lost by the time steps of a pressed bed"},
+        {"floor_work", "work of the floor"},
+        {"bath_work", "work of the bath"},
+        {"imbalance", "what the ledger does not account for"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);
     list_.number("/collisions", "1", "contacts of all kinds");
     list_.number("/disk_collisions", "1", "contacts between two disks");
@@ -121,7 +124,8 @@ class BedStatement {
                    given_if(bed_.material, "\"disks\" name a \"material\""));
     list_.number("/events", "1", "events of all kinds");
     list_.number("/periods", "1", "periods over which the bed was measured");
-    list_.quantity("/max_overlap", "D", "largest overlap of two disks, by rounding");
+    list_.quantity("/max_overlap", "D",
+                   "largest overlap of two disks at the end: rounding, or springs of a pressed bed");
   }
 
   void judgement() {

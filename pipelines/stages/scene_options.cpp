@@ -128,6 +128,11 @@ void describe_disks(Fields& f, DiskOptions& d) {
       "rests", d.rests,
       {.help = "a dissipative bed under gravity that has come to rest lies on the floor and moves with it until the "
                "floor falls away; false: it goes on in ever smaller contacts, at up to a thousand times the cost"});
+  f.boolean(
+      "presses", d.presses,
+      {.help = "a bed of equal smooth dissipative disks goes on as one of soft disks (linear springs and dashpots, "
+               "contacts of 0.007 sqrt(D/g) at most) while it is pressed on the floor; false: as hard disks, at up "
+               "to a thousand times the cost. It applies to constant restitutions of at least 0.3, without a bath"});
   f.object<SecondSpeciesOptions>(
       "second", d.second,
       [](Fields& g, SecondSpeciesOptions& s) {
@@ -456,6 +461,7 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   const double length = length_unit(), time = time_unit(), speed = length / time;
   sim::Scene scene;
   scene.rests = disks_.rests;
+  scene.presses = disks_.presses;
   scene.seed = seed;
   if (gravity_) scene.gravity = sim::UniformGravity{};
 

@@ -36,7 +36,7 @@ struct DiskOptions {
   SurfaceOptions surface;
   Inertia inertia = Inertia::disk;
   std::optional<double> contact_duration;
-  bool rests = true;
+  bool rests = true, presses = true;
   std::optional<SecondSpeciesOptions> second;
 };
 

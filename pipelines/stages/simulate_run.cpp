@@ -189,7 +189,9 @@ Json BedRun::results(const SceneOptions& options) const {
                           {"initial", energy.initial},
                           {"kinetic", energy.kinetic},
                           {"potential", energy.potential},
+                          {"compressed", energy.compressed},
                           {"dissipated", energy.dissipated},
+                          {"step_error", energy.step_error},
                           {"floor_work", energy.floor_work},
                           {"bath_work", energy.bath_work},
                           {"imbalance", energy.imbalance()}};

@@ -265,7 +265,10 @@ class Bed:
 
     @property
     def energy(self) -> dict[str, float]:
-        """Where the energy went, in m g D: kinetic + potential + dissipated - floor_work - bath_work = initial."""
+        """Where the energy went, in m g D.
+
+        kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
+        """
         return self._bed.energy()
 
     @property
@@ -454,7 +457,10 @@ class Simulation:
 
     @property
     def energy(self) -> dict[str, float]:
-        """Where the energy went, in m g D: kinetic + potential + dissipated - floor_work - bath_work = initial."""
+        """Where the energy went, in m g D.
+
+        kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
+        """
         return self._stepper.energy()
 
     @property

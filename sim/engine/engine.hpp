@@ -14,6 +14,7 @@
 // So a run continued from a checkpoint taken there gives the same bytes as one that was never stopped.
 //
 // Large periodic beds go on tile by tile: engine_tiles.hpp. Beds that lie on the floor rest there: engine_rest.hpp.
+// Beds that are pressed on it go on as soft disks: engine_press.hpp.
 #pragma once
 
 #include <algorithm>
@@ -46,6 +47,7 @@
 #include "sim/engine/neighbour_lists.hpp"
 #include "sim/engine/overlap.hpp"
 #include "sim/engine/policies.hpp"
+#include "sim/engine/pressed_bed.hpp"
 #include "sim/engine/random.hpp"
 #include "sim/engine/restitution.hpp"
 #include "sim/engine/shell_grid.hpp"
@@ -76,6 +78,7 @@ class Engine final : public Simulation {
   EnergyLedger energy() const override;
   Counters counters() const override { return counters_; }
   [[gnu::cold]] double largest_overlap() const override;
+  double allowed_overlap() const override;
   bool foresees_contacts() const override;
   [[gnu::cold]] std::size_t bytes() const override;
   [[gnu::cold]] std::vector<std::uint8_t> checkpoint() const override;
@@ -212,6 +215,7 @@ class Engine final : public Simulation {
   // --- rest: engine_rest.hpp
   static constexpr bool rests_apply = Space::falls && Rule::dissipates;
   void plan_rest(bool wanted);
+  void look_again();
   void act_rest();
   bool is_calm(const FloorMotion::Motion& floor);
   void lay_down(const FloorMotion::Motion& floor);
@@ -227,6 +231,25 @@ class Engine final : public Simulation {
   bool is_supported(std::uint32_t i, double floor);
   bool is_at_rest(std::uint32_t i) const { return rest_height_[i] < never; }
   double energy_of(std::uint32_t i, TwoLanes velocity) const;
+
+  // --- press: engine_press.hpp
+  static constexpr bool press_applies = rests_apply && !Rule::spins && Sizes::equal;
+  void plan_press(bool wanted);
+  void ask_press();
+  std::optional<double> approach_of_neighbours() const;
+  void begin_press();
+  void go_on_pressed();
+  void write_down_pressed();
+  void end_press();
+  void check_press(const FloorMotion::Motion& floor);
+  bool press_until(double until);
+  FloorMotion::Motion press_on(const FloorMotion::Motion& before, double next);
+  void tell_pressed(double step) const;
+  Motion motion_now(std::uint32_t i) const {
+    if (!is_pressed_) return motion_at(disks_[i], now_);
+    const PressedBed::State state = pressed_.at(i, now_ - pressed_to_);
+    return {TwoLanes{state.x, state.z}, TwoLanes{state.vx, state.vz}};
+  }
 
   // --- tiles
   static constexpr bool tiles_apply = Space::wraps_x && Space::wraps_z && !Rule::dissipates;
@@ -319,8 +342,21 @@ class Engine final : public Simulation {
   std::uint32_t resting_ = 0;
   bool woken_ = false;                        // a disk has lost its rest, and others perhaps their support
   double rest_at_ = never, look_at_ = never;  // the next hop or look; the next look
+  bool rests_ = false;
   double rest_period_ = 1;
   std::uint64_t contacts_at_look_ = 0;
+
+  // --- press
+  PressedBed pressed_;  // while is_pressed_ the disks are there; their records are of no use
+  bool presses_ = false, is_pressed_ = false, is_asleep_ = false;
+  bool press_wanted_ = false;  // events end here
+  double pressed_to_ = 0;      // the end of the last step
+  double press_contact_time_ = 1;
+  double released_at_ = never;      // since when the floor has fallen away, since the start
+  double energy_when_pressed_ = 0;  // when pressed_ was begun, and its springs
+  double step_error_ = 0;           // of the ledger, before that
+  double asked_at_ = 0;
+  std::uint64_t contacts_when_asked_ = 0, floor_contacts_when_asked_ = 0, events_to_ask_ = 1;
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
@@ -348,6 +384,7 @@ class Engine final : public Simulation {
 #include "sim/engine/engine_flight.hpp"
 #include "sim/engine/engine_loop.hpp"
 #include "sim/engine/engine_prediction.hpp"
+#include "sim/engine/engine_press.hpp"
 #include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_shells.hpp"
 #include "sim/engine/engine_state.hpp"

@@ -34,6 +34,7 @@ bool Engine<Space, Rule, Sizes>::foresees_contacts_of(std::uint32_t i) const {
 
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::foresees_contacts() const {
+  if (is_pressed_) return true;  // there are no events
   for (std::uint32_t i = 0; i < count_; ++i) {
     if (!foresees_contacts_of(i)) return false;
   }

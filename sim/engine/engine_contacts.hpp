@@ -87,7 +87,8 @@ void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Moti
   if constexpr (Space::wraps_x || Space::wraps_z)
     d += Period::to_nearest(period_x_, period_z_, pair_at(&disks_[j].x) - pair_at(&disks_[i].x));
   const TwoLanes dv = second.velocity - first.velocity;
-  assert(std::abs(std::sqrt(d[0] * d[0] + d[1] * d[1]) - sizes_.contact_distance(i, j)) < asserted_rounding);
+  assert(std::abs(std::sqrt(d[0] * d[0] + d[1] * d[1]) - sizes_.contact_distance(i, j)) <
+         std::max(allowed_overlap(), asserted_rounding));
 
   double restitution = 1;
   bool elastic = true;

@@ -62,6 +62,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   initial_energy_ = kinetic_energy() + potential_energy();
   unusual_ = disk_surface_.varies();
   plan_rest(scene.rests);
+  plan_press(scene.presses);
   begin_interval();
 }
 

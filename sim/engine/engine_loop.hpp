@@ -46,14 +46,18 @@ template <class Space, class Rule, class Sizes>
     if (now_ < until) return false;
     events_to_return_ = 1;  // of the events at `until` none is left to the next call
   }
-  const std::uint64_t events = std::min(events_to_check_, events_to_return_);
+  if constexpr (press_applies) {
+    if (events_to_ask_ == 0) ask_press();
+  }
+  const std::uint64_t events = std::min({events_to_check_, events_to_return_, events_to_ask_});
   events_to_check_ -= events;
+  events_to_ask_ -= events;
   events_to_return_ -= events;
   events_to_pause_ = events + 1;
-  return true;
+  return !press_wanted_;
 }
 
-// False where it returns for its number of events.
+// False where it returns for its number of events, or because the bed is to go on as a pressed one.
 template <class Space, class Rule, class Sizes>
 template <bool watched>
 bool Engine<Space, Rule, Sizes>::process_until(double until) {
@@ -78,6 +82,7 @@ bool Engine<Space, Rule, Sizes>::process_until(double until) {
   settle();
   now_ = until;
   events_to_check_ += events_to_pause_;  // what was not used
+  events_to_ask_ += events_to_pause_;
   events_to_return_ += events_to_pause_;
   return true;
 }
@@ -177,10 +182,19 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
     if (!(goal > now_)) return true;
     const double until = std::min({goal, synchronise_at_, bath_at_, rest_at_});
     bool arrived = true;
-    if (tiles_.empty()) {
+    if (is_pressed_) {
+      if constexpr (press_applies) arrived = press_until(until);
+      if (arrived && now_ < until) continue;
+    } else if (tiles_.empty()) {
       arrived = watcher_ == nullptr ? process_until<false>(until) : process_until<true>(until);
     } else if constexpr (tiles_apply) {
       arrived = process_tiles_until(until);
+    }
+    if constexpr (press_applies) {
+      if (press_wanted_) {
+        begin_press();
+        continue;
+      }
     }
     if (!arrived) return false;
     if constexpr (rests_apply) {

@@ -40,10 +40,17 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::plan_rest(bool wanted) {
   if constexpr (rests_apply) {
     rest_height_.assign(count_, never);
-    if (!wanted || contact_duration_ <= 0 || !std::holds_alternative<NoBath>(bath_)) return;
     rest_period_ = std::min(floor_.period(), longest_rest_period);
-    rest_at_ = look_at_ = rest_period_ / looks_a_period;
+    rests_ = wanted && contact_duration_ > 0 && std::holds_alternative<NoBath>(bath_);
+    look_again();
   }
+}
+
+// Looks at the bed go on from now on.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::look_again() {
+  contacts_at_look_ = counters_.collisions();
+  if (rests_) rest_at_ = look_at_ = now_ + rest_period_ / looks_a_period;
 }
 
 // For how long from now on, `horizon` at most, the floor presses on what lies on it; 0 if it does not.

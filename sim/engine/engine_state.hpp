@@ -9,6 +9,12 @@ void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
   if constexpr (tiles_apply) {  // a watcher is given everything in the order of time
     if (watcher != nullptr && !tiles_.empty()) leave_tiles();
   }
+  if constexpr (press_applies) {
+    if (is_pressed_ && watcher != nullptr) {
+      tell_pressed(0);
+      return;
+    }
+  }
   tell_all();
 }
 
@@ -38,7 +44,7 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.vz.resize(count_);
   out.spin.resize(spins_.size());
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Motion motion = motion_at(disks_[i], now_);
+    const Motion motion = motion_now(i);
     const std::uint32_t label = labels_[i];
     out.x[label] = Space::wraps_x ? period_x_.wrapped(motion.x()) : motion.x();
     out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
@@ -69,7 +75,7 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::kinetic_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const Motion motion = motion_at(disks_[i], now_);
+    const Motion motion = motion_now(i);
     const long double vx = motion.vx(), vz = motion.vz();
     sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
     if constexpr (Rule::spins) {
@@ -83,13 +89,24 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
 template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
-  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_at(disks_[i], now_).z();
+  for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_now(i).z();
   return static_cast<double>(sum);
 }
 
 template <class Space, class Rule, class Sizes>
 EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
-  return {initial_energy_, kinetic_energy(), potential_energy(), dissipated_, floor_work_, bath_work_};
+  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,
+                      dissipated_,     step_error_,      floor_work_,        bath_work_};
+  if (!is_pressed_) return ledger;
+  const double later = now_ - pressed_to_;
+  const double work =
+      pressed_.floor_work() + pressed_.floor_force() * (floor_.position(now_) - floor_.position(pressed_to_));
+  const double damped = pressed_.damped() + pressed_.loss_rate() * later;
+  ledger.compressed = pressed_.compressed();
+  ledger.floor_work += work;
+  ledger.dissipated += damped;
+  ledger.step_error += energy_when_pressed_ + work - damped - (ledger.kinetic + ledger.potential + ledger.compressed);
+  return ledger;
 }
 
 template <class Space, class Rule, class Sizes>
@@ -97,6 +114,11 @@ double Engine<Space, Rule, Sizes>::largest_overlap() const {
   Snapshot here;
   snapshot(here);
   return sim::largest_overlap(here, properties().radius, period_x_.length, period_z_.length);
+}
+
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::allowed_overlap() const {
+  return is_pressed_ || step_error_ != 0 ? soft_overlap : hard_overlap;
 }
 
 template <class Space, class Rule, class Sizes>

@@ -4,11 +4,16 @@
 
 namespace shakebed::sim {
 
+inline constexpr std::uint64_t seldom = std::numeric_limits<std::uint64_t>::max() / 2;
 inline constexpr double longest_interval = 64;  // between synchronisations, unless the floor's period is longer
 
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::synchronise() {
   ++counters_.synchronisations;
+  const bool was_pressed = is_pressed_;
+  if constexpr (press_applies) {
+    if (was_pressed) write_down_pressed();
+  }
   for (std::uint32_t i = 0; i < count_; ++i) {
     bring_forward(i);
     disks_[i].own_time = 0;
@@ -18,6 +23,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   bath_at_ -= now_;
   rest_at_ -= now_;
   look_at_ -= now_;
+  pressed_to_ -= now_;
   assert(now_ == synchronise_at_ && pending_[0].disk == nothing_pending);
   const double elapsed = now_;
   intervals_done_ += intervals_;
@@ -33,6 +39,9 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   if (events_a_disk < 150 && elapsed * 2 <= longest_interval) intervals_ *= 2;
   if (events_a_disk > 1000 && intervals_ > 1) intervals_ /= 2;
   begin_interval();
+  if constexpr (press_applies) {
+    if (was_pressed) go_on_pressed();
+  }
 }
 
 // Numbers the disks along a space-filling curve. Sorting what is sorted changes
@@ -92,6 +101,10 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   checked_at_ = -1;
   crawls_ = 0;
   events_to_check_ = events_between_checks();
+  asked_at_ = now_;
+  contacts_when_asked_ = counters_.collisions();
+  floor_contacts_when_asked_ = counters_.floor_collisions;
+  events_to_ask_ = presses_ ? events_between_presses * count_ : seldom;
   if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
@@ -171,6 +184,11 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
     visit(self.rest_at_);
     visit(self.look_at_);
     visit(self.contacts_at_look_);
+    visit(self.is_pressed_);
+    visit(self.is_asleep_);
+    visit(self.press_contact_time_);
+    visit(self.released_at_);
+    visit(self.step_error_);
   }
 }
 
@@ -215,7 +233,11 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
+  const bool was_pressed = std::exchange(is_pressed_, false);
   begin_interval();
+  if constexpr (press_applies) {
+    if (was_pressed) go_on_pressed();
+  }
 }
 
 }  // namespace shakebed::sim

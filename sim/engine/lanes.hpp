@@ -104,6 +104,13 @@ inline Lanes unless(LaneMask mask, Lanes value) {
   return reinterpret_cast<Lanes>(~mask & reinterpret_cast<LaneMask>(value));
 #endif
 }
+inline bool any_of(LaneMask mask) {
+#if defined(__AVX__)
+  return _mm256_testz_si256(reinterpret_cast<__m256i>(mask), reinterpret_cast<__m256i>(mask)) == 0;
+#else
+  return (mask[0] | mask[1] | mask[2] | mask[3]) != 0;
+#endif
+}
 inline Lanes sqrt_lanes(Lanes value) {
 #if defined(__AVX__)
   return _mm256_sqrt_pd(value);

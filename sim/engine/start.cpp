@@ -8,6 +8,7 @@
 
 #include "sim/engine/floor_motion.hpp"
 #include "sim/engine/overlap.hpp"
+#include "sim/engine/pressed_bed.hpp"
 #include "sim/engine/random.hpp"
 #include "sim/engine/start.hpp"
 #include "sim/scene/scene.hpp"
@@ -191,6 +192,38 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
   }
 }
 
+// A start may be the frame of a bed that was pressed on the floor, whose disks overlap by less than soft_overlap. They
+// are moved apart. Where more overlaps nothing is changed, and check_placed() says so.
+void move_apart(const Scene& scene, std::vector<Placed>& disks) {
+  constexpr double most = 1e-13;
+  constexpr int sweeps = 100'000;
+  const Room room = room_of(scene);
+  if (!scene.presses || room.periodic_z || scene.disks.species.size() != 1) return;
+  Snapshot at;
+  std::vector<PressedBed::State> states;
+  double deepest = 0;
+  for (const Placed& p : disks) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.z)) return;
+    at.x.push_back(p.x);
+    at.z.push_back(p.z);
+    states.push_back({p.x, p.z, 0, 0});
+    deepest = std::max({deepest, room.floor + 0.5 - p.z, p.z + 0.5 - room.height});
+    if (!room.periodic_x) deepest = std::max({deepest, 0.5 - p.x, p.x + 0.5 - room.width});
+  }
+  const std::vector<double> radii(disks.size(), 0.5);
+  deepest = std::max(deepest, largest_overlap(at, radii, room.periodic_x ? room.width : 0, 0));
+  if (deepest <= most || deepest > soft_overlap) return;
+  PressedBed bed;
+  bed.set_up({room.width, room.periodic_x ? room.width : 0, room.height}, {});
+  bed.begin(states, {room.floor, 0, 0}, 1);
+  bed.separate(room.floor, most, sweeps);
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    const PressedBed::State state = bed.at(static_cast<std::uint32_t>(i), 0);
+    disks[i].x = state.x;
+    disks[i].z = state.z;
+  }
+}
+
 // Maxwellian velocities at T; in a weightless box with no net momentum and exactly this T.
 void give_velocities(const Scene& scene, std::vector<Placed>& disks, Random& random) {
   const double t = scene.start_temperature;
@@ -224,8 +257,10 @@ void give_velocities(const Scene& scene, std::vector<Placed>& disks, Random& ran
 
 std::vector<Placed> place_disks(const Scene& scene) {
   if (const auto* placed = std::get_if<PlacedStart>(&scene.start)) {
-    check_placed(scene, placed->disks);
-    return placed->disks;
+    std::vector<Placed> disks = placed->disks;
+    move_apart(scene, disks);
+    check_placed(scene, disks);
+    return disks;
   }
   Random random(scene.seed);
   const Room room = room_of(scene);

@@ -100,6 +100,11 @@ void FlightObserver::touched(double, double, double z, double dx, double dz, dou
   sums_[layer_of(z + dz / 2)].contacts += 1;
 }
 
+// A contact that lasts is not counted: it would be once a step.
+void FlightObserver::pressed(double, double, double z, double dx, double dz, double px, double pz) {
+  hand_on(z, dz, dx * px, dz * pz);
+}
+
 void FlightObserver::touched_wall(double, std::uint32_t disk, bool floor, double z, double, double pz) {
   if (!floor) return;
   floor_momentum_ += pz;

@@ -28,6 +28,7 @@ class FlightObserver final : public Watcher {
 
   void flies(double time, std::uint32_t disk, double x, double z, double vx, double vz) override;
   void touched(double time, double x, double z, double dx, double dz, double px, double pz) override;
+  void pressed(double time, double x, double z, double dx, double dz, double px, double pz) override;
   void touched_wall(double time, std::uint32_t disk, bool floor, double z, double px, double pz) override;
 
   // Counts from this time on; call after Simulation::watch(), at the time when the simulation stands.

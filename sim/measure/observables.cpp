@@ -41,7 +41,8 @@ std::string precision_lost(const Simulation& simulation) {
     return out.str();
   }
   const double overlap = simulation.largest_overlap();
-  if (!(overlap <= 1e-9)) out << "two disks overlap by " << overlap << " D (1e-9 D is allowed)";
+  const double allowed = simulation.allowed_overlap();
+  if (!(overlap <= allowed)) out << "two disks overlap by " << overlap << " D (" << allowed << " D is allowed)";
   return out.str();
 }
 

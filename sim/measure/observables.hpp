@@ -27,7 +27,7 @@ double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
 double ideal_centre_of_mass(const Scene& scene);
 
 // Why the run can no longer be trusted, "two disks overlap by 3e-7 D ..."; empty when it can: every number finite, no
-// overlap above 1e-9 D, the energy ledger closed to 1e-6 of what has been turned over.
+// overlap above what the bed allows, the energy ledger closed to 1e-6 of what has been turned over.
 std::string precision_lost(const Simulation& simulation);
 
 // Collects snapshots taken at `phases` moments of each period, in order, and averages over whole periods.

@@ -77,7 +77,7 @@ TEST(ShakenBed, IsCalmedByFriction) {
 }
 
 // 500 disks of 2 mm, 61.2 mm wide, e = 0.9, 30 Hz: gently shaken beds lie on the floor for a part of the period, where
-// the engine lets them chatter and rest (engine_rest.hpp). Soft spheres (LAMMPS, linear dashpots, contact time 10 us,
+// the engine goes on with soft disks (engine_press.hpp). Soft spheres (LAMMPS, linear dashpots, contact time 10 us,
 // 30 steps a contact) from two starts each, 25 and 40 periods: T_x 0.0009 and 0.0007, 0.0074 and 0.0078, 0.0471 and
 // 0.0485.
 struct GentleBed {
@@ -86,7 +86,7 @@ struct GentleBed {
   double allowed, centre_allowed;                     // besides errors [m g D]; [D]
 };
 
-Measurement run_gentle_bed(double gamma, int periods) {
+Measurement run_gentle_bed(double gamma, int periods, double width = 30.6) {
   constexpr double d = 2e-3, f = 30;
   const double time_unit = std::sqrt(d / gravity);
   Scene scene;
@@ -94,7 +94,7 @@ Measurement run_gentle_bed(double gamma, int periods) {
   scene.disks.species = {{500, 1, 1}};
   scene.disks.contact = scene.box.floor_surface = {0.9, 0, 0};
   scene.disks.contact_duration = 1e-4;
-  scene.box.width = 30.6;
+  scene.box.width = width;
   scene.box.sides = HardSides{{0.9, 0, 0}};
   scene.box.floor = SinusoidalFloor{gamma * gravity / std::pow(2 * std::numbers::pi * f, 2) / d, f * time_unit};
   scene.start_temperature = 0.01;
@@ -111,7 +111,7 @@ TEST(ShakenBed, IsThatOfSoftSpheresWhereItIsGentlyShaken) {
     expect_law("T_x [m g D]", bed.temperature_x.value, error, soft.temperature_x, soft.allowed + 2 * error);
     expect_law("centre of mass [D]", bed.centre.value, bed.centre.std_error, soft.centre, soft.centre_allowed);
     expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);
-    expect_law("largest overlap [D]", bed.overlap, 0, 0, 1e-12);
+    expect_law("largest overlap [D]", bed.overlap, 0, 0, 2e-3);
   }
 }
 
@@ -120,7 +120,18 @@ TEST(ShakenBed, LiesStillBelowGammaOne) {
   const Measurement bed = run_gentle_bed(0.7, 80);
   expect_law("T_x [m g D]", bed.temperature_x.value, bed.temperature_x.std_error, 0, 1e-6);
   expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);
-  expect_law("largest overlap [D]", bed.overlap, 0, 0, 1e-12);
+  expect_law("largest overlap [D]", bed.overlap, 0, 0, 2e-3);
+}
+
+// Where thirty disks fill the box exactly rows lock. By contacts of hard disks such beds had no end.
+TEST(ShakenBed, EndsWhereRowsLock) {
+  for (const double gamma : {0.7, 1.5, 2.0}) {
+    const Measurement bed = run_gentle_bed(gamma, 20, 30);
+    std::printf("  Gamma %.1f:\n", gamma);
+    expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);
+    expect_law("largest overlap [D]", bed.overlap, 0, 0, 5e-3);
+    EXPECT_LT(bed.temperature_x.value, 0.1);
+  }
 }
 
 }  // namespace

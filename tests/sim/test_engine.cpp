@@ -74,6 +74,13 @@ Scene gentle_bed(double gamma = 1.3) {
   return scene;
 }
 
+// The same by contacts of hard disks alone: it rests by engine_rest.hpp.
+Scene resting_bed(double gamma = 1.3) {
+  Scene scene = gentle_bed(gamma);
+  scene.presses = false;
+  return scene;
+}
+
 // 5 to 30 disks in rows of random length, close above one another, in a box 1.2 to 4 D wide; every second floor shakes
 // with Gamma from 0.2 to 1.5, every third stack is rough.
 Scene random_stack(std::uint64_t seed) {
@@ -127,8 +134,8 @@ TEST(Engine, DoesNotCareWhenOneLooks) {
 // Also of a bed that is shaken so gently that its disks chatter on one another.
 TEST(Engine, ReturnsAfterSoManyEventsAndMakesTheSameBytes) {
   Scene restless = gentle_bed(0.5);
-  restless.rests = false;
-  for (const Scene& scene : {shaken_bed(), gentle_bed(), restless, fluid()}) {
+  restless.rests = restless.presses = false;
+  for (const Scene& scene : {shaken_bed(), resting_bed(), restless, fluid()}) {
     const auto a = simulate(scene), b = simulate(scene);
     a->advance_to(8);
     std::uint64_t most = 1;
@@ -170,7 +177,7 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[5].disks.species = {{40, 1, 1}, {250, 0.3, 0.09}};
   scenes[5].start = RandomStart{};
   scenes[6] = gentle_bed();
-  scenes[7] = gentle_bed(0.5);
+  scenes[7] = resting_bed(0.5);
   for (const Scene& scene : scenes) expect_resumes(scene, 60, 150);
   for (std::uint64_t seed = 0; seed < 10; ++seed)
     expect_resumes(random_stack(seed), 6, 18);  // some of the disks at rest
@@ -179,7 +186,7 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
 // Below Gamma = 1 nothing moves against anything once it has come to rest, and nothing is done for it.
 TEST(Engine, LetsABedLieThatHasComeToRest) {
   for (const double friction : {0.0, 0.3}) {
-    Scene scene = gentle_bed(0.8);
+    Scene scene = resting_bed(0.8);
     scene.disks.contact.friction = scene.box.floor_surface.friction = friction;
     const auto bed = simulate(scene);
     bed->advance_to(30);
@@ -207,7 +214,7 @@ TEST(Engine, LetsABedLieThatHasComeToRest) {
 // It lands, rests but for a few disks on top, and takes off when the floor falls faster than it, again and again.
 TEST(Engine, LetsARestingBedTakeOff) {
   constexpr double gamma = 1.15, period = 1 / 0.35, frequency = 2 * std::numbers::pi * 0.35, since = 0.3;
-  const auto bed = simulate(gentle_bed(gamma));
+  const auto bed = simulate(resting_bed(gamma));
   const double take_off = std::asin(1 / gamma) / frequency;  // a w^2 sin(wt) = g
   const double height = 1 / (frequency * frequency), speed = gamma / frequency * std::cos(frequency * take_off);
   Snapshot at;
@@ -275,7 +282,7 @@ TEST(Engine, ForeseesEveryContactOfStacksThatRestAndWake) {
 
 // What lies on the floor presses on it with its weight, whether its contacts are made or not.
 TEST(Engine, TellsWatchersWhatARestingBedWeighs) {
-  const Scene scene = gentle_bed(0.8);
+  const Scene scene = resting_bed(0.8);
   const auto bed = simulate(scene), unwatched = simulate(scene);
   bed->advance_to(30);
   FlightObserver observer(scene, bed->properties(), LayerGrid{-1, 0.5, 60});

@@ -15,6 +15,7 @@ namespace {
 class Nobody final : public Watcher {
   void flies(double, std::uint32_t, double, double, double, double) override {}
   void touched(double, double, double, double, double, double, double) override {}
+  void pressed(double, double, double, double, double, double, double) override {}
   void touched_wall(double, std::uint32_t, bool, double, double, double) override {}
 };
 

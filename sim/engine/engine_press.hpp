@@ -1,0 +1,243 @@
+// A bed that is pressed on the floor, as soft disks: when it is taken for one, and for how long. Included by engine.hpp
+// only.
+//
+// Events are cheap and exact in flight and when a bed lands. Soon after, every disk meets all its neighbours again and
+// again: hundreds of contacts a disk and period, by any rule that hard disks can follow. From then until the floor
+// falls away the bed is one of soft disks (pressed_bed.hpp). Their contact time follows the speed of the contacts, so
+// that overlaps stay small, and ends at a value that is short against the motion of rows (pressed_contact_time). A bed
+// that has come to rest sleeps: it moves with the floor, at no cost, until its weight begins to go.
+//
+// Beds in which contacts are never that frequent are not touched, not even by rounding.
+#pragma once
+
+namespace shakebed::sim {
+
+// What was measured: T_x [m g D] of 500 disks, e = 0.9, Gamma = 1.5, 30.6 D wide. Soft spheres with contacts of 7e-4
+// have 0.0074(1) to 0.0076(2), events alone 0.0080(2). tests/bench/README.md has the tables.
+
+// The longest contact time of a pressed bed [sqrt(D/g)]; 100 us for 2 mm disks.
+inline constexpr double pressed_contact_time = 0.007;
+// How far disks approach in a contact time [D], while it is shorter than that: T_x 0.0080(2) for 0.0090(2) with 2e-4.
+inline constexpr double pressed_travel = 1e-4;
+// How far they move against the floor in a contact time [D]: 0.0080(2) for 0.0085(3) with 5e-4.
+inline constexpr double pressed_drift = 3e-4;
+// Quicker contacts are left to events, unless rows have locked; so they are in a bed's first period, a packing that the
+// floor hits.
+inline constexpr double least_contact_time = 3e-4, least_contact_time_at_start = 1e-3,
+                        least_contact_time_of_locked = 1e-4;
+// Contacts a disk and contact time from which on a bed on the floor is taken for pressed, and one anywhere: rows that
+// lock have thousands of them. With 0.2 on the floor the bed is 5 % hotter, as hard disks are while they land.
+inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
+inline constexpr double softening = 1.05;       // of the contact time at most, between two checks
+inline constexpr double least_neighbours = 1;   // pairs a disk; rows on rows have three
+inline constexpr double neighbour_gap = 0.01;   // between two that are counted as such [D]
+inline constexpr double least_on_floor = 0.25;  // contacts with the floor meanwhile, a diameter of width
+// A bed leaves the floor that falls away while fewer pairs a disk than this are in contact, or after such a time.
+inline constexpr double released_touching = 0.1, longest_release = 0.3;
+inline constexpr double separated = 1e-13;  // overlap that hard disks may begin with [D]
+inline constexpr int separating_sweeps = 200;
+// A bed sleeps that moves with less than this against the floor [m g D], [sqrt(g D)]; it wakes before its weight is
+// gone, so that its springs can follow.
+inline constexpr double sleeping_temperature = 2e-6, sleeping_speed = 0.01, waking_weight = 0.3;
+inline constexpr double sleep_steps = 256;  // a period of the floor
+inline constexpr std::uint64_t events_between_presses =
+    4;                                                  // a disk, after which it is asked whether the bed is pressed
+inline constexpr double least_press_width = 4;          // [D]; nearest images must be told apart
+inline constexpr double least_press_restitution = 0.3;  // stronger dashpots would need shorter steps
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::plan_press(bool wanted) {
+  if constexpr (press_applies) {
+    const auto fits = [](const Contact& surface) {
+      return !surface.varies() && surface.restitution >= least_press_restitution;
+    };
+    presses_ = wanted && contact_duration_ > 0 && std::holds_alternative<NoBath>(bath_) &&
+               width_ >= least_press_width && fits(disk_surface_) && fits(side_surface_) && fits(floor_surface_) &&
+               fits(lid_surface_);
+    if (!presses_) return;
+    pressed_.set_up({width_, Space::wraps_x ? width_ : 0, lid_height_},
+                    {disk_surface_, side_surface_, floor_surface_, lid_surface_});
+  }
+}
+
+// The approach of neighbours, root of the mean square; nothing if they are few.
+template <class Space, class Rule, class Sizes>
+std::optional<double> Engine<Space, Rule, Sizes>::approach_of_neighbours() const {
+  double squares = 0;
+  std::uint64_t pairs = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Motion mine = motion_at(disks_[i], now_);
+    lists_.each_neighbour(i, [&](std::uint32_t k) {
+      if (k < i) return;
+      const Motion other = motion_at(disks_[k], now_);
+      double dx = other.x() - mine.x();
+      const double dz = other.z() - mine.z();
+      if constexpr (Space::wraps_x) dx = period_x_.nearest(dx);
+      const double squared = dx * dx + dz * dz;
+      if (squared > (1 + neighbour_gap) * (1 + neighbour_gap)) return;
+      const double closing = dx * (other.vx() - mine.vx()) + dz * (other.vz() - mine.vz());
+      squares += closing * closing / squared;
+      ++pairs;
+    });
+  }
+  if (static_cast<double>(pairs) < least_neighbours * count_) return {};
+  return std::sqrt(squares / static_cast<double>(pairs));
+}
+
+// Asked after every so many events: are contacts so frequent that the bed is to go on as a pressed one?
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::ask_press() {
+  events_to_ask_ = events_between_presses * count_;
+  const double passed = now_ - asked_at_;
+  const auto contacts = static_cast<double>(counters_.collisions() - contacts_when_asked_);
+  asked_at_ = now_;
+  const auto on_floor = static_cast<double>(counters_.floor_collisions - floor_contacts_when_asked_);
+  contacts_when_asked_ = counters_.collisions();
+  floor_contacts_when_asked_ = counters_.floor_collisions;
+  const auto crowded = [&](double contact_time, double crowd) {
+    return contacts * contact_time >= crowd * count_ * passed;
+  };
+  const bool pushed = on_floor >= least_on_floor * width_;
+  if (!crowded(pressed_contact_time, pushed ? pressed_crowd : locked_crowd)) return;
+  const bool lies = pushed && gravity_ + floor_.motion(now_).acceleration > 0;
+  if (!crowded(pressed_contact_time, lies ? pressed_crowd : locked_crowd)) return;
+  const std::optional<double> approach = approach_of_neighbours();
+  if (!approach) return;
+  const double contact_time = std::min(pressed_contact_time, pressed_travel / *approach);
+  if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time_of_locked)) return;
+  if (!crowded(contact_time, lies && contact_time >= least_contact_time ? pressed_crowd : locked_crowd)) return;
+  press_contact_time_ = contact_time;
+  press_wanted_ = true;
+}
+
+// From the records, which are those of now_.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::go_on_pressed() {
+  std::vector<PressedBed::State> disks(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) disks[i] = {disks_[i].x, disks_[i].z, disks_[i].vx, disks_[i].vz};
+  is_pressed_ = true;
+  pressed_to_ = now_;
+  const FloorMotion::Motion floor = floor_.motion(now_);
+  pressed_.begin(std::move(disks), floor, press_contact_time_);
+  if (is_asleep_) pressed_.lie(floor);
+  energy_when_pressed_ = kinetic_energy() + potential_energy() + pressed_.compressed();
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::begin_press() {
+  press_wanted_ = false;
+  if (resting_ > 0) wake_all();
+  unusual_ = false;
+  for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
+  rest_at_ = look_at_ = never;
+  released_at_ = never;
+  is_asleep_ = false;
+  go_on_pressed();
+  step_error_ -= pressed_.compressed();  // of disks that were no longer apart
+}
+
+// Books what has happened since go_on_pressed(), and writes the disks' states into their records.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::write_down_pressed() {
+  const EnergyLedger ledger = energy();
+  floor_work_ = ledger.floor_work;
+  dissipated_ = ledger.dissipated;
+  step_error_ = ledger.step_error;
+  for (std::uint32_t i = 0; i < count_; ++i) write_down(i, motion_now(i));
+  is_pressed_ = false;
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::end_press() {
+  pressed_.separate(floor_.position(now_), separated, separating_sweeps);
+  write_down_pressed();
+  step_error_ += pressed_.compressed();  // where the disks could not be moved apart
+  look_again();
+  unusual_ = disk_surface_.varies();
+  begin_interval();
+}
+
+// Sleeps, wakes, softens or ends, by what the bed does. After a step.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
+  const double approach = pressed_.approach(), speed = std::sqrt(pressed_.mean_square_speed());
+  double contact_time = pressed_contact_time;
+  if (approach * contact_time > pressed_travel) contact_time = pressed_travel / approach;
+  if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
+  if (contact_time > press_contact_time_) {
+    press_contact_time_ = std::min(contact_time, softening * press_contact_time_);
+    pressed_.soften(press_contact_time_);
+  }
+  const bool falls_away = floor.acceleration + gravity_ < 0 && pressed_.floor_force() == 0;
+  if (!falls_away) {
+    released_at_ = never;
+    if (floor.acceleration + gravity_ > waking_weight && pressed_.fastest() < sleeping_speed &&
+        pressed_.mean_square_speed() < 2 * sleeping_temperature) {
+      is_asleep_ = true;
+      pressed_.lie(floor);
+    }
+    return;
+  }
+  released_at_ = std::min(released_at_, base_ + now_);
+  if (pressed_.touching() < released_touching * count_ || base_ + now_ - released_at_ > longest_release) end_press();
+}
+
+// One step, or one of sleep, from `before`, the floor's motion at pressed_to_; how it moves at its end.
+template <class Space, class Rule, class Sizes>
+FloorMotion::Motion Engine<Space, Rule, Sizes>::press_on(const FloorMotion::Motion& before, double next) {
+  const FloorMotion::Motion after = floor_.motion(next);
+  const double step = next - pressed_to_;
+  pressed_to_ = now_ = next;
+  if (is_asleep_) {
+    pressed_.carry(before, after);
+    is_asleep_ = after.acceleration + gravity_ > waking_weight;
+    if (!is_asleep_) pressed_.wake(after);
+  } else {
+    pressed_.step(before, after, step);
+    if (pressed_.check_due()) check_press(after);
+  }
+  if (watcher_ != nullptr) tell_pressed(step);
+  return after;
+}
+
+// False where it returns for its number of events.
+template <class Space, class Rule, class Sizes>
+bool Engine<Space, Rule, Sizes>::press_until(double until) {
+  const std::uint64_t worth = 1 + count_ / 8;  // of a step in events
+  FloorMotion::Motion floor = floor_.motion(pressed_to_);
+  while (is_pressed_ && pressed_to_ < until) {
+    const double step = is_asleep_ ? rest_period_ / sleep_steps : press_contact_time_ / PressedBed::steps_a_contact;
+    // A step that would end just before the synchronisation, or behind it, ends there.
+    const double next = pressed_to_ + 1.001 * step > synchronise_at_ ? synchronise_at_ : pressed_to_ + step;
+    if (next > until) break;
+    floor = press_on(floor, next);
+    if (events_to_return_ <= worth) return false;
+    events_to_return_ -= worth;
+  }
+  if (is_pressed_) now_ = until;
+  return true;
+}
+
+// What a watcher is told of a step: the momenta of its contacts, and flights from where it ends. In a sleeping bed all
+// forces are as large as the floor's.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::tell_pressed(double step) const {
+  if (is_pressed_) {
+    double on_floor = 0;
+    pressed_.each_wall_contact(
+        [&](std::uint32_t, bool is_floor, TwoLanes force) { on_floor += is_floor ? force[1] : 0; });
+    if (is_asleep_ && on_floor > 0) step *= pressed_.floor_force() / on_floor;
+    pressed_.each_contact([&](TwoLanes place, TwoLanes to, TwoLanes force) {
+      watcher_->pressed(time(), place[0], place[1], to[0], to[1], step * force[0], step * force[1]);
+    });
+    pressed_.each_wall_contact([&](std::uint32_t i, bool is_floor, TwoLanes force) {
+      watcher_->touched_wall(time(), labels_[i], is_floor, pressed_.at(i, 0).z, step * force[0], step * force[1]);
+    });
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const Motion motion = motion_now(i);
+    watcher_->flies(time(), labels_[i], motion.x(), motion.z(), motion.vx(), motion.vz());
+  }
+}
+
+}  // namespace shakebed::sim

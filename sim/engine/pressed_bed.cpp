@@ -1,0 +1,430 @@
+#include "sim/engine/pressed_bed.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <numbers>
+
+namespace shakebed::sim {
+
+namespace {
+
+using State = PressedBed::State;
+
+constexpr double radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
+constexpr double far_off = -100;             // where the sentinels are: they touch nothing
+// A pair is asked until the next check if it would touch within so many times that many steps at the speed it has, or
+// at that which is usual.
+constexpr double foresight = 6;
+// By how much more than its overlap a pair is moved apart: rows that fill the box come apart in a tenth of the sweeps.
+constexpr double overdone = 1.6;
+
+// Part of its energy that a contact loses whose contact time is 1 and whose velocity would fall by exp(-damping), mean
+// over the moments within a step at which it may begin.
+double share_lost(double damping) {
+  constexpr int moments = 64;
+  constexpr double dt = 1 / PressedBed::steps_a_contact;
+  const double stiffness = std::numbers::pi * std::numbers::pi + damping * damping;
+  double sum = 0;
+  for (int moment = 0; moment < moments; ++moment) {
+    double gap = dt * (moment + 0.5) / moments, v = -1, a = 0;
+    bool touched = false;
+    do {
+      gap += dt * (v + 0.5 * dt * a);
+      const double next = gap < 0 ? -stiffness * gap - 2 * damping * (v + dt * a) : 0;
+      v += 0.5 * dt * (a + next);
+      a = next;
+      touched = touched || gap < 0;
+    } while (!touched || gap < 0);
+    sum += v * v;
+  }
+  return 1 - sum / moments;
+}
+
+// Differences of four pairs, second less first.
+struct Differences {
+  Lanes x, z, vx, vz;
+};
+Lanes state_at(const State* disks, std::uint32_t place) {
+  Lanes state;
+  std::memcpy(&state, reinterpret_cast<const char*>(disks) + place, sizeof state);
+  return state;
+}
+[[gnu::always_inline]] inline Differences differences(const State* disks, const std::uint32_t* i,
+                                                      const std::uint32_t* k) {
+  const Lanes d0 = state_at(disks, k[0]) - state_at(disks, i[0]), d1 = state_at(disks, k[1]) - state_at(disks, i[1]),
+              d2 = state_at(disks, k[2]) - state_at(disks, i[2]), d3 = state_at(disks, k[3]) - state_at(disks, i[3]);
+  const Lanes a01 = __builtin_shufflevector(d0, d1, 0, 4, 2, 6), b01 = __builtin_shufflevector(d0, d1, 1, 5, 3, 7);
+  const Lanes a23 = __builtin_shufflevector(d2, d3, 0, 4, 2, 6), b23 = __builtin_shufflevector(d2, d3, 1, 5, 3, 7);
+  return {__builtin_shufflevector(a01, a23, 0, 1, 4, 5), __builtin_shufflevector(b01, b23, 0, 1, 4, 5),
+          __builtin_shufflevector(a01, a23, 2, 3, 6, 7), __builtin_shufflevector(b01, b23, 2, 3, 6, 7)};
+}
+Lanes nearest_image(Lanes dx, double period) {
+  const Lanes large = all_lanes(0x1.8p52);
+  return fused(all_lanes(-period), fused(dx, all_lanes(1 / period), large) - large, dx);
+}
+double sum_of(Lanes lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
+
+std::uint32_t place_of(std::uint32_t i) { return i * static_cast<std::uint32_t>(sizeof(State)); }
+
+}  // namespace
+
+PressedBed::Spring PressedBed::spring_of(const Surface& surface) {
+  const double e = surface.restitution;
+  double low = 0, high = 1 - 2 * std::log(e);
+  for (int halving = 0; e < 1 && halving < 50; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (share_lost(middle) < 1 - e * e ? low : high) = middle;
+  }
+  return {std::numbers::pi * std::numbers::pi + low * low, 2 * low};
+}
+
+void PressedBed::set_up(const Box& box, const Surfaces& surfaces) {
+  box_ = box;
+  const Spring pair = spring_of(surfaces.disks);
+  const Spring half{0.5 * pair.stiffness, 0.5 * pair.damping};  // of their reduced mass
+  const auto spring_on = [&](const Surface& wall) {
+    return wall.restitution == surfaces.disks.restitution ? pair : spring_of(wall);
+  };
+  of_unit_time_ =
+      std::array<Spring, 4>{half, spring_on(surfaces.sides), spring_on(surfaces.floor), spring_on(surfaces.lid)};
+}
+
+void PressedBed::soften(double contact_time) {
+  const auto soft = [contact_time](const Spring& spring) {
+    return Spring{spring.stiffness / (contact_time * contact_time), spring.damping / contact_time};
+  };
+  pair_ = soft(of_unit_time_[0]);
+  side_ = soft(of_unit_time_[1]);
+  floor_ = soft(of_unit_time_[2]);
+  lid_ = soft(of_unit_time_[3]);
+}
+
+void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time) {
+  disks_ = std::move(disks);
+  count_ = static_cast<std::uint32_t>(disks_.size());
+  halfway_.resize(2 * std::size_t{count_});
+  for (std::uint32_t i = 0; i < count_; ++i) put_pair(&halfway_[2 * i], pair_at(&disks_[i].vx));
+  last_step_ = 0;
+  disks_.push_back({far_off, far_off, 0, 0});
+  disks_.push_back({2 * far_off, 2 * far_off, 0, 0});
+  force_.assign(4 * disks_.size(), 0);
+  floor_work_ = damped_ = usual_approach_ = 0;
+  fastest_ = mean_square_speed_ = never;
+  soften(contact_time);
+  list_pairs(floor.position);
+  add_forces(floor);
+}
+
+auto PressedBed::at(std::uint32_t i, double later) const -> State {
+  const TwoLanes a = pair_at(&force_[4 * i]) + TwoLanes{0, -1};
+  const TwoLanes v = fused(both(0.5 * last_step_), a, pair_at(&halfway_[2 * i]));
+  const TwoLanes place = fused(both(later), fused(both(0.5 * later), a, v), pair_at(&disks_[i].x));
+  const TwoLanes velocity = fused(both(later), a, v);
+  return {place[0], place[1], velocity[0], velocity[1]};
+}
+
+// ------------------------------------------------------------------------------------------------
+// neighbours
+
+TwoLanes PressedBed::gap_of(std::uint32_t i, std::uint32_t k) const {
+  TwoLanes d = pair_at(&disks_[k].x) - pair_at(&disks_[i].x);
+  if (box_.period > 0) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
+  return d;
+}
+
+// All pairs within the skin, by columns of disks in the order of height.
+void PressedBed::list_pairs(double floor) {
+  const double reach = 2 * radius + skin;
+  const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(box_.width / reach)));
+  std::vector<std::vector<std::uint32_t>> column(columns);
+  listed_.resize(2 * std::size_t{count_});
+  first_.clear();
+  second_.clear();
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    State& disk = disks_[i];
+    if (box_.period > 0) disk.x -= box_.period * std::floor(disk.x / box_.period);
+    put_pair(&listed_[2 * i], pair_at(&disk.x) - TwoLanes{0, floor});
+    const double at =
+        std::clamp(disk.x / box_.width * static_cast<double>(columns), 0.0, static_cast<double>(columns - 1));
+    column[static_cast<std::size_t>(at)].push_back(i);
+  }
+  const auto lower = [this](std::uint32_t a, std::uint32_t b) { return disks_[a].z < disks_[b].z; };
+  for (auto& one : column) std::stable_sort(one.begin(), one.end(), lower);
+  for (std::size_t c = 0; c < columns; ++c) {
+    for (std::size_t other : {c, c + 1}) {
+      if (other == columns && !(box_.period > 0)) continue;
+      const auto& beside = column[other % columns];
+      std::size_t from = 0;
+      for (const std::uint32_t i : column[c]) {
+        while (from < beside.size() && disks_[beside[from]].z < disks_[i].z - reach) ++from;
+        for (std::size_t o = from; o < beside.size() && disks_[beside[o]].z < disks_[i].z + reach; ++o) {
+          const std::uint32_t k = beside[o];
+          if (other == c && k <= i) continue;
+          const TwoLanes d = gap_of(i, k);
+          if (!(d[0] * d[0] + d[1] * d[1] < reach * reach)) continue;
+          first_.push_back(place_of(i));
+          second_.push_back(place_of(k));
+        }
+      }
+    }
+  }
+  interleave();
+  list_walls(floor);
+  until_check_ = steps_a_check;
+}
+
+// Pairs of one disk stand apart: the sum of its forces need not wait for the pair before. And whole blocks of four.
+void PressedBed::interleave() {
+  constexpr std::size_t parts = 16;
+  const std::size_t pairs = first_.size(), part = (pairs + parts - 1) / parts;
+  active_first_.clear();
+  active_second_.clear();
+  for (std::size_t k = 0; k < part; ++k) {
+    for (std::size_t q = k; q < pairs; q += part) {
+      active_first_.push_back(first_[q]);
+      active_second_.push_back(second_[q]);
+    }
+  }
+  while (active_first_.size() % 4 != 0) {
+    active_first_.push_back(place_of(count_));
+    active_second_.push_back(place_of(count_ + 1));
+  }
+  first_ = active_first_;
+  second_ = active_second_;
+}
+
+void PressedBed::list_walls(double floor) {
+  const double near = radius + skin / 2;
+  for (auto* list : {&near_left_, &near_right_, &near_floor_, &near_lid_}) list->clear();
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const State& disk = disks_[i];
+    if (!(box_.period > 0) && disk.x < near) near_left_.push_back(i);
+    if (!(box_.period > 0) && disk.x > box_.width - near) near_right_.push_back(i);
+    if (disk.z - floor < near) near_floor_.push_back(i);
+    if (disk.z > box_.lid - near - 2 * skin) near_lid_.push_back(i);  // places are listed above the floor, which moves
+  }
+}
+
+// Of all neighbours those that may touch before the next check.
+void PressedBed::choose_active(double dt) {
+  const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
+  const std::size_t pairs = first_.size();
+  const Lanes contact = all_lanes(4 * radius * radius);
+  active_first_.resize(pairs + 4);
+  active_second_.resize(pairs + 4);
+  std::size_t active = 0;
+  Lanes approaches{};
+  for (std::size_t p = 0; p < pairs; p += 4) {
+    Differences d = differences(disks_.data(), &first_[p], &second_[p]);
+    if (box_.period > 0) d.x = nearest_image(d.x, box_.period);
+    const Lanes squared = fused(d.x, d.x, d.z * d.z), closing = fused(d.x, d.vx, d.z * d.vz);
+    const LaneMask near = fused(all_lanes(-2 * margin), all_lanes(1), squared) < contact;
+    const LaneMask comes = fused(all_lanes(2 * ahead), closing, squared) < contact;
+    approaches += closing * closing;
+    for (std::size_t q = 0; q < 4; ++q) {
+      active_first_[active] = first_[p + q];
+      active_second_[active] = second_[p + q];
+      active += static_cast<std::size_t>((near[q] | comes[q]) & 1);
+    }
+  }
+  for (; active % 4 != 0; ++active) {
+    active_first_[active] = place_of(count_);
+    active_second_[active] = place_of(count_ + 1);
+  }
+  active_first_.resize(active);
+  active_second_.resize(active);
+  usual_approach_ = std::sqrt(sum_of(approaches) / static_cast<double>(std::max<std::size_t>(pairs, 1)));
+}
+
+void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
+  until_check_ = steps_a_check;
+  double farthest = 0, fastest = 0, squares = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const TwoLanes moved = pair_at(&disks_[i].x) - TwoLanes{0, floor.position} - pair_at(&listed_[2 * i]);
+    const TwoLanes speed = pair_at(&disks_[i].vx) - TwoLanes{0, floor.velocity};
+    farthest = std::max(farthest, moved[0] * moved[0] + moved[1] * moved[1]);
+    const double square = speed[0] * speed[0] + speed[1] * speed[1];
+    fastest = std::max(fastest, square);
+    squares += square;
+  }
+  fastest_ = std::sqrt(fastest);
+  mean_square_speed_ = squares / count_;
+  if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
+    list_pairs(floor.position);
+  } else {
+    choose_active(dt);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------
+// forces and steps
+
+template <bool periodic>
+void PressedBed::add_pair_forces() {
+  const std::size_t pairs = active_first_.size();
+  const State* const disks = disks_.data();
+  char* const force = reinterpret_cast<char*>(force_.data());
+  const Lanes stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping), one = all_lanes(1);
+  Lanes squares{}, count{};
+  const auto add = [force](std::uint32_t first, std::uint32_t second, TwoLanes f) {
+    auto* const a = reinterpret_cast<double*>(force + first);
+    auto* const b = reinterpret_cast<double*>(force + second);
+    put_pair(a, pair_at(a) - f);
+    put_pair(b, pair_at(b) + f);
+  };
+  for (std::size_t p = 0; p < pairs; p += 4) {
+    const std::uint32_t *i = &active_first_[p], *k = &active_second_[p];
+    Differences d = differences(disks, i, k);
+    if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
+    const Lanes u = one - fused(d.x, d.x, d.z * d.z);  // 1 - r^2
+    const LaneMask touch = u > all_lanes(0);
+    if (!any_of(touch)) continue;
+    // 1 - r and 1 / r of r = sqrt(1 - u), to 1e-10 for overlaps of 0.01 D
+    const Lanes overlap =
+        u * fused(u, fused(u, fused(u, all_lanes(5.0 / 128), all_lanes(1.0 / 16)), all_lanes(0.125)), all_lanes(0.5));
+    const Lanes inverse = fused(
+        u, fused(u, fused(u, fused(u, all_lanes(35.0 / 128), all_lanes(5.0 / 16)), all_lanes(0.375)), all_lanes(0.5)),
+        one);
+    const Lanes nx = d.x * inverse, nz = d.z * inverse, v = fused(d.vx, nx, d.vz * nz);
+    const Lanes f = unless(~touch, fused(stiffness, overlap, -(damping * v)));
+    squares += unless(~touch, v * v);
+    count += unless(~touch, one);
+    const Lanes fx = f * nx, fz = f * nz;
+    const Lanes even = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), odd = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
+    add(i[0], k[0], __builtin_shufflevector(even, even, 0, 1));
+    add(i[1], k[1], __builtin_shufflevector(odd, odd, 0, 1));
+    add(i[2], k[2], __builtin_shufflevector(even, even, 2, 3));
+    add(i[3], k[3], __builtin_shufflevector(odd, odd, 2, 3));
+  }
+  touching_ = sum_of(count);
+  pair_squares_ = sum_of(squares);
+}
+
+auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
+                            TwoLanes velocity) const -> WallContacts {
+  const TwoLanes along = inward * pair_at(&disks_[i].x), flow = inward * velocity;
+  const double gap = along[0] + along[1] - place - radius;
+  if (!(gap < 0)) return {};
+  const double v = flow[0] + flow[1] - speed;
+  return {-spring.stiffness * gap - spring.damping * v, spring.damping * v * v};
+}
+
+// inward: from the wall into the box; place and speed of the wall that way.
+auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
+                                 const Spring& spring) -> WallContacts {
+  WallContacts contacts;
+  for (const std::uint32_t i : near) {
+    const WallContacts one = wall_force(i, inward, place, speed, spring, velocity_of(i));
+    put_pair(&force_[4 * i], fused(both(one.force), inward, pair_at(&force_[4 * i])));
+    contacts.force += one.force;
+    contacts.lost += one.lost;
+  }
+  return contacts;
+}
+
+void PressedBed::add_forces(const FloorMotion::Motion& floor) {
+  std::fill(force_.begin(), force_.end(), 0.0);
+  box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
+  loss_rate_ = pair_.damping * pair_squares_;
+  loss_rate_ += add_wall_forces(near_left_, TwoLanes{1, 0}, 0, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_right_, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_lid_, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
+  const WallContacts on_floor = add_wall_forces(near_floor_, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
+  loss_rate_ += on_floor.lost;
+  floor_force_ = on_floor.force;
+  floor_at_ = floor;
+}
+
+void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt) {
+  assert(dt > 0);
+  const TwoLanes weight = {0, -1}, half = both(0.5 * dt), halves = both(0.5 * (last_step_ + dt)), whole = both(dt);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    double* const disk = &disks_[i].x;
+    const TwoLanes a = pair_at(&force_[4 * i]) + weight, v = fused(halves, a, pair_at(&halfway_[2 * i]));
+    put_pair(&halfway_[2 * i], v);
+    put_pair(disk, fused(whole, v, pair_at(disk)));
+    put_pair(disk + 2, fused(half, a, v));
+  }
+  last_step_ = dt;
+  if (--until_check_ == 0) check(after, dt);
+  const double force_before = floor_force_, loss_before = loss_rate_;
+  add_forces(after);
+  floor_work_ += 0.5 * (force_before + floor_force_) * (after.position - before.position);
+  damped_ += 0.5 * (loss_before + loss_rate_) * dt;
+}
+
+void PressedBed::lie(const FloorMotion::Motion& floor) {
+  last_step_ = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const TwoLanes velocity = {0, floor.velocity};
+    put_pair(&halfway_[2 * i], velocity);
+    put_pair(&disks_[i].vx, velocity);
+    put_pair(&force_[4 * i], TwoLanes{0, 1 + floor.acceleration});
+  }
+  floor_force_ = count_ * (1 + floor.acceleration);
+  loss_rate_ = 0;
+}
+
+void PressedBed::carry(const FloorMotion::Motion& before, const FloorMotion::Motion& after) {
+  const double rise = after.position - before.position;
+  for (std::uint32_t i = 0; i < count_; ++i) disks_[i].z += rise;
+  floor_work_ += count_ * (rise + 0.5 * (after.velocity * after.velocity - before.velocity * before.velocity));
+  floor_at_ = after;
+  lie(after);
+}
+
+void PressedBed::wake(const FloorMotion::Motion& floor) {
+  list_pairs(floor.position);
+  add_forces(floor);
+}
+
+double PressedBed::approach() const { return std::sqrt(pair_squares_ / std::max(touching_, 1.0)); }
+
+double PressedBed::compressed() const {
+  double sum = 0;
+  const auto add = [&sum](double overlap, const Spring& spring) {
+    if (overlap > 0) sum += 0.5 * spring.stiffness * overlap * overlap;
+  };
+  for (std::size_t p = 0; p < first_.size(); ++p) {
+    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+    if (i >= count_) continue;
+    const TwoLanes d = gap_of(i, k);
+    add(2 * radius - std::sqrt(d[0] * d[0] + d[1] * d[1]), pair_);
+  }
+  for (const std::uint32_t i : near_left_) add(radius - disks_[i].x, side_);
+  for (const std::uint32_t i : near_right_) add(disks_[i].x + radius - box_.width, side_);
+  for (const std::uint32_t i : near_lid_) add(disks_[i].z + radius - box_.lid, lid_);
+  for (const std::uint32_t i : near_floor_) add(floor_at_.position + radius - disks_[i].z, floor_);
+  return sum;
+}
+
+void PressedBed::separate(double floor, double most, int sweeps) {
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    double worst = 0;
+    const auto excess = [&worst](double overlap) {
+      worst = std::max(worst, overlap);
+      return std::max(overlap, 0.0);
+    };
+    for (const std::uint32_t i : near_floor_) disks_[i].z += excess(floor + radius - disks_[i].z);
+    for (const std::uint32_t i : near_lid_) disks_[i].z -= excess(disks_[i].z + radius - box_.lid);
+    for (const std::uint32_t i : near_left_) disks_[i].x += excess(radius - disks_[i].x);
+    for (const std::uint32_t i : near_right_) disks_[i].x -= excess(disks_[i].x + radius - box_.width);
+    for (std::size_t p = 0; p < first_.size(); ++p) {
+      const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+      if (i >= count_) continue;
+      const TwoLanes d = gap_of(i, k);
+      const double squared = d[0] * d[0] + d[1] * d[1];
+      if (squared >= 4 * radius * radius) continue;
+      const double distance = std::sqrt(squared);
+      const TwoLanes move = both(0.5 * overdone * excess(2 * radius - distance) / distance) * d;
+      put_pair(&disks_[i].x, pair_at(&disks_[i].x) - move);
+      put_pair(&disks_[k].x, pair_at(&disks_[k].x) + move);
+    }
+    if (worst <= most) return;
+  }
+}
+
+}  // namespace shakebed::sim

@@ -1,0 +1,138 @@
+// A bed under load as soft disks: a linear spring and a dashpot in every contact, small steps of time. What hard disks
+// do by ever more and ever smaller contacts, a bed that lies on the floor does here in contacts that last. Equal smooth
+// disks; the engine decides when (engine_press.hpp).
+//
+// A value owns its disks; one thread at a time may use one. Reduced units.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sim/engine/disk.hpp"
+#include "sim/engine/floor_motion.hpp"
+#include "sim/engine/lanes.hpp"
+#include "sim/scene/surface.hpp"
+
+namespace shakebed::sim {
+
+// Velocity Verlet with steps of a fraction of the contact time. Each dashpot is such that contacts of two disks which
+// begin at any moment within a step lose 1 - e^2 of their energy in the mean.
+class PressedBed {
+ public:
+  struct Box {
+    double width = 0, period = 0, lid = never;  // period 0: hard sides
+  };
+  struct Surfaces {
+    Surface disks, sides, floor, lid;
+  };
+  struct alignas(32) State {
+    double x, z, vx, vz;
+  };
+  // Steps a contact time. The mean loss is right with any; with 4 a packed bed was unstable.
+  static constexpr double steps_a_contact = 6;
+  static constexpr std::uint32_t steps_a_check = 8;  // of who may touch whom, and of the contact time
+
+  void set_up(const Box& box, const Surfaces& surfaces);
+  void begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time);
+  // One step of dt, from a floor that moves so to one that moves so.
+  void step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt);
+  // Springs and dashpots as of another contact time, from now on.
+  void soften(double contact_time);
+  bool check_due() const { return until_check_ == steps_a_check; }  // in step with the checks of neighbours
+
+  // At rest against the floor, and on with it; awake again.
+  void lie(const FloorMotion::Motion& floor);
+  void carry(const FloorMotion::Motion& before, const FloorMotion::Motion& after);
+  void wake(const FloorMotion::Motion& floor);
+
+  // Against the floor, at the last check.
+  double fastest() const { return fastest_; }
+  double mean_square_speed() const { return mean_square_speed_; }
+
+  // After the last step, and `later` than that.
+  State at(std::uint32_t i, double later) const;
+  double floor_force() const { return floor_force_; }
+  double floor_work() const { return floor_work_; }  // since begin()
+  double damped() const { return damped_; }          // in dashpots, since begin()
+  double loss_rate() const { return loss_rate_; }    // of the dashpots now
+  double compressed() const;                         // energy of the springs
+  double approach() const;                           // of disks in contact, root of the mean square
+  std::uint32_t touching() const { return static_cast<std::uint32_t>(touching_); }  // pairs
+  // Calls visit(centre of the first, from there to the second, force on the second) for each pair in contact.
+  template <class Visit>
+  void each_contact(Visit visit) const {
+    for (std::size_t p = 0; p < first_.size(); ++p) {
+      const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+      const TwoLanes d = gap_of(i, k);
+      const double distance = std::sqrt(d[0] * d[0] + d[1] * d[1]);
+      if (i >= count_ || !(distance < 1)) continue;
+      const TwoLanes normal = d / both(distance), flow = (velocity_of(k) - velocity_of(i)) * normal;
+      const double force = pair_.stiffness * (1 - distance) - pair_.damping * (flow[0] + flow[1]);
+      visit(pair_at(&disks_[i].x), d, both(force) * normal);
+    }
+  }
+  // Calls visit(disk, whether it is on the floor, force on it) for each disk in contact with a wall.
+  template <class Visit>
+  void each_wall_contact(Visit visit) const {
+    const auto all = [&](const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
+                         const Spring& spring) {
+      for (const std::uint32_t i : near) {
+        const double force = wall_force(i, inward, place, speed, spring, velocity_of(i)).force;
+        if (force != 0) visit(i, &spring == &floor_, both(force) * inward);
+      }
+    };
+    all(near_left_, TwoLanes{1, 0}, 0, 0, side_);
+    all(near_right_, TwoLanes{-1, 0}, -box_.width, 0, side_);
+    all(near_lid_, TwoLanes{0, -1}, -box_.lid, 0, lid_);
+    all(near_floor_, TwoLanes{0, 1}, floor_at_.position, floor_at_.velocity, floor_);
+  }
+  // Moves apart what overlaps, half of it each, until all do by no more than `most` or for so many sweeps.
+  void separate(double floor, double most, int sweeps);
+
+ private:
+  struct Spring {
+    double stiffness = 0, damping = 0;  // of mass 1
+  };
+  struct WallContacts {
+    double force = 0, lost = 0;
+  };
+  static Spring spring_of(const Surface& surface);
+  void list_pairs(double floor);
+  void list_walls(double floor);
+  void interleave();
+  void choose_active(double dt);
+  void check(const FloorMotion::Motion& floor, double dt);
+  void add_forces(const FloorMotion::Motion& floor);
+  template <bool periodic>
+  void add_pair_forces();
+  static std::uint32_t disk_at(std::uint32_t place) { return place / static_cast<std::uint32_t>(sizeof(State)); }
+  TwoLanes velocity_of(std::uint32_t i) const { return pair_at(&disks_[i].vx); }
+  WallContacts wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
+                          TwoLanes velocity) const;
+  WallContacts add_wall_forces(const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
+                               const Spring& spring);
+  TwoLanes gap_of(std::uint32_t i, std::uint32_t k) const;
+
+  Box box_;
+  std::array<Spring, 4> of_unit_time_;  // of a contact time of 1
+  Spring pair_, side_, floor_, lid_;
+  std::uint32_t count_ = 0;
+  std::vector<State> disks_;     // velocities: those foreseen for the end of the step. Two sentinels behind the last
+  std::vector<double> halfway_;  // velocities half a step before, {vx, vz}
+  std::vector<double> force_;    // {x, z} at the places of disks_; weight apart
+  double last_step_ = 0;
+  std::vector<double> listed_;  // {x, z} when the neighbours were listed, z above the floor
+  // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
+  std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
+  std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;
+  std::uint32_t until_check_ = steps_a_check;
+  double usual_approach_ = 0;  // of neighbours
+  double touching_ = 0, loss_rate_ = 0, pair_squares_ = 0, floor_force_ = 0, floor_work_ = 0, damped_ = 0;
+  double fastest_ = never, mean_square_speed_ = never;
+  FloorMotion::Motion floor_at_{};  // that of the latest forces
+};
+
+}  // namespace shakebed::sim
