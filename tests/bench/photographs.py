@@ -81,7 +81,7 @@ def run_program(program, picture, folder):
     if os.path.exists(disks):
         rows = csv.DictReader(line for line in open(disks) if not line.startswith('#'))
         found = [[float(row['x_px']), float(row['y_px'])] for row in rows if int(float(row['frame'])) == 0]
-    said = [line for line in text.splitlines() if 'error' in line.lower() or line.startswith('warning: extract')]
+    said = [line for line in text.splitlines() if line.startswith(('error: ', 'warning: extract: '))]
     return {'found': numpy.array(found).reshape(-1, 2), 'code': code, 'said': (said or [''])[0], 'seconds': seconds}
 
 
@@ -109,7 +109,7 @@ def tuned_hough(picture, truth):
 
 def first_sentence(said, picture):
     """What the program said first, without paths of this machine."""
-    said = said.replace(picture, os.path.basename(picture)).replace('warning: extract: ', '').replace('error: ', '')
+    said = said.replace(picture, os.path.basename(picture)).replace('warning: extract: ', '').replace('error: extract (extract): ', '')
     said = said.split('. See ')[0].split('. ')[0]
     return said.replace('|', '/')[:200]
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/survey.hpp"
 #include "tests/ingest/test_files.hpp"
 
@@ -179,6 +180,26 @@ TEST(DrawingSigns, ScreenCopiesWithRoundMarksAreRefused) {
       const Survey survey = survey_of_file(copy.draw(random), ending);
       EXPECT_FALSE(survey.found) << copy.name << ending << ": " << survey.candidates.front().disks.size() << " disks";
     }
+}
+
+// Black may be a camera's limit: what is between black and white tells whether there is noise.
+TEST(DrawingSigns, ADarkPhotographIsNoDrawing) {
+  std::mt19937 random(3);
+  cv::Mat on(high, wide, CV_8U, cv::Scalar(0)), noise(high, wide, CV_16S);
+  for (int k = 0; k < 20; ++k) mark(on, within(random, 30, 600), within(random, 30, 440), 14, cv::Scalar(90));
+  cv::theRNG().state = 2;
+  cv::randn(noise, 0, 3);
+  cv::Mat noisy;
+  cv::add(on, noise, noisy, on, CV_8U);
+  const auto drawn = [](const cv::Mat& picture) {
+    GrayFrame frame{picture.cols, picture.rows, {}};
+    for (int row = 0; row < picture.rows; ++row)
+      for (int column = 0; column < picture.cols; ++column)
+        frame.pixels.push_back(picture.at<std::uint8_t>(row, column));
+    return signs_of_drawing(frame).looks_drawn();
+  };
+  EXPECT_TRUE(drawn(on));
+  EXPECT_FALSE(drawn(noisy));
 }
 
 // Beads in a box, drawn without noise: walls and floor are ruled lines, but the beads make up the picture.
