@@ -196,7 +196,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   for (std::size_t k = 0; k < channels.size(); ++k) pictures.push_back(options.roi ? &cropped[k] : &channels[k]->frame);
   CensusOptions asked;
   asked.polarity = options.polarity;
-  const DrawingSigns signs = options.any_shape ? DrawingSigns{} : signs_inside(frames, options.roi);
+  const DrawingSigns signs = signs_inside(frames, options.roi);
   if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
   const CircleCensus census = take_census(pictures, asked);
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
@@ -209,8 +209,8 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
     judge(candidate, learned.edge_length_px);
-    if (const char* why = candidate.why_not.empty() ? why_drawn(signs, candidate.explained_share) : nullptr)
-      candidate.why_not = why;
+    if (const char* why = why_drawn(signs, candidate.explained_share)) candidate.why_drawn = why;
+    if (candidate.why_not.empty() && !options.any_shape) candidate.why_not = candidate.why_drawn;
     if (candidate.why_not.empty())
       judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
                   options.any_shape);

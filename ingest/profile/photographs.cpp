@@ -115,17 +115,17 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
   out.measurement.warnings.insert(out.measurement.warnings.begin(), doubts.begin(), doubts.end());
   const Doubt doubt = doubt_of(out.measurement.expected_wrong);
   out.status = doubt == Doubt::too_many ? FindStatus::doubtful : FindStatus::ok;
-  const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
-  if (out.measurement.contacts.far_apart(diameter_px)) {
-    out.status = FindStatus::doubtful;
-    out.message = doubts.front();
-  }
   if (doubt != Doubt::little) {
     const std::string warning =
         formatted("%.1f %% of the disks found may be wrong: look at them before the numbers are used",
                   100 * out.measurement.expected_wrong);
     if (!out.ok()) out.message = warning;
     out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
+  }
+  const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
+  if (out.measurement.contacts.far_apart(diameter_px)) {
+    out.status = FindStatus::doubtful;
+    out.message = doubts.front();
   }
   return out;
 }

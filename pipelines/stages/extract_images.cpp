@@ -69,6 +69,9 @@ void use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
         fmt::format("{}: the outlines are not those of disks ({}); they are measured because of shape "
                     "\"any\". Positions hold if these are your beads; radii and densities hold for disks",
                     look->path, chosen->why_not_round));
+  if (!chosen->why_drawn.empty())
+    context.warning(
+        fmt::format("{}: {}; the circles are measured because of shape \"any\".", look->path, chosen->why_drawn));
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};

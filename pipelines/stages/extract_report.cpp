@@ -106,6 +106,8 @@ StagePages extract_pages() {
            "Look through the film for circles that are no beads; give a region (\"roi\") that holds the bed alone."},
           {"outlines are not those", measurement,
            "Check in the film that the circles are your beads; densities hold for disks alone."},
+          {"as in a plot", measurement, "Check in the film that the circles are your beads."},
+          {"as in a drawing", measurement, "Check in the film that the circles are your beads."},
           {"covered area", measurement, "Look through the film for beads that were missed or found twice."},
           {"varies by", measurement, "Use a wider view, or a region (\"roi\") that beads do not leave."},
           {"lower border", measurement, "Give the floor's row (\"floor\"): heights begin there."},

@@ -82,6 +82,7 @@ def run_program(program, picture, folder):
         rows = csv.DictReader(line for line in open(disks) if not line.startswith('#'))
         found = [[float(row['x_px']), float(row['y_px'])] for row in rows if int(float(row['frame'])) == 0]
     said = [line for line in text.splitlines() if line.startswith(('error: ', 'warning: extract: '))]
+    said.sort(key=lambda line: not line.startswith('error: '))
     return {'found': numpy.array(found).reshape(-1, 2), 'code': code, 'said': (said or [''])[0], 'seconds': seconds}
 
 

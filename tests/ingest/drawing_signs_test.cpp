@@ -182,6 +182,16 @@ TEST(DrawingSigns, ScreenCopiesWithRoundMarksAreRefused) {
     }
 }
 
+// Who wants the marks of a plot measured can have them; then the plot is told of.
+TEST(DrawingSigns, MarksAreMeasuredWhenAskedFor) {
+  std::mt19937 random(1);
+  SurveyOptions any;
+  any.any_shape = true;
+  const Survey survey = survey_of_file(scatter(random, true, true, 60, 11), ".png", any);
+  ASSERT_TRUE(survey.found) << survey.why_not;
+  EXPECT_FALSE(survey.candidates.front().why_drawn.empty());
+}
+
 // Black may be a camera's limit: what is between black and white tells whether there is noise.
 TEST(DrawingSigns, ADarkPhotographIsNoDrawing) {
   std::mt19937 random(3);
