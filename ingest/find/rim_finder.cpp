@@ -19,7 +19,9 @@ constexpr double radius_window = 0.12;     // radii, either way: circles of one 
 constexpr double nearest_centres = 0.8;    // diameters: two circles nearer than that are one
 constexpr double faintest_support = 0.3;   // share of the rim
 constexpr double least_probability = 0.8;  // of a disk that is reported: more than one circle alone in its class has
-constexpr double well_supported = 0.9;     // probability from which a circle counts for the radius
+// Of the beads' contrast. Beads of 17 photographs: 0.40 or more; a shadow's corner that looked round: 0.10.
+constexpr double faintest_contrast = 0.25;
+constexpr double well_supported = 0.9;  // probability from which a circle counts for the radius
 // Where blurred beads touch, their steepest edges lie farther out than a lone one's: in a photograph of beads of 2.5 px
 // at 1.4 times its radius. A circle so much smaller than the others must show most of its rim.
 constexpr double lone_share = 0.75, lone_support = 0.6;
@@ -207,6 +209,11 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   const EdgeMap edges = find_edges(at.picture, model.threshold);
   RimsFound found;
   found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
+  const auto drop_faint = [&] {
+    std::erase_if(found.disks,
+                  [&](const RimDisk& disk) { return disk.circle.contrast < faintest_contrast * model.contrast; });
+  };
+  drop_faint();
   if (!model.gaps) return found;
   const GapCircles more = circles_in_gaps(edges, on_the_map(found.disks, at), model, at.scale);
   found.expected_missed = more.expected_missed;
@@ -217,6 +224,7 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
     found.disks.back().probability = one.probability;
     found.disks.back().other_size = one.other_size;
   }
+  drop_faint();
   sort_by_place(found.disks);
   return found;
 }

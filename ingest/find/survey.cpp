@@ -6,8 +6,10 @@
 #include <cstdio>
 #include <numbers>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/circle_census.hpp"
+#include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/settle_channel.hpp"
 
 namespace shakebed::ingest {
@@ -100,6 +102,17 @@ GrayFrame only_inside(GrayFrame frame, const PixelRectangle& roi, int reduction)
   return frame;
 }
 
+DrawingSigns signs_inside(const ChannelFrames& frames, const std::optional<PixelRectangle>& roi) {
+  const GrayFrame& frame = frames.channels.front().frame;
+  if (!roi) return signs_of_drawing(frame);
+  PicturePart part;
+  part.left = std::clamp(roi->left / frames.reduction, 0, frame.width - 1);
+  part.top = std::clamp(roi->top / frames.reduction, 0, frame.height - 1);
+  part.width = std::clamp(roi->width / frames.reduction, 1, frame.width - part.left);
+  part.height = std::clamp(roi->height / frames.reduction, 1, frame.height - part.top);
+  return signs_of_drawing(cut_out(frame, part));
+}
+
 std::string text_of(const char* format, double a, double b = 0) {
   char text[300];
   std::snprintf(text, sizeof text, format, a, b);
@@ -183,6 +196,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   for (std::size_t k = 0; k < channels.size(); ++k) pictures.push_back(options.roi ? &cropped[k] : &channels[k]->frame);
   CensusOptions asked;
   asked.polarity = options.polarity;
+  const DrawingSigns signs = signs_inside(frames, options.roi);
   if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
   const CircleCensus census = take_census(pictures, asked);
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
@@ -195,6 +209,8 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
     judge(candidate, learned.edge_length_px);
+    if (const char* why = why_drawn(signs, candidate.explained_share)) candidate.why_drawn = why;
+    if (candidate.why_not.empty() && !options.any_shape) candidate.why_not = candidate.why_drawn;
     if (candidate.why_not.empty())
       judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
                   options.any_shape);

@@ -21,6 +21,7 @@ struct SurveyCandidate {
   double expected_wrong = 0;   // share of the disks
   bool not_round = false;      // circles are seen, but on outlines that are not round ...
   std::string why_not_round;   // ... a sentence
+  std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads
   bool credible = false;       // "no beads here" does not explain the picture as well
   std::string why_not;         // a sentence, unless credible
 };
@@ -35,7 +36,7 @@ struct SurveyOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;  // px of the full frame
   std::optional<PixelRectangle> roi;
-  bool any_shape = false;  // outlines that are not round may be beads
+  bool any_shape = false;  // outlines that are not round, and marks of a drawing, may be beads
 };
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options = {});

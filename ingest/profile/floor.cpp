@@ -55,7 +55,7 @@ Line robust_line(const std::vector<std::pair<double, double>>& points) {
 
 }  // namespace
 
-Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, int width) {
+FloorPoints lowest_points(const std::vector<FrameFindings>& frames, double diameter_px, int width) {
   const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
   std::vector<std::vector<std::pair<double, double>>> lowest(columns);  // (bottom, x) per frame
   for (const FrameFindings& frame : frames) {
@@ -69,13 +69,18 @@ Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, in
     for (std::size_t c = 0; c < columns; ++c)
       if (best[c].first > 0) lowest[c].push_back(best[c]);
   }
-  std::vector<std::pair<double, double>> points;
+  FloorPoints points;
   for (auto& column : lowest) {
     if (column.empty()) continue;
     std::sort(column.begin(), column.end());
     const auto& chosen = column[static_cast<std::size_t>(0.95 * static_cast<double>(column.size() - 1))];
     points.emplace_back(chosen.second, chosen.first);
   }
+  return points;
+}
+
+Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, int width) {
+  const FloorPoints points = lowest_points(frames, diameter_px, width);
   // Columns without beads at the floor would pull the line up: start from the lower half.
   std::vector<double> heights;
   for (const auto& point : points) heights.push_back(point.second);

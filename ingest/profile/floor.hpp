@@ -20,6 +20,10 @@ struct Line {
   std::pair<double, double> middle;  // of the points
 };
 
+// Per column of the frame, the lowest bottom seen in nearly all frames: (x, y), px.
+using FloorPoints = std::vector<std::pair<double, double>>;
+FloorPoints lowest_points(const std::vector<FrameFindings>& frames, double diameter_px, int width);
+
 // The floor: per column of the frame, the lowest bottom seen in nearly all frames.
 Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, int width);
 

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/bed_geometry.hpp"
 #include "ingest/profile/coverage.hpp"
 #include "ingest/profile/film_calibration.hpp"
@@ -153,10 +154,28 @@ class BedMeasurer {
     held_.clear();
   }
 
+  // What lies beside the bed, unless walls or a region are given, is no bead.
+  void leave_out_beside(FrameFindings& frame) {
+    const auto beside = [&](const FoundDisk& disk) { return disk.x_px < ends_.left_px || disk.x_px > ends_.right_px; };
+    const std::size_t left_out = std::erase_if(frame.disks, beside) + std::erase_if(frame.second, beside);
+    result_.beside_bed += left_out;
+    frame.report.rejected += left_out;
+    frame.report.disks = frame.disks.size();
+    frame.report.second = frame.second.size();
+  }
+
   void settle_geometry() {
+    if (!options_.find.roi && !options_.left_wall_px && !options_.right_wall_px)
+      ends_ = ends_of_bed(held_, refined_.radius_px);
+    result_.bed_region = region_between(ends_, film_.finder.width, film_.finder.height);
+    for (FrameFindings& frame : held_) leave_out_beside(frame);
     for (std::string& warning : find_geometry(film_, held_, refined_, bed_))
       result_.warnings.push_back(std::move(warning));
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
+    result_.contacts = contacts_of(held_, 0.5 * diameter_px_);
+    if (!bed_.floor_given)
+      result_.floor_sag =
+          sag_of_floor(lowest_points(held_, diameter_px_, film_.finder.width), diameter_px_) / diameter_px_;
     if (options_.frame_rate_hz) {
       shaking_.begin(held_, diameter_px_, film_.finder.width, bed_);
       for (const std::string& warning : shaking_.warnings()) result_.warnings.push_back(warning);
@@ -183,6 +202,7 @@ class BedMeasurer {
 
   // A frame's disks in heights, its densities.
   void place(FrameFindings& frame) {
+    leave_out_beside(frame);
     const FrameStatus status = frame.report.status;
     if (status == FrameStatus::good || status == FrameStatus::nothing_found) {
       ++good_;
@@ -345,6 +365,7 @@ class BedMeasurer {
   FrameSource& source_;
   const FilmCalibration film_;
   const MeasureOptions& options_;
+  BedEnds ends_;
   Measurement result_;
   BedCalibration& bed_ = result_.calibration;
   const LensMap lens_map_{film_.lens, film_.recorded_width, film_.recorded_height};

@@ -118,6 +118,15 @@ struct BedCalibration {
   bool walls_are_frame_sides = false;  // no walls seen: the profile is that of the part of the bed in view
 };
 
+// Of pairs of disks of the most frequent size: so many are nearer to one another than 1.1 diameters, so many are
+// expected among disks that keep no other distance than a diameter, as the pairs up to two diameters apart tell.
+struct Contacts {
+  double seen = 0, expected = 0;
+  double nearest_px = 0;               // the median over the disks of the distance to their nearest neighbour
+  [[nodiscard]] bool missing() const;  // so few that these are no touching beads
+  [[nodiscard]] bool overlapping(double diameter_px) const;  // the outline seen is too large
+  [[nodiscard]] bool far_apart(double diameter_px) const;    // so far that these are holes or marks
+};
 struct PhaseProfile {
   double phase = 0;  // middle of the phase bin, 0 .. 1
   DensityProfile profile;
@@ -142,6 +151,10 @@ struct Measurement {
   double disk_count_std = 0;          // scatter of the bead number from frame to frame
   bool floor_out_of_view = false;     // the lower border cuts beads, and no floor was given
   bool surface_out_of_view = false;   // the upper border cuts beads
+  Contacts contacts;                  // in the frames that geometry is found from
+  std::size_t beside_bed = 0;         // disks left out, a few beyond an empty stretch beside the bed
+  PixelRectangle bed_region;          // what lies between them, px of the recorded frame
+  double floor_sag = 0;               // D: the lowest disks lie on an arc of this height, none on a straight floor
   std::vector<std::string> warnings;  // plain sentences
 };
 

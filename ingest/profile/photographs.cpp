@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/profile/bed_doubts.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
@@ -110,6 +111,8 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
     };
   out.measurement = measure_bed(source, options);
   out.measurement.disks = std::move(kept);
+  const std::vector<std::string> doubts = doubts_of_bed(out.measurement, options.bead_diameter_m);
+  out.measurement.warnings.insert(out.measurement.warnings.begin(), doubts.begin(), doubts.end());
   const Doubt doubt = doubt_of(out.measurement.expected_wrong);
   out.status = doubt == Doubt::too_many ? FindStatus::doubtful : FindStatus::ok;
   if (doubt != Doubt::little) {
@@ -118,6 +121,11 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
                   100 * out.measurement.expected_wrong);
     if (!out.ok()) out.message = warning;
     out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
+  }
+  const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
+  if (out.measurement.contacts.far_apart(diameter_px)) {
+    out.status = FindStatus::doubtful;
+    out.message = doubts.front();
   }
   return out;
 }

@@ -73,6 +73,9 @@ Measurement measure_reduced_bed(FrameSource& source, const MeasureOptions& asked
   Measurement measurement = measure_bed(source, options);
   for (MeasuredDisk& disk : measurement.disks) enlarge(disk, by);
   enlarge(measurement.calibration, by);
+  for (int* length : {&measurement.bed_region.left, &measurement.bed_region.width, &measurement.bed_region.height})
+    *length *= asked.reduction;
+  measurement.contacts.nearest_px = by.length(measurement.contacts.nearest_px);
   return measurement;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/overlay.hpp"
 #include "ingest/profile/photographs.hpp"
@@ -70,6 +71,9 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
         fmt::format("{}: the outlines are not those of disks ({}); they are measured because of shape "
                     "\"any\". Positions hold if these are your beads; radii and densities hold for disks",
                     look->path, chosen->why_not_round));
+  if (!chosen->why_drawn.empty())
+    context.warning(
+        fmt::format("{}: {}; the circles are measured because of shape \"any\".", look->path, chosen->why_drawn));
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};
@@ -77,6 +81,18 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
                           options_for(*chosen), chosen->disks.size()));
   return !chosen->not_round;
+}
+
+// Refuses holes and printed dots, and warns where heights or scale mean nothing.
+void judge_bed(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
+  const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
+  if (options.shape == BeadShape::round && found.contacts.far_apart(diameter_px))
+    throw StageError(fmt::format(
+        "Hardly any of the {} disks found touch, and nearest centres are typically {:.1f} diameters apart: holes and "
+        "printed dots look so, beads of a bed do not. Look at fit-images --preview. If they are your beads, give "
+        "--shape any, or --radius if a bead is larger than the circle",
+        found.disk_total, found.contacts.nearest_px / diameter_px));
+  for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
@@ -94,10 +110,11 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
         fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
                     "numbers.",
                     100 * wrong));
+  judge_bed(options, context, found);
   if (ingest::doubt_of(missed) != ingest::Doubt::little)
     context.warning(fmt::format(
-        "About {:.0f} % of the beads may be missed: so many are seen too poorly to be reported. Look at the "
-        "overlays before you use the density.",
+        "About {:.0f} % of the beads are seen too poorly to be reported, and may be missed; what is not seen at all "
+        "comes on top. Look at the overlays before you use the density.",
         100 * missed));
   if (!options.bead_number) return;
   const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);

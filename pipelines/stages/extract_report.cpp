@@ -93,6 +93,12 @@ StagePages extract_pages() {
       .warnings = {
           {"may be wrong", measurement,
            "Look through the film with the colours by quality: what is marked and is no bead?"},
+          {"do not touch", measurement,
+           "Look through the film: are the circles as large as your beads? Give the length of a pixel (\"scale\")."},
+          {"disks found overlap", measurement,
+           "Look through the film: are the circles as large as your beads? Give the length of a pixel (\"scale\")."},
+          {"beside the bed", measurement, "Look through the film: does the region that is named hold all beads?"},
+          {"No level floor", measurement, "Photograph the bed from the side, or give the floor's row (\"floor\")."},
           {"missed or out of view", measurement,
            "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone, or "
            "more even light."},
@@ -100,6 +106,8 @@ StagePages extract_pages() {
            "Look through the film for circles that are no beads; give a region (\"roi\") that holds the bed alone."},
           {"outlines are not those", measurement,
            "Check in the film that the circles are your beads; densities hold for disks alone."},
+          {"as in a plot", measurement, "Check in the film that the circles are your beads."},
+          {"as in a drawing", measurement, "Check in the film that the circles are your beads."},
           {"covered area", measurement, "Look through the film for beads that were missed or found twice."},
           {"varies by", measurement, "Use a wider view, or a region (\"roi\") that beads do not leave."},
           {"lower border", measurement, "Give the floor's row (\"floor\"): heights begin there."},

@@ -71,7 +71,7 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
          fmt::format("--polarity {} --radius {:.2f}",
                      candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
                      candidate.rims.radius_px) +
-         (candidate.not_round ? " --shape any" : "");
+         (candidate.not_round || !candidate.why_drawn.empty() ? " --shape any" : "");
 }
 
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,

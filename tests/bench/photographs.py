@@ -3,7 +3,7 @@
 
 usage: photographs.py PROGRAM FOLDER [--hough] [--only PART] [--out TABLE.md] [--keep FOLDER]
 
-FOLDER holds pictures, `index.csv` (columns file, number_full; others are ignored), and for each picture `NAME.csv` with columns
+FOLDER holds pictures, `index.csv` (columns file, number_full; repository, path and licence, if given, are copied), and for each picture `NAME.csv` with columns
 x_px, y_px, radius_px, class (centres of pixels at integers; class "full" counts, "partial" does not). number_full = 0: no beads,
 the picture is to be refused. number_full empty: nothing is known, and only the outcome is written.
 
@@ -81,9 +81,9 @@ def run_program(program, picture, folder):
     if os.path.exists(disks):
         rows = csv.DictReader(line for line in open(disks) if not line.startswith('#'))
         found = [[float(row['x_px']), float(row['y_px'])] for row in rows if int(float(row['frame'])) == 0]
-    said = [line for line in text.splitlines() if 'extract' in line and ('wrong' in line or 'doubt' in line or 'no beads' in line)]
-    errors = [line for line in text.splitlines() if 'error' in line.lower() or 'no beads' in line]
-    return {'found': numpy.array(found).reshape(-1, 2), 'code': code, 'said': (said or errors or [''])[0], 'seconds': seconds}
+    said = [line for line in text.splitlines() if line.startswith(('error: ', 'warning: extract: '))]
+    said.sort(key=lambda line: not line.startswith('error: '))
+    return {'found': numpy.array(found).reshape(-1, 2), 'code': code, 'said': (said or [''])[0], 'seconds': seconds}
 
 
 def tuned_hough(picture, truth):
@@ -108,6 +108,17 @@ def tuned_hough(picture, truth):
     return best
 
 
+def first_sentence(said, picture):
+    """What the program said first, without paths of this machine."""
+    said = said.replace(picture, os.path.basename(picture)).replace('warning: extract: ', '').replace('error: extract (extract): ', '')
+    said = said.split('. See ')[0].split('. ')[0]
+    return said.replace('|', '/')[:200]
+
+
+def source_of(row):
+    return ', '.join(row[key] for key in ('repository', 'path', 'licence') if row.get(key))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('program')
@@ -117,8 +128,8 @@ def main():
     parser.add_argument('--out')
     parser.add_argument('--keep', help='results of the program, a folder a picture')
     given = parser.parse_args()
-    lines = ['| picture | beads | found | F1 | rms, radii | outcome | CPU s |' + (' Hough F1 |' if given.hough else ''),
-             '|---|---|---|---|---|---|---|' + ('---|' if given.hough else '')]
+    lines = ['| picture | beads | found | F1 | rms, radii | outcome | CPU s | first warning or reason | source, licence |' +
+             (' Hough F1 |' if given.hough else ''), '|---|---|---|---|---|---|---|---|---|' + ('---|' if given.hough else '')]
     for row in csv.DictReader(open(os.path.join(given.folder, 'index.csv'))):
         if given.only not in row['file']:
             continue
@@ -141,8 +152,8 @@ def main():
         f1 = f"{one['f1']:.3f}" if one else ('1' if known and not len(result['found']) else '0' if known else '')
         rms = f"{one['rms_r']:.3f}" if one and one['rms_r'] == one['rms_r'] else ''
         lines.append(f"| {row['file']} | {'' if beads is None else beads} | {len(result['found'])} | {f1} | {rms} | {outcome} | "
-                     f"{result['seconds']:.1f} |{hough}")
-        print(lines[-1], result['said'][:230], flush=True)
+                     f"{result['seconds']:.1f} | {first_sentence(result['said'], picture)} | {source_of(row)} |{hough}")
+        print(lines[-1], flush=True)
     if given.out:
         with open(given.out, 'w') as table:
             table.write('\n'.join(lines) + '\n')

@@ -153,6 +153,48 @@ TEST(Frames, PagesOfATiffAreFrames) {
   EXPECT_FALSE(source.next());
 }
 
+// What a file holds counts, not what its name says.
+TEST(Frames, ATiffThatIsNamedAsAJpegIsReadAsATiff) {
+  const ScratchFolder folder;
+  write_tiff(folder / "pages.jpg", 2, 1, {{100, 65535}, {200, 65535}}, 16);
+  EXPECT_EQ(FrameSource::open({folder / "pages.jpg"}).count_if_known(), 2U);
+  EXPECT_NEAR(read_frame(folder / "pages.jpg", 1).pixels[0], 200.0 * 255 / 65535, 1e-4);
+}
+
+TEST(Frames, TransparencyChangesNoLevel) {
+  const ScratchFolder folder;
+  cv::Mat picture(2, 3, CV_8UC4);
+  for (int k = 0; k < 6; ++k) {
+    const auto level = static_cast<std::uint8_t>(40 * k);
+    picture.at<cv::Vec4b>(k / 3, k % 3) = {level, level, level, static_cast<std::uint8_t>(k % 2 ? 255 : 0)};
+  }
+  cv::imwrite(folder / "clear.png", picture);
+  const GrayFrame frame = read_frame(folder / "clear.png");
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_EQ(frame.pixels[k], 40.0F * static_cast<float>(k));
+}
+
+// A camera held on its side: the picture is stored lying, and its orientation (EXIF tag 0x112 = 6) says so.
+TEST(Frames, APhotographIsTurnedAsItsCameraWasHeld) {
+  const ScratchFolder folder;
+  cv::Mat lying(16, 32, CV_8U, cv::Scalar(40));
+  lying(cv::Rect(0, 0, 16, 16)).setTo(220);
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", lying, jpeg);
+  std::string note("Exif\0\0II\x2a\0\x08\0\0\0", 14);
+  append(note, 1, 2), append(note, 0x112, 2), append(note, 3, 2), append(note, 1, 4), append(note, 6, 4);
+  append(note, 0, 4);
+  std::string bytes(jpeg.begin(), jpeg.end()), head = "\xff\xe1";
+  head += static_cast<char>(0);
+  head += static_cast<char>(note.size() + 2);
+  bytes.insert(2, head + note);
+  std::ofstream(folder / "held.jpg", std::ios::binary) << bytes;
+  const GrayFrame frame = read_frame(folder / "held.jpg");
+  ASSERT_EQ(frame.width, 16);
+  ASSERT_EQ(frame.height, 32);
+  EXPECT_GT(frame.at(8, 4), 200);
+  EXPECT_LT(frame.at(8, 28), 60);
+}
+
 // A film of `count` grey pictures, each with its number written in black and white blocks that survive compression.
 constexpr int film_side = 96, film_block = 32;
 cv::Mat numbered_picture(std::size_t number) {

@@ -113,6 +113,30 @@ TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
   EXPECT_TRUE(learn_beads({&frame}, options).calibration.rims->gaps->other_size.empty());
 }
 
+// A shadow's round end, of a tenth of the beads' contrast.
+TEST(Sizes, AFaintCircleIsNoBead) {
+  std::vector<Bead> beads = scattered(40, {18}, 520, 460, 12);
+  beads.back().radius = 18.01;
+  const auto face = [](const Bead& bead, double u, double v) {
+    return bead.radius > 18 ? 170.0 : fringed_face(bead, u, v);
+  };
+  const GrayFrame frame = drawn(beads, 520, 460, 190, face, 6);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 18};
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  const auto sees_faint = [&](const RimModel& rims) {
+    const RimsFound found = find_rims(frame, rims);
+    return std::any_of(found.disks.begin(), found.disks.end(), [&](const RimDisk& disk) {
+      return std::hypot(disk.circle.x - beads.back().x, disk.circle.y - beads.back().y) < 5;
+    });
+  };
+  RimModel without_contrast = *learned.calibration.rims;
+  without_contrast.contrast = 0;
+  EXPECT_TRUE(sees_faint(without_contrast));
+  EXPECT_FALSE(sees_faint(*learned.calibration.rims));
+}
+
 TEST(Sizes, TheChannelIsSettledInWhichTheFacesAreSeen) {
   const std::vector<Bead> beads = scattered(50, {18}, 520, 460, 13);
   ChannelFrames frames;
