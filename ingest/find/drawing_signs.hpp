@@ -12,9 +12,8 @@ namespace shakebed::ingest {
 
 struct DrawingSigns {
   double flat_share = 0;  // pixels that have the level of their eight neighbours, of all
-  // Of pixels that are neither black nor white: as many differ a little (by at most 4 grey levels) from a neighbour, of
-  // those that differ little or not at all. 1 when there are hardly any: black and white areas may be a camera's
-  // limits.
+  // Of the pixels that are neither black nor white and differ by at most 4 grey levels from their neighbours: the share
+  // that differs at all. It is 1 when there are hardly any such pixels: black and white areas may be a camera's limits.
   double faint_share = 1;
   std::size_t ruled_lines = 0;  // straight edges along rows and columns, over a quarter of the frame or more
   bool looks_ruled() const;     // as plots, forms and windows of programs are

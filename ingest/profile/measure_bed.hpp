@@ -118,8 +118,8 @@ struct BedCalibration {
   bool walls_are_frame_sides = false;  // no walls seen: the profile is that of the part of the bed in view
 };
 
-// Of pairs of disks of the most frequent size: so many are nearer to one another than 1.1 diameters, so many are
-// expected among disks that keep no other distance than a diameter, as the pairs up to two diameters apart tell.
+// Pairs of disks of the most frequent size that are nearer than 1.1 diameters: seen, and expected. The expected number
+// follows from the pairs that are up to two diameters apart, for disks that keep no distance but a diameter.
 struct Contacts {
   double seen = 0, expected = 0;
   double nearest_px = 0;               // the median over the disks of the distance to their nearest neighbour

@@ -4,8 +4,8 @@
 //   337
 //   Lattice="30 0 0 0 1 0 0 0 40" Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1 Time=12.5 Phase=0.25 ...
 //   X 0.5 0 0.5 0.1 0 -0.2 0.5
-// y is the direction across the slab (0), z is up. The species is X for disks of diameter 1 and B for others: ASE takes
-// symbols of elements alone, and X is its atom that is no element, of mass 1. Comment keys of ours: Time, Phase (of the
+// y is the direction across the slab (0), z is up. The species is X for disks of diameter 1 and B for others. ASE takes
+// symbols of elements alone; X is its atom that is no element, of mass 1. Comment keys of ours: Time, Phase (of the
 // floor's cycle, 0 to 1), Floor (height of the floor), FloorVelocity, Width, Units ("SI" or "reduced"), pbc.
 #pragma once
 

@@ -46,7 +46,7 @@ void Engine<Space, Rule, Sizes>::plan_rest(bool wanted) {
   }
 }
 
-// Looks at the bed go on from now on.
+// The next look at the bed is one interval from now.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::look_again() {
   contacts_at_look_ = counters_.collisions();

@@ -75,8 +75,8 @@ class Watcher {
   virtual void touched_wall(double time, std::uint32_t disk, bool floor, double z, double px, double pz) = 0;
 };
 
-// The largest overlap that rounding leaves of hard disks, and the largest of a bed that is pressed on the floor [D]:
-// the beds of tests/bench/README.md have up to 2.5e-3.
+// The largest overlap that rounding leaves of hard disks, and the largest of a bed pressed on the floor [D]. The beds
+// of tests/bench/README.md have up to 2.5e-3.
 inline constexpr double hard_overlap = 1e-9, soft_overlap = 0.01;
 
 class Simulation {

@@ -23,10 +23,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 GENERATED = ("docs/reference/", "docs/results.md", "docs/results/")  # text of the code, which is read as code
 # Files whose strings or header comments still have faults, with their number. It may only shrink.
 CODE_ALLOWED = {
-    "fit/profile_fit/answer.cpp": 2, "fit/profile_fit/answer.hpp": 1, "fit/profile_fit/bins.cpp": 1,
+    "fit/profile_fit/answer.cpp": 2, "fit/profile_fit/answer.hpp": 1,
     "pipelines/stages/extract_images.cpp": 1, "pipelines/stages/extract_report.cpp": 1,
     "pipelines/stages/figure.cpp": 1, "pipelines/stages/film.hpp": 1, "pipelines/stages/fit.cpp": 3,
-    "pipelines/stages/fit_report.cpp": 1, "pipelines/stages/scene_options.cpp": 2,
     "pipelines/stages/simulate_run.cpp": 1, "sim/measure/observables.hpp": 1,
 }
 CODE_ROOMS = ("statistics", "sim", "ingest", "fit", "pipelines", "python")
