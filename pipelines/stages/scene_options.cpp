@@ -28,8 +28,8 @@ void describe_surface(Fields& fields, SurfaceOptions& surface) {
       {{sim::RestitutionLaw::constant, "constant"},
        {sim::RestitutionLaw::power, "power"},
        {sim::RestitutionLaw::viscoelastic, "viscoelastic"}},
-      {.help = "how e depends on the approach v. constant: not at all. power: 1 - (1 - e) (v/v0)^(3/4) below v0, e "
-               "above (Bizon 1998). viscoelastic: as of viscoelastic spheres, e at v0 (Mueller and Poeschel 2011)"});
+      {.help = "how e depends on the approach v. Constant: not at all. Power: 1 - (1 - e) (v/v0)^(3/4) below v0, e "
+               "above (Bizon 1998). Viscoelastic: as of viscoelastic spheres, e at v0 (Mueller and Poeschel 2011)"});
   fields.quantity("restitution_speed", surface.law_speed, dimension::velocity,
                   {.help = "v0 of the restitution's law", .range = positive, .example = "\"0.3 m/s\""});
   if (fields.decoding())
@@ -126,14 +126,13 @@ void describe_disks(Fields& f, DiskOptions& d) {
        .example = "\"1 us\""});
   f.boolean(
       "rests", d.rests,
-      {.help = "true: a dissipative bed under gravity that has come to rest moves with the floor until the floor falls "
-               "away. false: it makes ever smaller contacts, at up to a thousand times the cost"});
+      {.help = "whether a dissipative bed under gravity may rest: it then moves with the floor until the floor falls "
+               "away. Without rest it makes ever smaller contacts, at up to a thousand times the cost"});
   f.boolean(
       "presses", d.presses,
-      {.help =
-           "true: while a bed is pressed on the floor, its disks are soft: linear springs and dashpots, contacts of "
-           "0.007 sqrt(D/g) at most. false: they stay hard, at up to a thousand times the cost. It applies to equal "
-           "smooth disks with constant restitutions between 0.3 and 1, without a bath"});
+      {.help = "whether the disks of a bed are soft while it is pressed on the floor: linear springs and dashpots, "
+               "contacts of 0.007 sqrt(D/g) at most. Hard disks cost up to a thousand times as much there. It applies "
+               "to equal smooth disks with constant restitutions of at least 0.3, without a bath"});
   f.object<SecondSpeciesOptions>(
       "second", d.second,
       [](Fields& g, SecondSpeciesOptions& s) {
