@@ -429,7 +429,7 @@ TEST(Engine, SaysWhereDisksCollapse) {
   const auto soft = simulate(scene);
   soft->advance_to(12);
   EXPECT_LT(soft->energy().kinetic, 0.1);  // hops of a contact's duration are all that is left
-  EXPECT_LE(soft->largest_overlap(), 1e-12);
+  EXPECT_LE(soft->largest_overlap(), 1e-3);  // as springs are: it is pressed on the floor
 }
 
 // Two disks at the very edge of each other's reach, of which by rounding one sees the other and is not seen by it.
