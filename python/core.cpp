@@ -378,32 +378,13 @@ py::dict estimate(const fit::Estimate& value) {
 // Without an answer there are no numbers: None.
 py::dict answer_of(const fit::Answer& answer) {
   py::dict out;
-<<<<<<< HEAD
-  // No number where there is no answer.
-  const auto number = [&](double value) -> py::object {
-    if (!answer.ok()) return py::none();
-    return py::float_(value);
-=======
   const auto number = [&](const char* name, double value) {
     out[name] = answer.ok() ? py::object(py::float_(value)) : py::object(py::none());
->>>>>>> 395c0dff7890e311ce0afbf2f1bf13c0965100ea
   };
   out["status"] = std::string(to_string(answer.status));
   out["verdict"] = std::string(to_string(answer.verdict));
   out["why"] = answer.why;
   out["advice"] = answer.advice;
-<<<<<<< HEAD
-  out["temperature"] = number(answer.temperature);
-  out["std_error"] = number(answer.std_error);
-  out["statistical_error"] = number(answer.statistical_error);
-  out["bias_uncertainty"] = number(answer.bias_uncertainty);
-  out["contact_duration_uncertainty"] = number(answer.contact_duration_uncertainty);
-  out["spread"] = number(answer.spread);
-  out["low"] = number(answer.interval.low);
-  out["high"] = number(answer.interval.high);
-  out["confidence"] = answer.interval.confidence;
-  out["solid_height"] = estimate(answer.solid_height);
-=======
   number("temperature", answer.temperature);
   number("std_error", answer.std_error);
   number("statistical_error", answer.statistical_error);
@@ -414,7 +395,6 @@ py::dict answer_of(const fit::Answer& answer) {
   number("high", answer.interval.high);
   number("confidence", answer.interval.confidence);
   out["solid_height"] = answer.ok() ? py::object(estimate(answer.solid_height)) : py::object(py::none());
->>>>>>> 395c0dff7890e311ce0afbf2f1bf13c0965100ea
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;
   return out;
