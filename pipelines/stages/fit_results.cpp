@@ -104,8 +104,7 @@ class FitStatement {
   void answer() {
     const Given asked = given_if(fit_.answer, "\"answer\" is true and the model is not \"simulation\""),
                 found = both(asked, given_when("there is an answer"));
-    list_.text("/answer/verdict",
-               "one temperature, model does not fit, or no single temperature", asked);
+    list_.text("/answer/verdict", "one temperature, model does not fit, or no single temperature", asked);
     list_.text("/answer/why", "the reason of the verdict", asked);
     list_.text("/answer/advice", "what to do", asked);
     list_.text("/answer/status", "ok, or why there is no answer", asked);

@@ -36,9 +36,12 @@ def test_fit_is_that_of_the_command_line(curve, tmp_path):
     fit = shakebed.fit_profile(*rows.T, kernel=curve.kernel, diameter="3 mm")
     # What the program says of the file itself comes after what the fit says.
     said = printed.pop("warnings")
+    answer = printed.pop("answer")
     numbers = dict(fit.to_dict())
     assert numbers.pop("warnings") == said[: len(fit.warnings)]
     assert fit.ok and numbers == printed
+    found = shakebed.find_answer(*rows.T, kernel=curve.kernel)
+    assert (answer["verdict"], answer["temperature"]["value"]) == (found["verdict"], found["temperature"])
     assert fit.temperature_over_mg.value == pytest.approx(fit.temperature.value * 3e-3, rel=1e-12)
     assert "temperature" in fit._repr_html_() and fit.brief() in repr(fit)
     drawn = fit.curve()

@@ -27,10 +27,14 @@ Scene bed(std::uint32_t count, double width, double restitution) {
   return scene;
 }
 
+// Springs of a pressed bed give way by no more than this in the beds of tests/bench/README.md [D].
+constexpr double pressed_overlap = 2.5e-3;
+
 // Runs to `until`, looking `looks` times: no overlap, nothing below the floor, the ledger closed, events bounded.
 // most_events: a disk and unit of time, over the last half of the run.
 // Returns the simulation as it stands then.
-std::unique_ptr<Simulation> survive(const char* name, const Scene& scene, double until, int looks, double most_events) {
+std::unique_ptr<Simulation> survive(const char* name, const Scene& scene, double until, int looks, double most_events,
+                                    double most_overlap = 1e-12) {
   auto simulation = simulate(scene);
   const DiskProperties disks = simulation->properties();
   const double count = static_cast<double>(std::max<std::size_t>(disks.radius.size(), 1));
@@ -54,12 +58,20 @@ std::unique_ptr<Simulation> survive(const char* name, const Scene& scene, double
   std::printf("  %s: %llu collisions, %llu locks relieved\n", name,
               static_cast<unsigned long long>(counters.collisions()),
               static_cast<unsigned long long>(counters.locks_relieved));
-  expect_law("largest overlap [D]", overlap, 0, 0, 1e-12);
-  expect_law("deepest below the floor [D]", depth, 0, 0, 1e-12);
+  expect_law("largest overlap [D]", overlap, 0, 0, most_overlap);
+  expect_law("deepest below the floor [D]", depth, 0, 0, most_overlap);
   expect_law("energy ledger, of the energy turned over", ledger.imbalance() / turned_over, 0, 0, 1e-10);
   std::printf("  %-58s %.6g, at most %.6g\n", "events a disk and unit of time, last half", rate, most_events);
   EXPECT_LE(rate, most_events) << name;
   return simulation;
+}
+
+// The same as hard disks alone, then as a bed that may be pressed. Returns the latter.
+std::unique_ptr<Simulation> survive_both(const char* name, Scene scene, double until, int looks, double most_events) {
+  scene.presses = false;
+  survive(name, scene, until, looks, most_events);
+  scene.presses = true;
+  return survive(name, scene, until, looks, most_events, pressed_overlap);
 }
 
 TEST(HardCases, ClosePackedStart) {
@@ -150,7 +162,7 @@ TEST(HardCases, BedAtRestOnAGentleFloor) {
   scene.disks.contact_duration = 1e-3;
   scene.start_temperature = 0.01;
   scene.box.floor = SinusoidalFloor{0.8 / std::pow(2 * std::numbers::pi, 2), 1};
-  survive("Gamma = 0.8, bed of 200", scene, 8, 16, 1e5);
+  survive_both("Gamma = 0.8, bed of 200", scene, 8, 16, 1e5);
 }
 
 // 5,000 disks rain down from up to 130 D, 30 m g D each, and come to rest: at the end a disk has less than lifts it by
@@ -160,7 +172,7 @@ TEST(HardCases, HeapOfFiveThousandComesToRest) {
   scene.disks.contact_duration = 1e-2;
   scene.start = RandomStart{};
   scene.start_temperature = 1;
-  const auto heap = survive("heap of 5,000, e = 0.3", scene, 40, 8, 2e3);
+  const auto heap = survive_both("heap of 5,000, e = 0.3", scene, 40, 8, 2e3);
   expect_law("kinetic energy a disk [m g D]", heap->energy().kinetic / 5000, 0, 0, 1e-2);
 }
 
@@ -180,7 +192,7 @@ TEST(HardCases, LatticeHitAtOneInstant) {
     }
     // A disk's width of free room a row, so that rows are not locked.
     scene.box.width = 10.5;
-    survive("lattice hit by its lowest row", scene, 20, 40, 1e5);
+    survive_both("lattice hit by its lowest row", scene, 20, 40, 1e5);
   }
 }
 

@@ -432,18 +432,18 @@ TEST(TwoSpecies, ShareTheirEnergyInEquilibrium) {
   EXPECT_NEAR(heavy, all, 4 * std::hypot(error(numbers["temperature_second"]), error(numbers["temperature_x"])));
 
   const NumberTable layers(folder / "o/bed/species.csv");
-  double disks_seen[2] = {}, looks = 0, slope_top = 0, slope_bottom = 0, mean_z = 0, mean_log = 0, weight = 0;
+  double disks_seen[2] = {}, all_looks = 0, slope_top = 0, slope_bottom = 0, mean_z = 0, mean_log = 0, weight = 0;
   for (const char* name : {"first", "second"}) {
     for (std::size_t r = 0; r < layers.rows(); ++r)
       disks_seen[name[0] == 's'] += layers(std::string("number_density_") + name, r) * 60;
   }
   EXPECT_NEAR(disks_seen[0], 40, 1e-9);
   EXPECT_NEAR(disks_seen[1], 40, 1e-9);
-  for (std::size_t r = 0; r < layers.rows(); ++r) looks += layers("samples_first", r) / 40;
+  for (std::size_t r = 0; r < layers.rows(); ++r) all_looks += layers("samples_first", r) / 40;
   for (std::size_t r = 0; r < layers.rows(); ++r) {
     for (const std::string name : {"_first", "_second"}) {
       const double samples = layers("samples" + name, r);
-      EXPECT_NEAR(samples, layers("number_density" + name, r) * 60 * looks, 1e-6 * (1 + samples));
+      EXPECT_NEAR(samples, layers("number_density" + name, r) * 60 * all_looks, 1e-6 * (1 + samples));
     }
     const double z = layers("height", r), one = layers("samples_first", r), two = layers("samples_second", r);
     if (z < 0 || z > 12 || two < 300) continue;

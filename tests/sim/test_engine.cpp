@@ -428,7 +428,7 @@ TEST(Engine, SaysWhereDisksCollapse) {
   scene.disks.contact_duration = 1e-4;
   const auto soft = simulate(scene);
   soft->advance_to(12);
-  EXPECT_LT(soft->energy().kinetic, 0.1);  // hops of a contact's duration are all that is left
+  EXPECT_LT(soft->energy().kinetic, 0.1);    // hops of a contact's duration are all that is left
   EXPECT_LE(soft->largest_overlap(), 1e-3);  // as springs are: it is pressed on the floor
 }
 
