@@ -3,6 +3,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <random>
@@ -38,16 +39,20 @@ void kill_at_random_moments(int kills, std::uint32_t seed) {
   ASSERT_EQ(std::count(expected.begin(), expected.end(), '\n'), points + 1);
 
   std::mt19937 random(seed);
-  // Moments spread over the whole of an undisturbed run; a run that was finished starts afresh.
-  std::uniform_real_distribution<double> moment(0, 1.2 * undisturbed.seconds);
+  // Moments spread over the whole of an undisturbed run; a run that was finished starts afresh. When such a run has
+  // ended before its moment, a whole run takes no longer than that: the machine has less other work than before.
+  double whole_run = undisturbed.seconds;
+  bool afresh = true;
   int killed = 0, finished = 0, stale_locks = 0;
   while (killed < kills && finished < 2 * kills) {
     const int process = start_shakebed({"run", "r.json", "--out", "o"}, folder.path());
-    std::this_thread::sleep_for(std::chrono::duration<double>(moment(random)));
+    const double moment = std::uniform_real_distribution<double>(0, 1.2 * whole_run)(random);
+    std::this_thread::sleep_for(std::chrono::duration<double>(moment));
     ::kill(process, SIGKILL);
     const int code = wait_for(process);
     if (code == 128 + SIGKILL) {
       ++killed;
+      afresh = false;
       // Nothing half-written under a final name: every stage folder has its record, every JSON can be read.
       std::error_code error;
       if (fs::is_directory(folder / "o/points", error)) {
@@ -65,6 +70,8 @@ void kill_at_random_moments(int kills, std::uint32_t seed) {
     } else {
       EXPECT_EQ(code, 0);
       ++finished;
+      if (afresh) whole_run = std::min(whole_run, moment);
+      afresh = true;
       EXPECT_EQ(read_text(folder / "o/sweep.csv"), expected);
       fs::remove_all(folder / "o");
     }
