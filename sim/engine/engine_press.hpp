@@ -42,7 +42,7 @@ inline constexpr double sleeping_temperature = 2e-6, sleeping_speed = 0.01, waki
 inline constexpr double sleep_steps = 256;  // a period of the floor
 inline constexpr std::uint64_t events_between_presses =
     4;                                                  // a disk, after which it is asked whether the bed is pressed
-inline constexpr double least_press_width = 4;          // [D]; nearest images must be told apart
+inline constexpr double least_press_width = 4;          // [D]; the nearest image of a disk must be unique
 inline constexpr double least_press_restitution = 0.3;  // stronger dashpots would need shorter steps
 
 template <class Space, class Rule, class Sizes>
@@ -218,7 +218,7 @@ bool Engine<Space, Rule, Sizes>::press_until(double until) {
   return true;
 }
 
-// What a watcher is told of a step: the momenta of its contacts, and flights from where it ends. In a sleeping bed all
+// What a watcher receives of a step: the momenta of its contacts, and flights from where it ends. In a sleeping bed all
 // forces are as large as the floor's.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::tell_pressed(double step) const {

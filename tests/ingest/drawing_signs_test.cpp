@@ -182,7 +182,7 @@ TEST(DrawingSigns, ScreenCopiesWithRoundMarksAreRefused) {
     }
 }
 
-// Who wants the marks of a plot measured can have them; then the plot is told of.
+// With --shape any the marks of a plot are measured; a warning then says that it is a plot.
 TEST(DrawingSigns, MarksAreMeasuredWhenAskedFor) {
   std::mt19937 random(1);
   SurveyOptions any;
