@@ -2,13 +2,17 @@
 const margin = { left: 46, right: 10, top: 10, bottom: 36 };
 const fontSize = 12;
 
-// About `count` round numbers from low to high.
+// Round values from `low` to `high`, about `count` of them and at least three.
 function ticks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= rough);
-  const list = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) list.push(k * step);
-  return list;
+  const coarse = [1, 2, 5, 10].findIndex((k) => k >= rough / power * (1 - 1e-9));
+  const multiples = (step) => {
+    const list = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) list.push(k * step);
+    return list;
+  };
+  const steps = [10, 5, 2, 1, 0.5, 0.2, 0.1].map((k) => k * power).slice(3 - coarse);
+  return steps.map(multiples).find((list) => list.length >= 3);
 }
 const label = (value) => String(Number(value.toPrecision(6)));
 
