@@ -29,7 +29,9 @@ constexpr double admissible_misfit = 2.0;
 constexpr double usual_density = 0.5;
 // The misfit that is known of beds without a crystal: none that matters. Below, a model misses the densities by so much
 // more; weights hold it also where the data are too poor to show it, as they do in the beds from which the biases are
-// known. Else 60 photographs gave T 2 % lower, between 1 and 2 T_c, than all of the same beds' densities. [1/D^2]
+// known. Else 60 photographs gave T 2 % lower, between 1 and 2 T_c, than all of the same beds' densities. A thin gas is
+// missed by less: the models' second virial coefficient is exact, so their error falls at least as the density squared.
+// [1/D^2]
 constexpr double misfit_of_fluids = 0.005;
 // The root mean square modulation of the density by a crystal's rows, seen through no window: sqrt(2) 2/sqrt(3) for
 // rows that are thin [1/D^2]. Where the window leaves some of it, a model without rows misses as much.
@@ -104,8 +106,10 @@ class AnswerFinder {
 
   // False when none gives a temperature; the answer then says why.
   bool read_thermometers() {
-    if (const FitResult first = fit_profile(seen_.profile, options_of(thermometers().front())); first.ok())
-      least_misfit_ = std::max(0.0, known_misfit(first.temperature.value) - misfit_of_fluids);
+    if (const FitResult first = fit_profile(seen_.profile, options_of(thermometers().front())); first.ok()) {
+      const double part = part_of_usual_density(first.window_low, first.window_high);
+      least_misfit_ = std::max(0.0, part * part * (known_misfit(first.temperature.value) - misfit_of_fluids));
+    }
     for (const Thermometer& thermometer : thermometers()) {
       if (thermometer.column_known && !input_.column_number) continue;
       const FitResult fit = fit_profile(seen_.profile, options_of(thermometer));
@@ -237,7 +241,7 @@ class AnswerFinder {
       return;
     }
     const ThermometerReading& whole = whole_column();
-    const double misfit = std::min(1.0, greatest_density(whole) / usual_density) *
+    const double misfit = part_of_usual_density(whole.window_low, whole.window_high) *
                           (known_misfit(whole.temperature) + row_modulation * seen_.rows_seen);
     answer_.verdict = Verdict::model_does_not_fit;
     if (whole.model_error > std::max(least_misfit_, admissible_misfit * misfit)) {
@@ -257,15 +261,14 @@ class AnswerFinder {
                          : "Most of the uncertainty is statistical: measure longer to lessen it.";
   }
 
-  // In the window of a reading [1/D^2].
-  [[nodiscard]] double greatest_density(const ThermometerReading& reading) const {
+  // The greatest density from `low` to `high` [D] over the usual one, at most 1.
+  [[nodiscard]] double part_of_usual_density(double low, double high) const {
     double greatest = 0.0;
     for (std::size_t i = 0; i < seen_.profile.height.size(); ++i) {
       const double z = seen_.profile.height[i];
-      if (z >= reading.window_low && z <= reading.window_high)
-        greatest = std::max(greatest, seen_.profile.number_density[i]);
+      if (z >= low && z <= high) greatest = std::max(greatest, seen_.profile.number_density[i]);
     }
-    return greatest;
+    return std::min(1.0, greatest / usual_density);
   }
 
   // The whole column's reading whose misfit is known.

@@ -70,6 +70,25 @@ TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
   EXPECT_NEAR(answer.interval.low * answer.interval.high, answer.temperature * answer.temperature, 1e-9);
 }
 
+// The known misfit is of beds that are dense at the floor. A model of a thin gas misses its densities by as much less,
+// so the statistics decide.
+TEST(Answer, OfAThinGasIsAsCertainAsItsStatistics) {
+  const double temperature = 0.5;
+  const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {0.02, close_packing_density});
+  ASSERT_LT(truth.density(0.5), 0.05);
+  AnswerInput input;
+  input.kernel = usual_kernel;
+  input.base = 0.0;
+  input.column_number = 0.02;
+  const double top = synthetic::top_of(truth);
+  input.profile = synthetic::profile_of(truth, usual_kernel, static_cast<int>(4 * top), top, 0.001, 11);
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+  EXPECT_LT(answer.misfit_error, answer.statistical_error);
+  EXPECT_NEAR(answer.temperature, temperature, 3 * answer.std_error);
+}
+
 // What the simulation's contact duration leaves is one more part of the uncertainty, in quadrature, and nothing else.
 TEST(Answer, TakesInTheContactDuration) {
   AnswerInput input = column(1.0);
