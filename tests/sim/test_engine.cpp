@@ -430,6 +430,10 @@ TEST(Engine, SaysWhereDisksCollapse) {
   soft->advance_to(12);
   EXPECT_LT(soft->energy().kinetic, 0.1);    // hops of a contact's duration are all that is left
   EXPECT_LE(soft->largest_overlap(), 1e-3);  // as springs are: it is pressed on the floor
+  scene.disks.presses = false;
+  const auto hard = simulate(scene);
+  hard->advance_to(12);
+  EXPECT_LE(hard->largest_overlap(), 1e-12);
 }
 
 // Two disks at the very edge of each other's reach, of which by rounding one sees the other and is not seen by it.
