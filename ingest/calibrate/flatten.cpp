@@ -7,6 +7,7 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -185,11 +186,7 @@ struct Blocks {
       for (int column = left; column < right; ++column)
         if (!unseen(small.at(column, row))) levels.push_back(small.at(column, row));
     if (levels.size() < std::max<std::size_t>(1, fewest)) return;
-    const auto pick = [&](double part) {
-      const auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(levels.size() - 1));
-      std::nth_element(levels.begin(), levels.begin() + place, levels.end());
-      return static_cast<double>(levels[static_cast<std::size_t>(place)]);
-    };
+    const auto pick = [&](double part) { return static_cast<double>(quantile_of(levels, part)); };
     const double u = 2 * (0.5 * (left + right)) / small.width - 1, v = 2 * (0.5 * (top + bottom)) / small.height - 1;
     const double median = pick(0.5);
     upper.push_back({u, v, pick(0.97), median, false});

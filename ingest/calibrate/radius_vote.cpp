@@ -7,12 +7,13 @@
 #include <numbers>
 
 #include "ingest/calibrate/solid_borders.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-constexpr double radius_ratio = 1.04;        // of one radius voted for to the next
+constexpr double vote_ratio = 1.04;          // of one radius voted for to the next
 constexpr std::size_t most_edges = 14000;    // that vote
 constexpr std::size_t most_maxima = 3;       // radii of a level looked at in full
 constexpr std::size_t most_peaks = 4000;     // centres looked at
@@ -25,16 +26,16 @@ struct EdgePixel {
   float x, y, unit_x, unit_y, weight;
 };
 
-// Gradient by Sobel's differences over 8, so that a ramp of slope 1 gives 1.
-struct Gradient {
+// GradientField by Sobel's differences over 8, so that a ramp of slope 1 gives 1.
+struct GradientField {
   int width = 0, height = 0;
   std::vector<float> x, y;
   [[nodiscard]] std::size_t at(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
   }
 };
-Gradient sobel(const GrayFrame& frame) {
-  Gradient gradient;
+GradientField sobel(const GrayFrame& frame) {
+  GradientField gradient;
   gradient.width = frame.width;
   gradient.height = frame.height;
   gradient.x.assign(frame.pixels.size(), 0.0F);
@@ -60,13 +61,6 @@ Gradient sobel(const GrayFrame& frame) {
   return gradient;
 }
 
-float quantile(std::vector<float>& values, double fraction) {
-  if (values.empty()) return 0;
-  const auto place = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<std::size_t>(place)];
-}
-
 // Points of a circle.
 struct Point {
   float x, y;
@@ -86,7 +80,7 @@ struct Rim {
   int x, y;
   double radius;
 };
-double rim_support(const Gradient& gradient, const Rim& rim, const std::vector<Point>& points, float sign,
+double rim_support(const GradientField& gradient, const Rim& rim, const std::vector<Point>& points, float sign,
                    float threshold) {
   std::size_t supported = 0, inside = 0;
   const float centre_x = static_cast<float>(rim.x) + 0.5F, centre_y = static_cast<float>(rim.y) + 0.5F;
@@ -122,9 +116,9 @@ CircleSpacing typical_spacing(const std::vector<Point>& places) {
     }
     distances.push_back(std::sqrt(second));
   }
-  const double low = static_cast<double>(quantile(distances, 0.25)),
-               high = static_cast<double>(quantile(distances, 0.75));
-  return {static_cast<double>(quantile(distances, 0.5)), 0.5 * (high - low)};
+  const double low = static_cast<double>(quantile_of(distances, 0.25)),
+               high = static_cast<double>(quantile_of(distances, 0.75));
+  return {static_cast<double>(quantile_of(distances, 0.5)), 0.5 * (high - low)};
 }
 
 // The edges of a frame that vote, in the order of rows; every k-th of too many keeps a share of every rim.
@@ -132,15 +126,15 @@ struct VotingEdges {
   std::vector<EdgePixel> pixels;
   float threshold = 0;  // the weakest gradient of an edge
 };
-VotingEdges edges_of(const Gradient& gradient) {
+VotingEdges edges_of(const GradientField& gradient) {
   VotingEdges edges;
   std::vector<float> sizes;
   sizes.reserve(gradient.x.size() / 2);
   const std::size_t step = std::max<std::size_t>(1, gradient.x.size() / most_sizes);
   for (std::size_t i = 0; i < gradient.x.size(); i += step)
     sizes.push_back(std::sqrt(gradient.x[i] * gradient.x[i] + gradient.y[i] * gradient.y[i]));
-  const float strong = quantile(sizes, 0.98);
-  const float quiet = quantile(sizes, 0.25) / 0.7585F;  // quantile of a Rayleigh law
+  const float strong = quantile_of(sizes, 0.98);
+  const float quiet = quantile_of(sizes, 0.25) / 0.7585F;  // quantile of a Rayleigh law
   // A noise-free frame can have 98 % of its pixels without gradient: then its edges are the rest.
   const float strongest = *std::max_element(sizes.begin(), sizes.end());
   const float reference = strong > 0.1F * strongest ? strong : 0.5F * strongest;
@@ -170,12 +164,12 @@ struct Peak {
 // Votes of one polarity.
 class RadiusVote {
  public:
-  RadiusVote(const Gradient& gradient, const VotingEdges& edges, double sign, const RadiusRange& radii)
+  RadiusVote(const GradientField& gradient, const VotingEdges& edges, double sign, const RadiusRange& radii)
       : gradient_(gradient),
         edges_(edges),
         sign_(sign),
         from_(radii.from),
-        count_(static_cast<int>(std::ceil(std::log(radii.to / radii.from) / std::log(radius_ratio))) + 1),
+        count_(static_cast<int>(std::ceil(std::log(radii.to / radii.from) / std::log(vote_ratio))) + 1),
         width_(static_cast<std::size_t>(gradient.width)),
         height_(static_cast<std::size_t>(gradient.height)),
         votes_(width_ * height_),
@@ -184,11 +178,11 @@ class RadiusVote {
   // The sharpest radii, then how much of all edges their circles explain.
   void search(double scale, std::vector<RadiusCandidate>& candidates) {
     for (int k = 0; k < count_; ++k) {
-      fill(from_ * std::pow(radius_ratio, k));
+      fill(from_ * std::pow(vote_ratio, k));
       sharpness_.push_back(sharpness_now());
     }
     for (const int k : sharpest()) {
-      const double radius = from_ * std::pow(radius_ratio, position_of_maximum(k));
+      const double radius = from_ * std::pow(vote_ratio, position_of_maximum(k));
       fill(radius);
       judge(radius, scale, candidates);
     }
@@ -306,7 +300,7 @@ class RadiusVote {
         taken[gradient_.at(column, row)] = 1;
   }
 
-  const Gradient& gradient_;
+  const GradientField& gradient_;
   const VotingEdges& edges_;
   double sign_, from_;
   int count_;  // of radii
@@ -320,7 +314,7 @@ class RadiusVote {
 std::vector<RadiusCandidate> vote_for_radii(const GrayFrame& frame, double scale, const RadiusRange& radii) {
   std::vector<RadiusCandidate> candidates;
   if (frame.width < 5 || frame.height < 5) return candidates;
-  const Gradient gradient = sobel(frame);
+  const GradientField gradient = sobel(frame);
   const VotingEdges edges = edges_of(gradient);
   constexpr std::size_t fewest_edges = 12;
   if (edges.pixels.size() < fewest_edges) return candidates;

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "statistics/ranks.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
@@ -23,13 +25,6 @@ struct View {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(column);
   }
 };
-
-float quantile_of(std::vector<float>& values, double part) {
-  if (values.empty()) return 0;
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
 
 // How far levels of one even area lie apart: a tenth of the frame's range, more under noise. Nothing where noise hides
 // what is even.

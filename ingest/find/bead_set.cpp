@@ -8,6 +8,7 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/bed_light.hpp"
 #include "ingest/find/candidates.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 

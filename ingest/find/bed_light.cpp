@@ -6,15 +6,9 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double field_at(const LightField& light, const std::vector<float>& field, double x, double y) {
   const double across = std::clamp(x / light.spacing_px, 0.0, light.columns - 1.001),
@@ -158,12 +152,10 @@ std::vector<TileSums> open_background(const GrayFrame& flat, const std::vector<M
           u += column, v += row;
         }
       if (levels.size() < fewest_pixels) continue;
-      const auto middle = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() / 2);
-      std::nth_element(levels.begin(), middle, levels.end());
       TileSums tile;
       tile.u = 2 * (u / static_cast<double>(levels.size()) + 0.5) / flat.width - 1;
       tile.v = 2 * (v / static_cast<double>(levels.size()) + 0.5) / flat.height - 1;
-      tile.flat = static_cast<double>(*middle);
+      tile.flat = static_cast<double>(median_of(levels));
       tiles.push_back(tile);
     }
   return tiles;

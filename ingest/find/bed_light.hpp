@@ -12,8 +12,6 @@
 
 namespace shakebed::ingest {
 
-double median_of(std::vector<double> values);
-
 // The field of a light at a pixel, bilinear between its nodes.
 double field_at(const LightField& light, const std::vector<float>& field, double x, double y);
 

@@ -5,6 +5,7 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -61,19 +62,10 @@ double noise_of(const GrayFrame& flat) {
     for (int column = 1; column + 1 < flat.width; column += step)
       if (!unseen(flat.at(column - 1, row) + flat.at(column, row) + flat.at(column + 1, row)))
         sizes.push_back(std::abs(flat.at(column - 1, row) - 2 * flat.at(column, row) + flat.at(column + 1, row)));
-  if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return 1.4826 * static_cast<double>(*middle) / std::sqrt(6.0);
+  return 1.4826 * static_cast<double>(median_of(std::move(sizes))) / std::sqrt(6.0);
 }
 
-double residual_spread(const JointFit& fit) {
-  std::vector<float> sizes = residual_sizes(fit);
-  if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return 1.4826 * static_cast<double>(*middle);
-}
+double residual_spread(const JointFit& fit) { return 1.4826 * static_cast<double>(median_of(residual_sizes(fit))); }
 
 double residual_noise(const JointFit& fit) {
   std::vector<float> sizes = residual_sizes(fit);

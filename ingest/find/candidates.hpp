@@ -15,6 +15,9 @@ constexpr double least_separation = 0.72;
 // longer separates beads from the voids between them. The map of the learned profile does.
 constexpr double strong_blur = 0.14;
 
+// What a place in the map must score to be tried: a strongly blurred bead in a crystal scores 0.7.
+constexpr double least_candidate_score = 0.35;
+
 // Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.
 double noise_of(const GrayFrame& flat);
 

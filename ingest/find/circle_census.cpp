@@ -8,16 +8,16 @@
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/picture_scale.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
 constexpr double smallest_at_level = 5, largest_at_level = 10.4;  // px, radii searched at each level of the pyramid
-constexpr int window_side = 640;                                  // px, of the busiest part searched at each level
-constexpr double circle_cost_px = 8;                              // px of rim, for a circle's place and radius
+constexpr int census_window = 640;                                // px, of the busiest part searched at each level
 constexpr double mode_width = 0.1;                                // radii of one hypothesis, either way
-constexpr double faintest_support = 0.35;
+constexpr double faintest_census_support = 0.35;
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
@@ -38,14 +38,14 @@ std::vector<ScaledPicture> pyramid_of(const GrayFrame& frame, const CensusOption
     return *options.radius_px * 1.25 > smallest_at_level * scale && *options.radius_px * 0.8 < largest_at_level * scale;
   };
   if (wanted(0.5)) {
-    ScaledPicture half = windowed(frame, 1, window_side / 2);
+    ScaledPicture half = windowed(frame, 1, census_window / 2);
     half.picture = doubled(half.picture);
     half.scale = 0.5;
     levels.push_back(std::move(half));
   }
   GrayFrame picture = frame;
   for (double scale = 1; std::min(picture.width, picture.height) >= 4 * smallest_at_level; scale *= 2) {
-    if (wanted(scale)) levels.push_back(windowed(picture, scale, window_side));
+    if (wanted(scale)) levels.push_back(windowed(picture, scale, census_window));
     picture = halved(picture);
   }
   return levels;
@@ -57,12 +57,8 @@ double range_of(const GrayFrame& frame) {
   for (std::size_t k = 0; k < frame.pixels.size(); k += step)
     if (!unseen(frame.pixels[k])) levels.push_back(frame.pixels[k]);
   if (levels.empty()) return 1;
-  const auto part = [&](double fraction) {
-    const auto place = levels.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(levels.size() - 1));
-    std::nth_element(levels.begin(), place, levels.end());
-    return static_cast<double>(*place);
-  };
-  return std::max(1.0, part(0.998) - part(0.002));
+  return std::max(1.0,
+                  static_cast<double>(quantile_of(levels, 0.998)) - static_cast<double>(quantile_of(levels, 0.002)));
 }
 
 // What one circle explains, px of its level.
@@ -122,11 +118,7 @@ CircleHypothesis weigh(const Found& found, double radius, double range, double* 
       best.scatter += circle.scatter / best.circles;
       contrasts.push_back(circle.contrast);
     }
-  if (!contrasts.empty()) {
-    std::nth_element(contrasts.begin(), contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2),
-                     contrasts.end());
-    best.contrast = contrasts[contrasts.size() / 2];
-  }
+  if (!contrasts.empty()) best.contrast = median_of(std::move(contrasts));
   return best;
 }
 
@@ -143,7 +135,7 @@ class Census {
       for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
         if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
         const auto circles = [&](const EdgeMap& map) {
-          return find_circles(map, smallest_at_level, largest_at_level, polarity, faintest_support);
+          return find_circles(map, smallest_at_level, largest_at_level, polarity, faintest_census_support);
         };
         const Found found{circles(edges), {circles(one), circles(other)}};
         for (double radius = smallest_at_level; radius < largest_at_level; radius *= 1.05) {

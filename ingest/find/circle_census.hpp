@@ -15,6 +15,8 @@
 
 namespace shakebed::ingest {
 
+constexpr double circle_cost_px = 8;  // px of rim at a radius of 8 px, for a circle's place and radius
+
 struct CircleHypothesis {
   std::size_t channel = 0;  // of those given
   Polarity polarity = Polarity::automatic;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "ingest/find/nearby.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -94,12 +95,6 @@ Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double
 struct MetEdge {
   double cosine = 0, sine = 0, offset = 0, weight = 1;
 };
-
-float median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Faint edges count little.
 void weigh(std::vector<MetEdge>& met, const std::vector<float>& slopes, double faint) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ingest/calibrate/solid_borders.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -20,15 +21,8 @@ constexpr float weakest_share = 0.1F;
 // Grey levels per px: below the rounding of 8-bit pictures.
 constexpr float least_threshold = 0.3F;
 
-float quantile(std::vector<float>& values, double fraction) {
-  if (values.empty()) return 0;
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 // Standard deviation of white noise, from second differences along rows.
-float noise_of(const GrayFrame& frame) {
+float white_noise_of(const GrayFrame& frame) {
   std::vector<float> sizes;
   const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 60000);
   const std::size_t width = static_cast<std::size_t>(frame.width);
@@ -37,7 +31,7 @@ float noise_of(const GrayFrame& frame) {
     const float left = frame.pixels[at - 1], middle = frame.pixels[at], right = frame.pixels[at + 1];
     if (!unseen(left + middle + right)) sizes.push_back(std::abs(left - 2 * middle + right));
   }
-  return 1.4826F * quantile(sizes, 0.5) / std::sqrt(6.0F);
+  return 1.4826F * quantile_of(sizes, 0.5) / std::sqrt(6.0F);
 }
 
 // By 1/4, 1/2, 1/4 along both axes, in place; the outermost pixels stay.
@@ -84,8 +78,8 @@ float threshold_of(const GrayFrame& frame, const EdgeMap& edges) {
   std::vector<float> sizes;
   const std::size_t step = std::max<std::size_t>(1, edges.x.size() / 60000);
   for (std::size_t at = 0; at < edges.x.size(); at += step) sizes.push_back(std::hypot(edges.x[at], edges.y[at]));
-  const float strong = quantile(sizes, 0.95);
-  return std::max({noise_multiple * gradient_noise * noise_of(frame), weakest_share * strong, least_threshold});
+  const float strong = quantile_of(sizes, 0.95);
+  return std::max({noise_multiple * gradient_noise * white_noise_of(frame), weakest_share * strong, least_threshold});
 }
 
 // Pixels whose gradient is larger than that of both neighbours along it.

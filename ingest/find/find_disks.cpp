@@ -14,14 +14,13 @@
 #include "ingest/find/joint_fit.hpp"
 #include "ingest/find/learned_beads.hpp"
 #include "ingest/find/nearby.hpp"
+#include "statistics/ranks.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-// What a place in the map must score to be tried: a strongly blurred bead in a crystal scores 0.7.
-constexpr double least_score = 0.35;
 // Of the median bead's share of contrast: below it, a disk is not reported even if half hidden ones are wanted.
 constexpr double least_reported = 0.5;
 // A bead with less than this share explained in its worst quarter of rim is half hidden.
@@ -49,7 +48,7 @@ class FrameFinder {
         fit_(flat_) {}
 
   FindResult find() {
-    disks_ = disks_at(candidates_by({calibration_.profile, radius_, edge_}, flat_, noise_, least_score));
+    disks_ = disks_at(candidates_by({calibration_.profile, radius_, edge_}, flat_, noise_, least_candidate_score));
     if (disks_.empty()) {
       result_.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius_) + " px";
       return std::move(result_);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "ingest/find/bead_profile.hpp"
 #include "ingest/find/nearby.hpp"
@@ -13,7 +14,6 @@ namespace {
 
 constexpr int sectors = 16;         // of a bead
 constexpr double spacing_px = 0.2;  // of the profile
-constexpr double pi = 3.14159265358979;
 
 // Parts of the way from a bead's middle outwards.
 struct FreeRimZones {
@@ -40,11 +40,12 @@ Sectors open_sectors(const std::vector<ModelDisk>& beads, std::size_t i, const N
     if (j == i) return false;
     const double dx = beads[j].x - bead.x, dy = beads[j].y - bead.y;
     const double distance = std::sqrt(dx * dx + dy * dy);
-    const double half = std::asin(std::min(1.0, reach / distance)) + 2 * pi / sectors / 2;
+    const double half = std::asin(std::min(1.0, reach / distance)) + 2 * std::numbers::pi / sectors / 2;
     const double direction = std::atan2(dy, dx);
     for (int s = 0; s < sectors; ++s) {
-      const double middle = (s + 0.5) * 2 * pi / sectors - pi;
-      if (std::abs(std::remainder(direction - middle, 2 * pi)) < half) open[static_cast<std::size_t>(s)] = false;
+      const double middle = (s + 0.5) * 2 * std::numbers::pi / sectors - std::numbers::pi;
+      if (std::abs(std::remainder(direction - middle, 2 * std::numbers::pi)) < half)
+        open[static_cast<std::size_t>(s)] = false;
     }
     return false;
   });
@@ -63,7 +64,8 @@ std::array<std::vector<FreeRimSample>, sectors> samples_around(const GrayFrame& 
       const double dx = column - bead.x, dy = row - bead.y;
       const double r = std::sqrt(dx * dx + dy * dy);
       if (r < zones.inner || r > zones.open_to) continue;
-      const int s = std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * pi) + 0.5) * sectors), 0, sectors - 1);
+      const int s =
+          std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * std::numbers::pi) + 0.5) * sectors), 0, sectors - 1);
       if (open[static_cast<std::size_t>(s)]) samples[static_cast<std::size_t>(s)].push_back({r, flat.at(column, row)});
     }
   return samples;

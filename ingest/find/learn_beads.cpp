@@ -16,7 +16,7 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double same_place = 0.3;     // radii, between a face and a rim that are one bead
+constexpr double same_bead = 0.3;      // radii, between a face and a rim that are one bead
 constexpr double surely_a_bead = 0.9;  // probability of a rim from which the faces must have it too
 constexpr double most_missed = 0.06;   // share of these that faces may miss
 constexpr double no_rim = 0.2;         // support below which a face has no rim at all
@@ -86,7 +86,7 @@ struct Agreement {
 };
 Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
   Agreement agreement;
-  const double near = same_place * rims.model.radius_px;
+  const double near = same_bead * rims.model.radius_px;
   const Nearby by_face(faces.disks.size(), near,
                        [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
   double sure = 0, missed = 0;

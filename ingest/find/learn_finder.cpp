@@ -20,16 +20,14 @@ namespace shakebed::ingest {
 
 namespace {
 
-// What a place in the map must score to be tried: a strongly blurred bead in a crystal scores 0.7.
-constexpr double least_score = 0.35;
 // px: what the edge of a floor or wall is blurred by before that of beads is known.
 constexpr double usual_edge = 0.75;
 // Light and profile are learned in turns at least this often, and no more often than the second.
-constexpr int least_rounds = 5, most_rounds = 12;
+constexpr int least_rounds = 5, most_learning_rounds = 12;
 // Contrast units: what is left is larger than the beads, so light and bead run away from the frame.
 constexpr double hopeless = 3;
 // Contrast units beyond the noise: where more is left than that, the frame shows something else.
-constexpr double most_left = 0.2;
+constexpr double most_left_over = 0.2;
 // px: the outline no longer moves the centres.
 constexpr double still = 0.01;
 
@@ -146,7 +144,7 @@ class BeadLearner {
       keep_good_beads(round);
       if (!(beads_->spread < hopeless)) return refused("no model of bead and light describes the frame");
       const bool enough = round + 1 >= first_round + least_rounds && settled_;
-      if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_rounds || enough) break;
+      if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_learning_rounds || enough) break;
       if (options_.learn_profile || round < 2) learn_bead(round);
       outline_moved_px_ = 0;
       const bool may_be_one_sided = allowed_.one_sided && options_.learn_profile && round >= 1;
@@ -213,8 +211,8 @@ class BeadLearner {
       fit.set_table(&table_);
       if (search) {
         const double noise = noise_of(flat);
-        disks = disks_at(round == 0 ? candidates_in(flat, radius_, noise, least_score)
-                                    : candidates_by({profile_, radius_, edge_}, flat, noise, least_score));
+        disks = disks_at(round == 0 ? candidates_in(flat, radius_, noise, least_candidate_score)
+                                    : candidates_by({profile_, radius_, edge_}, flat, noise, least_candidate_score));
       }
       for (ModelDisk& disk : disks) disk.quiet_sweeps = 0;
       fit.reset(flat, disks);
@@ -332,7 +330,7 @@ class BeadLearner {
     if (total == 0) return refused("none is filled like a bead");
     const double spread = beads_->spread, noise = noise_of(beads_->flats.front());
     CalibrationResult& result = all_.result;
-    if (spread * spread > noise * noise + most_left * most_left) {
+    if (spread * spread > noise * noise + most_left_over * most_left_over) {
       result.why_not =
           "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not explain the frame";
       return std::move(all_);
@@ -452,13 +450,13 @@ class StartChooser {
   // What explains the frame little gives way to what explains it better: the bright middle of a glass bead to the
   // whole of it, say. Of what was not seen at first, many beads must be seen clearly.
   CalibrationResult or_another(Learned best) const {
-    constexpr double clearly_less = 0.5, well_explained = 0.75;
+    constexpr double clearly_less = 0.5, mostly_explained = 0.75;
     constexpr std::size_t fewest = 20;
     const bool seen = best.result.found;
     if (options_.radius_px || (best.result.found && best.complete)) return best.result;
     for (const auto& other : estimate_.others) {
       Learned another = learn(Start{other.radius_px, other.polarity});
-      if (!another.result.found || another.typical < well_explained || another.result.calibration.disks_used < fewest)
+      if (!another.result.found || another.typical < mostly_explained || another.result.calibration.disks_used < fewest)
         continue;
       if (seen ? another.unexplained < clearly_less * best.unexplained : another.complete) best = std::move(another);
       if (best.result.found && best.complete) break;

@@ -9,20 +9,21 @@
 #include <optional>
 
 #include "ingest/find/nearby.hpp"
+#include "statistics/ranks.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-constexpr int directions = 48;
-constexpr double pi = std::numbers::pi;
+constexpr int outline_directions = 48;
 constexpr std::size_t most_outlines = 120;                 // followed: enough for a median
 constexpr double nearest_edge = 0.5, farthest_edge = 1.6;  // radii: where an outline may run
 constexpr double ring_step = 0.5;                          // px
 // An outline of axis ratio 2 leaves the direction of the radius by up to 37 degrees.
-constexpr double least_alignment = 0.7;   // cosine between an edge's gradient and the radius
-constexpr double steepest_path = 0.11;    // radii from one direction to the next: 40 degrees
-constexpr double cost_of_turning = 0.15;  // of a full edge, for the steepest path
+constexpr double least_radial_alignment = 0.7;  // cosine between an edge's gradient and the radius
+constexpr double steepest_path = 0.11;          // radii from one direction to the next: 40 degrees
+constexpr double cost_of_turning = 0.15;        // of a full edge, for the steepest path
 // Edges of this share of a typical rim's slope begin to count for the shape, and of the second count in full: where
 // beads touch, their rims run into one another, are faint and lie farther in.
 constexpr double faint_share = 0.65, full_share = 0.9;
@@ -46,7 +47,7 @@ constexpr double largest_own_elongation = 0.035;
 constexpr double largest_single_deviation = 0.045, least_single_on_circle = 0.85, largest_single_gap = 0.3;
 constexpr double most_not_round = 0.4;  // beads seen 2.6 px in radius, enlarged by repeating pixels: 0.21 to 0.32
 
-constexpr std::size_t terms = 1 + 2 * highest_harmonic;
+constexpr std::size_t outline_terms = 1 + 2 * highest_harmonic;
 
 struct OneOutline {
   double followed = 0, on_circle = 1, gap = 0, deviation = 0, rim_width = 0;
@@ -54,21 +55,15 @@ struct OneOutline {
   bool developed = false;
 };
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 struct Ray {
   double cosine = 0, sine = 0;
-  std::array<double, terms> basis{};
+  std::array<double, outline_terms> basis{};
 };
-const std::array<Ray, directions>& rays() {
-  static const std::array<Ray, directions> table = [] {
-    std::array<Ray, directions> all{};
+const std::array<Ray, outline_directions>& rays() {
+  static const std::array<Ray, outline_directions> table = [] {
+    std::array<Ray, outline_directions> all{};
     for (std::size_t k = 0; k < all.size(); ++k) {
-      const double angle = 2 * pi * static_cast<double>(k) / directions;
+      const double angle = 2 * std::numbers::pi * static_cast<double>(k) / outline_directions;
       all[k] = {std::cos(angle), std::sin(angle), {1}};
       for (std::size_t q = 1; q <= highest_harmonic; ++q) {
         all[k].basis[2 * q - 1] = std::cos(static_cast<double>(q) * angle);
@@ -101,7 +96,7 @@ class Slopes {
     const float along_x = mix(edges_.x), along_y = mix(edges_.y);
     const float radial = sign_ * (along_x * static_cast<float>(ray.cosine) + along_y * static_cast<float>(ray.sine));
     const float slope = std::hypot(along_x, along_y);
-    return slope < edges_.threshold || radial < static_cast<float>(least_alignment) * slope ? 0.0F : slope;
+    return slope < edges_.threshold || radial < static_cast<float>(least_radial_alignment) * slope ? 0.0F : slope;
   }
   // Towards the outside, whatever its size and direction.
   [[nodiscard]] double outwards(double x, double y, const Ray& ray) const {
@@ -130,8 +125,8 @@ class OutlinePath {
   OutlinePath(const Slopes& slopes, const Circle& circle, double typical_slope)
       : circle_(circle),
         rings_(static_cast<std::size_t>((farthest_edge - nearest_edge) * circle.radius / ring_step) + 1),
-        score_(directions * rings_) {
-    for (std::size_t k = 0; k < directions; ++k)
+        score_(outline_directions * rings_) {
+    for (std::size_t k = 0; k < outline_directions; ++k)
       for (std::size_t ring = 0; ring < rings_; ++ring) {
         const Ray& ray = rays()[k];
         const double r = radius_of(static_cast<double>(ring));
@@ -141,16 +136,16 @@ class OutlinePath {
     follow();
   }
 
-  std::array<double, directions> offset{};  // from the circle, radii
-  std::array<double, directions> weight{};  // 0 .. 1: a faint edge or a clear one
-  std::array<bool, directions> met{};       // an edge at all
+  std::array<double, outline_directions> offset{};  // from the circle, radii
+  std::array<double, outline_directions> weight{};  // 0 .. 1: a faint edge or a clear one
+  std::array<bool, outline_directions> met{};       // an edge at all
 
  private:
   [[nodiscard]] double radius_of(double ring) const { return nearest_edge * circle_.radius + ring * ring_step; }
 
   // Three turns, of which the middle one closes well enough.
   void follow() {
-    constexpr std::size_t turns = 3, steps = turns * directions;
+    constexpr std::size_t turns = 3, steps = turns * outline_directions;
     const int jump = std::max(1, static_cast<int>(std::lround(steepest_path * circle_.radius / ring_step)));
     const auto cost = static_cast<float>(cost_of_turning / jump);
     std::vector<float> value(score_.begin(), score_.begin() + static_cast<std::ptrdiff_t>(rings_)), next(rings_);
@@ -165,14 +160,14 @@ class OutlinePath {
           if (here > best) best = here, by = j;
         }
         const auto at = static_cast<std::size_t>(ring);
-        next[at] = best + score_[(step % directions) * rings_ + at];
+        next[at] = best + score_[(step % outline_directions) * rings_ + at];
         came_from[step * rings_ + at] = static_cast<std::int8_t>(by);
       }
       value.swap(next);
     }
     auto ring = static_cast<std::size_t>(std::max_element(value.begin(), value.end()) - value.begin());
-    for (std::size_t step = steps - 1; step >= directions; --step) {
-      if (step < 2 * directions) take(step - directions, ring);
+    for (std::size_t step = steps - 1; step >= outline_directions; --step) {
+      if (step < 2 * outline_directions) take(step - outline_directions, ring);
       ring = static_cast<std::size_t>(static_cast<int>(ring) + came_from[step * rings_ + ring]);
     }
   }
@@ -195,24 +190,24 @@ class OutlinePath {
 };
 
 // Weighted least squares of the outline's harmonics; those that no edge shows are held at 0.
-std::array<double, terms> harmonics_of(const OutlinePath& path) {
-  std::array<std::array<double, terms + 1>, terms> rows{};
-  for (std::size_t k = 0; k < directions; ++k) {
+std::array<double, outline_terms> harmonics_of(const OutlinePath& path) {
+  std::array<std::array<double, outline_terms + 1>, outline_terms> rows{};
+  for (std::size_t k = 0; k < outline_directions; ++k) {
     const auto& basis = rays()[k].basis;
-    for (std::size_t p = 0; p < terms; ++p) {
-      for (std::size_t q = 0; q < terms; ++q) rows[p][q] += path.weight[k] * basis[p] * basis[q];
-      rows[p][terms] += path.weight[k] * basis[p] * path.offset[k];
+    for (std::size_t p = 0; p < outline_terms; ++p) {
+      for (std::size_t q = 0; q < outline_terms; ++q) rows[p][q] += path.weight[k] * basis[p] * basis[q];
+      rows[p][outline_terms] += path.weight[k] * basis[p] * path.offset[k];
     }
   }
-  for (std::size_t p = 0; p < terms; ++p) rows[p][p] += p < 3 ? 1e-6 : hold_harmonics * directions;
-  for (std::size_t p = 0; p < terms; ++p)
-    for (std::size_t q = 0; q < terms; ++q) {
+  for (std::size_t p = 0; p < outline_terms; ++p) rows[p][p] += p < 3 ? 1e-6 : hold_harmonics * outline_directions;
+  for (std::size_t p = 0; p < outline_terms; ++p)
+    for (std::size_t q = 0; q < outline_terms; ++q) {
       if (q == p) continue;
       const double part = rows[q][p] / rows[p][p];
-      for (std::size_t c = p; c <= terms; ++c) rows[q][c] -= part * rows[p][c];
+      for (std::size_t c = p; c <= outline_terms; ++c) rows[q][c] -= part * rows[p][c];
     }
-  std::array<double, terms> amplitude{};
-  for (std::size_t p = 0; p < terms; ++p) amplitude[p] = rows[p][terms] / rows[p][p];
+  std::array<double, outline_terms> amplitude{};
+  for (std::size_t p = 0; p < outline_terms; ++p) amplitude[p] = rows[p][outline_terms] / rows[p][p];
   return amplitude;
 }
 
@@ -235,11 +230,11 @@ class OutlineFollower {
     const OutlinePath path(slopes_, circle, std::max(least_slope_, median_of(rim)));
     OneOutline outline;
     double clear = 0, on_circle = 0;
-    for (std::size_t k = 0; k < directions; ++k) {
+    for (std::size_t k = 0; k < outline_directions; ++k) {
       clear += path.weight[k];
       if (std::abs(path.offset[k]) < on_the_circle) on_circle += path.weight[k];
     }
-    outline.followed = clear / directions;
+    outline.followed = clear / outline_directions;
     outline.on_circle = clear > 0 ? on_circle / clear : 0;
     outline.gap = gap_of(path, circle);
     outline.rim_width = rim_width_of(circle);
@@ -255,11 +250,11 @@ class OutlineFollower {
   }
 
   static void develop(const OutlinePath& path, double clear, OneOutline& outline) {
-    const std::array<double, terms> amplitude = harmonics_of(path);
+    const std::array<double, outline_terms> amplitude = harmonics_of(path);
     double squares = 0;
-    for (std::size_t k = 0; k < directions; ++k) {
+    for (std::size_t k = 0; k < outline_directions; ++k) {
       double shape = 0;
-      for (std::size_t p = 3; p < terms; ++p) shape += amplitude[p] * rays()[k].basis[p];
+      for (std::size_t p = 3; p < outline_terms; ++p) shape += amplitude[p] * rays()[k].basis[p];
       squares += path.weight[k] * shape * shape;
     }
     outline.deviation = std::sqrt(squares / clear);
@@ -286,24 +281,24 @@ class OutlineFollower {
   }
 
   [[nodiscard]] double gap_of(const OutlinePath& path, const Circle& circle) const {
-    std::array<bool, directions> hidden{};
+    std::array<bool, outline_directions> hidden{};
     near_.any_near(circle.x, circle.y, [&](std::size_t i) {
       const double dx = circles_[i].x - circle.x, dy = circles_[i].y - circle.y, away = std::hypot(dx, dy);
       if (away < 0.1 * circle.radius || away > neighbour_reach * circle.radius) return false;
-      for (std::size_t k = 0; k < directions; ++k)
+      for (std::size_t k = 0; k < outline_directions; ++k)
         hidden[k] = hidden[k] || dx * rays()[k].cosine + dy * rays()[k].sine > away * std::cos(hidden_within);
       return false;
     });
     int run = 0, longest = 0;
-    for (std::size_t step = 0; step < 2 * directions; ++step) {
-      const std::size_t k = step % directions;
+    for (std::size_t step = 0; step < 2 * outline_directions; ++step) {
+      const std::size_t k = step % outline_directions;
       if (path.met[k] && std::abs(path.offset[k]) < near_the_circle)
         run = 0;
       else if (!hidden[k])
         ++run;
-      longest = std::max(longest, std::min(run, directions));
+      longest = std::max(longest, std::min(run, outline_directions));
     }
-    return static_cast<double>(longest) / directions;
+    return static_cast<double>(longest) / outline_directions;
   }
 
   const std::vector<Circle>& circles_;
@@ -350,28 +345,22 @@ Roundness summary_of(const std::vector<OneOutline>& outlines) {
   return out;
 }
 
-std::string text_of(const char* format, double a, double b = 0) {
-  char text[200];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
-
 }  // namespace
 
 std::string Roundness::why_not() const {
   if (outlines == 0) return {};
   if (on_circle < least_on_circle)
-    return text_of("the outlines are not round: only %.0f %% of a typical one lies on its circle", 100 * on_circle);
-  if (gap > largest_gap) return text_of("the outlines are open: %.0f %% of the circumference is missing", 100 * gap);
+    return formatted("the outlines are not round: only %.0f %% of a typical one lies on its circle", 100 * on_circle);
+  if (gap > largest_gap) return formatted("the outlines are open: %.0f %% of the circumference is missing", 100 * gap);
   if (common_elongation > largest_common_elongation || harmonic[2] > common_elongation + largest_own_elongation)
-    return text_of("the outlines are oval, their axes in the ratio %.2f", (1 + harmonic[2]) / (1 - harmonic[2]));
+    return formatted("the outlines are oval, their axes in the ratio %.2f", (1 + harmonic[2]) / (1 - harmonic[2]));
   for (std::size_t q = 3; q <= highest_harmonic; ++q)
     if (harmonic[q] > largest_harmonic)
-      return text_of("the outlines are not round: they have %.0f corners or bulges, %.1f %% of the radius high",
-                     static_cast<double>(q), 100 * harmonic[q]);
+      return formatted("the outlines are not round: they have %.0f corners or bulges, %.1f %% of the radius high",
+                       static_cast<double>(q), 100 * harmonic[q]);
   if (deviation > largest_deviation)
-    return text_of("the outlines are not round: they depart from a circle by %.1f %% of the radius", 100 * deviation);
-  if (not_round > most_not_round) return text_of("%.0f %% of the outlines are not round", 100 * not_round);
+    return formatted("the outlines are not round: they depart from a circle by %.1f %% of the radius", 100 * deviation);
+  if (not_round > most_not_round) return formatted("%.0f %% of the outlines are not round", 100 * not_round);
   return {};
 }
 

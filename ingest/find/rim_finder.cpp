@@ -10,6 +10,7 @@
 #include "ingest/find/picture_scale.hpp"
 #include "ingest/find/rim_gaps.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -17,11 +18,10 @@ namespace {
 
 constexpr double radius_window = 0.12;     // radii, either way: circles of one kind of bead
 constexpr double nearest_centres = 0.8;    // diameters: two circles nearer than that are one
-constexpr double faintest_support = 0.3;   // share of the rim
 constexpr double least_probability = 0.8;  // of a disk that is reported: more than one circle alone in its class has
 // Of the beads' contrast. Beads of 17 photographs: 0.40 or more; a shadow's corner that looked round: 0.10.
 constexpr double faintest_contrast = 0.25;
-constexpr double well_supported = 0.9;  // probability from which a circle counts for the radius
+constexpr double sure_probability = 0.9;  // probability from which a circle counts for the radius
 // Where blurred beads touch, their steepest edges lie farther out than a lone one's: in a photograph of beads of 2.5 px
 // at 1.4 times its radius. A circle so much smaller than the others must show most of its rim.
 constexpr double lone_share = 0.75, lone_support = 0.6;
@@ -38,7 +38,7 @@ constexpr double blur_of_map_px2 = 1.42;
 const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07, .faint = 0.65};
 
 std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity polarity) {
-  std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_support);
+  std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_rim_support);
   std::erase_if(circles, [&](const Circle& circle) { return std::abs(circle.radius / radius - 1) > radius_window; });
   return without_doubles(std::move(circles), nearest_centres);
 }
@@ -54,18 +54,11 @@ double edge_length(const EdgeMap& edges, double contrast) {
   return sum;
 }
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Radius, its spread and the contrast, of circles that are beads.
 void measure_rims(const std::vector<Circle>& circles, double scale, RimModel& model) {
   std::vector<double> radii, contrasts, deviations;
   for (const Circle& circle : circles)
-    if (model.probability_of(circle.support) >= std::min(well_supported, model.probability.back())) {
+    if (model.probability_of(circle.support) >= std::min(sure_probability, model.probability.back())) {
       radii.push_back(circle.radius);
       contrasts.push_back(circle.contrast);
     }
@@ -239,7 +232,7 @@ std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const
     start.y = at.from_frame_y(place.y);
     start.radius = model.radius_px / at.scale;
     Circle fitted = fit_circle(edges, start, model.polarity);
-    if (fitted.support < faintest_support) {
+    if (fitted.support < faintest_rim_support) {
       Circle smaller = start;
       smaller.radius *= lone_share;
       smaller = fit_circle(edges, smaller, model.polarity);

@@ -14,14 +14,13 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double gap_reach = 2;       // radii: so far from a bead's rim a circle's rim may be
-constexpr double nearest_rims = 0.8;  // sums of radii: two circles nearer than that overlap
-constexpr double same_radius = 0.12;  // of the beads' radius, either way
+constexpr double gap_reach = 2;            // radii: so far from a bead's rim a circle's rim may be
+constexpr double nearest_rims = 0.8;       // sums of radii: two circles nearer than that overlap
+constexpr double same_bead_radius = 0.12;  // of the beads' radius, either way
 // In radii of the beads; at half of it, fringes in photoelastic disks are mistaken for beads.
 constexpr double smallest_other = 0.6, largest_other = 1.67;
-constexpr double faintest_support = 0.3;   // share of the rim
-constexpr double least_probability = 0.5;  // of a circle that is reported
-constexpr int most_rounds = 8;             // of circles beside circles
+constexpr double least_gap_probability = 0.5;  // of a circle that is reported
+constexpr int most_gap_rounds = 8;             // of circles beside circles
 // Other sizes are accepted when at least this number is expected, and this share of the beads.
 constexpr double fewest_others = 3, least_share_of_others = 0.05;
 
@@ -36,12 +35,12 @@ class GapSearch {
   GapSearch(const EdgeMap& edges, double radius, Polarity polarity, Sizes sizes, ToPicture to_picture)
       : radius_(radius), to_picture_(std::move(to_picture)) {
     const bool same = sizes == Sizes::same;
-    const double from = (same ? 1 - 0.6 * same_radius : smallest_other) * radius;
-    const double to = (same ? 1 + 0.6 * same_radius : largest_other) * radius;
-    circles_ = find_circles(edges, from, to, polarity, faintest_support);
+    const double from = (same ? 1 - 0.6 * same_bead_radius : smallest_other) * radius;
+    const double to = (same ? 1 + 0.6 * same_bead_radius : largest_other) * radius;
+    circles_ = find_circles(edges, from, to, polarity, faintest_rim_support);
     std::erase_if(circles_, [&](const Circle& one) {
       const double ratio = one.radius / radius;
-      const bool like_the_others = std::abs(ratio - 1) <= same_radius;
+      const bool like_the_others = std::abs(ratio - 1) <= same_bead_radius;
       return same ? !like_the_others : like_the_others || ratio < smallest_other || ratio > largest_other;
     });
   }
@@ -82,13 +81,13 @@ double take_likely(const GapSearch& search, const std::vector<double>& probabili
     const std::size_t before = taken.size();
     for (const Circle& circle : search.beside(beads)) {
       const double its = probability_at(probability, circle.support);
-      if (its < least_probability)
+      if (its < least_gap_probability)
         left += its;
       else
         taken.push_back({circle, its, sizes == Sizes::other});
     }
     for (std::size_t k = before; k < taken.size(); ++k) beads.push_back(taken[k].circle);
-    if (taken.size() == before || round == most_rounds) return left;
+    if (taken.size() == before || round == most_gap_rounds) return left;
   }
 }
 

@@ -13,6 +13,8 @@
 
 namespace shakebed::ingest {
 
+constexpr double faintest_rim_support = 0.3;  // share of a rim from which a circle is fitted
+
 struct GapCircle {
   Circle circle;  // px of the map
   double probability = 0;

@@ -8,12 +8,13 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-constexpr double enough_radius_px = 12;                         // frames are averaged down to it for the trials
+constexpr double trial_radius_px = 12;                          // frames are averaged down to it for the trials
 constexpr double clearly_more = 1.03;                           // times as many beads, for a change of channel
 constexpr double inside = 0.8, outside = 1.15, farthest = 1.3;  // radii: where a face and what is behind it are seen
 constexpr double least_contrast = 4;                            // grey levels between the two
@@ -54,10 +55,7 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
       }
     if (in_count > 0 && out_count > 0) contrasts.push_back(in / in_count - out / out_count);
   }
-  if (contrasts.empty()) return 0;
-  const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
-  std::nth_element(contrasts.begin(), middle, contrasts.end());
-  return *middle;
+  return median_of(std::move(contrasts));
 }
 
 class ChannelTrials {
@@ -65,7 +63,7 @@ class ChannelTrials {
   ChannelTrials(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options)
       : frames_(frames), best_(best) {
     const double radius = best.rims.radius_px / frames.reduction;
-    factor_ = std::max(1, static_cast<int>(radius / enough_radius_px));
+    factor_ = std::max(1, static_cast<int>(radius / trial_radius_px));
     if (!options.roi) return;
     const int all = factor_ * frames.reduction;
     roi_ = PixelRectangle{options.roi->left / all, options.roi->top / all, options.roi->width / all,

@@ -11,6 +11,7 @@
 #include "ingest/find/circle_census.hpp"
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/settle_channel.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
@@ -19,12 +20,11 @@ namespace {
 // Two channels whose levels are this much alike show the same: one is enough.
 constexpr double alike = 0.97;
 constexpr std::size_t most_examined = 8;  // hypotheses of the census looked at in full
-constexpr double circle_cost_px = 8;      // px of rim at a radius of 8 px, for a circle's place and radius
 constexpr double cost_radius_px = 8;
-constexpr double hopeless = 0.5;       // of the census's circles, made up by chance: not looked at in full
-constexpr double worth_a_look = 0.15;  // of the best hypothesis's gain
-constexpr double most_wrong = 0.2;     // share of the disks beyond which nothing is measured
-constexpr double few_wrong = 0.1;      // beyond it, beads must make up a good part of the picture's edges
+constexpr double hopeless_share = 0.5;  // of the census's circles, made up by chance: not looked at in full
+constexpr double worth_a_look = 0.15;   // of the best hypothesis's gain
+constexpr double most_by_chance = 0.2;  // share of the circles that chance may make up
+constexpr double few_wrong = 0.1;       // beyond it, beads must make up a good part of the picture's edges
 constexpr double good_part = 0.15;
 constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
@@ -113,12 +113,6 @@ DrawingSigns signs_inside(const ChannelFrames& frames, const std::optional<Pixel
   return signs_of_drawing(cut_out(frame, part));
 }
 
-std::string text_of(const char* format, double a, double b = 0) {
-  char text[300];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
-
 // Things that are not round are no beads, nor are spots without a rim among much else.
 void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool any_shape) {
   candidate.not_round = !roundness.round();
@@ -144,15 +138,15 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   const double at_worst = (wrong + std::sqrt(wrong)) / std::max(1.0, count);  // a standard deviation more
   if (candidate.disks.empty())
     candidate.why_not = "no circle is seen more often than chance makes up";
-  else if (at_worst > most_wrong || (at_worst > few_wrong && candidate.explained_share < good_part))
-    candidate.why_not = text_of("of %.0f circles, chance makes up as many as %.0f %%", count, 100 * at_worst);
+  else if (at_worst > most_by_chance || (at_worst > few_wrong && candidate.explained_share < good_part))
+    candidate.why_not = formatted("of %.0f circles, chance makes up as many as %.0f %%", count, 100 * at_worst);
   else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
     candidate.why_not =
-        text_of("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
+        formatted("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
   else if (least_seen_side(candidate.disks) < least_side)
     candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
-    candidate.why_not = text_of("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
+    candidate.why_not = formatted("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
 }
 
 // Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.
@@ -165,8 +159,8 @@ void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
         continue;
       candidate.credible = false;
       candidate.why_not =
-          text_of("things of %.1f px that are not round make up more of the edges than circles of %.1f px",
-                  other.rims.radius_px, candidate.rims.radius_px);
+          formatted("things of %.1f px that are not round make up more of the edges than circles of %.1f px",
+                    other.rims.radius_px, candidate.rims.radius_px);
     }
   }
 }
@@ -201,7 +195,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   const CircleCensus census = take_census(pictures, asked);
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
     if (survey.candidates.size() >= most_examined) break;
-    if (hypothesis.by_chance > hopeless * hypothesis.circles) continue;
+    if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
     if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
     SurveyCandidate candidate;
     candidate.channel = channels[hypothesis.channel]->channel;
@@ -220,7 +214,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;
       candidate.why_not =
-          text_of("circles of %.1f px are seen, too small to distinguish from specks", candidate.rims.radius_px);
+          formatted("circles of %.1f px are seen, too small to distinguish from specks", candidate.rims.radius_px);
     }
     survey.candidates.push_back(std::move(candidate));
   }

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "statistics/ranks.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
@@ -18,8 +20,8 @@ constexpr std::size_t fewest_steps = 30;
 constexpr double least_enlargement = 2, on_lattice_px = 0.8, most_off_lattice = 0.02;
 // Of the lattice's steps, so many are seen: drawings have a few lines wherever they like.
 constexpr double least_seen = 0.5;
-// The two sides are enlarged alike.
-constexpr double alike = 0.05;
+// The two sides are enlarged alike_steps.
+constexpr double alike_steps = 0.05;
 
 // Columns after which the picture changes.
 std::vector<double> steps_between_columns(const cv::Mat& levels) {
@@ -28,12 +30,10 @@ std::vector<double> steps_between_columns(const cv::Mat& levels) {
     const float* line = levels.ptr<float>(row);
     for (std::size_t k = 0; k < changes.size(); ++k) changes[k] += static_cast<double>(std::abs(line[k + 1] - line[k]));
   }
-  std::vector<double> sorted = changes;
-  const auto high = sorted.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), high, sorted.end());
+  const double high = quantile_of(changes, 0.9);
   std::vector<double> steps;
   for (std::size_t k = 0; k < changes.size(); ++k)
-    if (changes[k] > same_share * *high && changes[k] > 0) steps.push_back(static_cast<double>(k) + 0.5);
+    if (changes[k] > same_share * high && changes[k] > 0) steps.push_back(static_cast<double>(k) + 0.5);
   return steps;
 }
 
@@ -99,7 +99,7 @@ double smooth_repeated_pixels(cv::Mat& picture) {
   const auto across = lattice_of(steps_between_columns(levels));
   if (!across) return 1;
   const auto down = lattice_of(steps_between_columns(levels.t()));
-  if (!down || std::abs(across->spacing / down->spacing - 1) > alike) return 1;
+  if (!down || std::abs(across->spacing / down->spacing - 1) > alike_steps) return 1;
   const Originals columns(*across, picture.cols), rows(*down, picture.rows);
   cv::Mat map_x(rows.count, columns.count, CV_32F), map_y(rows.count, columns.count, CV_32F), originals;
   for (int row = 0; row < rows.count; ++row)

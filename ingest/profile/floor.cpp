@@ -126,7 +126,7 @@ struct Bottom {
 };
 constexpr std::size_t parts = 12;  // of the period
 constexpr std::size_t fewest_bottoms = 30;
-constexpr double least_tolerance = 0.02;  // D: what touching beads scatter
+constexpr double least_contact_tolerance = 0.02;  // D: what touching beads scatter
 
 std::vector<Bottom> bottoms_by_phase(const std::vector<LowestBottoms>& frames, double turns_per_frame) {
   std::vector<Bottom> bottoms;
@@ -187,7 +187,7 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
   double tolerance = diameter_px;
   constexpr int rounds = 60;
   for (int round = 0; round < rounds; ++round) {
-    tolerance = std::max(least_tolerance * diameter_px, 0.85 * tolerance);
+    tolerance = std::max(least_contact_tolerance * diameter_px, 0.85 * tolerance);
     if (!fit_floor_once(bottoms, tolerance, fit)) return motion;
   }
   std::vector<std::size_t> touching(parts, 0);

@@ -47,7 +47,7 @@ Level level_at(const std::byte* row, int column) {
 }
 
 template <class Level>
-void copy_levels(const ImageView& image, double scale, float* out) {
+void copy_image(const ImageView& image, double scale, float* out) {
   for (int row = 0; row < image.height; ++row) {
     const std::byte* from = row_of(image, row);
     for (int column = 0; column < image.width; ++column)
@@ -146,16 +146,16 @@ GrayFrame frame_of(const ImageView& image) {
   float* out = frame.pixels.data();
   switch (image.type) {
     case PixelType::u8:
-      copy_levels<std::uint8_t>(image, 1, out);
+      copy_image<std::uint8_t>(image, 1, out);
       break;
     case PixelType::u16:
-      copy_levels<std::uint16_t>(image, 1 / levels_16_bit, out);
+      copy_image<std::uint16_t>(image, 1 / levels_16_bit, out);
       break;
     case PixelType::f32:
-      copy_levels<float>(image, 1, out);
+      copy_image<float>(image, 1, out);
       break;
     case PixelType::f64:
-      copy_levels<double>(image, 1, out);
+      copy_image<double>(image, 1, out);
       break;
   }
   return frame;

@@ -8,10 +8,10 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double resting = 0.02;      // D: what touching beads scatter
-constexpr double clearly_more = 1.5;  // beads that touch a floor of twice the bed's frequency
-constexpr double doubted = 5;         // standard errors between a frequency given and one seen ...
-constexpr double smeared = 0.1;       // ... and turns between them over the film
+constexpr double resting = 0.02;               // D: what touching beads scatter
+constexpr double clearly_more_contacts = 1.5;  // beads that touch a floor of twice the bed's frequency
+constexpr double doubted_frequency = 5;        // standard errors between a frequency given and one seen ...
+constexpr double smeared = 0.1;                // ... and turns between them over the film
 
 }  // namespace
 
@@ -43,7 +43,8 @@ void Shaking::choose_period() {
   if (twice < 0.5) {
     const FloorMotion once = find_floor_motion(first_bottoms_, diameter_px_, in_film_.cycles_per_frame);
     const FloorMotion as_twice = find_floor_motion(first_bottoms_, diameter_px_, twice);
-    const bool more = static_cast<double>(as_twice.touching) > clearly_more * static_cast<double>(once.touching);
+    const bool more =
+        static_cast<double>(as_twice.touching) > clearly_more_contacts * static_cast<double>(once.touching);
     bed_repeats_every_ = as_twice.known && more ? 2 : 1;
   }
   turns_per_frame_ = bed_repeats_every_ * in_film_.cycles_per_frame;
@@ -105,7 +106,7 @@ void Shaking::compare_with_given() {
   for (const int periods : {1, 2, 3})
     nearest = std::min(nearest,
                        std::abs(seen_as(periods * in_film_.cycles_per_frame) - seen_as(*turns_per_frame_)) / periods);
-  if (nearest < doubted * in_film_.std_error || nearest * length < smeared) return;
+  if (nearest < doubted_frequency * in_film_.std_error || nearest * length < smeared) return;
   const double rate = *options_.frame_rate_hz;
   char text[400];
   std::snprintf(text, sizeof text,
