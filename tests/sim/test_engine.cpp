@@ -430,7 +430,7 @@ TEST(Engine, SaysWhereDisksCollapse) {
   soft->advance_to(12);
   EXPECT_LT(soft->energy().kinetic, 0.1);    // hops of a contact's duration are all that is left
   EXPECT_LE(soft->largest_overlap(), 1e-3);  // as springs are: it is pressed on the floor
-  scene.disks.presses = false;
+  scene.presses = false;
   const auto hard = simulate(scene);
   hard->advance_to(12);
   EXPECT_LE(hard->largest_overlap(), 1e-12);
