@@ -29,6 +29,30 @@ inline double time_to_disk(double dx, double dz, double dvx, double dvz, double 
   return c / (std::sqrt(discriminant) - b);
 }
 
+// Disks that another one may meet, one in each lane. Number: Lanes or TwoLanes.
+template <class Number>
+struct SeenDisks {
+  Number x, z, vx, vz, own_time, event_time, contact_squared;
+};
+inline SeenDisks<TwoLanes> first_half(const SeenDisks<Lanes>& all) {
+  return {first_half(all.x),
+          first_half(all.z),
+          first_half(all.vx),
+          first_half(all.vz),
+          first_half(all.own_time),
+          first_half(all.event_time),
+          first_half(all.contact_squared)};
+}
+inline SeenDisks<TwoLanes> second_half(const SeenDisks<Lanes>& all) {
+  return {second_half(all.x),
+          second_half(all.z),
+          second_half(all.vx),
+          second_half(all.vz),
+          second_half(all.own_time),
+          second_half(all.event_time),
+          second_half(all.contact_squared)};
+}
+
 // A wall across a direction in which nothing accelerates. gap: free distance to it (slightly negative counts as
 // touching); approach_speed: how fast the gap closes.
 inline double time_to_wall(double gap, double approach_speed) {

@@ -125,6 +125,10 @@ class Engine final : public Simulation {
 
   // --- prediction
   // `images`: whether to tell which images of the others are the nearest.
+  template <bool images, bool others_ahead, class Number>
+  Number meetings(const SeenDisks<Number>& others, const Disk& me) const;
+  template <bool others_ahead>
+  LaneMask may_meet(const SeenDisks<Lanes>& others, const Disk& me) const;
   template <bool images, bool others_ahead = false>
   Lanes contact_times(const std::uint32_t* ids, std::size_t beyond, const Disk& me, double radius) const;
   template <bool images, bool others_ahead = false>

@@ -3,6 +3,72 @@
 
 namespace shakebed::sim {
 
+// When the disk meets others; `never` where it does not.
+template <class Space, class Rule, class Sizes>
+template <bool images, bool others_ahead, class Number>
+[[gnu::always_inline]] inline Number Engine<Space, Rule, Sizes>::meetings(const SeenDisks<Number>& others,
+                                                                          const Disk& me) const {
+  Number time = in_lanes<Number>(now_);
+  if constexpr (others_ahead) time = larger(time, others.own_time);
+  const Number dt = time - others.own_time;
+  Number dx = fused(others.vx, dt, others.x) - in_lanes<Number>(me.x);
+  Number dz, vz = others.vz;
+  if constexpr (Space::falls) {
+    const Number fall = in_lanes<Number>(gravity_) * dt;
+    dz = fused(fused(in_lanes<Number>(-0.5), fall, vz), dt, others.z) - in_lanes<Number>(me.z);
+    vz = vz - fall;
+  } else {
+    dz = fused(vz, dt, others.z) - in_lanes<Number>(me.z);
+  }
+  if constexpr (others_ahead) {
+    const Number since = time - in_lanes<Number>(me.own_time);
+    dx = fused(in_lanes<Number>(-me.vx), since, dx);
+    dz = fused(in_lanes<Number>(-me.vz), since, dz);
+  }
+  if constexpr (images && Space::wraps_x) dx = period_x_.nearest(dx);
+  if constexpr (images && Space::wraps_z) dz = period_z_.nearest(dz);
+  const Number dvx = others.vx - in_lanes<Number>(me.vx), dvz = vz - in_lanes<Number>(me.vz);
+
+  // As time_to_disk() in contact_time.hpp, but in the form (-b - root) / a: its division does not wait for the root.
+  // What it loses to cancellation is 2e-16 of the distance in place, no more than the places themselves. Of a negative
+  // discriminant the root is NaN, which is not before anything.
+  const Number b = fused(dx, dvx, dz * dvz);
+  const Number c = larger(fused(dx, dx, fused(dz, dz, -others.contact_squared)), in_lanes<Number>(0));
+  const Number a = fused(dvx, dvx, dvz * dvz);
+  const Number root = sqrt_lanes(fused(b, b, -(a * c)));
+  // Earlier than the other's next event: -(b + root) < a (event_time - time), which does not wait for the contact.
+  const auto meets = (b < in_lanes<Number>(-slowest_approach)) & (root > fused(time - others.event_time, a, -b));
+  const Number contact = fused(-(b + root), in_lanes<Number>(1) / a, time);
+  // The larger of the contact and 0 or, where there is none, `never`: quicker than a selection.
+  return larger(contact, unless(meets, in_lanes<Number>(never)));
+}
+
+// Those that the disk may meet, by ordinary products: all that it does meet and a few more. What rounding changes here
+// is far below `doubt`, for places up to 1e5 D. Asked where fused products take long.
+template <class Space, class Rule, class Sizes>
+template <bool others_ahead>
+[[gnu::always_inline]] inline LaneMask Engine<Space, Rule, Sizes>::may_meet(const SeenDisks<Lanes>& others,
+                                                                            const Disk& me) const {
+  const Lanes doubt = all_lanes(1e-9);
+  Lanes time = all_lanes(now_);
+  if constexpr (others_ahead) time = larger(time, others.own_time);
+  const Lanes dt = time - others.own_time, fall = all_lanes(Space::falls ? gravity_ : 0) * dt;
+  Lanes dx = others.x + others.vx * dt - all_lanes(me.x);
+  Lanes dz = others.z + (others.vz - all_lanes(0.5) * fall) * dt - all_lanes(me.z);
+  if constexpr (others_ahead) {
+    const Lanes since = time - all_lanes(me.own_time);
+    dx -= all_lanes(me.vx) * since;
+    dz -= all_lanes(me.vz) * since;
+  }
+  const Lanes dvx = others.vx - all_lanes(me.vx), dvz = others.vz - fall - all_lanes(me.vz);
+  const Lanes a = dvx * dvx + dvz * dvz, b = dx * dvx + dz * dvz;
+  const Lanes c = larger(dx * dx + dz * dz - others.contact_squared, all_lanes(0));
+  const Lanes of_square = b * b + a * c + a, of_all = of_square + all_lanes(1);
+  const Lanes discriminant = b * b - a * c, root = sqrt_lanes(larger(discriminant, all_lanes(0)) + doubt * of_square);
+  const Lanes late = (time - others.event_time) * a - b;  // minus infinity where the other's event is never
+  return (b <= doubt * of_all) & (discriminant >= -doubt * of_square) & (root >= late - doubt * (of_all - late));
+}
+
 // Contact times of one disk with four others: ids 0 and 1 and the two from `beyond` on. The disk's struct is that of
 // now_. The time is `never` where there is no other disk or where the other's next event is earlier. If others may be
 // ahead of now_, the disk's struct may be an earlier one. Contacts before the others' flights began are then left out.
@@ -17,50 +83,25 @@ template <bool images, bool others_ahead>
   const Lanes x = __builtin_shufflevector(position02, position13, 0, 4, 2, 6),
               z = __builtin_shufflevector(position02, position13, 1, 5, 3, 7);
   const Lanes vx = __builtin_shufflevector(velocity02, velocity13, 0, 4, 2, 6);
-  Lanes vz = __builtin_shufflevector(velocity02, velocity13, 1, 5, 3, 7);
+  const Lanes vz = __builtin_shufflevector(velocity02, velocity13, 1, 5, 3, 7);
   const Lanes times02 = two_pairs(&k0.own_time, &k2.own_time), times13 = two_pairs(&k1.own_time, &k3.own_time);
   const Lanes own_time = __builtin_shufflevector(times02, times13, 0, 4, 2, 6),
               event_time = __builtin_shufflevector(times02, times13, 1, 5, 3, 7);
 
-  Lanes time = all_lanes(now_);
-  if constexpr (others_ahead) time = larger(time, own_time);
-  const Lanes dt = time - own_time;
-  Lanes dx = fused(vx, dt, x) - all_lanes(me.x);
-  Lanes dz;
-  if constexpr (Space::falls) {
-    const Lanes fall = all_lanes(gravity_) * dt;
-    dz = fused(fused(all_lanes(-0.5), fall, vz), dt, z) - all_lanes(me.z);
-    vz = vz - fall;
-  } else {
-    dz = fused(vz, dt, z) - all_lanes(me.z);
-  }
-  if constexpr (others_ahead) {
-    const Lanes since = time - all_lanes(me.own_time);
-    dx = fused(all_lanes(-me.vx), since, dx);
-    dz = fused(all_lanes(-me.vz), since, dz);
-  }
-  if constexpr (images && Space::wraps_x) dx = period_x_.nearest(dx);
-  if constexpr (images && Space::wraps_z) dz = period_z_.nearest(dz);
-  const Lanes dvx = vx - all_lanes(me.vx), dvz = vz - all_lanes(me.vz);
-
-  Lanes contact_squared = all_lanes(1);
+  SeenDisks<Lanes> others{x, z, vx, vz, own_time, event_time, all_lanes(1)};
   if constexpr (!Sizes::equal) {
     const Lanes distance = all_lanes(radius) + Lanes{sizes_.radius(ids[0]), sizes_.radius(ids[1]),
                                                      sizes_.radius(ids[beyond]), sizes_.radius(ids[beyond + 1])};
-    contact_squared = distance * distance;
+    others.contact_squared = distance * distance;
   }
-  // As time_to_disk() in contact_time.hpp, but in the form (-b - root) / a: its division does not wait for the root.
-  // What it loses to cancellation is 2e-16 of the distance in place, no more than the places themselves. Of a negative
-  // discriminant the root is NaN, which is not before anything.
-  const Lanes b = fused(dx, dvx, dz * dvz);
-  const Lanes c = larger(fused(dx, dx, fused(dz, dz, -contact_squared)), all_lanes(0));
-  const Lanes a = fused(dvx, dvx, dvz * dvz);
-  const Lanes root = sqrt_lanes(fused(b, b, -(a * c)));
-  // Earlier than the other's next event: -(b + root) < a (event_time - time), which does not wait for the contact.
-  const LaneMask meets = (b < all_lanes(-slowest_approach)) & (root > fused(time - event_time, a, -b));
-  const Lanes contact = fused(-(b + root), all_lanes(1) / a, time);
-  // The larger of the contact and 0 or, where there is none, `never`: quicker than a selection.
-  return larger(contact, unless(meets, all_lanes(never)));
+  if constexpr (fused_takes_long && !images) {
+    const LaneMask may = may_meet<others_ahead>(others, me);
+    const TwoLanes none = both(never);
+    return joined((may[0] | may[1]) == 0 ? none : meetings<false, others_ahead>(first_half(others), me),
+                  (may[2] | may[3]) == 0 ? none : meetings<false, others_ahead>(second_half(others), me));
+  } else {
+    return meetings<images, others_ahead>(others, me);
+  }
 }
 
 // The earliest contact with the eight of a block.

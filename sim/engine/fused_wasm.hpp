@@ -56,8 +56,8 @@ template <class Number>
   const Number rest = sum_rest + low_rest, doubt = rest * twice_rounding;
   const Number result = sum + (rest + doubt), other = sum + (rest - doubt);
   const auto finite = a - a == 0.0;
-  const auto exact =
-      (magnitude(product) >= smallest_exact_product) | ((product == 0.0) & (magnitude(c) >= smallest_exact_product));
+  const auto of_zero = (product == 0.0) & (magnitude(c) >= smallest_exact_product);
+  const auto exact = static_cast<decltype(of_zero)>(magnitude(product) >= smallest_exact_product) | of_zero;
   if (!all_hold((exact & (result == other) & (result != 0.0)) | !finite)) [[unlikely]]
     return fused_rarely(a, b, c);
   return finite ? result : product + c;

@@ -138,6 +138,33 @@ inline Lanes larger(Lanes a, Lanes b) {
 #endif
 }
 
+// Whether a fused product costs many times an ordinary one. Then most are avoided, and two lanes are computed where
+// four are not needed.
+#if defined(__wasm_simd128__)
+inline constexpr bool fused_takes_long = true;
+#else
+inline constexpr bool fused_takes_long = false;
+#endif
+using TwoMasks = std::int64_t __attribute__((vector_size(16)));
+inline TwoLanes unless(TwoMasks mask, TwoLanes value) {
+  return reinterpret_cast<TwoLanes>(~mask & reinterpret_cast<TwoMasks>(value));
+}
+inline TwoLanes larger(TwoLanes a, TwoLanes b) {
+  const auto mask = reinterpret_cast<TwoMasks>(a > b);
+  return reinterpret_cast<TwoLanes>((reinterpret_cast<TwoMasks>(a) & mask) | (reinterpret_cast<TwoMasks>(b) & ~mask));
+}
+inline TwoLanes first_half(Lanes lanes) { return __builtin_shufflevector(lanes, lanes, 0, 1); }
+inline TwoLanes second_half(Lanes lanes) { return __builtin_shufflevector(lanes, lanes, 2, 3); }
+inline Lanes joined(TwoLanes first, TwoLanes second) { return __builtin_shufflevector(first, second, 0, 1, 2, 3); }
+template <class Number>
+Number in_lanes(double value) {
+  if constexpr (sizeof(Number) == sizeof(Lanes)) {
+    return all_lanes(value);
+  } else {
+    return both(value);
+  }
+}
+
 // Four doubles that have been written one by one just now are read so, too: at once they could not be read before they
 // have reached the cache. The compiler may not see that they stand side by side.
 inline Lanes four_just_written(const double* doubles) {

@@ -2,8 +2,9 @@
 const margin = { left: 46, right: 10, top: 10, bottom: 36 };
 const fontSize = 12;
 
-// Round values from `low` to `high`, about `count` of them and at least three.
+// Round values from `low` to `high`, about `count` of them and at least three; one where there is no range yet.
 function ticks(low, high, count) {
+  if (!(high > low)) return [low];
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const coarse = [1, 2, 5, 10].findIndex((k) => k >= rough / power * (1 - 1e-9));
   const multiples = (step) => {
@@ -50,7 +51,7 @@ export class Chart {
       return;
     }
     const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);
-    const lowX = Math.min(...xs), highX = Math.max(...xs), highY = 1.08 * Math.max(...ys, 1e-9);
+    const lowX = Math.min(0, ...xs), highX = Math.max(...xs), highY = 1.08 * Math.max(...ys, 1e-9);
     const toX = (x) => margin.left + ((x - lowX) / (highX - lowX || 1)) * (width - margin.left - margin.right);
     const toY = (y) => height - margin.bottom - (y / highY) * (height - margin.top - margin.bottom);
     const path = (list) => list.map(([x, y], k) => `${k ? "L" : "M"}${toX(x).toFixed(1)} ${toY(y).toFixed(1)}`).join("");
