@@ -125,6 +125,14 @@ std::string map_curve(const InferOptions& options, const UnknownParameter& frequ
   return rows;
 }
 
+// A round step of which three to six make up the range.
+double tic_step(double range) {
+  const double power = std::pow(10.0, std::floor(std::log10(range / 3)));
+  for (const double step : {5.0, 2.0})
+    if (step * power <= range / 3) return step * power;
+  return power;
+}
+
 }  // namespace
 
 // pairs.gp: marginals on the diagonal, draws below it.
@@ -143,7 +151,8 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
   // The bars are of all draws; as points more than 400 hide one another and make the page large.
   const std::size_t every = std::max<std::size_t>(1, (found.draws.size() + 399) / 400);
   std::string body = fmt::format(
-      "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font ',9'\n",
+      "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font "
+      "tic_font\n",
       d);
   for (std::size_t row = 0; row < d; ++row) {
     for (std::size_t column = 0; column < d; ++column) {
@@ -159,25 +168,28 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
       const auto label = [](const std::string& name, const UnknownParameter& p) {
         return words(name) + (p.unit.empty() ? "" : " (" + p.unit + ")");
       };
-      body += row + 1 == d ? fmt::format("set xlabel '{}' font ',11'\nset format x '%g'\n", label(x_name, x))
+      body += row + 1 == d ? fmt::format("set xlabel '{}' font label_font\nset format x '%g'\n", label(x_name, x))
                            : "unset xlabel\nset format x ''\n";
-      body += column == 0 && row > 0 ? fmt::format("set ylabel '{}' font ',11'\nset format y '%g'\n", label(y_name, y))
-                                     : "unset ylabel\nset format y ''\n";
+      body += column == 0 && row > 0
+                  ? fmt::format("set ylabel '{}' font label_font\nset format y '%g'\n", label(y_name, y))
+                  : "unset ylabel\nset format y ''\n";
       const auto [x_low, x_high] = ends(x);
-      body += fmt::format("set xrange [{}:{}]\n", x_low, x_high);
+      body += fmt::format("set xrange [{}:{}]\nset xtics {}\n", x_low, x_high, tic_step(x_high - x_low));
       if (row == column) {
         const double bin = (x_high - x_low) / 24;
         body += fmt::format(
-            "set yrange [0:*]\nplot 'pairs.dat' index 0 using ({0}+{1}*(floor((${2}-({0}))/{1})+0.5)):(1) smooth "
+            "set yrange [0:*]\nset ytics autofreq\nplot 'pairs.dat' index 0 using "
+            "({0}+{1}*(floor((${2}-({0}))/{1})+0.5)):(1) smooth "
             "frequency with boxes fillstyle solid 0.5 noborder lc rgb '#0072B2'\n",
             x_low, bin, column + 1);
         continue;
       }
       const auto [y_low, y_high] = ends(y);
       body += fmt::format(
-          "set yrange [{}:{}]\nplot 'pairs.dat' index 0 every {} using {}:{} with points pt 7 ps 0.2 lc rgb '#0072B2', "
+          "set yrange [{}:{}]\nset ytics {}\nplot 'pairs.dat' index 0 every {} using {}:{} with points pt 7 ps 0.2 lc "
+          "rgb '#0072B2', "
           "'pairs.dat' index 1 using {}:{} with points pt 2 ps 0.8 lw 2 lc rgb '#D55E00'",
-          y_low, y_high, every, column + 1, row + 1, column + 1, row + 1);
+          y_low, y_high, tic_step(y_high - y_low), every, column + 1, row + 1, column + 1, row + 1);
       const auto a = x.in_scene(options.bed.scene), b = y.in_scene(options.bed.scene);
       if (a && b)
         body += fmt::format(", '+' using ({}):({}) every ::0::0 with points pt 6 ps 1 lw 2 lc rgb '#000000'", *a, *b);
@@ -192,10 +204,11 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
   }
   body += "unset multiplot\nunset output\n";
   run_gnuplot(context.output_directory(), "pairs",
-              "set encoding utf8\nset terminal svg size 860,860 noenhanced font 'Helvetica,14' background "
-              "'#ffffff'\nset output 'pairs.svg'\n" +
+              "set encoding utf8\ntic_font = ',14'\nlabel_font = ',15'\nset terminal svg size 700,700 noenhanced font "
+              "'Helvetica,14' background '#ffffff'\nset output 'pairs.svg'\n" +
                   body +
-                  "reset\nset terminal pdfcairo size 17.2cm,17.2cm noenhanced font 'Helvetica,9' background "
+                  "reset\ntic_font = ',9'\nlabel_font = ',11'\nset terminal pdfcairo size 17.2cm,17.2cm noenhanced "
+                  "font 'Helvetica,9' background "
                   "'#ffffff'\nset output 'pairs.pdf'\n" +
                   body);
 }

@@ -106,7 +106,7 @@ node=$(command -v node || command -v nodejs || true)
 if [ -z "$node" ]; then
   echo "SKIPPED in part: node is not installed (Debian: nodejs); nothing was clicked"
 else
-  axe=
+  axe=none
   if command -v npm >/dev/null && timeout 60 npm install --prefix "$folder/npm" --no-audit --no-fund --ignore-scripts \
       axe-core@4.10.2 ro-crate@3.7.2 >/dev/null 2>&1; then
     axe="$folder/npm/node_modules/axe-core/axe.min.js"
@@ -114,7 +114,12 @@ else
   else
     echo "SKIPPED in part: axe-core and ro-crate cannot be had from npm; contrast was looked at by this script alone"
   fi
-  timeout 200 "$node" "$here/browser/report.mjs" "$browser" o s $axe || complain "the pages do not do what they should"
+  # Other pages: the published figure with its posterior, photographs (the frames of the bed above), a benchmark.
+  "$shakebed" reproduce clement-rajchenbach --preset quick --out m --quiet >/dev/null 2>&1 || [ $? = 6 ]
+  "$shakebed" fit-images o/render/frames --diameter "3 mm" --out f \
+    --quiet >/dev/null 2>&1 || [ $? = 6 ] || complain "the frames are not measured"
+  "$shakebed" bench map --quick --out b --quiet >/dev/null 2>&1 || complain "no bench"
+  timeout 400 "$node" "$here/browser/report.mjs" "$browser" o s "$axe" m/report.html f/report.html b/bench.html || complain "the pages do not do what they should"
 fi
-[ "$bad" = 0 ] && echo "both reports are whole, alone, move, and fit"
+[ "$bad" = 0 ] && echo "the pages are whole, alone, move, and fit"
 exit "$bad"

@@ -88,6 +88,6 @@ export class Browser {
     const ended = this.process.exitCode !== null ? Promise.resolve() : new Promise(done => this.process.once("exit", done));
     if (this.process.exitCode === null) this.process.kill();
     await Promise.race([ended, new Promise(done => setTimeout(done, 5000))]);
-    rmSync(this.profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 200 });  // its children write a little longer
+    rmSync(this.profile, { recursive: true, force: true, maxRetries: 60, retryDelay: 500 });  // its children write a little longer
   }
 }

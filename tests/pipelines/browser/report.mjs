@@ -1,14 +1,15 @@
 // Reports as people use them, in headless Chromium: the film's slider, values under the pointer and by keyboard, series
 // on and off, zoom, sorting and filtering, print to PDF, JavaScript off, sizes of text and no sideways scrolling at 400 px,
 // contrast (axe-core, where it is at hand). Numbers shown are compared with the files they come from.
-// usage: node report.mjs CHROMIUM REPORT-FOLDER SWEEP-FOLDER [AXE.js]
+// usage: node report.mjs CHROMIUM REPORT-FOLDER SWEEP-FOLDER AXE.js|none [PAGE.html ...]   (pages: looked at, not used)
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import { Browser } from "./devtools.mjs";
 
-const [program, report, sweep, axe] = process.argv.slice(2);
-const page = folder => pathToFileURL(resolve(folder, "report.html")).href;
+const [program, report, sweep, axeFile, ...others] = process.argv.slice(2);
+const axe = axeFile === "none" ? null : axeFile;
+const page = place => pathToFileURL(resolve(place.endsWith(".html") ? place : resolve(place, "report.html"))).href;
 const json = (...path) => JSON.parse(readFileSync(resolve(...path), "utf8"));
 let failures = 0, checks = 0;
 const check = (what, good, found = "") => {
@@ -28,8 +29,9 @@ try {
   await tables();
   await print();
   await withoutScripts();
-  for (const folder of [report, sweep]) for (const width of [400, 1300]) for (const dark of [false, true]) await looks(folder, width, dark);
+  for (const place of [report, sweep, ...others]) for (const width of [400, 1300]) for (const dark of [false, true]) await looks(place, width, dark);
   await times();
+  for (const place of others) await firstPaint(place);
   check("no console message and no request", browser.complaints.length === 0, browser.complaints);
 } finally { await browser.stop(); }
 console.log(failures ? `${failures} of ${checks} checks failed` : `${checks} checks of the pages in the browser hold`);
@@ -156,10 +158,10 @@ async function withoutScripts() {
   check("and no control that does nothing", controls === 0, controls);
 }
 
-async function looks(folder, width, dark) {
-  const name = `${folder} at ${width} px, ${dark ? "dark" : "light"}`;
+async function looks(place, width, dark) {
+  const name = `${place} at ${width} px, ${dark ? "dark" : "light"}`;
   await browser.show({ width, dark });
-  await browser.open(page(folder));
+  await browser.open(page(place));
   check(`${name}: no sideways scrolling`, await browser.ask("document.documentElement.scrollWidth") <= width, await browser.ask("document.documentElement.scrollWidth"));
   if (width === 400) {
     const small = await browser.ask(`(() => {
@@ -183,10 +185,14 @@ async function looks(folder, width, dark) {
 }
 
 // Said, not asserted: times depend on the machine.
-async function times() {
+async function firstPaint(place) {
   await browser.show({});
-  await browser.open(page(report));
+  await browser.open(page(place));
   const paint = await browser.ask(`performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? NaN`);
+  console.log(`${place}: first paint ${paint.toFixed(0)} ms`);
+}
+async function times() {
+  await firstPaint(report);
   const step = await browser.ask(`(async () => {
     const f = document.querySelector(".film"), s = f.querySelector("input"), n = Math.min(20, Number(s.max)), all = [];
     for (let k = 0; k < n; ++k) {
@@ -197,5 +203,5 @@ async function times() {
     }
     return all.sort((a, b) => a - b);
   })()`);
-  console.log(`first paint ${paint.toFixed(0)} ms; a step of the film's slider ${step[step.length >> 1].toFixed(1)} ms (median), ${step.at(-1).toFixed(1)} ms (largest of ${step.length})`);
+  console.log(`a step of the film's slider ${step[step.length >> 1].toFixed(1)} ms (median), ${step.at(-1).toFixed(1)} ms (largest of ${step.length})`);
 }
