@@ -38,7 +38,8 @@ as_png reproduced/figure/profile.gp "$here/reproduced-figure.png"
 if command -v chromium >/dev/null && command -v node >/dev/null; then
   "$shakebed" fit-images starter/render/frames --diameter "3 mm" --out photographs --quiet
   "$shakebed" reproduce --out main --quiet
+  "$shakebed" bench fit --quick --out bench --quiet >/dev/null
   node "$here/../../tests/pipelines/browser/screenshots.mjs" "$(command -v chromium)" "$here" 1300 \
-    main=main/report.html photographs=photographs/report.html
+    main=main/report.html photographs=photographs/report.html bench=bench/bench.html
 fi
 ls -l "$here"

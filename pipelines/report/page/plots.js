@@ -38,6 +38,8 @@
     }
   };
   const number = v => (v === 0 ? "0" : Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5 ? v.toExponential(3) : String(Number(v.toPrecision(5))));
+  // At an axis: no zeros behind the last digit.
+  const tickLabel = v => minus(Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5 ? (v === 0 ? "0" : Number(v.toPrecision(4)).toExponential()) : number(v));
   const ticks = (low, high, most) => {
     const least = (high - low) / most, power = 10 ** Math.floor(Math.log10(least));
     const step = [1, 2, 5, 10].map(k => k * power).find(s => s >= least * 0.999) || 10 * power;
@@ -233,13 +235,15 @@
       const width = this.width, narrow = width < 560, right = 12, top = 8, bottom = 46;
       const upper = Math.round(Math.min(420, Math.max(230, width * (narrow ? 0.72 : 0.5)))), lowerHeight = two ? Math.round(upper * 0.42) : 0, gap = two ? 16 : 0;
       const lines = [Plot.lines(d.y, upper), two ? Plot.lines(d.lowerLabel, lowerHeight) : [""]];
-      const left = (narrow ? 50 : 66) + 15 * (Math.max(lines[0].length, lines[1].length) - 1);
       const height = top + upper + gap + lowerHeight + bottom;
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, width, height, tabindex: 0, role: "application", "aria-roledescription": "interactive figure",
         "aria-label": `${plain(d.y, true)} against ${plain(d.x, true)}: arrow keys go from point to point and from series to series, plus and minus zoom, Escape shows the whole` });
-      const px = u => left + (u - view.x[0]) / (view.x[1] - view.x[0]) * (width - left - right);
       const frames = [{ y0: top, h: upper, range: view.y, label: d.y, log: d.log[1], panel: 0 }];
       if (two) frames.push({ y0: top + upper + gap, h: lowerHeight, range: view.lower, label: d.lowerLabel, log: false, panel: 1 });
+      for (const f of frames) f.ticks = f.log ? decades(f.range[0], f.range[1], 7) : ticks(f.range[0], f.range[1], f.panel ? 4 : 7).map(t => [t, t]);
+      const longest = Math.max(...frames.flatMap(f => f.ticks.map(([, value]) => tickLabel(value).length)));
+      const left = Math.max(narrow ? 50 : 66, 7 * longest + 26) + 15 * (Math.max(lines[0].length, lines[1].length) - 1);
+      const px = u => left + (u - view.x[0]) / (view.x[1] - view.x[0]) * (width - left - right);
       this.px = px;
       this.geometry = { left, right: width - right, frames, width, height };
       const clip = `clip-${(Plot.count = (Plot.count || 0) + 1)}`;
@@ -252,17 +256,16 @@
         const inside = make("g", { "clip-path": `url(#${id})` }, svg);
         if (!f.panel) for (const [a, b] of d.bands || []) make("rect", { class: "band", x: px(this.u(a)), y: f.y0, width: Math.max(0, px(this.u(b)) - px(this.u(a))), height: f.h }, inside);
         for (const [u] of xTicks) make("path", { class: "grid", d: `M${px(u).toFixed(1)} ${f.y0}v${f.h}` }, inside);
-        const yTicks = f.log ? decades(f.range[0], f.range[1], 7) : ticks(f.range[0], f.range[1], f.panel ? 4 : 7).map(t => [t, t]);
-        for (const [v, value] of yTicks) {
+        for (const [v, value] of f.ticks) {
           make("path", { class: "grid", d: `M${left} ${py(v).toFixed(1)}H${width - right}` }, inside);
-          make("text", { class: "tick", x: left - 6, y: py(v) + 4, "text-anchor": "end" }, svg).textContent = minus(number(value));
+          make("text", { class: "tick", x: left - 6, y: py(v) + 4, "text-anchor": "end" }, svg).textContent = tickLabel(value);
         }
         make("rect", { class: "axis", x: left, y: f.y0, width: width - left - right, height: f.h }, svg);
         lines[f.panel].forEach((line, i) => svgText(line, true, { transform: `translate(${(narrow ? 11 : 14) + 15 * i} ${f.y0 + f.h / 2}) rotate(-90)`, "text-anchor": "middle" }, svg));
         for (const s of this.series) if (s.on && s.panel === f.panel) this.drawSeries(s, f, inside);
       }
       const base = top + upper + gap + lowerHeight;
-      for (const [u, value] of xTicks) make("text", { class: "tick", x: px(u), y: base + 16, "text-anchor": "middle" }, svg).textContent = minus(number(value));
+      for (const [u, value] of xTicks) make("text", { class: "tick", x: px(u), y: base + 16, "text-anchor": "middle" }, svg).textContent = tickLabel(value);
       svgText(d.x, true, { x: (left + width - right) / 2, y: base + 38, "text-anchor": "middle" }, svg);
       this.mark = make("g", {}, svg);
       const focused = this.svg && this.svg === document.activeElement;
