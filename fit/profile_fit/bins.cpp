@@ -118,8 +118,8 @@ Bins bins_of(const MeasuredProfile& measured, const Window& window, FitResult* r
     weigh_by_smooth_errors(covariance, bins);
   } else if (bins.samples > 0 && too_few_samples(bins.samples, n)) {
     if (result != nullptr) {
-      result->warnings.push_back("Only " + std::to_string(bins.samples) + " independent samples for " +
-                                 std::to_string(n) +
+      result->warnings.push_back("Only " + std::to_string(bins.samples) + " independent sample" +
+                                 (bins.samples == 1 ? "" : "s") + " for " + std::to_string(n) +
                                  " heights: the fit ignores correlations between heights (its errors include them).");
     }
     weigh_by_smooth_errors(covariance, bins);
