@@ -13,6 +13,19 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENTS_ALL program development)
 
+# The same shared libraries for processors with AVX2 and FMA, from a build of their own: packaging/build_deb.sh.
+set(SHAKEBED_FAST_BUILD "" CACHE PATH "Build folder of the shared libraries for x86-64-v3, which the loader prefers")
+if(SHAKEBED_FAST_BUILD)
+  foreach(room statistics sim ingest fit)
+    install(FILES "${SHAKEBED_FAST_BUILD}/${room}/libshakebed_${room}.so.${PROJECT_VERSION}"
+            DESTINATION "${CMAKE_INSTALL_LIBDIR}/glibc-hwcaps/x86-64-v3" COMPONENT program
+            RENAME "libshakebed_${room}.so.${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")
+  endforeach()
+endif()
+foreach(room statistics sim ingest fit)
+  list(APPEND CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${PROJECT_BINARY_DIR}/${room}")
+endforeach()
+
 # Debian wants the licence of each package in share/doc/<package>.
 function(shakebed_copyright component package)
   install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${package}" RENAME copyright
@@ -29,7 +42,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libshakebed-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS "libgsl-dev, libopencv-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
-    "Static libraries and headers of shakebed::sim (standard library only), shakebed::fit (needs libgsl-dev) and\n shakebed::ingest (needs libopencv-dev), with files for CMake and pkg-config.")
+    "Libraries and headers of shakebed::sim (standard library only), shakebed::fit (needs libgsl-dev) and\n shakebed::ingest (needs libopencv-dev), with files for CMake and pkg-config.")
 
 if(TARGET shakebed_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
