@@ -8,6 +8,7 @@
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/run_plan.hpp"
+#include "pipelines/formats/quantity.hpp"
 #include "pipelines/stages/images_module.hpp"
 #include "statistics/kernel.hpp"
 
@@ -126,8 +127,21 @@ Json recipe_of(const ImageArguments& image) {
   return recipe;
 }
 
+// Mistakes that would otherwise be located in a recipe that the user has not written.
+void check_arguments(const ImageArguments& image) {
+  const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
+  require_positive("--diameter", diameter);
+  if (!parse_quantity(image.diameter).has_unit)
+    throw UsageError(fmt::format("--diameter: \"{}\" has no unit. Write \"{}\"", image.diameter,
+                                 likely_quantity(image.diameter, diameter, dimension::length)));
+  for (const std::string& file : image.files) {
+    if (file.find_first_of("*?[") == std::string::npos && !fs::exists(file))
+      throw InputError(fmt::format("there is no file or folder \"{}\"", file));
+  }
+}
+
 int fit_images(const Call& call, const ImageArguments& image) {
-  require_positive("--diameter", quantity_argument("--diameter", image.diameter, dimension::length));
+  check_arguments(image);
   if (image.preview) return preview_images(call, image);
   return run_plan_command(
       call, image.run,

@@ -1,5 +1,8 @@
 #include "pipelines/stages/render.hpp"
 
+#include <fmt/format.h>
+
+#include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
@@ -38,6 +41,9 @@ class Render : public Stage {
     fields.integer("frames", o.frames, {.help = "largest number of frames that are drawn; 0: all"});
     fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
                    "Choose another level");
+    if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->keeps_frames)
+      fields.problem("/from", "the simulated bed keeps no frames, so there is nothing to photograph",
+                     fmt::format("Add \"frames\": {{\"count\": 640}} to {}", known->place));
   }
   void results(ResultList& list) const override {
     list.number("/frames", "1", "frames drawn");

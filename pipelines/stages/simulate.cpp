@@ -52,6 +52,7 @@ class Simulate : public Stage {
                              .observe = ObserveOptions::from(observe_)});
   }
   Json facts() const override { return bed_.facts(); }
+  bool keeps_frames() const override { return measure_.keeps_frames(); }
   void run(RunContext& context) const override;
   std::optional<BedDescription> bed() const override;
 

@@ -58,8 +58,17 @@ class Fit:
     def _quantity(self, name: str) -> Quantity:
         entry = self._numbers.get(name)
         if entry is None:
-            raise AttributeError(f"the fit has no {name}: {self.status}")
+            raise AttributeError(f"the fit has no {name}: {self._why_missing(name)}")
         return Quantity(entry["value"], entry.get("std_error"), entry.get("unit", "1"))
+
+    def _why_missing(self, name: str) -> str:
+        if not self.ok:
+            return self.message or self.status
+        if name.endswith("_over_mg"):
+            return 'a length needs the diameter of a disk; call fit_profile with diameter="2.99 mm"'
+        if name == "critical_temperature":
+            return "T_c needs N D/W; call fit_profile with column_number"
+        return self.status
 
     @property
     def temperature(self) -> Quantity:

@@ -147,6 +147,7 @@ class Results:
     summary, manifest : dict
         Content of summary.json and manifest.json.
     stages : dict of str to StageResults
+        Stages of a single bed; empty for a sweep, whose numbers are in `sweep`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -171,6 +172,12 @@ class Results:
             raise input_error(f"{path}: is no JSON: {error}", str(path)) from None
 
     @property
+    def sweep(self) -> Optional[Table]:
+        """Collected numbers of a sweep (sweep.csv), one row per point; None if the recipe has no sweep."""
+        path = self.folder / "sweep.csv"
+        return Table(path) if path.is_file() else None
+
+    @property
     def answer(self) -> Optional[dict[str, Any]]:
         """Temperature with its whole uncertainty and the verdict; None if the recipe has no answer."""
         answer: Optional[dict[str, Any]] = _with_quantities(self.summary.get("answer"))
@@ -187,7 +194,9 @@ class Results:
         return self.stages[stage]
 
     def __repr__(self) -> str:
-        return f"<shakebed.Results {self.folder}: {', '.join(self.stages)}>"
+        sweep = self.sweep
+        held = f"a sweep of {len(sweep)} points" if sweep is not None else ", ".join(self.stages)
+        return f"<shakebed.Results {self.folder}: {held}>"
 
     def _repr_html_(self) -> str:
         rows: dict[str, Any] = {"stages": ", ".join(self.stages), "report": self.report}
