@@ -183,12 +183,14 @@ def pages(program):
         if name in ELSEWHERE:
             continue
         result[f"command-{name.replace(' ', '-')}.md"] = command_page(program, name, text, names)
+    recipe = said(program, "reference", "recipe")
+    result["recipe.md"] = NOTE + "\n" + recipe.replace("\n", "\n\n", 1).replace("<", "&lt;")
     result["messages.md"] = messages_page()
     shared = [row for row in entries(help_sections(said(program, "run", "--help"))["Options"]) if row[0] in SHARED]
     index = [NOTE, "# Reference\n", "All pages here are written from the program itself.\n", "## Stages\n",
              "| stage | what it does |", "|---|---|"]
     index += [f"| [{name}](stage-{name}.md) | {cell(stage_text[name])} |" for name in names]
-    index += ["", "Each page lists the options with type, range, default and example, then every number of the result file with its unit,\n"
+    index += ["", "Name, report, sweep and presets of a [recipe](recipe.md).\n", "Each page lists the options with type, range, default and example, then every number of the result file with its unit,\n"
               "then every column of every table.\n", "## Commands\n", "| command | what it does |", "|---|---|"]
     index += [f"| {name if name in ELSEWHERE else f'[{name}](command-' + name.replace(' ', '-') + '.md)'} | {cell(text)} |"
               for name, text in command_text]

@@ -234,7 +234,7 @@ class AnswerFinder {
       return;
     }
     if (farthest_ != nullptr) {
-      answer_.why = "T depends on the part of the profile it is read from: " + number(chosen_->temperature) +
+      answer_.why = "T depends on the range of heights that is fitted: " + number(chosen_->temperature) +
                     " m g D (" + chosen_->thermometer + ") or " + number(farthest_->temperature) + " m g D (" +
                     farthest_->thermometer + ").";
       answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
@@ -253,12 +253,12 @@ class AnswerFinder {
     }
     answer_.verdict = Verdict::one_temperature;
     answer_.why = compared_ == 0
-                      ? "Only one reading of the profile can be trusted here, and its model fits."
+                      ? "Only one model and window can be trusted for this profile, and this model fits."
                       : "All " + std::to_string(compared_ + 1) +
-                            " readings of the profile agree within 20 % or their errors, and the model fits.";
+                            " fits (models and windows) agree within 20 % or their errors, and the model fits.";
     answer_.advice = std::hypot(answer_.bias_uncertainty, answer_.misfit_error) > answer_.statistical_error
-                         ? "Most of the uncertainty is the model's: measuring longer does not lessen it."
-                         : "Most of the uncertainty is statistical: measure longer to lessen it.";
+                         ? "Most of the uncertainty comes from the model: a longer measurement does not reduce it."
+                         : "Most of the uncertainty is statistical: a longer measurement reduces it.";
   }
 
   // The greatest density from `low` to `high` [D] over the usual one, at most 1.
@@ -271,7 +271,7 @@ class AnswerFinder {
     return std::min(1.0, greatest / usual_density);
   }
 
-  // The whole column's reading whose misfit is known.
+  // The fit of the whole column, whose misfit is known.
   [[nodiscard]] const ThermometerReading& whole_column() const {
     for (const ThermometerReading& reading : answer_.readings) {
       if (reading.thermometer == "whole column" && reading.status == FitStatus::ok) return reading;

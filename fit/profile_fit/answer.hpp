@@ -30,14 +30,14 @@ struct AnswerInput {
   // One standard error of T, relative, that the simulation's contact duration leaves; 0 where nothing is simulated.
   double contact_duration_effect = 0.0;
   double confidence = 0.95;
-  // What whoever measured the profile knows against it, beside what the profile itself shows (objections.hpp).
+  // Doubts of the measurement about the profile, besides those that the profile itself shows (objections.hpp).
   std::vector<Objection> objections{};
 };
 
 enum class Verdict { one_temperature, model_does_not_fit, no_single_temperature };
 std::string_view to_string(Verdict verdict);  // "one temperature", ...
 
-// What one thermometer says.
+// Temperature that one thermometer (a model and a window) gives.
 struct ThermometerReading {
   std::string thermometer;  // "whole column, N known"
   std::string model;        // FitOptions::model

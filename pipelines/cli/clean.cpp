@@ -91,10 +91,12 @@ void add_clean(Program& program) {
   CLI::App& command = program.add(
       {"clean", "remove results", "  shakebed clean results --older-than 30d --dry-run\n  shakebed clean results/bed"},
       [given](const Call& call) { return clean(call, *given); });
-  command.add_option("folder", given->folder, "a results folder, or a folder of them (default results)")
+  command
+      .add_option("folder", given->folder, "results folder, or a folder that holds results folders (default: results)")
       ->type_name("DIR");
-  command.add_option("--older-than", given->older_than, "only what is older: 30d, 12h")->type_name("AGE");
-  command.add_flag("--dry-run", given->dry_run, "say what would go");
+  command.add_option("--older-than", given->older_than, "remove only results older than this: 30d, 12h, 90min")
+      ->type_name("AGE");
+  command.add_flag("--dry-run", given->dry_run, "say what would be removed, and remove nothing");
 }
 
 }  // namespace shakebed::pipelines

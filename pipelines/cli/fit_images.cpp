@@ -8,6 +8,7 @@
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/run_plan.hpp"
+#include "pipelines/formats/quantity.hpp"
 #include "pipelines/stages/images_module.hpp"
 #include "statistics/kernel.hpp"
 
@@ -126,8 +127,21 @@ Json recipe_of(const ImageArguments& image) {
   return recipe;
 }
 
+// Mistakes that would otherwise be located in a recipe that the user has not written.
+void check_arguments(const ImageArguments& image) {
+  const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
+  require_positive("--diameter", diameter);
+  if (!parse_quantity(image.diameter).has_unit)
+    throw UsageError(fmt::format("--diameter: \"{}\" has no unit. Write \"{}\"", image.diameter,
+                                 likely_quantity(image.diameter, diameter, dimension::length)));
+  for (const std::string& file : image.files) {
+    if (file.find_first_of("*?[") == std::string::npos && !fs::exists(file))
+      throw InputError(fmt::format("there is no file or folder \"{}\"", file));
+  }
+}
+
 int fit_images(const Call& call, const ImageArguments& image) {
-  require_positive("--diameter", quantity_argument("--diameter", image.diameter, dimension::length));
+  check_arguments(image);
   if (image.preview) return preview_images(call, image);
   return run_plan_command(
       call, image.run,
@@ -136,51 +150,56 @@ int fit_images(const Call& call, const ImageArguments& image) {
 
 // What is in the picture.
 void add_picture_options(CLI::App& command, ImageArguments& image) {
-  command.add_option("files", image.files, "images, films, or folders of them")->required()->type_name("FILES");
+  command.add_option("files", image.files, "photographs, films, or folders of them")->required()->type_name("FILES");
   command.add_option("--diameter", image.diameter, "diameter of a bead, with its unit: \"2.99 mm\"")->required();
   command.add_option("--scale", image.scale, "length of a pixel: \"0.2 mm/px\" (default: found from the diameter)");
   command.add_option("--floor", image.floor, "row of the floor in pixels from the top (default: found)");
   command.add_option("--left-wall", image.left_wall, "column of the left wall in pixels (default: found)");
   command.add_option("--right-wall", image.right_wall, "column of the right wall in pixels (default: found)");
-  command.add_option("--roi", image.roi, "region of interest in pixels: LEFT,TOP,WIDTH,HEIGHT")
+  command
+      .add_option("--roi", image.roi,
+                  "region of interest in pixels: LEFT,TOP,WIDTH,HEIGHT (default: the whole picture)")
       ->delimiter(',')
       ->expected(4);
-  command.add_option("--polarity", image.polarity, "automatic, dark or bright beads")->check(CLI::IsMember(polarities));
+  command.add_option("--polarity", image.polarity, "whether beads are dark or bright (default: automatic)")
+      ->check(CLI::IsMember(polarities));
   command.add_option("--radius", image.radius, "radius of a bead in pixels, within 25 % (default: found)")
       ->check(CLI::PositiveNumber);
-  command.add_option("--channel", image.channel, "part of a colour picture that is used (default: found)")
+  command.add_option("--channel", image.channel, "part of a colour picture that is used (default: automatic)")
       ->check(CLI::IsMember(channels));
   command
       .add_option("--shape", image.shape,
-                  "round: beads have round outlines (default); any: measure what is seen all the same")
+                  "round: only round outlines are beads (default); any: measure other outlines too, with a warning")
       ->check(CLI::IsMember(shapes));
   command.add_flag("--preview", image.preview,
-                   "draw what would be found in the first frame, with the command for each alternative, and stop");
-  command.add_option("--second-diameter", image.second_diameter, "diameter of beads of another size, to be found too");
-  command.add_option("--pixel-aspect", image.pixel_aspect, "a pixel's width over its height (default: found)");
+                   "only draw the disks found in the first frame, with the command for each alternative");
+  command.add_option("--second-diameter", image.second_diameter, "diameter of a second kind of beads, with its unit");
+  command.add_option("--pixel-aspect", image.pixel_aspect, "width of a pixel over its height (default: found)");
   command.add_option(
       "--lens", image.lens,
-      "distortion of the lens: shift of the corners in half diagonals, a barrel positive (default: found)");
-  command.add_option("--bead-number", image.bead_number, "number of beads in view, for a check");
+      "distortion of the lens: outward shift of the corners in half diagonals, barrel positive (default: found)");
+  command.add_option("--bead-number", image.bead_number,
+                     "number of beads in view; missed and doubled beads are then reported");
 }
 
 // What is known of the bed, and how it is measured.
 void add_bed_options(CLI::App& command, ImageArguments& image) {
   command.add_option("--plateau-density", image.plateau_density, plateau_help);
-  command.add_option("--model", image.model, "model of the fit (default enskog-rectangle)");
-  command.add_option(
-      "--frequency", image.frequency,
-      "frequency of the shaking: \"20 Hz\" (default: found in the film); with --amplitude also Gamma → T");
-  command.add_option("--amplitude", image.amplitude, "of the shaking: \"2.5 mm\"");
+  command.add_option("--model", image.model,
+                     "model of the fit: enskog-rectangle (default), hydrostatic:<equation of state>, fermi, rectangle");
+  command.add_option("--frequency", image.frequency,
+                     "frequency of the shaking: \"20 Hz\" (default: found in a film). With --amplitude, T is also "
+                     "predicted from Gamma");
+  command.add_option("--amplitude", image.amplitude, "amplitude of the shaking: \"2.5 mm\"");
   command.add_option(
       "--frame-rate", image.frame_rate,
-      "frame rate of a film, such as \"500 Hz\": gives velocities, and profiles by phase if the bed shakes");
+      "frame rate of a film: \"500 Hz\". Velocities are then measured, and profiles by phase if the bed is shaken");
   command.add_option("--kernel", image.kernel,
                      "kernel of the density: gaussian:0.5 (default), top_hat:1, disk_chord:1");
-  command.add_option("--initial-height", image.initial_height,
-                     "height mu of the bed at rest, in D or a length (default: from the beads counted between the "
-                     "walls)");
-  command.add_option("--gravity", image.gravity, "default \"9.81 m/s^2\"");
+  command.add_option(
+      "--initial-height", image.initial_height,
+      "height mu of the bed at rest, in D or as a length (default: from the number of beads between the walls)");
+  command.add_option("--gravity", image.gravity, "acceleration of gravity (default: \"9.81 m/s^2\")");
 }
 
 }  // namespace

@@ -79,18 +79,24 @@ void add_fit_profile(Program& program) {
                                    "  shakebed fit-profile profile.csv --plateau-density 1.10 --diameter \"2.99 mm\"\n"
                                    "  shakebed fit-profile profile.csv --model hydrostatic:best-of --json"},
                                   [given](const Call& call) { return fit_profile(call, *given); });
-  command.add_option("file", given->file, "CSV with height (in D) and number_density (n D^2); std_error if known")
+  command
+      .add_option("file", given->file,
+                  "CSV file with the columns height [D], number_density [1/D^2] and, if known, std_error [1/D^2]")
       ->required()
       ->type_name("FILE.csv");
-  command.add_option("--model", given->model, "enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle");
+  command.add_option("--model", given->model,
+                     "model of the fit: enskog-rectangle (default), hydrostatic:<equation of state>, fermi, rectangle");
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
-  command.add_flag("--plateau-density-free", given->plateau_density_free, "fit it too");
-  command.add_option("--diameter", given->diameter, "D, for T/(m g) as a length");
-  command.add_option("--column-number", given->column_number, "N D/W, for T_c");
+  command.add_flag("--plateau-density-free", given->plateau_density_free, "fit phi_0 too");
+  command.add_option("--diameter", given->diameter, "diameter D with its unit, for T/(m g) as a length");
+  command.add_option("--column-number", given->column_number,
+                     "column number N D/W, for T_c (default: as the file says)");
   command.add_option("--kernel", given->kernel,
-                     "what it was measured through: none, gaussian:0.5, top_hat:1, disk_chord:1 (default: as the file "
-                     "says)");
-  command.add_option("--window", given->window, "LOW,HIGH in D (default: found)")->delimiter(',')->expected(2);
+                     "kernel through which the profile was measured: none, gaussian:0.5, top_hat:1, disk_chord:1 "
+                     "(default: as the file says)");
+  command.add_option("--window", given->window, "heights of the fit: LOW,HIGH in D (default: found)")
+      ->delimiter(',')
+      ->expected(2);
 }
 
 }  // namespace shakebed::pipelines

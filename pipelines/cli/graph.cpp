@@ -36,7 +36,8 @@ void add_graph(Program& program) {
                    "  shakebed graph bed.json | dot -Tsvg > bed.svg\n  shakebed graph bed.json --format mermaid"},
                   [given](const Call& call) { return graph(call, *given); });
   command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
-  command.add_option("--format", given->format, "dot or mermaid")->check(CLI::IsMember({"dot", "mermaid"}));
+  command.add_option("--format", given->format, "output format: dot (default) or mermaid")
+      ->check(CLI::IsMember({"dot", "mermaid"}));
 }
 
 }  // namespace shakebed::pipelines

@@ -27,7 +27,7 @@ void add_init(Program& program) {
                         : fmt::format("wrote {0}\nnext: shakebed validate {0}\n      shakebed run {0}\n", *file));
         return exit_ok;
       });
-  command.add_option("file", *file, "default bed.json")->type_name("FILE.json");
+  command.add_option("file", *file, "file that is written (default: bed.json)")->type_name("FILE.json");
 }
 
 }  // namespace shakebed::pipelines

@@ -57,18 +57,18 @@ void add_map(Program& program) {
                     print(call.json ? dump(json) : map_text(json));
                     return exit_ok;
                   });
-  command.add_option("--gamma", given->gamma, "peak acceleration in g");
-  command.add_option("--amplitude", given->amplitude, "amplitude of the floor, instead of --gamma");
-  command.add_option("--frequency", given->frequency, "of the floor")->required();
+  command.add_option("--gamma", given->gamma, "peak acceleration of the floor over g");
+  command.add_option("--amplitude", given->amplitude, "amplitude of the floor with its unit, in place of --gamma");
+  command.add_option("--frequency", given->frequency, "frequency of the floor: \"20 Hz\"")->required();
   command.add_option("--diameter", given->diameter, "D")->required();
   command.add_option("--initial-height", given->initial_height, initial_height_help)->required();
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
-  command.add_option("--gravity", given->gravity, "default \"9.81 m/s^2\"");
+  command.add_option("--gravity", given->gravity, "acceleration of gravity (default: \"9.81 m/s^2\")");
   command.add_option("--restitution", given->restitution,
-                     "restitution of the single ball (default 0: one flight, no rebound)");
-  command.add_option("--eos", given->equation, "equation of state (default enskog)");
+                     "coefficient of restitution of the single ball (default 0: one flight without rebound)");
+  command.add_option("--eos", given->equation, "equation of state (default: enskog)");
   command.add_option("--temperature", given->temperature,
-                     "a measured T, mapped back to Gamma: T/(m g) as a length, or T in m g D");
+                     "measured T, for which Gamma is computed: T/(m g) as a length, or T in m g D");
 }
 
 }  // namespace shakebed::pipelines

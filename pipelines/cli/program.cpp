@@ -38,9 +38,9 @@ CLI::App& Program::add(const CommandText& text, std::function<int(const Call&)> 
   CLI::App& command = *(parent == nullptr ? &app_ : parent)->add_subcommand(text.name, text.help);
   command.footer(fmt::format("Examples:\n{}", text.examples));
   command.add_option("--out", call_.out, "folder for the results")->type_name("DIR");
-  command.add_flag("--json", call_.json, "machine-readable result on stdout, messages on stderr");
-  command.add_flag("--quiet,-q", call_.quiet, "warnings and errors only");
-  command.add_flag("--verbose,-v", call_.verbose, "what the stages say");
+  command.add_flag("--json", call_.json, "JSON result on stdout, messages on stderr");
+  command.add_flag("--quiet,-q", call_.quiet, "show warnings and errors only");
+  command.add_flag("--verbose,-v", call_.verbose, "show all messages of the stages");
   command.callback([this, work = std::move(work)] { chosen_ = work; });
   return command;
 }

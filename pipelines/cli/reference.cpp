@@ -24,13 +24,16 @@ const StageRow& stage_named(const std::string& name) {
 
 void add_reference(Program& program) {
   const auto stage = std::make_shared<std::string>();
-  CLI::App& command = program.add({"reference", "the manual page of a stage: options, numbers, tables (Markdown)",
-                                   "  shakebed reference\n  shakebed reference fit"},
-                                  [stage](const Call&) {
-                                    print(stage->empty() ? reference_index() : reference_page(stage_named(*stage)));
-                                    return exit_ok;
-                                  });
-  command.add_option("stage", *stage, "name of a stage; none: all of them, a line each");
+  CLI::App& command =
+      program.add({"reference", "reference page of a stage or of a recipe: options, numbers, tables (Markdown)",
+                   "  shakebed reference\n  shakebed reference fit\n  shakebed reference recipe"},
+                  [stage](const Call&) {
+                    print(stage->empty()       ? reference_index()
+                          : *stage == "recipe" ? recipe_reference_page()
+                                               : reference_page(stage_named(*stage)));
+                    return exit_ok;
+                  });
+  command.add_option("stage", *stage, "name of a stage, or recipe; left out: list of the stages");
 }
 
 }  // namespace shakebed::pipelines

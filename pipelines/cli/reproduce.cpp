@@ -136,12 +136,11 @@ void add_reproduce(Program& program) {
                   });
   command.add_option(
       "figure", given->figure,
-      "name of a recipe (--list shows them), or all; clement-rajchenbach if left out, which is also named "
-      "quinn-hong-fig3");
-  command.add_flag("--list", given->list, "list the recipes with their verdicts of record, and run nothing");
+      "name of a recipe (--list shows them), or all (default: clement-rajchenbach, also named quinn-hong-fig3)");
+  command.add_flag("--list", given->list, "list the recipes with their recorded verdicts, and run nothing");
   command
       .add_flag("--results", given->results,
-                "print the page of results of record, or that of one recipe, and run nothing")
+                "print the page of recorded results, or that of one recipe, and run nothing")
       ->excludes("--list");
   add_preset(command, given->run);
   add_run_options(command, given->run);

@@ -94,7 +94,8 @@ void add_rerun(Program& program) {
       {"rerun", "run what made a results folder once more and compare", "  shakebed rerun results/bed --out again"},
       [given](const Call& call) { return rerun(call, *given); });
   command.add_option("folder", given->folder, "the results folder")->required()->type_name("DIR");
-  command.add_option("--jobs,-j", given->jobs, "threads")->check(CLI::PositiveNumber);
+  command.add_option("--jobs,-j", given->jobs, "number of threads (default: all processors)")
+      ->check(CLI::PositiveNumber);
 }
 
 }  // namespace shakebed::pipelines

@@ -123,22 +123,22 @@ void add_preset(CLI::App& command, RunArguments& run) {
 }
 
 void add_run_options(CLI::App& command, RunArguments& run) {
-  command.add_option("--set", run.settings, "change the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
+  command.add_option("--set", run.settings, "change of the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
       ->type_name("POINTER=VALUE");
-  command.add_option("--only", run.only, "only this stage")->type_name("STAGE");
+  command.add_option("--only", run.only, "run only this stage")->type_name("STAGE");
   command.add_option("--from", run.from, "run this stage and those that depend on it")->type_name("STAGE");
   command.add_option("--until", run.until, "run this stage and those it needs")->type_name("STAGE");
   command.add_flag("--force", run.force, "run stages that are up to date, too");
   command.add_flag("--dry-run", run.dry_run, "say what would run, and why, without running it");
-  command.add_option("--jobs,-j", run.jobs, "threads (default: all processors)")
+  command.add_option("--jobs,-j", run.jobs, "number of threads (default: all processors)")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
-  command.add_option("--shard", run.shard, "of a sweep: only the points k, k + n, k + 2n, ... (k from 1 to n)")
+  command.add_option("--shard", run.shard, "run only the points K, K + N, K + 2N, ... of a sweep (K from 1 to N)")
       ->type_name("K/N");
-  command.add_flag("--gather", run.gather, "of a sweep: run nothing, gather what its shards have left");
+  command.add_flag("--gather", run.gather, "run nothing, collect the results of the shards of a sweep");
   command
       .add_option("--data", run.data,
-                  "points of your own (CSV with height, number_density): drawn into the figures and compared")
+                  "your own points (CSV file with height, number_density), drawn into the figures and compared")
       ->type_name("FILE.csv");
 }
 

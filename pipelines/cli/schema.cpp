@@ -20,7 +20,7 @@ void add_schema(Program& program) {
           write_file_atomically(*file, text);
         return exit_ok;
       });
-  command.add_option("file", *file, "write it there instead of to stdout")->type_name("FILE.json");
+  command.add_option("file", *file, "file that is written (default: stdout)")->type_name("FILE.json");
 }
 
 }  // namespace shakebed::pipelines

@@ -38,12 +38,13 @@ void add_submit(Program& program) {
        "--shards 100 --sbatch=--partition=short --dry-run"},
       [given](const Call& call) { return submit(call, *given); }, &group);
   slurm.add_option("recipe", given->recipe, "a recipe with a sweep")->required()->type_name("FILE.json");
-  slurm.add_option("--shards", given->shards, "tasks of the array")->check(CLI::PositiveNumber);
-  slurm.add_option("--sbatch", given->options, "more options for sbatch, one each: --sbatch=--time=1:00:00")
+  slurm.add_option("--shards", given->shards, "number of tasks of the job array")->check(CLI::PositiveNumber);
+  slurm.add_option("--sbatch", given->options, "further option for sbatch, may be repeated: --sbatch=--time=1:00:00")
       ->type_name("OPTION");
   add_preset(slurm, given->run);
-  slurm.add_option("--set", given->run.settings, "change the recipe")->type_name("POINTER=VALUE");
-  slurm.add_flag("--dry-run", given->run.dry_run, "write the scripts, submit nothing");
+  slurm.add_option("--set", given->run.settings, "change of the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
+      ->type_name("POINTER=VALUE");
+  slurm.add_flag("--dry-run", given->run.dry_run, "write the scripts and submit nothing");
 }
 
 }  // namespace shakebed::pipelines

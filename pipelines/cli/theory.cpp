@@ -51,9 +51,9 @@ void add_theory(Program& program) {
   command.add_option("--eos", given->equation,
                      "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, "
                      "best-of, or all");
-  command.add_option("--diameter", given->diameter, "D, for lengths");
+  command.add_option("--diameter", given->diameter, "diameter D with its unit, for lengths");
   command.add_option("--initial-height", given->initial_height, initial_height_help);
-  command.add_option("--column-number", given->column_number, "N D/W instead of the initial height");
+  command.add_option("--column-number", given->column_number, "column number N D/W, in place of the initial height");
   command.add_option("--temperature", given->temperature, "T/(m g) as a length with its unit, or T in m g D");
 }
 

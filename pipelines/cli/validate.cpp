@@ -56,7 +56,9 @@ void add_validate(Program& program) {
                                   [given](const Call& call) { return validate(call, *given); });
   command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
   add_preset(command, given->run);
-  command.add_option("--set", given->run.settings, "change the recipe first")->type_name("POINTER=VALUE");
+  command
+      .add_option("--set", given->run.settings, "change of the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")
+      ->type_name("POINTER=VALUE");
 }
 
 }  // namespace shakebed::pipelines

@@ -44,6 +44,8 @@ struct BedDescription {
 struct KnownBed {
   BedDescription bed;
   std::string place;  // "stage \"bed\" (/stages/0)"
+  // Whether that stage keeps frames, which can be photographed. One that measures photographs has frames.
+  bool keeps_frames = true;
 };
 
 // Whether two statements of one fact agree: to 1e-9.

@@ -146,7 +146,7 @@ bool Fields::in_range(const JsonNode& node, std::string_view key, double value, 
   complain(node, key,
            fmt::format("must be {}{}{}, got {}", about.range.words(), unit.empty() ? "" : " ", unit,
                        node.is_string() ? "\"" + node.text + "\"" : node.text),
-           about.help.empty() ? "" : fmt::format("It is the {}", about.help));
+           about.help.empty() ? "" : fmt::format("Meaning of \"{}\": {}", key, about.help));
   return false;
 }
 
@@ -533,6 +533,14 @@ std::optional<std::size_t> Fields::read_tag(const std::string& tag, const std::v
   return read_choice(*node, tag, names);
 }
 
+// An option that means one thing in one alternative and another in the next.
+static Json either_of(const Json& one, const Json& other) {
+  Json schema{{"anyOf", Json::array({one, other})}};
+  const std::string first = one.value("description", std::string()), second = other.value("description", std::string());
+  if (!first.empty() && !second.empty() && first != second) schema["description"] = first + "; or " + second;
+  return schema;
+}
+
 void Fields::schema_of_variant(Json& out, std::string_view tag, const std::vector<RowText>& rows,
                                const std::vector<Json>& bodies, std::size_t current, bool) {
   Json names = Json::array();
@@ -552,7 +560,7 @@ void Fields::schema_of_variant(Json& out, std::string_view tag, const std::vecto
         if (known.is_null() || known == schema)
           known = schema;
         else
-          known = Json{{"anyOf", Json::array({known, schema})}};
+          known = either_of(known, schema);
       }
     }
     if (bodies[i].contains("required") || bodies[i].contains("oneOf")) {

@@ -293,7 +293,8 @@ class PlanBuilder {
     fields.finish();
     if (problems_.size() == problems_before) {
       if (auto bed = planned.stage->bed())
-        planned.bed = KnownBed{std::move(*bed), fmt::format("stage \"{}\" ({})", planned.id, planned.pointer)};
+        planned.bed = KnownBed{std::move(*bed), fmt::format("stage \"{}\" ({})", planned.id, planned.pointer),
+                               planned.stage->keeps_frames()};
     }
     for (auto& [pointer, path] : planned.input_files) pointer.erase(0, planned.pointer.size());
     planned.options = Json::object();

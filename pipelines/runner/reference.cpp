@@ -43,6 +43,12 @@ std::string type_text(const Json& schema) {
 
 std::string range_text(const Json& schema) {
   if (is_quantity(schema)) return range_text(schema["anyOf"].back());
+  if (schema.contains("anyOf")) {  // of alternatives, where all have the same
+    const std::string first = range_text(schema["anyOf"][0]);
+    for (const Json& one : schema["anyOf"])
+      if (range_text(one) != first) return "";
+    return first;
+  }
   std::vector<std::string> parts;
   const std::pair<const char*, const char*> words[] = {
       {"minimum", "at least"}, {"exclusiveMinimum", "above"}, {"maximum", "at most"}, {"exclusiveMaximum", "below"}};
@@ -76,6 +82,8 @@ class OptionTable {
                         cell(schema.value("description", std::string())));
     add_all(schema, name + "/");
     if (schema.contains("items")) add_all(schema["items"], name + "/#/");
+    if (schema.contains("additionalProperties") && schema["additionalProperties"].is_object())
+      add_all(schema["additionalProperties"], name + "/*/");
     if (!schema.contains("anyOf") || is_quantity(schema)) return;
     for (const Json& one : schema["anyOf"]) {
       add_all(one, name + "/");
@@ -83,6 +91,9 @@ class OptionTable {
     }
   }
 };
+
+constexpr const char* options_note =
+    "`#` stands for an index, `*` for a name of your choice. An option without a default may be left out.\n\n";
 
 std::string options_text(const StageRow& row) {
   Json schema;
@@ -114,13 +125,22 @@ std::string kind_text(const StatedResult& result) {
 
 std::string when_text(const Given& given) { return given.possible && given.always ? "always" : cell(given.condition); }
 
+// The simulations of one page have two units of energy.
+std::string energy_unit_note(const ResultList& results) {
+  const auto& all = results.all();
+  const bool needed = std::any_of(all.begin(), all.end(),
+                                  [](const StatedResult& one) { return one.unit.find("T0") != std::string::npos; });
+  return needed ? "T0 is the unit of energy: m g D with gravity, the initial temperature of the disks without it.\n\n"
+                : "";
+}
+
 std::string results_text(const StageRow& row) {
   ResultList results;
   row.make()->results(results);
   std::string text = fmt::format(
       "## Numbers in {}\nPointers begin behind the stage's id: `/ID/...`; `#` stands for an index, `*` for a name.\n\n"
-      "| pointer | kind | unit | meaning | given |\n|---|---|---|---|---|\n",
-      row.result);
+      "{}| pointer | kind | unit | meaning | given |\n|---|---|---|---|---|\n",
+      row.result, energy_unit_note(results));
   for (const StatedResult& one : results.all())
     text += fmt::format("| `{}` | {} | {} | {} | {} |\n", one.pointer, kind_text(one), one.unit, cell(one.meaning),
                         when_text(one.given));
@@ -154,8 +174,23 @@ std::string reference_index() {
 }
 
 std::string reference_page(const StageRow& row) {
-  return fmt::format("# {}\nThe stage {} {}. {} Its result file is `{}`.\n\n## Options\n{}\n{}", row.name, row.name,
-                     row.summary, inputs_text(row), row.result, options_text(row), results_text(row));
+  return fmt::format("# {}\nThe stage {} {}. {} Its result file is `{}`.\n\n## Options\n{}{}\n{}", row.name, row.name,
+                     row.summary, inputs_text(row), row.result, options_note, options_text(row), results_text(row));
+}
+
+std::string recipe_reference_page() {
+  Json schema;
+  Fields fields = Fields::schema(schema);
+  RecipeTop top;
+  describe_top(fields, top);
+  fields.finish();
+  OptionTable table;
+  table.add_all(schema, "");
+  return fmt::format(
+      "# recipe\nA recipe is a JSON file. It holds the list \"stages\", each with the options of its own page, and "
+      "these "
+      "options.\n\n## Options\n{}{}",
+      options_note, table.text);
 }
 
 }  // namespace shakebed::pipelines

@@ -1,5 +1,4 @@
-// The manual's page of a stage, from what the stage says of itself: its options (describe), its numbers and tables
-// (results).
+// Reference pages in Markdown. They are written from the options (describe) and the stated results of the code itself.
 #pragma once
 
 #include <string>
@@ -8,9 +7,11 @@
 
 namespace shakebed::pipelines {
 
-// All stages, a line each. Markdown.
+// List of all stages.
 std::string reference_index();
-// Options with type, range, default and example; numbers with pointer and unit; tables with their columns. Markdown.
+// A stage: options with type, range, default and example; numbers with pointer and unit; tables with their columns.
 std::string reference_page(const StageRow& row);
+// The options of a recipe outside its stages: name, report, sweep, presets.
+std::string recipe_reference_page();
 
 }  // namespace shakebed::pipelines

@@ -188,17 +188,18 @@ void describe_sweep(Fields& fields, SweepOptions& sweep) {
   const std::vector<Choice<SweepKind>> kinds{
       {SweepKind::grid, "grid"}, {SweepKind::zip, "zip"}, {SweepKind::list, "list"}, {SweepKind::random, "random"}};
   fields.choice("kind", sweep.kind, kinds,
-                {.help = "grid: every combination; zip: first with first, ...; list: points one by one; random: "
-                         "uniform in the ranges"});
+                {.help = "kind of sweep. Grid: every combination of the values. Zip: the first values together, then "
+                         "the second, and so on. List: the points in \"points\". Random: uniform in the ranges"});
   Json over = Json::object(), points = Json::array();
   fields.any("over", over,
-             {.help = "JSON pointer into the recipe → array of values, or {\"from\", \"to\", \"count\", \"scale\"}"});
-  fields.any("points", points, {.help = "list: objects pointer → value"});
+             {.help = "varied options: JSON pointer into the recipe → list of values, or {\"from\", \"to\", \"count\", "
+                      "\"scale\"} with the scale linear or logarithmic"});
+  fields.any("points", points, {.help = "points of a list: objects with JSON pointer → value"});
   fields.integer("count", sweep.count, {.help = "number of random points", .range = non_negative});
-  fields.integer("seed", sweep.seed, {.help = "of the random points"});
+  fields.integer("seed", sweep.seed, {.help = "seed of the random points"});
   fields.integer("replicas", sweep.replicas,
-                 {.help = "runs of each point, each with its own seeds", .range = from_to(1, 1e6)});
-  fields.texts("collect", sweep.collect, {.help = "numbers to gather into sweep.csv: pointers into the results"});
+                 {.help = "number of runs of each point, each with its own seed", .range = from_to(1, 1e6)});
+  fields.texts("collect", sweep.collect, {.help = "pointers of the results that are collected in sweep.csv"});
   if (fields.decoding()) SweepReader(fields, sweep).read();
 }
 

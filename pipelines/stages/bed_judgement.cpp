@@ -102,7 +102,8 @@ class Judge {
     const auto found = notable_spread(joined_, beds_);
     if (!found) return;
     object("beds differ",
-           fmt::format("the {} beds differ by more than chance: {} scatters by {:.2g}, and each bed states {:.2g}. It "
+           fmt::format("the {} beds differ by more than chance: {} scatters by {:.2g}, and the stated error of each "
+                       "bed is {:.2g}. It "
                        "depends on how the bed was filled; the stated error includes this",
                        beds_, found->what, found->spread, found->within),
            "More \"replicas\" reduce the error");

@@ -39,38 +39,40 @@ class BedStatement {
   }
 
   void temperatures() {
-    temperature("temperature_x", "kinetic temperature across, without the mean velocity of the phase");
-    temperature("temperature_z", "kinetic temperature upwards, without the mean velocity of the phase");
-    temperature("temperature_z_local", "kinetic temperature upwards, without the mean velocity of layer and phase");
+    temperature("temperature_x", "horizontal kinetic temperature T_x, without the mean velocity of the phase");
+    temperature("temperature_z", "vertical kinetic temperature T_z, without the mean velocity of the phase");
+    temperature("temperature_z_local", "vertical kinetic temperature, without the mean velocity of layer and phase");
     temperature("spin_temperature", "temperature of the rotation");
-    list_.quantity("/drift_temperature_x", energy_, "T_x in the second half of the measurement less that in the first");
-    list_.quantity("/collision_rate", rate_, "contacts of a disk with others in a unit of time");
+    list_.quantity("/drift_temperature_x", energy_,
+                   "drift: T_x in the second half of the measurement minus T_x in the first half");
+    list_.quantity("/collision_rate", rate_, "contacts of a disk with other disks, per unit of time");
   }
 
   void heights() {
     list_.quantity("/center_of_mass", "D", "height of the centre of mass above the floor's mean position", heavy_);
     list_.quantity("/drift_center_of_mass", "D",
-                   "center_of_mass in the second half of the measurement less that in the first", heavy_);
+                   "drift: center_of_mass in the second half of the measurement minus that in the first half", heavy_);
     list_.quantity("/center_of_mass_rise", "D", "rise of the centre of mass above ideal hexagonal packing", heavy_);
     list_.quantity("/ideal_center_of_mass", "D", "height of the centre of mass in ideal hexagonal packing", heavy_);
     list_.quantity("/bottom_row_density", "1/D^2", "number density of the lowest row", heavy_);
     list_.number("/center_of_mass_by_phase/#", "D", "height of the centre of mass at each phase of the floor",
                  given_if(bed_.shaken, "the floor shakes"));
     list_.quantity("/gamma", "1", "peak acceleration of the floor over g: Gamma = a (2 pi f)^2/g");
-    list_.quantity("/column_number", "1", "disks a diameter of width: N D/W");
+    list_.quantity("/column_number", "1", "column number N D/W: disks per diameter of width");
   }
 
   void fluid() {
     const Given closed = given_if(bed_.periodic_upwards, "the box is periodic upwards");
-    list_.quantity("/compressibility_factor", "1", "p V/(N T) by the virial of the contacts", closed);
+    list_.quantity("/compressibility_factor", "1", "compressibility factor P V/(N T), from the virial of the contacts",
+                   closed);
     list_.quantity("/number_density", "1/D^2", "number density of the whole box", closed);
   }
 
   void observed_when_named() {
     const Given order = observed(bed_.observe.order, "order");
-    list_.quantity("/psi6_local", "1", "mean of |psi_6| of the disks", order, true);
-    list_.quantity("/psi6_global", "1", "|mean of psi_6| of the disks", order, true);
-    list_.quantity("/neighbours_per_disk", "1", "neighbours of a disk", order, true);
+    list_.quantity("/psi6_local", "1", "mean of |psi_6| over the disks", order, true);
+    list_.quantity("/psi6_global", "1", "|mean of psi_6| over the disks", order, true);
+    list_.quantity("/neighbours_per_disk", "1", "mean number of neighbours of a disk", order, true);
     list_.quantity("/vacancies", "1", "empty sites of the crystal", order, true);
     list_.quantity("/bottom_density", "1/D^2", "number density of the rows at the bottom", order, true);
     for (const int percent : {70, 80, 90})
@@ -79,13 +81,16 @@ class BedStatement {
                      true);
     const Given velocities = observed(bed_.observe.velocities, "velocities");
     list_.quantity("/a2", "1", "fourth cumulant of the velocities; 0 for a Maxwellian", velocities, true);
-    list_.quantity("/a2_local", "1", "fourth cumulant of the velocities, layer by layer", velocities, true);
+    list_.quantity("/a2_local", "1", "fourth cumulant of the velocities, mean over layers", velocities, true);
     const Given species = observed(bed_.observe.species, "species");
-    list_.quantity("/temperature_first", energy_,
-                   "kinetic temperature of the first species, half the sum of both directions, without the species' "
-                   "mean vertical velocity at each moment",
-                   species, true);
-    list_.quantity("/temperature_second", energy_, "the same of the second species", species, true);
+    list_.quantity(
+        "/temperature_first", energy_,
+        "kinetic temperature (T_x + T_z)/2 of the first species, without its mean vertical velocity at each moment",
+        species, true);
+    list_.quantity(
+        "/temperature_second", energy_,
+        "kinetic temperature (T_x + T_z)/2 of the second species, without its mean vertical velocity at each moment",
+        species, true);
     list_.quantity("/temperature_ratio", "1", "temperature_second over temperature_first", species, true);
     list_.quantity("/floor_pressure", "m g/D", "pressure on the floor", observed(bed_.observe.pressure, "pressure"),
                    true);
@@ -103,7 +108,7 @@ class BedStatement {
         {"step_error", "energy lost by the time steps of a pressed bed"},
         {"floor_work", "work of the floor"},
         {"bath_work", "work of the bath"},
-        {"imbalance", "what the ledger does not account for"}};
+        {"imbalance", "energy that the balance does not explain; 0 apart from rounding"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);
     list_.number("/collisions", "1", "contacts of all kinds");
     list_.number("/disk_collisions", "1", "contacts between two disks");
@@ -111,27 +116,28 @@ class BedStatement {
     list_.number("/floor_collisions", "1", "contacts with the floor");
     list_.number("/elastic_contacts", "1", "contacts made elastic by the contact duration t_c");
     const Given clocked = given_if(bed_.contact_duration, "contacts have a duration t_c");
-    list_.quantity("/elastic_share", "1", "share of the contacts made elastic by t_c, while measured", clocked);
-    list_.quantity("/withheld_share", "1",
-                   "energy that the first of each chain of these would have dissipated, over the energy dissipated, "
-                   "while measured",
+    list_.quantity("/elastic_share", "1", "share of the contacts that t_c made elastic, during the measurement",
                    clocked);
-    list_.quantity("/contact_duration_effect", "1",
-                   "how much too high T may be by t_c, as a part of it, against contacts without a duration; about",
+    list_.quantity("/withheld_share", "1",
+                   "energy that these contacts would have dissipated (the first of each chain), over the dissipated "
+                   "energy, during the measurement",
+                   clocked);
+    list_.quantity("/contact_duration_effect", "1", "estimate: relative amount by which T is too high because of t_c",
                    clocked);
     list_.quantity("/hertz_contact_time", "s",
-                   "how long a real contact lasts, by Hertz, at the floor's greatest speed or the bath's thermal one",
+                   "duration of a real contact by Hertz' law, at the peak velocity of the floor or the thermal "
+                   "velocity of the bath",
                    given_if(bed_.material, "\"disks\" name a \"material\""));
     list_.number("/events", "1", "events of all kinds");
-    list_.number("/periods", "1", "periods over which the bed was measured");
+    list_.number("/periods", "1", "periods of the floor over which the bed was measured");
     list_.quantity("/max_overlap", "D",
-                   "largest overlap of two disks at the end: rounding, or springs of a pressed bed");
+                   "largest overlap of two disks at the end, from rounding or from the springs of a pressed bed");
   }
 
   void judgement() {
     const Given judged = given_if(bed_.judged, "the floor shakes and there is gravity");
-    list_.text("/judgement/verdict", "\"holds\", or what speaks most against the numbers", judged);
-    list_.text("/judgement/why", "all that speaks against the numbers, the gravest first", judged);
+    list_.text("/judgement/verdict", "\"holds\", or the most serious doubt about the numbers", judged);
+    list_.text("/judgement/why", "all doubts about the numbers, the most serious first", judged);
     list_.text("/judgement/advice", "what to do", judged);
   }
 
@@ -149,20 +155,20 @@ class BedStatement {
                  "layers of 1 D above the floor's mean position, lab frame, all phases together",
                  {layer_height_,
                   {"temperature_x", energy_, "m <v_x^2>"},
-                  {"temperature_z", energy_, "m <(v_z - mean of v_z)^2>, the mean of the phase taken off"},
+                  {"temperature_z", energy_, "m <(v_z - mean of v_z)^2>, with the mean of the phase"},
                   {"mean_velocity_z", velocity_, "mean vertical velocity"},
                   {"share", "1", "fraction of all disks in the layer"},
                   {"spin_temperature", energy_, "I <spin^2>"}}});
     order_tables();
     velocity_tables();
     list_.table({"displacement.csv",
-                 "mean square displacements against the time between two looks",
-                 {{"lag", time_, "time between the two looks"},
+                 "mean square displacements against the time between two samples",
+                 {{"lag", time_, "time between the two samples"},
                   {"msd_x", "D^2", "mean square displacement in x"},
                   {"std_error_x", "D^2", "standard error of msd_x"},
                   {"msd_z", "D^2", "mean square displacement in z"},
                   {"std_error_z", "D^2", "standard error of msd_z"},
-                  {"origins", "1", "pairs of looks"}},
+                  {"origins", "1", "number of pairs of samples"}},
                  observed(bed_.observe.displacement, "displacement")});
     pressure_table();
     species_table();
@@ -240,8 +246,8 @@ class BedStatement {
              {"temperature_x", energy_, "m <v_x^2>"},
              {"temperature_z", energy_, "m <v_z^2> without the mean"},
              {"mean_velocity_z", velocity_, "mean vertical velocity"},
-             {"pressure_zz", pressure_, "vertical momentum flux, kinetic and by contacts"},
-             {"pressure_xx", pressure_, "horizontal momentum flux, kinetic and by contacts"},
+             {"pressure_zz", pressure_, "vertical flux of vertical momentum, kinetic part and contacts"},
+             {"pressure_xx", pressure_, "horizontal flux of horizontal momentum, kinetic part and contacts"},
              {"weight_above", pressure_, "weight of the disks above, per width"},
              {"collision_rate", rate_ + "/D^2", "contacts between disks per area and time"}}) {
       columns.push_back(row);

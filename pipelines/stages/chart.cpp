@@ -380,42 +380,47 @@ void check_points(Fields& fields, const PointsOptions& p) {
 }
 
 void describe_points(Fields& fields, PointsOptions& p) {
-  fields.text("name", p.name, {.help = "its name in chart.json", .required = true});
+  fields.text("name", p.name, {.help = "name of this data set in chart.json", .required = true});
   fields.text("from", p.from, {.help = "id of the stage whose table it is; may be left out when there is one"});
-  fields.text("file", p.file, {.help = "a CSV in that stage's folder"});
-  fields.text("label", p.label, {.help = "in the key, with T_c and D^2 as on the axes; none: not in the key"});
+  fields.text("file", p.file, {.help = "CSV file in that stage's folder"});
+  fields.text("label", p.label, {.help = "label in the key; subscripts and powers as in T_c and D^2; empty: no label"});
   Json where = Json::object();
   for (const auto& [name, value] : p.where) where[name] = value;
-  fields.any("where", where, {.help = "only rows with: column → text"});
-  fields.text("x", p.x, {.help = "column", .required = true});
-  fields.text("y", p.y, {.help = "column", .required = true});
-  fields.text("error", p.error, {.help = "column of the errors of y; left out, y_error or std_error; \"none\""});
-  fields.choice("look", p.look, looks, {.help = "how it is drawn; none: only its numbers are found"});
-  fields.integer("color", p.color,
-                 {.help = "number of the colour in the palette, 0 to 6; left out, one after the other"});
+  fields.any("where", where, {.help = "rows that are used: column → text that its cell must hold"});
+  fields.text("x", p.x, {.help = "column of the x values", .required = true});
+  fields.text("y", p.y, {.help = "column of the y values", .required = true});
+  fields.text("error", p.error,
+              {.help = "column of the standard errors of y; left out, y_error or std_error; \"none\": no errors"});
+  fields.choice("look", p.look, looks, {.help = "how the points are drawn; none: not drawn, only fitted and compared"});
+  fields.integer("color", p.color, {.help = "number of the colour in the palette, 0 to 6; -1: the next colour"});
   fields.number("times", p.times, {.help = "factor of y"});
-  fields.number("plus", p.plus, {.help = "added to y after the factor"});
-  fields.number("power_of_x", p.power_of_x,
-                {.help = "y is multiplied by x to this power: flat where y follows the inverse power"});
-  fields.boolean(
-      "logarithm", p.logarithm,
-      {.help = "take the natural logarithm of y, after factor and sum; where y is not positive it has none"});
+  fields.number("plus", p.plus, {.help = "constant that is added to y after the factor"});
+  fields.number("power_of_x", p.power_of_x, {.help = "exponent: y is multiplied by x to this power"});
+  fields.boolean("logarithm", p.logarithm,
+                 {.help = "whether the natural logarithm of y is drawn, after factor and sum; points with y of 0 or "
+                          "less are left out"});
   fields.number("x_times", p.x_times, {.help = "factor of x"});
-  fields.number("x_plus", p.x_plus, {.help = "added to x after the factor"});
-  fields.number("x_least", p.x_least, {.help = "points with a smaller x are left out"});
-  fields.number("x_most", p.x_most, {.help = "points with a larger x are left out"});
-  fields.boolean("line_fit", p.line_fit, {.help = "fit a straight line, weighted by the errors"});
-  fields.boolean("power_fit", p.power_fit,
-                 {.help = "fit offset + amplitude x^exponent, and the same with exponents 1 and 2 given"});
+  fields.number("x_plus", p.x_plus, {.help = "constant that is added to x after the factor"});
+  fields.number("x_least", p.x_least, {.help = "smallest x that is used"});
+  fields.number("x_most", p.x_most, {.help = "largest x that is used"});
+  fields.boolean("line_fit", p.line_fit, {.help = "whether a straight line is fitted, weighted by the errors"});
+  fields.boolean(
+      "power_fit", p.power_fit,
+      {.help =
+           "whether offset + amplitude x^exponent is fitted: with a free exponent, and with the exponents 1 and 2"});
   fields.number("fit_least", p.fit_least, {.help = "smallest x that fits and comparisons use"});
   fields.number("fit_most", p.fit_most, {.help = "largest x that fits and comparisons use"});
   fields.integer("pool", p.pool,
-                 {.help = "number of neighbouring points over which errors are averaged (root mean square), because "
-                          "errors from few replicas are themselves uncertain",
+                 {.help = "number of neighbouring points over which the errors are averaged (root mean square); useful "
+                          "where few replicas make the errors uncertain",
                   .range = from_to(1, 1000)});
-  fields.text("against", p.against, {.help = "a curve of this chart: chi2 of the points about it"});
-  fields.numbers("levels", p.levels, {.help = "values of y whose first crossing x is found (linear between points)"});
-  fields.boolean("residuals", p.residuals, {.help = "differences from \"against\" in a panel below"});
+  fields.text("against", p.against,
+              {.help = "name of a curve of this chart; chi2 of the points about this curve is computed"});
+  fields.numbers(
+      "levels", p.levels,
+      {.help = "values of y; for each, the first x at which the points cross it is found (linear between points)"});
+  fields.boolean("residuals", p.residuals,
+                 {.help = "whether a panel below shows the differences from the curve in \"against\""});
   if (!fields.decoding()) return;
   p.where.clear();
   if (where.is_object()) {
@@ -466,9 +471,10 @@ class PointsStatement {
     list_.quantity(at_ + "/slope", "1", "slope of the fitted line, in the units of the axes", found);
     list_.quantity(at_ + "/intercept", "1", "y of the fitted line at x = 0", found);
     list_.quantity(at_ + "/zero", "1", "x at which the fitted line crosses zero", found);
-    list_.number(at_ + "/chi2", "1", "sum of the squared residuals over their errors", found);
+    list_.number(at_ + "/chi2", "1", "chi-square: sum of squared residuals over their squared errors", found);
     list_.number(at_ + "/dof", "1", "degrees of freedom", found);
-    list_.number(at_ + "/p_value", "1", "chance of so large a chi2", found, true);
+    list_.number(at_ + "/p_value", "1", "probability of a chi-square at least this large, if the model is right", found,
+                 true);
   }
 
   void power() {
@@ -478,7 +484,8 @@ class PointsStatement {
     list_.quantity(at_ + "/power/exponent", "1", "fitted exponent", asked, true);
     for (const std::string law : {"/power/law", "/power/given/1", "/power/given/2"}) {
       for (const char* key : {"amplitude", "offset", "chi2", "dof", "p_value"})
-        list_.number(at_ + law + "/" + key, "1", "of offset + amplitude x^exponent", found, true);
+        list_.number(at_ + law + "/" + key, "1", std::string(key) + " of the fit of offset + amplitude x^exponent",
+                     found, true);
     }
   }
 
@@ -490,8 +497,9 @@ class PointsStatement {
     list_.number(at + "points", "1", "points compared", asked);
     list_.number(at + "chi2", "1", "sum of the squared differences over their errors", weighted, true);
     list_.number(at + "dof", "1", "degrees of freedom", weighted);
-    list_.number(at + "chi2_per_dof", "1", "chi2 over the degrees of freedom", weighted);
-    list_.number(at + "p_value", "1", "chance of so large a chi2", weighted, true);
+    list_.number(at + "chi2_per_dof", "1", "chi-square per degree of freedom", weighted);
+    list_.number(at + "p_value", "1", "probability of a chi-square at least this large, if the model is right",
+                 weighted, true);
     list_.quantity(at + "mean_difference", "1", "mean difference, in the unit of y", asked, true);
     list_.quantity(at + "rms_difference", "1", "rms difference, in the unit of y", asked, true);
     list_.number(at + "largest_difference", "1", "largest difference, in the unit of y", asked, true);
@@ -525,32 +533,33 @@ void Chart::describe(Fields& fields) {
   fields.array<ChartOptions>(
       "charts", charts_,
       [](Fields& f, ChartOptions& chart) {
-        f.text("name", chart.name, {.help = "of its files", .required = true});
-        f.text("caption", chart.caption, {.help = "below it in the report"});
-        f.text("x_label", chart.x_label, {.help = "with the unit", .required = true});
-        f.text("y_label", chart.y_label, {.help = "with the unit", .required = true});
+        f.text("name", chart.name, {.help = "name of the picture and of its files", .required = true});
+        f.text("caption", chart.caption, {.help = "caption below the picture in the report"});
+        f.text("x_label", chart.x_label, {.help = "label of the x axis, with its unit", .required = true});
+        f.text("y_label", chart.y_label, {.help = "label of the y axis, with its unit", .required = true});
         f.text("residual_label", chart.residual_label, {.help = "label of the panel of residuals"});
-        f.number("x_low", chart.x_low, {.help = "where the axis begins"});
-        f.number("x_high", chart.x_high, {.help = "where it ends"});
-        f.number("y_low", chart.y_low, {.help = "where the axis begins"});
-        f.number("y_high", chart.y_high, {.help = "where it ends"});
-        f.boolean("logarithmic_x", chart.logarithmic_x, {.help = "decades along x"});
-        f.boolean("logarithmic_y", chart.logarithmic_y, {.help = "decades along y"});
-        f.boolean("lead", chart.lead, {.help = "the picture that the report begins with"});
-        f.array<PointsOptions>("points", chart.points, describe_points, {.help = "what is drawn", .required = true});
+        f.number("x_low", chart.x_low, {.help = "lower end of the x axis; left out, from the data"});
+        f.number("x_high", chart.x_high, {.help = "upper end of the x axis; left out, from the data"});
+        f.number("y_low", chart.y_low, {.help = "lower end of the y axis; left out, from the data"});
+        f.number("y_high", chart.y_high, {.help = "upper end of the y axis; left out, from the data"});
+        f.boolean("logarithmic_x", chart.logarithmic_x, {.help = "whether the x axis is logarithmic"});
+        f.boolean("logarithmic_y", chart.logarithmic_y, {.help = "whether the y axis is logarithmic"});
+        f.boolean("lead", chart.lead, {.help = "whether the report begins with this picture"});
+        f.array<PointsOptions>("points", chart.points, describe_points,
+                               {.help = "data sets that are drawn", .required = true});
         f.array<CurveOptions>(
             "curves", chart.curves,
             [](Fields& g, CurveOptions& c) {
-              g.text("name", c.name, {.help = "for \"against\"", .required = true});
-              g.text("label", c.label, {.help = "in the key"});
+              g.text("name", c.name, {.help = "name of the curve, for \"against\"", .required = true});
+              g.text("label", c.label, {.help = "label in the key"});
               g.numbers("polynomial", c.polynomial, {.help = "coefficients, constant first", .required = true});
               g.number("exponent", c.exponent, {.help = "the polynomial is multiplied by x to this power"});
-              g.number("from", c.from, {.help = "smallest x"});
-              g.number("to", c.to, {.help = "largest x"});
-              g.choice("look", c.look, looks, {.help = "how it is drawn"});
-              g.integer("color", c.color, {.help = "of the palette, 0 to 6"});
+              g.number("from", c.from, {.help = "smallest x of the curve"});
+              g.number("to", c.to, {.help = "largest x of the curve"});
+              g.choice("look", c.look, looks, {.help = "how the curve is drawn; none: not drawn, only compared"});
+              g.integer("color", c.color, {.help = "number of the colour in the palette, 0 to 6"});
             },
-            {.help = "polynomials to compare with"});
+            {.help = "curves with which the points are compared: polynomials times a power of x"});
         if (!f.decoding()) return;
         f.require(!chart.name.empty() && chart.name.find_first_of("/\\ ") == std::string::npos && chart.name[0] != '.',
                   "name", "is no name of a file");
@@ -562,17 +571,17 @@ void Chart::describe(Fields& fields) {
                     "points/" + std::to_string(i) + "/against", "there is no curve \"" + against + "\"");
         }
       },
-      {.help = "pictures of tables"});
+      {.help = "charts of columns of tables"});
   fields.array<MapOptions>("maps", maps_, describe_map, {.help = "a number in the plane of two parameters"});
-  fields.array<SnapshotOptions>("snapshots", snapshots_,
-                                [](Fields& f, SnapshotOptions& s) {
-                                  f.text("name", s.name, {.help = "of its files", .required = true});
-                                  f.text("from", s.from,
-                                         {.help = "id of the simulate stage whose last state it is", .required = true});
-                                  f.text("caption", s.caption, {.help = "below it in the report"});
-                                  if (f.decoding() && f.has("from")) check_snapshot(f, s);
-                                },
-                                {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
+  fields.array<SnapshotOptions>(
+      "snapshots", snapshots_,
+      [](Fields& f, SnapshotOptions& s) {
+        f.text("name", s.name, {.help = "name of the picture and of its files", .required = true});
+        f.text("from", s.from, {.help = "id of the simulate stage whose last state is drawn", .required = true});
+        f.text("caption", s.caption, {.help = "caption below the picture in the report"});
+        if (f.decoding() && f.has("from")) check_snapshot(f, s);
+      },
+      {.help = "pictures of the disks, coloured by |psi_6|, with empty sites marked"});
   if (fields.decoding())
     fields.require(!charts_.empty() || !maps_.empty() || !snapshots_.empty(), "",
                    "there is nothing to draw: no charts, no maps, no snapshots");

@@ -21,14 +21,15 @@ struct MapPoint {
 };
 
 void describe_mark(Fields& fields, MapMark& mark) {
-  fields.text("label", mark.label, {.help = "in the key", .required = true});
+  fields.text("label", mark.label, {.help = "label in the key", .required = true});
   fields.map<MapBounds>(
       "where", mark.where,
       [](Fields& f, MapBounds& bounds) {
         f.number("least", bounds.least, {.help = "smallest value that is marked"});
         f.number("most", bounds.most, {.help = "largest value that is marked"});
       },
-      {.help = "column → its values at the marked settings; several: all must hold", .required = true});
+      {.help = "ranges of columns: column → smallest and largest value; a point is marked where all hold",
+       .required = true});
 }
 
 // The table and its columns must be what the stage writes.
@@ -124,23 +125,23 @@ std::string map_data(const MapOptions& map, const std::vector<MapPoint>& points)
 void describe_map(Fields& fields, MapOptions& map) {
   Json where = Json::object();
   for (const auto& [name, value] : map.where) where[name] = value;
-  fields.text("name", map.name, {.help = "of its files", .required = true});
+  fields.text("name", map.name, {.help = "name of the picture and of its files", .required = true});
   fields.text("from", map.from, {.help = "id of the stage with the table; may be left out when there is one"});
-  fields.text("file", map.file, {.help = "table of that stage"});
-  fields.any("where", where, {.help = "only rows with: column → text"});
-  fields.text("x", map.x, {.help = "column across", .required = true});
-  fields.text("y", map.y, {.help = "column upwards", .required = true});
-  fields.text("value", map.value, {.help = "column that colours the cells", .required = true});
-  fields.text("caption", map.caption, {.help = "below it in the report"});
-  fields.text("x_label", map.x_label, {.help = "with the unit", .required = true});
-  fields.text("y_label", map.y_label, {.help = "with the unit", .required = true});
-  fields.text("value_label", map.value_label, {.help = "label of the colours, with the unit", .required = true});
-  fields.number("value_low", map.value_low, {.help = "where the colours begin"});
-  fields.number("value_high", map.value_high, {.help = "where they end"});
-  fields.boolean("logarithmic_x", map.logarithmic_x, {.help = "decades along x"});
-  fields.boolean("logarithmic_y", map.logarithmic_y, {.help = "decades along y"});
-  fields.boolean("lead", map.lead, {.help = "the picture that the report begins with"});
-  fields.array<MapMark>("marks", map.marks, describe_mark, {.help = "settings that get a symbol"});
+  fields.text("file", map.file, {.help = "CSV file in that stage's folder"});
+  fields.any("where", where, {.help = "rows that are used: column → text that its cell must hold"});
+  fields.text("x", map.x, {.help = "column along the x axis", .required = true});
+  fields.text("y", map.y, {.help = "column along the y axis", .required = true});
+  fields.text("value", map.value, {.help = "column that gives the colour of a cell", .required = true});
+  fields.text("caption", map.caption, {.help = "caption below the picture in the report"});
+  fields.text("x_label", map.x_label, {.help = "label of the x axis, with its unit", .required = true});
+  fields.text("y_label", map.y_label, {.help = "label of the y axis, with its unit", .required = true});
+  fields.text("value_label", map.value_label, {.help = "label of the colour scale, with its unit", .required = true});
+  fields.number("value_low", map.value_low, {.help = "lower end of the colour scale; left out, the smallest value"});
+  fields.number("value_high", map.value_high, {.help = "upper end of the colour scale; left out, the largest value"});
+  fields.boolean("logarithmic_x", map.logarithmic_x, {.help = "whether the x axis is logarithmic"});
+  fields.boolean("logarithmic_y", map.logarithmic_y, {.help = "whether the y axis is logarithmic"});
+  fields.boolean("lead", map.lead, {.help = "whether the report begins with this picture"});
+  fields.array<MapMark>("marks", map.marks, describe_mark, {.help = "points that get a symbol"});
   if (!fields.decoding()) return;
   map.where.clear();
   if (where.is_object()) {

@@ -21,13 +21,13 @@ struct Expectation {
 };
 
 void describe_expectation(Fields& fields, Expectation& e) {
-  fields.any("value", e.value, {.help = "expected: a number, a quantity with unit, a string, true or false"});
+  fields.any("value", e.value, {.help = "expected value: a number, a quantity with its unit, a string, true or false"});
   fields.number("relative", e.relative, {.help = "tolerance as a part of the expected value", .range = non_negative});
   fields.any("absolute", e.absolute, {.help = "tolerance in the value's unit"});
   fields.number("std_errors", e.std_errors,
                 {.help = "tolerance in standard errors of the result", .range = non_negative});
-  fields.any("least", e.least, {.help = "lower bound, instead of or beside a value"});
-  fields.any("most", e.most, {.help = "upper bound, instead of or beside a value"});
+  fields.any("least", e.least, {.help = "lower bound of the result, in place of or together with a value"});
+  fields.any("most", e.most, {.help = "upper bound of the result, in place of or together with a value"});
   fields.text("note", e.note, {.help = "where the expectation comes from"});
   if (!fields.decoding()) return;
   const auto quantity = [&](const char* key, const Json& json) {
@@ -173,8 +173,9 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
 class Check : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.map<Expectation>("expect", expect_, describe_expectation,
-                            {.help = "/<stage id>/<name in its result> → what it should be", .required = true});
+    fields.map<Expectation>(
+        "expect", expect_, describe_expectation,
+        {.help = "expectations: /<stage id>/<name in its result> → value or bounds", .required = true});
     if (!fields.decoding()) return;
     for (const auto& [pointer, expectation] : expect_) {
       const std::string where = "/expect/" + escape_pointer_token(pointer);
@@ -186,12 +187,12 @@ class Check : public Stage {
 
   void results(ResultList& list) const override {
     list.truth("/passed", "whether every result is as expected");
-    list.number("/failures", "1", "results that are not as expected");
+    list.number("/failures", "1", "number of results that are not as expected");
     list.text("/checks/#/pointer", "a result");
-    list.text("/checks/#/expected", "what was expected of it");
+    list.text("/checks/#/expected", "expected value");
     list.text("/checks/#/found", "what was found");
-    list.truth("/checks/#/passed", "whether they agree");
-    list.text("/checks/#/why", "why they do not agree", given_when("they do not agree"));
+    list.truth("/checks/#/passed", "whether the two agree");
+    list.text("/checks/#/why", "reason why they do not agree", given_when("they do not agree"));
     list.text("/checks/#/note", "where the expectation comes from", given_when("the expectation has a \"note\""));
   }
 

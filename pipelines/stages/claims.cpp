@@ -164,20 +164,22 @@ void take_published(Fields& fields, Claim& claim) {
 }
 
 void describe_claim(Fields& f, Claim& c) {
-  f.text("claim", c.claim, {.help = "what is said", .required = true});
-  f.text("place", c.place, {.help = "where it stands"});
-  f.text("number", c.pointer, {.help = "/<stage id>/<name in its result>", .required = true});
+  f.text("claim", c.claim, {.help = "statement of the paper", .required = true});
+  f.text("place", c.place, {.help = "place in the paper"});
+  f.text("number", c.pointer,
+         {.help = "pointer to the measured number: /<stage id>/<name in its result>", .required = true});
   f.text("over", c.over,
-         {.help = "/<stage id>/<name in its result>: the number is divided by this one, whose error is independent"});
-  f.text("measured_as", c.measured_as, {.help = "what the number is, in words"});
+         {.help = "pointer to a second number, by which the first is divided; its error must be independent"});
+  f.text("measured_as", c.measured_as, {.help = "definition of the measured number, in words"});
   f.text("published", c.published,
-         {.help = "<paper>/<name>: the number of reference-data/<paper>/numbers.json is claimed"});
-  f.number("value", c.value, {.help = "claimed"});
-  f.number("tolerance", c.tolerance, {.help = "of the claimed value", .range = non_negative});
+         {.help = "claimed number, as <paper>/<name> of reference-data/<paper>/numbers.json, in place of value, least "
+                  "and most"});
+  f.number("value", c.value, {.help = "claimed value"});
+  f.number("tolerance", c.tolerance, {.help = "tolerance of the claimed value, in its unit", .range = non_negative});
   f.number("least", c.least, {.help = "claimed lower bound"});
   f.number("most", c.most, {.help = "claimed upper bound"});
   f.text("note", c.note, {.help = "remarks on the claim"});
-  f.boolean("main", c.main, {.help = "the report and the list of results begin with it"});
+  f.boolean("main", c.main, {.help = "whether the report and the list of results begin with this claim"});
   if (!f.decoding()) return;
   if (!c.published.empty()) take_published(f, c);
   f.require(c.value || c.least || c.most || !c.published.empty(), "",
@@ -190,10 +192,11 @@ void describe_claim(Fields& f, Claim& c) {
 class Claims : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.number(
-        "standard_errors", standard_errors_,
-        {.help = "half the width of the interval that decides, in standard errors; 1.96: 95 %", .range = positive});
-    fields.array<Claim>("claims", claims_, describe_claim, {.help = "sentence by sentence", .required = true});
+    fields.number("standard_errors", standard_errors_,
+                  {.help = "half width of the interval that decides the verdict, in standard errors; 1.96: 95 %",
+                   .range = positive});
+    fields.array<Claim>("claims", claims_, describe_claim,
+                        {.help = "claims of the paper, one by one", .required = true});
     if (fields.decoding()) fields.require(!claims_.empty() || !fields.has("claims"), "claims", "there are none");
   }
 

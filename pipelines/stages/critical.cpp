@@ -14,12 +14,15 @@ namespace {
 class Critical : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.text("temperature", temperature_, {.help = "column of the study that is the temperature, in any unit"});
-    fields.text("unit", unit_, {.help = "its unit, for messages and tables"});
-    fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; \"\": none"});
-    fields.numbers("densities", densities_, {.help = "T_c is where the bottom falls below these"});
-    fields.text("order", order_, {.help = "column of the bond order psi_6; \"\": none"});
-    fields.numbers("orders", orders_, {.help = "T_c' is where the crystal's bond order falls below these"});
+    fields.text("temperature", temperature_, {.help = "column of the study that holds the temperature, in any unit"});
+    fields.text("unit", unit_, {.help = "unit of the temperature, for messages and tables"});
+    fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; empty: not used"});
+    fields.numbers(
+        "densities", densities_,
+        {.help = "thresholds: T_c is the temperature at which the density at the bottom falls below each [1/D^2]"});
+    fields.text("order", order_, {.help = "column of the bond order psi_6; empty: not used"});
+    fields.numbers("orders", orders_,
+                   {.help = "thresholds: T_c' is the temperature at which the bond order falls below each"});
     if (!fields.decoding()) return;
     fields.require(!density_.empty() || !order_.empty(), "density", "neither a density nor an order is named");
     for (const double d : densities_)
@@ -43,11 +46,11 @@ class Critical : public Stage {
       for (const std::string& one : series) {
         const std::string row = pointer_join("/" + name + "/series", one) + "/#/";
         list.number(row + "threshold", "1", "threshold of the column", looked);
-        list.text(row + "status", "whether it is crossed", looked);
+        list.text(row + "status", "ok, or why there is no crossing", looked);
         list.quantity(row + "temperature", unit_, meaning, looked, true);
       }
     };
-    state("T_c", density_, "temperature at which the bottom falls below the threshold");
+    state("T_c", density_, "temperature at which the density at the bottom falls below the threshold");
     state("T_c_prime", order_, "temperature at which the bond order falls below the threshold");
     list.table(
         {"critical.csv",

@@ -16,24 +16,27 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
                       .example = "\"photos/*.tif\""});
   fields.boolean(
       "use_geometry", o.use_geometry,
-      {.help = "take scale, floor and walls of rendered frames from the render stage instead of finding them"});
+      {.help =
+           "whether scale, floor and walls of rendered frames are taken from the render stage instead of being found"});
   fields.quantity("scale", o.scale, dimension::length_per_pixel,
-                  {.help = "length of a pixel; found from the diameter if left out", .range = positive});
+                  {.help = "length of a pixel; left out, found from the diameter", .range = positive});
   fields.number("floor", o.floor,
-                {.help = "row of the floor's surface at the left edge, pixels from the top; found if left out"});
-  fields.number("floor_slope", o.floor_slope,
-                {.help = "slope of the floor: pixels down per pixel right", .range = from_to(-1, 1)});
-  fields.number("left_wall", o.left_wall,
-                {.help = "column of the left wall's inner face in pixels; found if left out"});
-  fields.number("right_wall", o.right_wall,
-                {.help = "column of the right wall's inner face in pixels; found if left out"});
-  fields.numbers("roi", o.roi, {.help = "region of interest in pixels: left, top, width, height"});
+                {.help = "row of the floor's surface at the left edge, in pixels from the top; left out, found"});
   fields.number(
-      "pixel_aspect", o.pixel_aspect,
-      {.help = "a pixel's width over its height; found on the beads' rims if left out", .range = from_to(0.5, 2)});
+      "floor_slope", o.floor_slope,
+      {.help = "slope of the floor, in pixels down per pixel to the right; left out, found", .range = from_to(-1, 1)});
+  fields.number("left_wall", o.left_wall,
+                {.help = "column of the inner face of the left wall, in pixels; left out, found"});
+  fields.number("right_wall", o.right_wall,
+                {.help = "column of the inner face of the right wall, in pixels; left out, found"});
+  fields.numbers("roi", o.roi,
+                 {.help = "region of interest, in pixels: left, top, width, height; empty: the whole frame"});
+  fields.number("pixel_aspect", o.pixel_aspect,
+                {.help = "width of a pixel over its height; left out, found from the rims of the beads",
+                 .range = from_to(0.5, 2)});
   fields.number("lens", o.lens_radial,
-                {.help = "distortion of the lens: true outward shift of the frame's corners, in half diagonals (a "
-                         "barrel is positive); found on the beads' rims if left out",
+                {.help = "distortion of the lens: true outward shift of the corners of the frame, in half diagonals "
+                         "(barrel: positive); left out, found from the rims of the beads",
                  .range = from_to(-0.3, 0.3)});
 }
 
@@ -51,38 +54,43 @@ void describe_beads(Fields& fields, ExtractOptions& o) {
                  {BeadChannel::grey, "grey"},
                  {BeadChannel::saturation, "saturation"},
                  {BeadChannel::background_distance, "background_distance"}},
-                {.help = "which part of a colour picture is used: saturation is the largest of red, green and blue "
-                         "less the smallest, background_distance the distance from the most frequent colour"});
+                {.help = "part of a colour picture that is used. Saturation: largest minus smallest of red, green and "
+                         "blue. Background_distance: distance from the most frequent colour"});
   fields.choice("shape", o.shape, {{BeadShape::round, "round"}, {BeadShape::any, "any"}},
-                {.help = "which outlines may be beads: round ones, or any, where round things look oval or rough (then "
-                         "the program warns)"});
-  fields.number("radius", o.radius,
-                {.help = "first value of a bead's radius in pixels; found if left out", .range = from_to(1, 1e4)});
-  fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "also count beads that are partly covered"});
+                {.help = "outlines that are taken for beads: round ones, or any. With any the program measures oval "
+                         "and rough outlines too, and warns"});
+  fields.number(
+      "radius", o.radius,
+      {.help = "first estimate of the radius of a bead, in pixels; left out, found", .range = from_to(1, 1e4)});
+  fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "whether beads that are partly covered are counted"});
 }
 
 void describe_profile(Fields& fields, ExtractOptions& o) {
   fields.object<Kernel>("kernel", o.kernel, describe_measuring_kernel,
-                        {.help = "the window through which density is measured"});
-  fields.number("spacing", o.spacing, {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
-  fields.number("lowest", o.lowest, {.help = "lowest height of the profile in D"});
-  fields.number("highest", o.highest, {.help = "highest height of the profile in D"});
+                        {.help = "kernel through which the density is measured"});
+  fields.number("spacing", o.spacing,
+                {.help = "distance between the heights of the profile, in D", .range = from_to(1e-3, 10)});
+  fields.number("lowest", o.lowest, {.help = "lowest height of the profile, in D; left out, 0"});
+  fields.number("highest", o.highest,
+                {.help = "highest height of the profile, in D; left out, just above the highest bead"});
   fields.quantity(
       "frequency", o.frequency, dimension::frequency,
-      {.help = "frequency of the shaking, for profiles by phase (needs frame_rate); found in the film if left out",
+      {.help = "frequency of the shaking, for profiles by phase (needs frame_rate); left out, found in the film",
        .range = positive});
-  fields.quantity("frame_rate", o.frame_rate, dimension::frequency,
-                  {.help = "frame rate of the film as recorded; if given, velocities are measured", .range = positive});
+  fields.quantity(
+      "frame_rate", o.frame_rate, dimension::frequency,
+      {.help = "frame rate at which the film was recorded; if given, velocities are measured", .range = positive});
 }
 
 void describe_frames(Fields& fields, ExtractOptions& o) {
   fields.integer(
       "bead_number", o.bead_number,
-      {.help = "how many beads there are in view, if known: then beads that are missed or seen twice are reported",
-       .range = at_least(1)});
-  fields.integer("stride", o.stride, {.help = "use every so many frames", .range = at_least(1)});
+      {.help = "number of beads in view, if known; missed and doubled beads are then reported", .range = at_least(1)});
+  fields.integer(
+      "stride", o.stride,
+      {.help = "step between the frames that are used: 1 for all, 2 for every second one", .range = at_least(1)});
   fields.integer("overlays", o.overlays,
-                 {.help = "frames drawn with the disks that were found", .range = from_to(0, 1000)});
+                 {.help = "number of frames that are drawn together with the disks found", .range = from_to(0, 1000)});
 }
 
 void check(Fields& fields, const ExtractOptions& o) {
@@ -127,13 +135,12 @@ class Extract : public Stage {
  private:
   void describe_bed(Fields& fields) {
     fields.quantity("diameter", diameter_, dimension::length,
-                    {.help = "diameter of a bead; needed for photographs of your own, else that of the simulated bed",
+                    {.help = "diameter of a bead; required for photographs of your own, else that of the simulated bed",
                      .range = positive,
                      .example = "\"2.99 mm\""});
-    fields.quantity("second_diameter", options_.second_diameter, dimension::length,
-                    {.help = "diameter of beads of another size that are to be found too; left out, they are counted "
-                             "as rejected",
-                     .range = positive});
+    fields.quantity(
+        "second_diameter", options_.second_diameter, dimension::length,
+        {.help = "diameter of a second kind of beads; left out, such beads count as rejected", .range = positive});
     fields.quantity(
         "gravity", gravity_, dimension::acceleration,
         {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "

@@ -126,7 +126,7 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
                      "--channel or --roi; or correct --bead-number");
   if (std::abs(ratio - 1) > 1e-3)
     context.warning(text + (ratio < 1 ? ": some are missed or out of view (count.svg, overlays)."
-                                      : ": something else passes for a bead (overlays), or there are more."));
+                                      : ": something else is taken for a bead (overlays), or there are more."));
 }
 
 // What the options ask of the measurement.

@@ -26,10 +26,12 @@ Json objections_json(const ingest::Measurement& found, bool not_round) {
   const double wrong = found.expected_wrong, missed = found.finder.expected_missed,
                tilt = std::abs(found.calibration.floor_tilt_degrees);
   if (found.floor_out_of_view && found.surface_out_of_view)
-    object("Beads go on beyond the lower and the upper border: neither floor nor surface is in view, as from above.",
-           "Photograph the bed from the side, with its floor and its surface.");
+    object(
+        "Beads extend beyond the lower and the upper border: neither floor nor surface is in view, as in a photograph "
+        "from above.",
+        "Photograph the bed from the side, with its floor and its surface.");
   else if (found.floor_out_of_view)
-    object("The lower border cuts beads: the floor is not in view, and heights begin nowhere.",
+    object("The lower border cuts beads: the floor is not in view, so heights have no origin.",
            "Show the floor in the picture, or give its row (\"floor\", --floor).");
   if (found.disk_total < least_disks)
     object(fmt::format("Only {} beads were found in all frames together.", found.disk_total), "Take more photographs.");

@@ -102,7 +102,7 @@ StagePages extract_pages() {
           {"missed or out of view", measurement,
            "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone, or "
            "more even light."},
-          {"passes for a bead", measurement,
+          {"is taken for a bead", measurement,
            "Look through the film for circles that are no beads; give a region (\"roi\") that holds the bed alone."},
           {"outlines are not those", measurement,
            "Check in the film that the circles are your beads; densities hold for disks alone."},

@@ -6,23 +6,23 @@ namespace shakebed::pipelines {
 namespace {
 
 void state_frames(ResultList& list, const ExtractOptions& options) {
-  list.number("/frames", "1", "frames read");
-  list.number("/frames_used", "1", "frames in which disks were found");
-  list.quantity("/disks_per_frame", "1", "disks found in a frame");
-  list.number("/disks_per_frame_scatter", "1", "standard deviation of that number");
-  list.number("/bead_number", "1", "beads that there are, as given",
+  list.number("/frames", "1", "number of frames read");
+  list.number("/frames_used", "1", "number of frames in which disks were found");
+  list.quantity("/disks_per_frame", "1", "mean number of disks found per frame");
+  list.number("/disks_per_frame_scatter", "1", "standard deviation of that number between frames");
+  list.number("/bead_number", "1", "number of beads in view, as given in the option",
               given_if(options.bead_number.has_value(), "\"bead_number\" is given"));
   list.number("/cut_disks", "1", "disks cut by the edge of the frame");
   list.number("/half_hidden_disks", "1", "disks partly covered by others");
   list.number("/quality/lowest_percent", "1", "quality below which 1 % of the disks lie");
   list.number("/quality/median", "1", "median quality of the disks");
-  const Given surveyed = given_when("the frames are photographs and the beads' rims were looked at");
-  list.number("/expected_wrong", "1", "share of the disks that are no beads, as expected from their rims", surveyed);
+  const Given surveyed = given_when("the frames are photographs and the beads' rims were examined");
+  list.number("/expected_wrong", "1", "expected share of found disks that are no beads, from their rims", surveyed);
   list.number("/expected_missed", "1",
-              "share of the beads that are seen too poorly to be reported, in the first frames", surveyed);
-  const Given against = given_when("something speaks against reading a temperature from the frames");
-  list.text("/objections/#/why", "what speaks against reading a temperature from the frames", against);
-  list.text("/objections/#/advice", "what to do about it", against);
+              "expected share of beads that are seen too poorly to be reported, from the first frames", surveyed);
+  const Given against = given_when("there are reasons against a temperature from the frames");
+  list.text("/objections/#/why", "reason against a temperature from the frames", against);
+  list.text("/objections/#/advice", "what to do", against);
   const Given rendered = given_when("the frames were rendered and the true centres are known");
   list.number("/truth/recall", "1", "share of the true disks that were found", rendered);
   list.number("/truth/precision", "1", "share of the disks found that are true", rendered);
@@ -55,7 +55,7 @@ void state_shaking(ResultList& list) {
   const Given shaking = given_when("shaking is seen or its frequency is given");
   list.quantity("/frequency", "Hz", "frequency of the shaking", shaking);
   list.truth("/frequency_given", "whether the frequency was given", shaking);
-  list.number("/frequency_false_alarm", "1", "chance that the frequency is one of the noise",
+  list.number("/frequency_false_alarm", "1", "probability that noise alone gives such a frequency",
               both(shaking, given_when("the frequency was found")), true);
   list.quantity("/floor_amplitude", "m", "amplitude of the floor", shaking);
   list.number("/floor_phase", "1", "phase of the floor in the first frame", shaking, true);
@@ -66,16 +66,17 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
   for (const char* axis : {"temperature_x_over_mg", "temperature_z_over_mg"}) {
     const std::string pointer = std::string("/velocities/") + axis;
     list.quantity(pointer, "m", "kinetic temperature as T/(m g)", timed, true);
-    list.number(pointer + "/localisation_bias", "m", "part of it that comes from errors of the centres", timed, true);
+    list.number(pointer + "/localisation_bias", "m", "part of the temperature that comes from errors of the centres",
+                timed, true);
     list.number(pointer + "/finite_time_factor", "1", "correction for the time between frames", timed, true);
   }
   list.number("/velocities/linked_share", "1", "share of the disks found again in the next frame", timed, true);
-  list.quantity("/velocities/mean_step", "D", "mean way between two frames", timed, true);
+  list.quantity("/velocities/mean_step", "D", "mean displacement of a disk between two frames", timed, true);
 }
 
 void state_density(ResultList& list, const ExtractOptions& options) {
-  list.quantity("/column_number", "1", "disks a diameter of width: N D/W");
-  list.text("/kernel/kind", "the window through which density was measured");
+  list.quantity("/column_number", "1", "column number N D/W: disks per diameter of width");
+  list.text("/kernel/kind", "kernel through which the density was measured");
   list.number("/kernel/width", "D", "its width");
   list.quantity("/profile/greatest_density", "1/D^2", "greatest density of the profile");
   list.number("/profile/frames", "1", "frames of the profile");
@@ -107,14 +108,15 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
                              {"x", "D", "centre, from the left wall"},
                              {"z", "D", "height of the centre above the floor's mean position"},
                              {"quality", "1", "1 is a bead that looks like all the others, 0 is none"}});
-  details.insert(details.end(), {{"std_error_x_px", "px", "standard error of x_px"},
-                                 {"std_error_y_px", "px", "standard error of y_px"},
-                                 {"correlation", "1", "correlation of the two errors"},
-                                 {"contrast", "1", "contrast relative to that of the mean bead"},
-                                 {"cut", "1", "1 where the border of the frame cuts the bead"},
-                                 {"half_hidden", "1", "1 where something covers part of the bead"},
-                                 {"species", "1", "1: the first diameter, 2: the second"},
-                                 {"probability", "1", "that it is a bead; 1 where rims were not looked at"}});
+  details.insert(details.end(),
+                 {{"std_error_x_px", "px", "standard error of x_px"},
+                  {"std_error_y_px", "px", "standard error of y_px"},
+                  {"correlation", "1", "correlation of the two errors"},
+                  {"contrast", "1", "contrast relative to that of the mean bead"},
+                  {"cut", "1", "1 where the border of the frame cuts the bead"},
+                  {"half_hidden", "1", "1 where something covers part of the bead"},
+                  {"species", "1", "1: the first diameter, 2: the second"},
+                  {"probability", "1", "probability that it is a bead; 1 where the rim was not examined"}});
   list.table({"disks.csv", "disks found in each frame", disks});
   list.table({"disk_details.csv", "errors and marks of the disks found, row by row as in disks.csv", details});
   list.table({"frames.csv",
@@ -125,7 +127,7 @@ void state_tables(ResultList& list, const ExtractOptions& options) {
                {"status", "", "good, nothing_found, unreadable or size_changed"},
                {"disks", "1", "disks found"},
                {"second", "1", "disks of the second diameter among them"},
-               {"rejected", "1", "places that were looked at and rejected"},
+               {"rejected", "1", "candidates that were rejected"},
                {"residual_level_grey_levels", "grey levels", "rms difference of the frame and its model"},
                {"contrast_gain", "1", "contrast relative to that of all frames"}}});
   list.table({"quality.csv",

@@ -338,11 +338,10 @@ void draw_cells(const MapPicture& picture, const std::filesystem::path& director
     // White below, so that a symbol is seen on dark and on light cells.
     const auto& [label, number] = picture.marks[k];
     const int symbol = symbols[number % symbols.size()];
-    body += fmt::format(
-        ", {0} index {1} using 1:2 with points pt {2} ps 1.0*scale lw 4 lc rgb '#ffffff' notitle, {0} index {1} using "
-        "1:2 "
-        "with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}",
-        file, k + 1, symbol, gnuplot_text(plain(label)));
+    body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 1.0*scale lw 4 lc rgb '#ffffff' notitle", file,
+                        k + 1, symbol);
+    body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}", file,
+                        k + 1, symbol, gnuplot_text(plain(label)));
   }
   run_gnuplot(directory, picture.name, twice(picture.name, {560, ""}, {170, ""}, body + "\n"));
 }
@@ -445,11 +444,14 @@ class Figure : public Stage {
   void describe(Fields& fields) override {
     fields.choice("reference", reference_,
                   {{Reference::none, "none"}, {Reference::clement_rajchenbach, "clement-rajchenbach-1991"}},
-                  {.help = "also draw the published fit, from its printed parameters"});
-    fields.input_files("data", data_,
-                       {.help = "points of your own (CSV with height and number_density), drawn and compared"});
-    fields.text("title", title_, {.help = "above the figure"});
-    fields.number("highest", highest_, {.help = "where the axis of heights ends, in D", .range = positive});
+                  {.help = "published fit that is drawn too, from its printed parameters"});
+    fields.input_files(
+        "data", data_,
+        {.help =
+             "your own points: a CSV file with height [D] and number_density [1/D^2]; they are drawn and compared"});
+    fields.text("title", title_, {.help = "title above the figure"});
+    fields.number("highest", highest_,
+                  {.help = "upper end of the axis of heights, in D; left out, from the data", .range = positive});
   }
   void results(ResultList& list) const override {
     const Given both_drawn = both(given_if(list.from("extract") != nullptr && list.from("simulate") != nullptr,
@@ -462,8 +464,8 @@ class Figure : public Stage {
     const Given compared = given_when("two profiles are drawn"), overlap = given_when("the two overlap");
     const std::string row = "/comparisons/#/";
     list.text(row + "of", "a profile", compared);
-    list.text(row + "with", "the one it is compared with", compared);
-    list.number(row + "points", "1", "heights at which both are known", compared);
+    list.text(row + "with", "profile with which it is compared", compared);
+    list.number(row + "points", "1", "number of heights at which both are known", compared);
     list.quantity(row + "rms_difference", "1/D^2", "rms difference", overlap);
     list.quantity(row + "mean_difference", "1/D^2", "mean difference", overlap);
     list.quantity(row + "largest_difference", "1/D^2", "largest difference", overlap);

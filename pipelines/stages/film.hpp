@@ -10,10 +10,17 @@
 
 namespace shakebed::pipelines {
 
-// {"kind": "webp", "width", "height" (of the frames, in px), "picture_width", "every", "of" (good frames), "floor" (row
-// in px), "rate" (frames a second, where it was given), "frames": [numbers], "pictures": [base64], "marks": [{"missed":
-// [x, y, ...], "false": [number of the disk]}] where the truth is known}. Every frame is in it, as long as pictures and
-// disks stay within film_bytes; else every second, every fourth, ... of the good ones.
+// Writes the film of a measurement as one JSON object:
+//   "kind": "webp"
+//   "width", "height": size of the frames [px]
+//   "picture_width": width of the pictures in the film [px]
+//   "every", "of": every n-th of this number of good frames is in the film
+//   "floor": row of the floor [px]
+//   "rate": frames per second, if given
+//   "frames": numbers of the frames
+//   "pictures": base64
+//   "marks": [{"missed": [x, y, ...], "false": [number of the disk]}], if the true centres are known
+// All frames are in it as long as pictures and disks stay within film_bytes. Else it holds every second or fourth frame.
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
                 const DisksOnTheWay& on_the_way, std::optional<double> rate);
 

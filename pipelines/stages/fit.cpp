@@ -40,17 +40,19 @@ const std::string simulation_model = "simulation";
 constexpr double tail_density = 0.6;
 
 void describe_window(Fields& f, WindowChoice& w) {
-  f.number("low", w.low, {.help = "lowest height used in D; found by the rule if left out"});
-  f.number("high", w.high, {.help = "highest height used in D; found by the rule if left out"});
+  f.number("low", w.low, {.help = "lowest height that is used, in D; left out, found by the rule below"});
+  f.number("high", w.high, {.help = "highest height that is used, in D; left out, found by the rule below"});
   f.number("floor_exclusion", w.floor_exclusion,
-           {.help = "rule: nothing below this height above the base, in D", .range = non_negative});
+           {.help = "rule: no heights below this distance from the base, in D", .range = non_negative});
   f.number("plateau_fraction", w.plateau_fraction,
-           {.help = "rule: begin where the smoothed profile first reaches this part of its greatest value",
+           {.help = "rule: the window begins where the smoothed density first reaches this fraction of its maximum",
             .range = zero_to_one});
   f.number("lowest_fraction", w.lowest_fraction,
-           {.help = "rule: end where the density falls below this part of its greatest value", .range = zero_to_one});
+           {.help = "rule: the window ends where the density falls below this fraction of its maximum",
+            .range = zero_to_one});
   f.number("lowest_significance", w.lowest_significance,
-           {.help = "rule: or below so many standard errors", .range = non_negative});
+           {.help = "rule: the window also ends where the density falls below this number of its standard errors",
+            .range = non_negative});
   f.require(!w.low || !w.high || *w.low < *w.high, "low", "the window ends below where it begins");
 }
 
@@ -92,64 +94,69 @@ class Fit : public Stage {
 
  private:
   void describe_model(Fields& fields) {
-    fields.input_files(
-        "profile", profile_,
-        {.help = "a profile of your own (CSV with height and number_density); left out, that of the stage in \"from\"",
-         .example = "\"profile.csv\""});
-    fields.text(
-        "model", options_.model,
-        {.help = "enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle, or simulation: the profile "
-                 "of the first stage in \"from\" (or of \"profile\") is matched against those of all other "
-                 "simulate stages there, at their known temperatures",
-         .example = "\"enskog-rectangle\""});
+    fields.input_files("profile", profile_,
+                       {.help = "your own profile: a CSV file with height [D] and number_density [1/D^2]; left out, "
+                                "that of the stage in \"from\"",
+                        .example = "\"profile.csv\""});
+    fields.text("model", options_.model,
+                {.help = "model: enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle or simulation. "
+                         "Simulation compares the profile of the first stage in \"from\" (or of \"profile\") with "
+                         "those of all other simulate stages there, whose temperatures are known",
+                 .example = "\"enskog-rectangle\""});
     fields.number(
         "plateau_density", options_.plateau_density,
         {.help = "density phi_0 of the solid in 1/D^2: 2/sqrt(3) in equilibrium, 1.10 for the published experiment",
          .range = {.low = 0, .high = fit::close_packing_density * (1 + 1e-12), .above_low = true}});
-    fields.boolean("plateau_density_free", options_.plateau_density_free,
-                   {.help = "fit it too (its T is biased low; printed beside the headline anyway)"});
+    fields.boolean(
+        "plateau_density_free", options_.plateau_density_free,
+        {.help =
+             "whether phi_0 is fitted too. T is then too low; this fit is also in \"models\" of fit.json by default"});
     fields.number("temperature", options_.fixed_temperature,
-                  {.help = "hold T at this value in m g D", .range = positive});
-    fields.boolean("temperature_measured", temperature_measured_,
-                   {.help = "hold T at the kinetic temperature of the simulated bed in \"from\", (T_x + T_z)/2"});
-    fields.number("shift", options_.fixed_shift, {.help = "hold the shift at this height in D"});
+                  {.help = "fixed value of T, in m g D; left out, T is fitted", .range = positive});
+    fields.boolean(
+        "temperature_measured", temperature_measured_,
+        {.help = "whether T is fixed at the kinetic temperature (T_x + T_z)/2 of the simulated bed in \"from\""});
+    fields.number("shift", options_.fixed_shift,
+                  {.help = "fixed value of the shift, in D; left out, the shift is fitted"});
     fields.number("column_number", options_.column_number,
-                  {.help = "N D/W; left out, what the measurement says", .range = positive});
-    fields.boolean("constrain_column", options_.constrain_column, {.help = "tie the shift to T by the sum rule"});
+                  {.help = "column number N D/W; left out, that of the measurement", .range = positive});
+    fields.boolean("constrain_column", options_.constrain_column,
+                   {.help = "whether the shift follows from T by the sum rule: the area under the model is N D/W"});
     fields.number("base", options_.base, {.help = "lower edge of the bed in D"});
-    fields.quantity("diameter", diameter_, dimension::length,
-                    {.help = "D, for T/(m g) as a length; left out, what the measurement says", .range = positive});
+    fields.quantity(
+        "diameter", diameter_, dimension::length,
+        {.help = "diameter D, for T/(m g) as a length; left out, that of the measurement", .range = positive});
   }
 
   // The window and the errors of the data.
   void describe_data(Fields& fields) {
     fields.object<Kernel>("kernel", kernel_, describe_kernel,
-                          {.help = "the window through which the profile was measured: the model is put through it "
-                                   "before the two are compared; left out, what the profile itself says"});
-    fields.object<WindowChoice>("window", window_, describe_window, {.help = "which part of the profile is fitted"});
-    fields.choice(
-        "errors", errors_,
-        {{ErrorSource::automatic, "automatic"},
-         {ErrorSource::diagonal, "diagonal"},
-         {ErrorSource::covariance, "covariance"}},
-        {.help = "covariance: that between heights, which simulate and extract measure; diagonal: the profile's "
-                 "standard errors, as if heights were independent (for a measured profile these are too "
-                 "small); automatic: covariance where there is one"});
+                          {.help = "kernel through which the profile was measured; the model is smoothed with it "
+                                   "before they are compared. Left out, the kernel named in the profile"});
+    fields.object<WindowChoice>("window", window_, describe_window, {.help = "range of heights that is fitted"});
+    fields.choice("errors", errors_,
+                  {{ErrorSource::automatic, "automatic"},
+                   {ErrorSource::diagonal, "diagonal"},
+                   {ErrorSource::covariance, "covariance"}},
+                  {.help = "errors of the fit. Covariance: with the correlations between heights, which simulate and "
+                           "extract measure. Diagonal: standard errors alone; the error of T is then too small. "
+                           "Automatic: covariance where there is one"});
   }
 
   // How it is fitted, and what else is to be found.
   void describe_results(Fields& fields) {
-    fields.boolean("robust", options_.robust, {.help = "Huber's loss: outliers count linearly"});
-    fields.boolean("sweep", options_.sweep, {.help = "also T against window"});
-    fields.boolean("compare", options_.compare, {.help = "also other models, and phi_0 free"});
+    fields.boolean("robust", options_.robust,
+                   {.help = "whether outliers count linearly instead of quadratically (Huber's loss)"});
+    fields.boolean("sweep", options_.sweep, {.help = "whether the fit is repeated in other windows (windows.csv)"});
+    fields.boolean("compare", options_.compare,
+                   {.help = "whether other models, and a free phi_0, are fitted too (\"models\" of fit.json)"});
     fields.boolean("answer", answer_,
-                   {.help = "also one answer from several models and windows: the temperature with its whole "
+                   {.help = "whether one answer is given from several models and windows: T with its whole "
                             "uncertainty, and whether the bed has one temperature"});
-    fields.integer(
-        "bootstrap", bootstrap_,
-        {.help = "resamples over windows of frames, for the error of T that frames show by themselves: of an "
-                 "extract stage, or of a simulate stage that kept its frames; 0: none",
-         .range = from_to(0, 100'000)});
+    fields.integer("bootstrap", bootstrap_,
+                   {.help = "number of bootstrap resamples of the frames, for the error of T from the frames alone; it "
+                            "needs an extract stage, or a simulate stage with \"frames\". 0: none",
+                    .range = from_to(0, 100'000)});
   }
 
   // What the bed knows may not be stated otherwise.
@@ -224,7 +231,7 @@ LibraryBed library_bed(const Input& input) {
     const Json observed = input.result();
     const Json *x = find_pointer(observed, "/temperature_x/value"), *z = find_pointer(observed, "/temperature_z/value");
     if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
-      throw InputError(input.id + ": this bed has no temperature, so it is no use in a library");
+      throw InputError(input.id + ": this bed has no temperature, so it cannot be used in a library of beds");
     bed.profile.temperature = (x->get<double>() + z->get<double>()) / 2;
   }
   return bed;

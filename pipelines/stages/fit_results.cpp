@@ -9,15 +9,15 @@ class FitStatement {
 
   void state() {
     list_.text("/status", "whether the fit succeeded");
-    list_.text("/message", "why it did not", given_when("the fit does not succeed"));
+    list_.text("/message", "reason, if it failed", given_when("the fit does not succeed"));
     list_.text("/model", "the model fitted");
     estimates();
     quality();
     window();
     comparisons();
     list_.truth("/describes_data", "whether the model fits");
-    list_.text("/why_not", "why it does not fit", given_when("the model does not fit"));
-    list_.text("/warnings/#", "what is odd about the fit", given_when("something is odd"));
+    list_.text("/why_not", "why the model does not fit", given_when("the model does not fit"));
+    list_.text("/warnings/#", "warning about the fit", given_when("something is odd"));
     answer();
     extras();
     tables();
@@ -33,12 +33,13 @@ class FitStatement {
     list_.quantity("/shift", "D", "height at which the fluid begins", fitted_);
     list_.quantity("/solid_height", "D", "height of the solid, zeta_F", fitted_);
     list_.quantity("/plateau_density", "1/D^2", "density of the solid, phi_0", fitted_);
-    list_.quantity("/column_number", "1", "disks a diameter of width, N D/W", fitted_);
+    list_.quantity("/column_number", "1", "column number N D/W: disks per diameter of width", fitted_);
     const Given critical = both(fitted_, given_when("T_c is known from N D/W"));
     list_.quantity("/critical_temperature", "m g D", "temperature at which the solid vanishes, T_c", critical);
     list_.quantity("/critical_temperature_over_mg", "m", "T_c as a length, T_c/(m g)", both(critical, known));
     list_.quantity("/reduced_temperature", "1", "T/T_c", critical);
-    list_.quantity("/solid_height_by_sum_rule", "D", "height of the solid by the number of disks", critical);
+    list_.quantity("/solid_height_by_sum_rule", "D", "height of the solid from the number of disks (sum rule)",
+                   critical);
     list_.text("/critical_temperature_status", "why T_c is not known", given_when("T_c is not known"));
     interval("/temperature_interval", fitted_);
     interval("/next_bed_interval", fitted_);
@@ -47,32 +48,34 @@ class FitStatement {
   }
 
   void interval(const std::string& pointer, const Given& given) {
-    list_.text(pointer + "/status", "whether both ends were found", given);
+    list_.text(pointer + "/status", "ok, or which end of the interval was not found", given);
     list_.number(pointer + "/low", "m g D", "lower end of the interval of T", given, true);
     list_.number(pointer + "/high", "m g D", "upper end of the interval of T", given, true);
-    list_.number(pointer + "/confidence", "1", "its confidence", given);
-    list_.truth(pointer + "/low_open", "whether the lower end lies beyond what was searched", given);
-    list_.truth(pointer + "/high_open", "whether the upper end lies beyond what was searched", given);
+    list_.number(pointer + "/confidence", "1", "confidence level of the interval", given);
+    list_.truth(pointer + "/low_open", "true if the lower end lies below the searched range", given);
+    list_.truth(pointer + "/high_open", "true if the upper end lies above the searched range", given);
   }
 
   void quality() {
-    list_.number("/chi2", "1", "sum of the squared residuals over their errors", fitted_);
+    list_.number("/chi2", "1", "chi-square: sum of squared residuals over their squared errors", fitted_);
     list_.number("/dof", "1", "degrees of freedom", fitted_);
-    list_.number("/chi2_per_dof", "1", "chi2 over the degrees of freedom", fitted_, true);
-    list_.number("/p_value", "1", "chance of so large a chi2", fitted_, true);
-    list_.number("/aic", "1", "Akaike's criterion", fitted_, true);
-    list_.number("/bic", "1", "Bayes' criterion", fitted_, true);
-    list_.truth("/errors_scaled", "whether the errors follow from the scatter about the fit", fitted_);
-    list_.number("/relative_misfit", "1", "rms residual over the greatest density");
-    list_.quantity("/area", "1", "disks a diameter of width, by the profile's area");
+    list_.number("/chi2_per_dof", "1", "chi-square per degree of freedom", fitted_, true);
+    list_.number("/p_value", "1", "probability of a chi-square at least this large, if the model is right", fitted_,
+                 true);
+    list_.number("/aic", "1", "information criterion of Akaike", fitted_, true);
+    list_.number("/bic", "1", "Bayesian information criterion", fitted_, true);
+    list_.truth("/errors_scaled", "true if the errors were scaled so that chi-square per degree of freedom is 1",
+                fitted_);
+    list_.number("/relative_misfit", "1", "rms residual over the largest density");
+    list_.quantity("/area", "1", "column number N D/W from the area under the profile");
   }
 
   void window() {
-    list_.quantity("/window/low", "D", "lowest height used");
-    list_.quantity("/window/high", "D", "highest height used");
-    list_.number("/window/bins", "1", "heights used");
-    list_.text("/window/rule", "the rule that chose them");
-    list_.text("/kernel/kind", "the window through which density was measured");
+    list_.quantity("/window/low", "D", "lowest height of the fit");
+    list_.quantity("/window/high", "D", "highest height of the fit");
+    list_.number("/window/bins", "1", "number of heights in the fit");
+    list_.text("/window/rule", "rule that chose the window");
+    list_.text("/kernel/kind", "kernel through which the density was measured");
     list_.number("/kernel/width", "D", "its width");
     const Given several = given_when("several windows are compared"),
                 good = given_when("the fit of the window succeeds");
@@ -90,15 +93,15 @@ class FitStatement {
   void comparisons() {
     const Given several = given_when("several models are compared"), good = given_when("the fit of the model succeeds");
     const std::string row = "/models/#/";
-    list_.text(row + "model", "a model beside the one chosen", several);
-    list_.truth(row + "plateau_density_free", "whether phi_0 was fitted, too", several);
-    list_.text(row + "status", "whether its fit succeeded", several);
+    list_.text(row + "model", "name of another model", several);
+    list_.truth(row + "plateau_density_free", "whether phi_0 was fitted too", several);
+    list_.text(row + "status", "ok, or why the fit of the model failed", several);
     list_.quantity(row + "temperature", "m g D", "its temperature", good);
     list_.quantity(row + "shift", "D", "its shift", good);
     list_.quantity(row + "plateau_density", "1/D^2", "its density of the solid", good);
     list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", good, true);
-    list_.number(row + "aic", "1", "its Akaike criterion", good, true);
-    list_.number(row + "bic", "1", "its Bayes criterion", good, true);
+    list_.number(row + "aic", "1", "information criterion of Akaike of this model", good, true);
+    list_.number(row + "bic", "1", "Bayesian information criterion of this model", good, true);
   }
 
   void answer() {
@@ -119,29 +122,30 @@ class FitStatement {
     temperature("temperature_z", "kinetic temperature, vertical", kinetic);
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
     list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
-    list_.number("/answer/interval/confidence", "1", "confidence of the interval", found);
+    list_.number("/answer/interval/confidence", "1", "confidence level of the interval", found);
     list_.quantity("/answer/next_bed_interval/low", "m g D",
-                   "lower end of the interval of what the chosen thermometer reads in further beds, on average", found);
-    list_.quantity("/answer/next_bed_interval/high", "m g D", "its upper end", found);
-    list_.number("/answer/next_bed_interval/confidence", "1", "its confidence", found);
+                   "lower end of the interval in which the mean T of further beds lies, by the same model and window",
+                   found);
+    list_.quantity("/answer/next_bed_interval/high", "m g D", "upper end of that interval", found);
+    list_.number("/answer/next_bed_interval/confidence", "1", "confidence level of the interval", found);
     list_.quantity("/answer/statistical_error", "m g D", "statistical error of T, by the measured errors alone", found);
-    list_.quantity("/answer/misfit_error", "m g D", "error of T by what the model misses of the profile", found);
+    list_.quantity("/answer/misfit_error", "m g D", "systematic error of T from the misfit of the model", found);
     list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
     list_.quantity("/answer/contact_duration_uncertainty", "m g D",
-                   "uncertainty by the contact duration of the simulation", found);
+                   "uncertainty of T from the contact duration t_c of the simulation", found);
     list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);
-    list_.number("/answer/bias", "1", "known bias that has been taken off, relative", found);
+    list_.number("/answer/bias", "1", "known relative bias of model and window, which was subtracted", found);
     list_.text("/answer/thermometer", "model and window that gave T", found);
     list_.text("/answer/model", "model that gave T", found);
     list_.quantity("/answer/solid_height", "D", "height of the solid at this T", found, true);
     const std::string row = "/answer/readings/#/";
     list_.text(row + "thermometer", "a model and window", found);
     list_.text(row + "model", "its model", found);
-    list_.text(row + "status", "whether its fit succeeded", found);
-    list_.truth(row + "admissible", "whether it checks the answer", found);
-    list_.quantity(row + "temperature", "m g D", "its temperature without the known bias", found);
-    list_.number(row + "bias", "1", "its known bias, relative", found);
-    list_.number(row + "bias_uncertainty", "1", "uncertainty of its bias, relative", found);
+    list_.text(row + "status", "ok, or why the fit of the model failed", found);
+    list_.truth(row + "admissible", "whether this fit is used to check the answer", found);
+    list_.quantity(row + "temperature", "m g D", "temperature of this fit, corrected for the known bias", found);
+    list_.number(row + "bias", "1", "known relative bias of this model and window", found);
+    list_.number(row + "bias_uncertainty", "1", "uncertainty of this relative bias", found);
     list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", found, true);
   }
 
@@ -154,15 +158,15 @@ class FitStatement {
     const Given asked = given_if(fit_.bootstrap, "\"bootstrap\" is above 0");
     const Given found = both(asked, given_when("the bootstrap succeeds"));
     list_.text("/bootstrap/status", "whether the bootstrap succeeded", asked);
-    list_.text("/bootstrap/message", "why it did not", both(asked, given_when("it does not succeed")));
+    list_.text("/bootstrap/message", "reason, if it failed", both(asked, given_when("it does not succeed")));
     list_.number("/bootstrap/resamples", "1", "resamples of the frames", asked);
     list_.number("/bootstrap/succeeded", "1", "resamples whose fit succeeded", asked);
     list_.number("/bootstrap/window_frames", "1", "frames in a block", asked);
-    list_.quantity("/bootstrap/temperature", "m g D", "temperature over the resamples", found);
-    list_.quantity("/bootstrap/shift", "D", "shift over the resamples", found);
+    list_.quantity("/bootstrap/temperature", "m g D", "mean and standard deviation of T over the resamples", found);
+    list_.quantity("/bootstrap/shift", "D", "mean and standard deviation of the shift over the resamples", found);
     for (const char* end : {"low", "high"})
       list_.number(std::string("/bootstrap/temperature_interval/") + end, "m g D", "end of the interval of T", found);
-    list_.number("/bootstrap/temperature_interval/confidence", "1", "its confidence", found);
+    list_.number("/bootstrap/temperature_interval/confidence", "1", "confidence level of the interval", found);
   }
 
   void tables() {
@@ -171,13 +175,13 @@ class FitStatement {
                  "the fitted model",
                  {height,
                   {"number_density", "1/D^2", "density of the model"},
-                  {"smoothed_density", "1/D^2", "density of the model through the kernel of the measurement"}}});
+                  {"smoothed_density", "1/D^2", "density of the model, smoothed with the kernel of the measurement"}}});
     list_.table({"residuals.csv",
                  "measured and fitted densities",
                  {height,
                   {"number_density", "1/D^2", "measured density"},
                   {"std_error", "1/D^2", "standard error of the measured density"},
-                  {"model", "1/D^2", "fitted density through the kernel"},
+                  {"model", "1/D^2", "fitted density, smoothed with the kernel"},
                   {"used", "1", "1 inside the window of the fit, else 0", {"0", "1"}}}});
     list_.table({"windows.csv",
                  "fits in other windows",

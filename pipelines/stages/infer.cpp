@@ -66,9 +66,9 @@ void Infer::describe_targets(Fields& fields) {
               observable.name, options_.targets[k],
               [&](Fields& g, InferTarget& target) {
                 for (const auto& [key, number, help] :
-                     {std::tuple{"value", &target.value, "what was measured"},
+                     {std::tuple{"value", &target.value, "measured value"},
                       std::tuple{"std_error", &target.std_error,
-                                 "its standard error, without the scatter between beds"}}) {
+                                 "standard error of the measured value, without the scatter between beds"}}) {
                   if (observable.is_length)
                     g.quantity(key, *number, dimension::length, {.help = help, .range = non_negative});
                   else
@@ -77,7 +77,7 @@ void Infer::describe_targets(Fields& fields) {
                 g.text(
                     "at", target.at,
                     {.help =
-                         "instead of a value, a pointer to a number of a stage in \"from\": /fit/temperature_over_mg"});
+                         "pointer to a number of a stage in \"from\", in place of a value: /fit/temperature_over_mg"});
                 if (!g.decoding()) return;
                 g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
                 g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value", "it must be above 0");
@@ -87,7 +87,7 @@ void Infer::describe_targets(Fields& fields) {
               {.help = observable.meaning});
         }
       },
-      {.help = "what was measured: numbers with their errors", .required = true});
+      {.help = "measured numbers with their errors", .required = true});
 }
 
 void Infer::describe_search(Fields& fields) {
@@ -96,57 +96,64 @@ void Infer::describe_search(Fields& fields) {
                           "the average; 0: they show the average",
                   .range = from_to(0, 64)});
   fields.number("average", options_.average,
-                {.help = "with moments: the prior probability that the average is shown", .range = zero_to_one});
-  fields.number(
-      "phase", options_.phase,
-      {.help = "the photographs show this phase of the shaking, 0 to 1 (0: the floor passes its mean height upwards)",
-       .range = {.low = 0, .high = 1, .below_high = true}});
-  fields.integer("first", options_.first, {.help = "beds all over the prior", .range = from_to(8, 100'000)});
-  fields.integer("rounds", options_.rounds,
-                 {.help = "rounds of further beds in the region of the posterior", .range = from_to(0, 20)});
-  fields.integer("each", options_.each, {.help = "beds of each round", .range = from_to(1, 10'000)});
-  fields.integer("best", options_.best, {.help = "most probable beds that are run again", .range = from_to(0, 20)});
+                {.help = "prior probability that the photographs show the average, where \"moments\" is above 0",
+                 .range = zero_to_one});
+  fields.number("phase", options_.phase,
+                {.help = "phase of the shaking that the photographs show, from 0 to 1 (0: the floor passes its mean "
+                         "height upwards); left out, they show the average",
+                 .range = {.low = 0, .high = 1, .below_high = true}});
+  fields.integer(
+      "first", options_.first,
+      {.help = "number of beds in the first round, spread over the whole prior", .range = from_to(8, 100'000)});
+  fields.integer(
+      "rounds", options_.rounds,
+      {.help = "number of further rounds, with beds in the region of the posterior", .range = from_to(0, 20)});
+  fields.integer("each", options_.each, {.help = "number of beds in each further round", .range = from_to(1, 10'000)});
+  fields.integer("best", options_.best,
+                 {.help = "number of the most probable beds that are run again", .range = from_to(0, 20)});
   fields.integer("best_replicas", options_.replicas,
-                 {.help = "runs of each of them, each with its own seed", .range = from_to(2, 1000)});
+                 {.help = "number of runs of each of these, each with its own seed", .range = from_to(2, 1000)});
   fields.quantity("best_measure", options_.best_measure, dimension::time,
-                  {.help = "measuring time of these beds; 0: that of the others", .range = non_negative});
-  fields.integer("draws", options_.draws, {.help = "rows of posterior.csv", .range = from_to(100, 100'000)});
-  fields.integer("calibration", options_.calibration,
-                 {.help = "beds with parameters drawn from the prior, measured and inferred: how often the intervals "
-                          "hold the truth; 0: none",
-                  .range = from_to(0, 10'000)});
+                  {.help = "measuring time of these runs; 0: that of the other beds", .range = non_negative});
+  fields.integer("draws", options_.draws,
+                 {.help = "number of draws from the posterior in posterior.csv", .range = from_to(100, 100'000)});
+  fields.integer(
+      "calibration", options_.calibration,
+      {.help = "number of beds with known parameters, drawn from the prior, by which the intervals are tested; 0: none",
+       .range = from_to(0, 10'000)});
   fields.object<MapCurve>(
       "map_curve", options_.curve,
       [](Fields& f, MapCurve& curve) {
         f.number("reduced_temperature", curve.reduced_temperature,
                  {.help = "T/T_c", .required = true, .range = positive});
         f.text("reading", curve.reading,
-               {.help = "a formula of the stage map", .required = true, .example = "\"eq6/relative_max/printed\""});
+               {.help = "name of a formula of the stage map (map.csv, column name)",
+                .required = true,
+                .example = "\"eq6/relative_max/printed\""});
         f.text("label", curve.label, {.help = "name of the curve in the picture"});
       },
-      {.help = "draws Gamma against frequency where a formula of the stage map gives this T/T_c"});
-  fields.text(
-      "stored", options_.stored,
-      {.help =
-           "beds.json of an earlier run that is part of the program (reference-data), in place of running the beds"});
+      {.help = "curve of Gamma against frequency at which a formula of the stage map gives this T/T_c"});
+  fields.text("stored", options_.stored,
+              {.help = "name of a beds.json of an earlier run in reference-data, which is used in place of new beds"});
 }
 
 void Infer::describe(Fields& fields) {
   options_.written.describe(fields);
   fields.quantity("settle", options_.bed.settle, dimension::time,
-                  {.help = "time before anything is measured", .range = non_negative});
+                  {.help = "time before the measurement begins", .range = non_negative});
   fields.quantity("measure", options_.bed.measure, dimension::time,
                   {.help = "time over which each bed is measured", .required = true, .range = positive});
-  fields.integer("phases", options_.bed.phases,
-                 {.help = "moments of each period over which the average is taken", .range = from_to(1, 4096)});
+  fields.integer(
+      "phases", options_.bed.phases,
+      {.help = "number of moments in each period over which the average is taken", .range = from_to(1, 4096)});
   fields.number("kernel_width", options_.bed.kernel_width,
-                {.help = "standard deviation of the Gaussian window of the profile in D", .range = from_to(0.01, 10)});
-  fields.number(
-      "plateau_density", options_.bed.plateau_density,
-      {.help = "phi_0 of the fitted profile", .range = {.low = 0, .high = 1.1547005383792517, .above_low = true}});
+                {.help = "standard deviation of the Gaussian kernel of the profile, in D", .range = from_to(0.01, 10)});
+  fields.number("plateau_density", options_.bed.plateau_density,
+                {.help = "density phi_0 of the solid for the fit of the profile, in 1/D^2",
+                 .range = {.low = 0, .high = 1.1547005383792517, .above_low = true}});
   fields.map<UnknownParameter>(
       "parameters", options_.parameters, [](Fields& f, UnknownParameter& p) { p.describe(f); },
-      {.help = "unknown parameters: name → pointer into the scene, and prior", .required = true});
+      {.help = "unknown parameters: name → pointers into the scene, and prior", .required = true});
   describe_targets(fields);
   describe_search(fields);
   if (fields.decoding() && fields.problem_count() == 0) check(fields);

@@ -45,18 +45,19 @@ class AtPhase final : public sim::RunObserver {
 // --- parameters
 
 void UnknownParameter::describe(Fields& f) {
-  f.texts("set", set, {.help = "pointers into this stage that take it: [\"/floor/gamma\"]", .required = true});
-  f.text("unit", unit, {.help = "unit of what is written there; none: a plain number", .example = "\"Hz\""});
+  f.texts("set", set,
+          {.help = "JSON pointers of the options of this stage that are set: [\"/floor/gamma\"]", .required = true});
+  f.text("unit", unit, {.help = "unit of the value that is set; empty: a plain number", .example = "\"Hz\""});
   std::optional<double> from = low == high ? std::nullopt : std::optional(low),
                         to = low == high ? std::nullopt : std::optional(high);
   f.number("low", from, {.help = "smallest possible value"});
   f.number("high", to, {.help = "largest possible value"});
-  f.any("values", values, {.help = "in place of low and high: a list of values, all equally likely"});
+  f.any("values", values, {.help = "list of values, all equally likely, in place of low and high"});
   f.choice("scale", logarithmic, {{false, "linear"}, {true, "logarithmic"}},
-           {.help = "where the prior is even: in the value or in its logarithm"});
+           {.help = "whether the prior is uniform in the value (linear) or in its logarithm"});
   f.number("mean", mean, {.help = "mean of a normal prior, cut off at low and high"});
   f.number("std_error", std_error, {.help = "standard deviation of the normal prior", .range = positive});
-  f.text("why", why, {.help = "why this range: for the report"});
+  f.text("why", why, {.help = "reason for this range, shown in the report"});
   if (!f.decoding()) return;
   low = from.value_or(0), high = to.value_or(0);
   f.require(!set.empty(), "set", "a parameter needs a pointer into the scene");
@@ -129,15 +130,17 @@ std::optional<double> UnknownParameter::in_scene(const JsonNode& scene) const {
 
 const std::vector<Observable>& observables() {
   static const std::vector<Observable> all = {
-      {"temperature_over_mg", true, "m", "fitted T/(m g)", true},
+      {"temperature_over_mg", true, "m", "temperature of the fitted profile, T/(m g)", true},
       {"shift", false, "D", "height at which the fitted tail reaches the plateau density", false},
       {"solid_height_by_sum_rule", false, "D", "height of the solid that belongs to the fitted T by the column number",
        false},
       {"density", false, "1/D^2", "greatest density of the profile", true},
-      {"temperature_x_over_mg", true, "m", "kinetic T/(m g) across", true},
-      {"temperature_z_over_mg", true, "m", "kinetic T/(m g) upwards, without the bed's mean velocity", true},
-      {"temperature_z_local_over_mg", true, "m", "the same without the mean velocity of each layer of 1 D", true},
-      {"center_of_mass_rise", false, "D", "rise of the centre of mass above ideal packing", false},
+      {"temperature_x_over_mg", true, "m", "kinetic temperature T_x/(m g), horizontal", true},
+      {"temperature_z_over_mg", true, "m", "kinetic temperature T_z/(m g), vertical, without the bed's mean velocity",
+       true},
+      {"temperature_z_local_over_mg", true, "m",
+       "kinetic temperature T_z/(m g), vertical, without the mean velocity of each layer of 1 D", true},
+      {"center_of_mass_rise", false, "D", "rise of the centre of mass above ideal hexagonal packing", false},
   };
   return all;
 }

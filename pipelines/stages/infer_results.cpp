@@ -394,41 +394,43 @@ void state_tables(ResultList& list, const InferOptions& options) {
     return a;
   };
   const std::vector<StatedColumn> numbers = observable_columns(options), parameters = parameter_columns(options);
-  const StatedColumn view{"photographs", "", "what is seen: the average over the shaking or one phase of it"};
+  const StatedColumn view{"photographs", "", "whether the photographs show the average over the shaking or one phase"};
   list.table({"beds.csv", "every bed that was run",
-              with(with({{"bed", "1", "number"},
-                         {"round", "1", "0: all over the prior; later ones where the posterior is"},
+              with(with({{"bed", "1", "number of the bed"},
+                         {"round", "1",
+                          "number of the round; 0: spread over the prior, later: in the region of the posterior"},
                          view},
                         parameters),
                    numbers)});
-  list.table({"posterior.csv", "draws from the posterior, all of equal weight",
-              with(parameters, {view, {"chi2", "1", "of the targets"}})});
+  list.table({"posterior.csv", "draws from the posterior, with equal weights",
+              with(parameters, {view, {"chi2", "1", "chi-square of the targets"}})});
   std::vector<std::string> names;
   for (const auto& [name, ignored] : options.parameters) names.push_back(name);
   list.table({"marginals.csv",
               "posterior density of each parameter",
-              {{"parameter", "", "its name", names},
+              {{"parameter", "", "name of the parameter", names},
                {"value", "1", "middle of a bin, in the parameter's unit"},
                {"density", "1", "posterior density, over the parameter's unit"}}});
   list.table({"best.csv", "the runs of the most probable beds",
-              with(with({{"bed", "1", "number"}, {"replica", "1", "number of the run"}, view}, parameters), numbers)});
+              with(with({{"bed", "1", "number of the bed"}, {"replica", "1", "number of the run"}, view}, parameters),
+                   numbers)});
   list.table({"calibration.csv",
               "beds with known parameters, inferred",
-              {{"bed", "1", "number"},
-               {"parameter", "", "its name", names},
-               {"truth", "1", "in the parameter's unit"},
+              {{"bed", "1", "number of the bed"},
+               {"parameter", "", "name of the parameter", names},
+               {"truth", "1", "true value, in the unit of the parameter"},
                {"low_68", "1", "lower end of the interval of 68 %"},
-               {"high_68", "1", "upper end"},
+               {"high_68", "1", "upper end of the interval of 68 %"},
                {"low_95", "1", "lower end of the interval of 95 %"},
-               {"high_95", "1", "upper end"},
-               {"rank", "1", "share of the posterior below the truth"}},
+               {"high_95", "1", "upper end of the interval of 95 %"},
+               {"rank", "1", "share of the posterior below the true value"}},
               given_if(options.calibration > 0, "\"calibration\" is above 0")});
 }
 
 }  // namespace
 
 void state_inference(ResultList& list, const InferOptions& options) {
-  list.number("/beds", "1", "beds that the surrogate is made from");
+  list.number("/beds", "1", "number of beds on which the surrogate is based");
   list.number("/effective_samples", "1",
               "effective number of independent draws of the weighted points of the posterior");
   list.quantity("/log_evidence", "1", "natural logarithm of the mean likelihood over the prior");
@@ -437,9 +439,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.quantity(at, unit, "mean and standard deviation of the posterior");
     for (const auto& [key, meaning] : {std::pair{"/median", "median"},
                                        {"/low_68", "lower end of the interval of 68 %"},
-                                       {"/high_68", "upper end"},
+                                       {"/high_68", "upper end of the interval of 68 %"},
                                        {"/low_95", "lower end of the interval of 95 %"},
-                                       {"/high_95", "upper end"},
+                                       {"/high_95", "upper end of the interval of 95 %"},
                                        {"/prior_low", "least value of the prior"},
                                        {"/prior_high", "greatest value of the prior"}})
       list.number(at + key, unit, meaning);
@@ -447,52 +449,58 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.text(at + "/why", "why this prior");
   }
   list.text("/photographs/#/show", "the average over the shaking, or a phase of it");
-  list.number("/photographs/#/prior", "1", "chance before the measurement");
-  list.number("/photographs/#/posterior", "1", "chance after the measurement");
+  list.number("/photographs/#/prior", "1", "prior probability");
+  list.number("/photographs/#/posterior", "1", "posterior probability");
   list.number("/agreement/least_chi2", "1",
-              "chi2 of the nearest bed, with the surrogate's error and the scatter of one bed");
-  list.number("/agreement/numbers", "1", "numbers that were measured");
-  list.number("/agreement/chance", "1", "chance of a chi2 at least as large, were the nearest bed the true one");
-  list.number("/agreement/deviations", "1", "the same as a number of standard deviations");
-  list.number("/agreement/predictive_p", "1", "the same on average over the posterior");
+              "chi-square of the nearest bed; errors include that of the surrogate and the scatter between beds");
+  list.number("/agreement/numbers", "1", "number of measured numbers");
+  list.number("/agreement/chance", "1",
+              "probability of a chi-square at least this large, if the nearest bed is the true one");
+  list.number("/agreement/deviations", "1", "that probability as a number of standard deviations");
+  list.number("/agreement/predictive_p", "1", "mean of that probability over the posterior");
   list.truth("/agreement/some_bed_agrees", "whether the nearest bed is within three standard deviations");
   list.number("/agreement/beds_run_again_that_agree", "1",
-              "most probable beds that, run again, lie within three errors of every number");
-  list.text("/agreement/statement", "the same in words");
+              "number of the beds run again that lie within three standard errors of every target");
+  list.text("/agreement/statement", "agreement in words");
   const Given inside = given_when("the scene as written lies within the prior");
   for (const auto& [name, parameter] : options.parameters)
-    list.number(pointer_join("/assumed/values", name), unit_of(parameter), "as the scene is written", inside);
+    list.number(pointer_join("/assumed/values", name), unit_of(parameter),
+                "value of the parameter in the scene as written", inside);
   state_targets(list, options, "/assumed", inside);
-  list.number("/assumed/chi2", "1", "of the targets, the photographs showing the average", inside);
-  list.number("/assumed/deviations", "1", "the same as a number of standard deviations", inside);
+  list.number("/assumed/chi2", "1", "chi-square of the targets, if the photographs show the average", inside);
+  list.number("/assumed/deviations", "1", "that probability as a number of standard deviations", inside);
   const Given best = given_if(options.best > 0, "\"best\" is above 0");
-  list.text("/best/#/photographs", "what is seen: the average over the shaking or one phase of it", best);
+  list.text("/best/#/photographs", "whether the photographs show the average over the shaking or one phase", best);
   for (const auto& [name, parameter] : options.parameters)
-    list.number(pointer_join("/best/#/values", name), unit_of(parameter), "of a most probable bed", best);
+    list.number(pointer_join("/best/#/values", name), unit_of(parameter),
+                "value of the parameter in a most probable bed", best);
   state_targets(list, options, "/best/#", best);
-  list.number("/best/#/largest_difference_in_errors", "1", "of its targets", best, true);
+  list.number("/best/#/largest_difference_in_errors", "1", "largest difference from a target, in standard errors", best,
+              true);
   list.text("/narrowing/#/measurement", "a further measurement");
   list.text("/narrowing/#/meaning", "what it is");
-  list.number("/narrowing/#/reduction", "1", "share of the parameters' variance that it would take away on average");
+  list.number("/narrowing/#/reduction", "1",
+              "mean share of the variance of the parameters that this measurement would remove");
   for (const auto& [name, ignored] : options.parameters)
-    list.number(pointer_join("/narrowing/#/parameters", name), "1", "the same of this parameter",
+    list.number(pointer_join("/narrowing/#/parameters", name), "1", "the same for this parameter",
                 given_when("the measurement is not the parameter itself"));
   for (const Observable& observable : observables()) {
     const std::string at = "/surrogate/" + std::string(observable.name);
-    list.number(at + "/beds", "1", "beds whose number is known");
-    list.number(at + "/scatter", "1", "standard deviation between beds at one point");
-    list.text(at + "/scatter_is", "relative, or in the number's unit");
-    list.number(at + "/within_1", "1", "share of the beds within one standard deviation of what the others predict");
-    list.number(at + "/within_2", "1", "within two");
+    list.number(at + "/beds", "1", "number of beds for which this number is known");
+    list.number(at + "/scatter", "1", "standard deviation between beds with the same parameters");
+    list.text(at + "/scatter_is", "whether the scatter is relative or in the unit of the number");
+    list.number(at + "/within_1", "1",
+                "share of the beds within one standard deviation of the prediction from the others");
+    list.number(at + "/within_2", "1", "share within two standard deviations");
   }
   const Given calibrated = given_if(options.calibration > 0, "\"calibration\" is above 0");
   list.number("/calibration/beds", "1", "beds with known parameters", calibrated);
-  list.number("/calibration/within_68", "1", "share of the intervals of 68 % that hold the truth", calibrated);
-  list.number("/calibration/within_95", "1", "share of the intervals of 95 % that hold the truth", calibrated);
+  list.number("/calibration/within_68", "1", "share of the 68 % intervals that contain the true value", calibrated);
+  list.number("/calibration/within_95", "1", "share of the 95 % intervals that contain the true value", calibrated);
   for (const auto& [name, ignored] : options.parameters) {
     const std::string at = pointer_join("/calibration/parameters", name);
-    list.number(at + "/within_68", "1", "the same of this parameter", calibrated);
-    list.number(at + "/within_95", "1", "the same of this parameter", calibrated);
+    list.number(at + "/within_68", "1", "the same for this parameter", calibrated);
+    list.number(at + "/within_95", "1", "the same for this parameter", calibrated);
     list.number(at + "/rank_chi2_p", "1", "probability that uniformly distributed ranks are at least as uneven",
                 calibrated);
   }

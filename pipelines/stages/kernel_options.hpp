@@ -11,10 +11,10 @@ inline void describe_kernel(Fields& fields, Kernel& kernel) {
   for (const KernelKind kind : kernel_kinds) choices.push_back({kind, to_string(kind)});
   fields.choice(
       "kind", kernel.kind, choices,
-      {.help = "none: densities at points. A Gaussian does not alias with the rows of a crystal; a top hat of "
-               "1 D does. disk_chord: covered area"});
+      {.help = "none: densities at points; gaussian, top_hat: smoothing; disk_chord: covered area. The density of a "
+               "crystal oscillates with its rows; a top hat of 1 D can show false beats, a Gaussian does not"});
   fields.number("width", kernel.width,
-                {.help = "standard deviation (gaussian), full width (top_hat) or diameter (disk_chord) in D",
+                {.help = "standard deviation (gaussian), full width (top_hat) or diameter (disk_chord), in D",
                  .range = from_to(0, 100)});
 }
 

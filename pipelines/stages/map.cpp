@@ -23,41 +23,50 @@ class Map : public Stage {
  public:
   void describe(Fields& fields) override {
     fields.number("gamma", gamma_,
-                  {.help = "peak acceleration in g; left out, that of the simulated bed", .range = positive});
+                  {.help = "peak acceleration of the floor over g, Gamma; left out, that of the simulated bed",
+                   .range = positive});
     fields.quantity("frequency", frequency_, dimension::frequency,
                     {.help = "frequency of the shaking; left out, that of the simulated bed", .range = positive});
     fields.quantity("diameter", diameter_, dimension::length,
                     {.help = "diameter of a disk; left out, that of the simulated bed", .range = positive});
-    fields.quantity("gravity", gravity_, dimension::acceleration,
-                    {.help = "left out, that of the simulated bed, else 9.81 m/s^2", .range = positive});
-    fields.number("initial_height", initial_height_,
-                  {.help = "height mu of the bed at rest in D; left out, N D/W of the bed or of the frames over phi_0",
-                   .range = positive});
+    fields.quantity(
+        "gravity", gravity_, dimension::acceleration,
+        {.help = "acceleration of gravity; left out, that of the simulated bed, else 9.81 m/s^2", .range = positive});
+    fields.number(
+        "initial_height", initial_height_,
+        {.help = "height mu of the bed at rest, in D; left out, N D/W of the bed or of the frames, divided by phi_0",
+         .range = positive});
     fields.number("plateau_density", plateau_density_,
-                  {.help = "phi_0 in 1/D^2; left out, that of the fit", .range = positive});
-    fields.number("restitution", restitution_,
-                  {.help = "restitution of the single ball; 0: one flight, no rebound", .range = from_to(0, 0.99)});
-    fields.text("equation", equation_, {.help = "equation of state"});
-    fields.input_files("table", table_,
-                       {.help = "simulated beds of known temperature, as a study writes them (table.csv): T is "
-                                "interpolated among them, beside the theory; left out, that of the study in \"from\"",
-                        .example = "\"table.csv\""});
+                  {.help = "density phi_0 of the solid, in 1/D^2; left out, that of the fit", .range = positive});
+    fields.number(
+        "restitution", restitution_,
+        {.help = "coefficient of restitution of the single ball whose jump defines H_0; 0: one flight without rebound",
+         .range = from_to(0, 0.99)});
+    fields.text("equation", equation_,
+                {.help = "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
+                         "luding or best-of"});
+    fields.input_files(
+        "table", table_,
+        {.help = "table of simulated beds with known T, as written by a study (table.csv); T is interpolated in it, in "
+                 "addition to the theory. Left out, that of the study in \"from\"",
+         .example = "\"table.csv\""});
     fields.object<TableColumns>(
         "columns", columns_,
         [](Fields& f, TableColumns& c) {
-          f.text("temperature", c.temperature, {.help = "column that is T, in m g D"});
+          f.text("temperature", c.temperature, {.help = "column of T, in m g D"});
           f.texts(
               "axes", c.axes,
-              {.help = "parameters of the table: columns, or names in its series (\"restitution=0.9 friction=0.2\"), "
-                       "among gamma, frequency (Hz), restitution and friction (of the beads), initial_height"});
+              {.help = "parameters of the table, among gamma, frequency (Hz), restitution, friction and initial_height "
+                       "(D). Each is a column, or is named in the series (\"restitution=0.9 friction=0.2\")"});
         },
-        {.help = "how the table is read"});
+        {.help = "columns of the table"});
     fields.number(
         "bead_restitution", bead_restitution_,
-        {.help = "restitution of the beads, for the table; left out, that of the simulated bed", .range = zero_to_one});
-    fields.number(
-        "bead_friction", bead_friction_,
-        {.help = "friction of the beads, for the table; left out, that of the simulated bed", .range = non_negative});
+        {.help = "coefficient of restitution of the beads, for the table; left out, that of the simulated bed",
+         .range = zero_to_one});
+    fields.number("bead_friction", bead_friction_,
+                  {.help = "friction coefficient of the beads, for the table; left out, that of the simulated bed",
+                   .range = non_negative});
     if (!fields.decoding()) return;
     if (fit::find_equation_of_state(equation_) == nullptr) {
       try {
@@ -186,16 +195,16 @@ class Map : public Stage {
   static void state_readings(ResultList& list, const Given& measured) {
     const std::string row = "/readings/#/";
     list.text(row + "name", "name of the formula");
-    list.text(row + "jump_height", "how the jump height follows from Gamma");
-    list.text(row + "expansion", "how the expansion follows from T");
-    list.text(row + "constants", "whose constants");
-    list.text(row + "status", "whether the formula gives a temperature");
+    list.text(row + "jump_height", "definition of the jump height H_0");
+    list.text(row + "expansion", "relation between the rise of the bed and T");
+    list.text(row + "constants", "constants of the theory that are used");
+    list.text(row + "status", "ok, or why the formula gives no temperature");
     list.quantity(row + "jump", "D", "jump height of a single ball", {}, true);
     list.quantity(row + "rise", "D", "rise of the centre of mass", {}, true);
     list.quantity(row + "temperature", "m g D", "temperature", {}, true);
     list.quantity(row + "temperature_over_mg", "m", "temperature as T/(m g)", {}, true);
     list.quantity(row + "reduced_temperature", "1", "T/T_c", {}, true);
-    list.truth(row + "in_range", "whether its formula applies at this Gamma");
+    list.truth(row + "in_range", "whether the formula applies at this Gamma");
     list.quantity(row + "gamma_of_measured_temperature", "1", "Gamma at which the formula gives the fitted temperature",
                   measured, true);
     list.table({"map.csv",
@@ -214,16 +223,17 @@ class Map : public Stage {
     const Given asked = given_if(list.from("study") != nullptr || !table_.texts.empty(),
                                  "\"from\" names a study or \"table\" is given");
     const Given found = both(asked, given_when("the table of simulated beds gives a temperature"));
-    list.text("/simulated/status", "whether the table of simulated beds gives a temperature", asked);
+    list.text("/simulated/status", "ok, or why the table of simulated beds gives no temperature", asked);
     list.text("/simulated/message", "why it does not", both(asked, given_when("it does not")));
     list.number("/simulated/beds", "1", "beds in the table", asked);
     for (const std::string& axis : columns_.axes)
-      list.number("/simulated/at/" + axis, axis == "frequency" ? "Hz" : "1", "where the bed lies in the table", asked);
-    list.truth("/simulated/inside", "whether the bed lies inside the table", found);
+      list.number("/simulated/at/" + axis, axis == "frequency" ? "Hz" : "1", "value of this parameter for the bed",
+                  asked);
+    list.truth("/simulated/inside", "whether the bed lies within the range of the table", found);
     list.number("/simulated/interpolation_error", "1", "relative error of the interpolation", found, true);
-    list.quantity("/simulated/temperature", "m g D", "temperature by the table", found);
-    list.quantity("/simulated/temperature_over_mg", "m", "the same as T/(m g)", found);
-    list.quantity("/simulated/reduced_temperature", "1", "the same as T/T_c", found);
+    list.quantity("/simulated/temperature", "m g D", "temperature from the table", found);
+    list.quantity("/simulated/temperature_over_mg", "m", "temperature from the table, as T/(m g)", found);
+    list.quantity("/simulated/reduced_temperature", "1", "temperature from the table, as T/T_c", found);
   }
 
   // What the bed knows need not be stated again, and may not be stated otherwise.

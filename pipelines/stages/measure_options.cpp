@@ -9,29 +9,28 @@ namespace shakebed::pipelines {
 
 void BedMeasureOptions::describe(Fields& fields) {
   fields.quantity("settle", settle_, dimension::time,
-                  {.help = "time before anything is measured", .range = non_negative, .example = "\"10 s\""});
+                  {.help = "time before the measurement begins", .range = non_negative, .example = "\"10 s\""});
   fields.quantity(
       "measure", duration_, dimension::time,
       {.help = "time over which the bed is measured", .required = true, .range = positive, .example = "\"20 s\""});
   fields.object<sim::MeasureOptions>(
       "frames", measure_,
       [](Fields& f, sim::MeasureOptions& frames) {
-        f.integer("count", frames.frames, {.help = "frames of the trajectory to keep; 0 for none"});
-        f.integer(
-            "phases", frames.phases,
-            {.help = "moments of each period at which the bed is sampled; the frames pass through all of them in turn",
-             .range = from_to(1, 4096)});
+        f.integer("count", frames.frames, {.help = "number of frames of the trajectory that are kept; 0: none"});
+        f.integer("phases", frames.phases,
+                  {.help = "number of moments in each period at which the bed is sampled; the frames take them in turn",
+                   .range = from_to(1, 4096)});
       },
-      {.help = "the trajectory"});
+      {.help = "trajectory that is kept"});
   fields.object<sim::MeasureOptions>(
       "profile", measure_,
       [](Fields& f, sim::MeasureOptions& profile) {
         f.number("spacing", profile.spacing,
-                 {.help = "distance of the profile's heights in D", .range = from_to(1e-3, 10)});
+                 {.help = "distance between the heights of the profile, in D", .range = from_to(1e-3, 10)});
         f.object<Kernel>("kernel", profile.kernel, describe_measuring_kernel,
-                         {.help = "the window through which density is measured"});
+                         {.help = "kernel through which the density is measured"});
       },
-      {.help = "the density profile"});
+      {.help = "density profile"});
 }
 
 sim::MeasureOptions BedMeasureOptions::reduced(double time_unit) const {

@@ -1,5 +1,8 @@
 #include "pipelines/stages/render.hpp"
 
+#include <fmt/format.h>
+
+#include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
@@ -17,25 +20,30 @@ class Render : public Stage {
     fields.quantity("exposure", o.exposure, dimension::time,
                     {.help = "exposure time: disks are smeared along their velocity", .range = non_negative});
     fields.number("background_level", o.background_level,
-                  {.help = "grey level without a bead", .range = from_to(0, 255)});
+                  {.help = "grey level of the background", .range = from_to(0, 255)});
     fields.number("bead_level", o.bead_level, {.help = "grey level of a bead", .range = from_to(0, 255)});
     fields.choice("shading", o.shading,
                   {{Shading::flat, "flat"}, {Shading::shaded, "shaded"}, {Shading::highlight, "highlight"}},
                   {.help = "flat: one level; shaded: like a sphere; highlight: with a bright spot"});
     fields.number("shading_depth", o.shading_depth,
-                  {.help = "(centre - rim) as a part of the contrast", .range = from_to(-2, 2)});
+                  {.help = "difference of the grey levels of centre and rim, relative to the contrast of the bead",
+                   .range = from_to(-2, 2)});
     fields.number("gradient_x", o.gradient_x,
                   {.help = "relative change of the light from left to right", .range = from_to(-1, 1)});
     fields.number("gradient_y", o.gradient_y,
                   {.help = "relative change of the light from top to bottom", .range = from_to(-1, 1)});
     fields.number("vignette", o.vignette, {.help = "relative loss of light in the corners", .range = from_to(0, 0.9)});
-    fields.integer("margin", o.margin, {.help = "pixels around the box", .range = from_to(0, 2000)});
+    fields.integer("margin", o.margin,
+                   {.help = "width of the margin around the box, in pixels", .range = from_to(0, 2000)});
     fields.quantity("height", o.height, dimension::length,
                     {.help = "height of the view above the floor's mean position; up to the highest disk if left out",
                      .range = positive});
-    fields.integer("frames", o.frames, {.help = "largest number of frames; 0 for all"});
+    fields.integer("frames", o.frames, {.help = "largest number of frames that are drawn; 0: all"});
     fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
                    "Choose another level");
+    if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->keeps_frames)
+      fields.problem("/from", "the simulated bed keeps no frames, so there is nothing to photograph",
+                     fmt::format("Add \"frames\": {{\"count\": 640}} to {}", known->place));
   }
   void results(ResultList& list) const override {
     list.number("/frames", "1", "frames drawn");

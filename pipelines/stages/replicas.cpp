@@ -158,12 +158,12 @@ std::vector<std::string> replica_warnings(const std::vector<Json>& results, cons
   std::vector<std::string> warnings;
   const std::size_t n = results.size();
   if (const auto found = notable_spread(joined, n))
-    warnings.push_back(
-        fmt::format("the {} beds differ by more than chance: {} scatters by {:.2g}, each bed states {:.2g}{}. The "
-                    "result depends on how the bed was filled; the stated error allows for it. A longer \"settle\" may "
-                    "reduce the difference; more \"replicas\" reduce the error",
-                    n, found->what, found->spread, found->within,
-                    starts == ReplicaStarts::alternate ? " (" + by_start(results, found->key) + ")" : ""));
+    warnings.push_back(fmt::format(
+        "the {} beds differ by more than chance: {} scatters by {:.2g}, the stated error of each bed is {:.2g}{}. "
+        "The result depends on how the bed was filled; the stated error includes this. A longer \"settle\" may "
+        "reduce the difference; more \"replicas\" reduce the error",
+        n, found->what, found->spread, found->within,
+        starts == ReplicaStarts::alternate ? " (" + by_start(results, found->key) + ")" : ""));
   if (const auto found = notable_drift_of(joined))
     warnings.push_back(fmt::format(
         "the bed still changes while it is measured: {} is {} by {:.2g} ({:.2g} %) in the second half of the time, "

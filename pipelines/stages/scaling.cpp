@@ -98,24 +98,27 @@ Json scaling_json(const ScalingFit& options, const fit::PowerProduct& found, std
 }
 
 void describe_fit(Fields& fields, ScalingFit& fit) {
-  fields.text("name", fit.name, {.help = "its name in scaling.json and of its table", .required = true});
+  fields.text("name", fit.name, {.help = "name of the fit in scaling.json and of its CSV file", .required = true});
   fields.text("from", fit.from, {.help = "id of the study; may be left out when there is one"});
-  fields.text("y", fit.y, {.help = "column, with its errors beside it", .required = true});
-  fields.texts("powers", fit.powers, {.help = "columns whose powers are multiplied", .required = true});
+  fields.text(
+      "y", fit.y,
+      {.help = "column that is fitted; its errors are in the column std_error or y_error beside it", .required = true});
+  fields.texts("powers", fit.powers, {.help = "columns x_1, x_2, ... whose exponents are fitted", .required = true});
   fields.texts(
       "each", fit.each,
       {.help =
-           "columns whose every value has an amplitude of its own, so that only the powers at a fixed value count"});
-  fields.texts("series", fit.series, {.help = "series of the study that are used; none: all"});
+           "columns that divide the points into groups; each group has its own amplitude, all share the exponents"});
+  fields.texts("series", fit.series, {.help = "series of the study that are used; left out, all"});
   fields.map<ColumnLimits>("within", fit.within,
                            [](Fields& f, ColumnLimits& limits) {
                              f.number("least", limits.least, {.help = "smallest value that is used"});
                              f.number("most", limits.most, {.help = "largest value that is used"});
                            },
-                           {.help = "column → values of the points that are used"});
+                           {.help = "ranges of the points that are used: column → smallest and largest value"});
   fields.boolean(
       "common_error", fit.common_error,
-      {.help = "give all points the same relative error, the rms of their own errors; useful with few replicas"});
+      {.help =
+           "whether all points get the same relative error, the rms of their own errors; useful with few replicas"});
 }
 
 // The study, its columns and series must be there.
@@ -159,7 +162,7 @@ class Scaling : public Stage {
                                describe_fit(f, fit);
                                if (f.decoding() && f.has("name") && f.has("y") && f.has("powers")) check_fit(f, fit);
                              },
-                             {.help = "y = amplitude x_1^a_1 x_2^a_2 ... through the points", .required = true});
+                             {.help = "fits of y = amplitude x_1^a_1 x_2^a_2 ... to the points", .required = true});
     if (!fields.decoding()) return;
     for (std::size_t i = 0; i < fits_.size(); ++i) {
       for (std::size_t k = 0; k < i; ++k)
@@ -180,7 +183,8 @@ class Scaling : public Stage {
                     both(found, given_if(fit.each.empty(), "\"each\" names no column")));
       list.number(at + "/chi2", "1", "sum of the squared residuals of ln y over their errors", found);
       list.number(at + "/dof", "1", "degrees of freedom", found);
-      list.number(at + "/p_value", "1", "chance of so large a chi2", found);
+      list.number(at + "/p_value", "1", "probability of a chi-square at least this large, if the model is right",
+                  found);
       list.number(at + "/rms_log_ratio", "1", "rms of ln(y/fit)", found);
       std::vector<StatedColumn> columns{{"series", "", "kind of bed"}};
       for (const std::vector<std::string>* names : {&fit.powers, &fit.each}) {

@@ -23,15 +23,15 @@ constexpr Dimension cube_over_time{.length = 2, .time = -3};
 void describe_surface(Fields& fields, SurfaceOptions& surface) {
   fields.number("restitution", surface.restitution,
                 {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
-  fields.choice(
-      "restitution_law", surface.law,
-      {{sim::RestitutionLaw::constant, "constant"},
-       {sim::RestitutionLaw::power, "power"},
-       {sim::RestitutionLaw::viscoelastic, "viscoelastic"}},
-      {.help = "how e depends on the approach v. Constant: not at all. Power: 1 - (1 - e) (v/v0)^(3/4) below v0, e "
-               "above (Bizon 1998). Viscoelastic: as of viscoelastic spheres, e at v0 (Mueller and Poeschel 2011)"});
+  fields.choice("restitution_law", surface.law,
+                {{sim::RestitutionLaw::constant, "constant"},
+                 {sim::RestitutionLaw::power, "power"},
+                 {sim::RestitutionLaw::viscoelastic, "viscoelastic"}},
+                {.help = "how the restitution depends on the normal velocity v. Constant: it is e. Power: 1 - (1 - e) "
+                         "(v/v0)^(3/4) below v0, e above (Bizon 1998). Viscoelastic: as of viscoelastic spheres, e at "
+                         "v0 (Mueller and Poeschel 2011)"});
   fields.quantity("restitution_speed", surface.law_speed, dimension::velocity,
-                  {.help = "v0 of the restitution's law", .range = positive, .example = "\"0.3 m/s\""});
+                  {.help = "velocity v0 of the restitution law", .range = positive, .example = "\"0.3 m/s\""});
   if (fields.decoding())
     fields.require(
         (surface.law == sim::RestitutionLaw::constant) == !surface.law_speed, "restitution_speed",
@@ -75,13 +75,15 @@ void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<d
   std::optional<double> amplitude;
   if (fields.mode() == Fields::Mode::encode && !s.gamma) amplitude = s.amplitude;
   fields.quantity("amplitude", amplitude, dimension::length,
-                  {.help = "amplitude a; or give gamma", .range = positive, .example = "\"2.5 mm\""});
+                  {.help = "amplitude a of the floor; in its place, gamma can be given",
+                   .range = positive,
+                   .example = "\"2.5 mm\""});
   fields.number("gamma", s.gamma,
                 {.help = "peak acceleration of the floor over g, Gamma = a (2 pi f)^2/g, in place of the amplitude",
                  .range = positive,
                  .example = "4"});
   fields.quantity("frequency", s.frequency, dimension::frequency,
-                  {.help = "frequency f", .required = true, .range = positive, .example = "\"20 Hz\""});
+                  {.help = "frequency f of the floor", .required = true, .range = positive, .example = "\"20 Hz\""});
   fields.either("amplitude", "gamma", "Give \"amplitude\": \"2.5 mm\", or \"gamma\": 4");
   const double omega = 2 * std::numbers::pi * s.frequency;
   if (fields.decoding()) {
@@ -110,8 +112,8 @@ void describe_disks(Fields& f, DiskOptions& d) {
               {Material::brass, "brass"},
               {Material::polystyrene, "polystyrene"},
               {Material::acetate, "acetate"}},
-             {.help = "gives the density, where none is named, and the time that a real contact lasts "
-                      "(hertz_contact_time); restitution and friction are for the recipe to state"});
+             {.help = "material of the disks. It sets the density, if none is given, and the duration of a real "
+                      "contact (hertz_contact_time). It does not set restitution and friction"});
     if (f.decoding() && d.material != Material::unnamed) d.density = constants_of(d.material).density;
   }
   f.quantity("density", d.density, dimension::density, {.help = "mass density of the material", .range = positive});
@@ -139,117 +141,132 @@ void describe_disks(Fields& f, DiskOptions& d) {
         g.integer("count", s.count,
                   {.help = "number of disks of the second species", .required = true, .range = at_least(1)});
         g.quantity("diameter", s.diameter, dimension::length,
-                   {.help = "their diameter", .required = true, .range = positive});
+                   {.help = "diameter of the second species", .required = true, .range = positive});
         g.quantity("density", s.density, dimension::density,
-                   {.help = "their density (default: as the first)", .range = positive});
+                   {.help = "mass density of the second species; left out, that of the first", .range = positive});
       },
-      {.help = "a second species"});
+      {.help = "second species of disks"});
   f.require(!f.reduced() || d.diameter == 1, "diameter", "in reduced units the first species has diameter 1",
             "Leave it out, or leave out \"units\": \"reduced\"");
 }
 
 void describe_box(Fields& f, BoxOptions& b) {
-  f.quantity("width", b.width, dimension::length,
-             {.help = "distance of the sides W", .required = true, .range = positive, .example = "\"89.7 mm\""});
-  f.variant("sides", b.sides, {.help = "the sides"},
+  f.quantity(
+      "width", b.width, dimension::length,
+      {.help = "distance W between the side walls", .required = true, .range = positive, .example = "\"89.7 mm\""});
+  f.variant("sides", b.sides, {.help = "side walls of the box"},
             alternative<HardSidesOptions>("hard", "walls with their own restitution and friction",
                                           [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
             alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
-  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "nothing"),
-            alternative<FixedLidOptions>(
-                "fixed", "a wall",
-                [](Fields& g, FixedLidOptions& l) {
-                  g.quantity("height", l.height, dimension::length,
-                             {.help = "above the floor's mean position", .required = true, .range = positive});
-                  describe_surface(g, l.surface);
-                }),
-            alternative<PeriodicLidOptions>("periodic", "no floor and no lid: periodic upwards (weightless scenes)",
-                                            [](Fields& g, PeriodicLidOptions& l) {
-                                              g.quantity("height", l.height, dimension::length,
-                                                         {.help = "period", .required = true, .range = positive});
-                                            }));
+  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
+            alternative<FixedLidOptions>("fixed", "a wall at rest",
+                                         [](Fields& g, FixedLidOptions& l) {
+                                           g.quantity("height", l.height, dimension::length,
+                                                      {.help = "height of the lid above the mean position of the floor",
+                                                       .required = true,
+                                                       .range = positive});
+                                           describe_surface(g, l.surface);
+                                         }),
+            alternative<PeriodicLidOptions>(
+                "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
+                [](Fields& g, PeriodicLidOptions& l) {
+                  g.quantity(
+                      "height", l.height, dimension::length,
+                      {.help = "period of the box in the vertical direction", .required = true, .range = positive});
+                }));
 }
 
 void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravity) {
   f.tagged(
-      "motion", floor.motion, {.help = "how the floor moves"}, alternative<StillFloorOptions>("still", "not at all"),
+      "motion", floor.motion, {.help = "motion of the floor"},
+      alternative<StillFloorOptions>("still", "the floor does not move"),
       alternative<SinusoidalFloorOptions>(
           "sinusoidal", "a sin(2 pi f t)",
           [gravity](Fields& g, SinusoidalFloorOptions& s) { describe_shaking(g, s, gravity); }),
       alternative<TableFloorOptions>(
-          "table", "one period of measured positions, equally spaced in time; a periodic cubic spline between them",
+          "table", "one period of measured positions at equal time steps, with a periodic cubic spline between them",
           [](Fields& g, TableFloorOptions& t) {
             g.quantity("period", t.period, dimension::time,
-                       {.help = "period (default: that of the file's times)", .range = positive});
-            g.quantities("heights", t.heights, dimension::length,
-                         {.help = "positions in the order of time", .example = "[\"0 mm\", \"1 mm\", ...]"});
+                       {.help = "period of the motion; left out, from the times in the file", .range = positive});
+            g.quantities(
+                "heights", t.heights, dimension::length,
+                {.help = "positions of the floor in the order of time", .example = "[\"0 mm\", \"1 mm\", ...]"});
             g.input_files("file", t.file,
-                          {.help = "instead of heights: a CSV with the columns time,height in s and m "
-                                   "(reduced: sqrt(D/g) and D), or height alone"});
+                          {.help = "CSV file in place of heights, with the columns time and height in s and m (reduced "
+                                   "units: sqrt(D/g) and D), or height alone"});
             read_table(g, t);
           }));
   describe_surface(f, floor.surface);
 }
 
 void describe_bath(Fields& fields, BathOptions& bath) {
-  fields.variant(
-      "bath", bath, {.help = "a reservoir"}, alternative<NoBathOptions>("none", "none: driven by the floor only"),
-      alternative<LangevinOptions>(
-          "langevin", "every interval v -> v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi",
-          [](Fields& f, LangevinOptions& b) {
-            f.quantity("temperature", b.temperature, dimension::length,
-                       {.help = "T/(m g)", .required = true, .range = positive});
-            f.quantity("rate", b.rate, dimension::frequency,
-                       {.help = "friction rate", .required = true, .range = positive});
-            f.quantity("interval", b.interval, dimension::time,
-                       {.help = "time between kicks", .required = true, .range = positive});
-          }),
-      alternative<AndersenOptions>(
-          "andersen", "redraws single disks' velocities at random moments",
-          [](Fields& f, AndersenOptions& b) {
-            f.quantity("temperature", b.temperature, dimension::length,
-                       {.help = "T/(m g)", .required = true, .range = positive});
-            f.quantity("rate", b.rate, dimension::frequency,
-                       {.help = "redraws a disk and unit of time", .required = true, .range = positive});
-          }),
-      alternative<WhiteNoiseOptions>(
-          "white_noise", "random kicks without friction: heats against dissipation",
-          [](Fields& f, WhiteNoiseOptions& b) {
-            f.quantity("heating", b.heating, cube_over_time,
-                       {.help = "H/m: growth of the variance of each velocity component per time",
-                        .required = true,
-                        .range = positive});
-            f.quantity("interval", b.interval, dimension::time,
-                       {.help = "time between kicks", .required = true, .range = positive});
-            f.boolean("conserve_momentum", b.conserve_momentum, {.help = "take the mean kick away"});
-          }),
-      alternative<ThermalFloorOptions>("thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
-                                       [](Fields& f, ThermalFloorOptions& b) {
-                                         f.quantity("temperature", b.temperature, dimension::length,
-                                                    {.help = "T/(m g)", .required = true, .range = positive});
-                                       }));
+  fields.variant("bath", bath, {.help = "heat bath, in place of or in addition to shaking"},
+                 alternative<NoBathOptions>("none", "no bath, the floor alone drives the bed"),
+                 alternative<LangevinOptions>(
+                     "langevin",
+                     "every interval, v becomes v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi, with "
+                     "xi a normal random number",
+                     [](Fields& f, LangevinOptions& b) {
+                       f.quantity("temperature", b.temperature, dimension::length,
+                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+                       f.quantity("rate", b.rate, dimension::frequency,
+                                  {.help = "friction rate", .required = true, .range = positive});
+                       f.quantity("interval", b.interval, dimension::time,
+                                  {.help = "time between two kicks", .required = true, .range = positive});
+                     }),
+                 alternative<AndersenOptions>(
+                     "andersen", "the velocity of a disk is drawn again at random moments",
+                     [](Fields& f, AndersenOptions& b) {
+                       f.quantity("temperature", b.temperature, dimension::length,
+                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+                       f.quantity("rate", b.rate, dimension::frequency,
+                                  {.help = "rate at which the velocity of each disk is drawn again",
+                                   .required = true,
+                                   .range = positive});
+                     }),
+                 alternative<WhiteNoiseOptions>(
+                     "white_noise", "random kicks without friction",
+                     [](Fields& f, WhiteNoiseOptions& b) {
+                       f.quantity("heating", b.heating, cube_over_time,
+                                  {.help = "heating H/m: increase of the variance of each velocity component per time",
+                                   .required = true,
+                                   .range = positive});
+                       f.quantity("interval", b.interval, dimension::time,
+                                  {.help = "time between two kicks", .required = true, .range = positive});
+                       f.boolean(
+                           "conserve_momentum", b.conserve_momentum,
+                           {.help = "whether the mean of all kicks is subtracted, so that momentum is conserved"});
+                     }),
+                 alternative<ThermalFloorOptions>(
+                     "thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
+                     [](Fields& f, ThermalFloorOptions& b) {
+                       f.quantity("temperature", b.temperature, dimension::length,
+                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+                     }));
 }
 
 void describe_start(Fields& fields, StartOptions& start) {
   fields.variant(
-      "start", start, {.help = "where the disks are at first"},
+      "start", start, {.help = "initial positions of the disks"},
       alternative<HexagonalStartOptions>(
           "hexagonal", "staggered rows from the floor up, or filling a closed box evenly",
           [](Fields& f, HexagonalStartOptions& s) {
-            f.integer("disks_a_row", s.disks_a_row, {.help = "0: as many as fit"});
+            f.integer("disks_a_row", s.disks_a_row, {.help = "number of disks in a row; 0: as many as fit"});
             f.number("spacing", s.spacing,
-                     {.help = "distance of neighbours in a row in D; 0: chosen from the width", .range = non_negative});
+                     {.help = "distance between neighbours in a row, in D; 0: chosen from the width",
+                      .range = non_negative});
           }),
       alternative<RandomStartOptions>("random", "random sequential insertion",
                                       [](Fields& f, RandomStartOptions& s) {
                                         f.quantity(
                                             "height", s.height, dimension::length,
-                                            {.help = "fills the box up to here; 0: chosen", .range = non_negative});
+                                            {.help = "height up to which the box is filled; 0: chosen by the program",
+                                             .range = non_negative});
                                       }),
-      alternative<FileStartOptions>("file", "the last frame of a trajectory (extended XYZ, lengths in D)",
-                                    [](Fields& f, FileStartOptions& s) {
-                                      f.input_files("file", s.file, {.help = "trajectory", .required = true});
-                                    }));
+      alternative<FileStartOptions>(
+          "file", "the last frame of a trajectory (extended XYZ, lengths in D)", [](Fields& f, FileStartOptions& s) {
+            f.input_files("file", s.file, {.help = "file of the trajectory", .required = true});
+          }));
 }
 
 // speed_unit: sqrt(g D) [m/s].
@@ -350,9 +367,9 @@ void SceneOptions::describe(Fields& fields) {
   describe_start(fields, start_);
   if (fields.decoding() || fields.mode() == Fields::Mode::schema)
     start_temperature_ = weightless() ? 1.0 : 0.01 * (reduced_ ? 1.0 : disks_.diameter);
-  fields.quantity(
-      "start_temperature", start_temperature_, dimension::length,
-      {.help = "T/(m g) of the first velocities (weightless: 1, the unit of energy)", .range = non_negative});
+  fields.quantity("start_temperature", start_temperature_, dimension::length,
+                  {.help = "temperature T/(m g) of the initial velocities (without gravity: 1, the unit of energy)",
+                   .range = non_negative});
   if (fields.decoding() && fields.problem_count() == 0) check_scene(fields);
 }
 

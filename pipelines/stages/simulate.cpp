@@ -52,6 +52,7 @@ class Simulate : public Stage {
                              .observe = ObserveOptions::from(observe_)});
   }
   Json facts() const override { return bed_.facts(); }
+  bool keeps_frames() const override { return measure_.keeps_frames(); }
   void run(RunContext& context) const override;
   std::optional<BedDescription> bed() const override;
 
@@ -86,7 +87,7 @@ void Simulate::describe(Fields& fields) {
       "schedule", annealing_,
       [](Fields& f, AnnealingStep& step) {
         f.quantity("temperature", step.temperature, dimension::length,
-                   {.help = "T/(m g) of the reservoir", .required = true, .range = positive});
+                   {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
         f.quantity("ramp", step.ramp, dimension::time,
                    {.help = "time in which T changes linearly to this temperature, from that of the previous step (or "
                             "of the bath)",
@@ -96,23 +97,24 @@ void Simulate::describe(Fields& fields) {
             {.help = "time at this temperature; its second half is averaged for schedule.csv", .range = non_negative});
       },
       {.help =
-           "annealing: temperatures of the bath, one after the other, before the bed settles; it stays at the last"});
+           "annealing before the bed settles: temperatures of the bath, one after the other; the last one remains"});
   fields.texts("observe", observe_,
-               {.help = "measured only when named: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
+               {.help = "additional measurements: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
                         "displacement, pressure (by height, exact time averages), phases (means by height and phase), "
                         "species (temperatures of two species)"});
   fields.integer("replicas", replicas_,
-                 {.help = "number of beds, each with its own seed; results are means, errors hold for the next bed. 4 "
-                          "by default where the floor shakes a dissipative bed that is open above, else 1",
+                 {.help = "number of beds, each with its own seed. Results are means, and errors hold for the next "
+                          "bed. Default: 4 for a shaken, dissipative bed without a lid, else 1",
                   .range = from_to(1, 10'000)});
   fields.choice("replica_starts", starts_, {{ReplicaStarts::alternate, "alternate"}, {ReplicaStarts::same, "same"}},
-                {.help = "alternate: on a shaken floor every second bed starts from a random fill instead of the "
-                         "hexagonal packing, so the spread shows this effect; same: all start as the first"});
+                {.help = "start of the replicas. Alternate: on a shaken floor every second bed starts from random "
+                         "positions, so the scatter shows the effect of the start. Same: all start as the first"});
   fields.number(
       "checkpoint_seconds", checkpoint_seconds_,
       {.help = "interval of checkpoints: a killed run continues from a state at most about this old; 0: no checkpoints",
        .range = non_negative});
-  fields.boolean("compress", compress_, {.help = "trajectory.extxyz.zst instead of .extxyz"});
+  fields.boolean("compress", compress_,
+                 {.help = "whether the trajectory is compressed (trajectory.extxyz.zst instead of trajectory.extxyz)"});
   if (fields.decoding()) check(fields);
 }
 

@@ -233,8 +233,8 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
   throw StageError(fmt::format(
       "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
       simulation.time(), simulation.counters().collisions(), trouble,
-      last_sound.empty() ? std::string("there is no earlier sound state")
-                         : "its last sound state is kept in " + checkpoint.string()));
+      last_sound.empty() ? std::string("no earlier state was kept")
+                         : "the last precise state is kept in " + checkpoint.string()));
 }
 
 }  // namespace shakebed::pipelines

@@ -162,6 +162,8 @@ class Stage {
   virtual void results(ResultList& list) const = 0;
   // What follows from the options and is worth knowing before a run, as quantities: {"gamma": {...}}.
   virtual Json facts() const { return Json::object(); }
+  // Whether the stage keeps frames of its bed. Called after describe.
+  virtual bool keeps_frames() const { return true; }
   virtual void run(RunContext& context) const = 0;
   // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
   // state it again, and may not state it otherwise.

@@ -165,11 +165,12 @@ Number taken(const Collected& c, const fs::path& path) {
 }
 
 void describe_parameter(Fields& f, Parameter& p) {
-  f.text("name", p.name, {.help = "name of its column"});
-  f.numbers("values", p.values, {.help = "its values", .required = true});
-  f.number("times", p.times, {.help = "factor: the value times this number is written into the chain"});
-  f.text("unit", p.unit, {.help = "unit of what is written into the chain; none: a plain number"});
-  f.texts("set", p.set, {.help = "pointers into the chain that take it: /stages/bed/bath/temperature"});
+  f.text("name", p.name, {.help = "name of the parameter's column in table.csv"});
+  f.numbers("values", p.values, {.help = "values of the parameter", .required = true});
+  f.number("times", p.times, {.help = "factor: the value times this number is set in the chain"});
+  f.text("unit", p.unit, {.help = "unit of the value that is set in the chain; empty: a plain number"});
+  f.texts("set", p.set,
+          {.help = "JSON pointers of the options of the chain that are set: /stages/bed/bath/temperature"});
 }
 
 // A whole number is written as one: a count takes nothing else.
@@ -180,50 +181,53 @@ Json written_value(const Parameter& parameter, double value) {
 
 void Study::describe(Fields& fields) {
   fields.any("stages", chain_,
-             {.help = "the chain that is run at every point: stages as in a recipe, which read no files of their own",
+             {.help = "stages that are run at every point, as in a recipe; they must not read files of the user",
               .required = true});
-  fields.object<Parameter>("parameter", parameter_, describe_parameter, {.help = "what is varied", .required = true});
+  fields.object<Parameter>("parameter", parameter_, describe_parameter,
+                           {.help = "parameter that is varied", .required = true});
   fields.object<Parameter>("second", second_, describe_parameter,
                            {.help = "a second parameter: every value of the first with every value of this one"});
   fields.map<Change>("series", series_,
                      [](Fields& f, Change& change) {
                        Json set = Json::object();
                        for (const auto& [pointer, value] : change.set) set[pointer] = value;
-                       f.any("set", set, {.help = "JSON pointer into the chain → value"});
+                       f.any("set", set, {.help = "changes of the chain: JSON pointer → value"});
                        f.number("times", change.times,
-                                {.help = "factor of the parameter in this series, instead of its own"});
+                                {.help = "factor of the parameter in this series, in place of \"times\""});
                        if (!f.decoding()) return;
                        f.require(set.is_object(), "set", "expected an object: pointer → value");
                        change.set.clear();
                        if (set.is_object())
                          for (const auto& [pointer, value] : set.items()) change.set.emplace_back(pointer, value);
                      },
-                     {.help = "kinds of beds: name → what is changed in the chain for it; none: one series, \"all\""});
+                     {.help = "kinds of beds: name → changes of the chain; left out, one series named \"all\""});
   fields.map<Collected>(
       "collect", collect_,
       [](Fields& f, Collected& c) {
         f.text("at", c.at,
-               {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv with a column", .required = true});
-        f.text("column", c.column, {.help = "column of the table of which one number is taken"});
+               {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv together with \"column\"",
+                .required = true});
+        f.text("column", c.column, {.help = "column of the CSV file from which one number is taken"});
         f.choice("take", c.take, takes,
-                 {.help = "which number: the largest or smallest, its place (noise makes the largest too large and the "
-                          "smallest too small), or the mean of the rows"});
-        f.text("by", c.by, {.help = "column that says where"});
-        f.number("least", c.least, {.help = "smallest place that is used"});
-        f.number("most", c.most, {.help = "largest place that is used"});
-        f.number("times", c.times, {.help = "factor"});
-        f.number("plus", c.plus, {.help = "added after the factor"});
+                 {.help = "which number: the largest or smallest, its place, or the mean of the rows. Noise makes the "
+                          "largest too large and the smallest too small"});
+        f.text("by", c.by, {.help = "column that gives the place, for \"take\", \"least\" and \"most\""});
+        f.number("least", c.least, {.help = "smallest place that is used, in the unit of that column"});
+        f.number("most", c.most, {.help = "largest place that is used, in the unit of that column"});
+        f.number("times", c.times, {.help = "factor of the collected number"});
+        f.number("plus", c.plus, {.help = "constant that is added after the factor"});
       },
-      {.help = "name of a column → where its number is", .required = true});
+      {.help = "collected numbers: name of a column of table.csv → where the number is", .required = true});
   fields.map<Tabulated>(
       "tables", tables_,
       [](Fields& f, Tabulated& t) {
-        f.text("at", t.at, {.help = "/<stage id>/<file>.csv", .required = true});
-        f.text("key", t.key, {.help = "column by which rows of replicas are matched", .required = true});
+        f.text("at", t.at, {.help = "file of a stage of the chain: /<stage id>/<file>.csv", .required = true});
+        f.text("key", t.key, {.help = "column by which the rows of the replicas are matched", .required = true});
       },
-      {.help = "name of a CSV of this stage → the chain's file whose rows are averaged over the replicas in it"});
+      {.help = "averaged tables: name of a CSV file of this stage → file of the chain whose rows are averaged over the "
+               "replicas"});
   fields.integer("replicas", replicas_,
-                 {.help = "runs at every point, each with its own seeds", .range = from_to(1, 1000)});
+                 {.help = "number of runs at every point, each with its own seed", .range = from_to(1, 1000)});
   if (!fields.decoding() || fields.problem_count() > 0) return;
   fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
   fields.require(!collect_.empty(), "collect", "nothing is collected");
@@ -258,7 +262,7 @@ std::vector<StatedColumn> Study::place_columns() const {
   std::vector<std::string> names;
   for (const Kind& kind : kinds_) scaled |= kind.change.times.value_or(1) != 1, names.push_back(kind.name);
   std::vector<StatedColumn> columns{{"series", "", "kind of bed", names},
-                                    {parameter_.name, unit_of(parameter_, scaled), "what is varied"}};
+                                    {parameter_.name, unit_of(parameter_, scaled), "parameter that is varied"}};
   if (second_) columns.push_back({second_->name, unit_of(*second_, second_->times != 1), "what is varied, too"});
   return columns;
 }
@@ -367,8 +371,8 @@ void Study::results(ResultList& list) const {
   const std::vector<std::string> names = columns.front().values;
   std::vector<StatedColumn> runs = columns;
   runs.push_back({"replica", "1", "number of the run"});
-  list.number("/replicas", "1", "runs at every point");
-  list.number("/runs", "1", "runs altogether");
+  list.number("/replicas", "1", "number of runs at every point");
+  list.number("/runs", "1", "total number of runs");
   for (const auto& [name, collected] : collect_) {
     const auto tokens = split_pointer(collected.at);
     const ChainStage* stage = first_->find(tokens.front());

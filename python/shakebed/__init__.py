@@ -6,8 +6,8 @@
 ...                            kernel=bed.profile.kernel)
 >>> print(fit.brief())
 
-Lengths are in D (the diameter of a disk), temperatures in m g D, unless a unit is named; arguments with a unit are strings
-("2.99 mm") or numbers in SI.
+Lengths are in D (the diameter of a disk) and temperatures in m g D, unless a unit is named. Arguments with a unit are
+strings ("2.99 mm") or numbers in SI.
 """
 
 from ._core import version as __version__

@@ -1,4 +1,4 @@
-"""What can go wrong. Every exception carries the exit code that the command line ends with for the same mistake."""
+"""Exceptions and warnings. Each exception has the exit code of the command line for the same mistake."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ class Error(RuntimeError):
     Attributes
     ----------
     exit_code : int
-        That of the command line: 2 usage, 3 recipe, 4 input file, 5 stage, 6 check.
-    file, pointer, suggestion : str
-        Where it is ("" where there is no such place) and what to do.
+        Exit code of the command line: 2 usage, 3 recipe, 4 input file, 5 stage, 6 check.
+    file, pointer : str
+        Place of the mistake: a file and a JSON pointer; "" if there is no such place.
     line, column : int
-        Place in the file, from 1; 0 where there is none.
+        Place in the file, from 1; 0 if unknown.
+    suggestion : str
+        What to do; "" if there is no suggestion.
     """
 
     exit_code = 5
@@ -29,19 +31,19 @@ class Error(RuntimeError):
 
 
 class UsageError(Error, ValueError):
-    """An argument that makes no sense."""
+    """An argument is invalid."""
 
     exit_code = 2
 
 
 class RecipeError(Error, ValueError):
-    """Mistakes in a recipe or a scene, all at once.
+    """All mistakes of a recipe or a scene.
 
     Attributes
     ----------
     problems : list of dict
-        Each with file, line, column, pointer, problem, suggestion. The attributes of the exception are those of the
-        first.
+        Keys: file, line, column, pointer, problem, suggestion. The attributes of the exception are those of the first
+        mistake.
     """
 
     exit_code = 3
@@ -49,30 +51,36 @@ class RecipeError(Error, ValueError):
 
 
 class InputError(Error, ValueError):
-    """A file that is missing, unreadable or not what it should be."""
+    """A file is missing, unreadable or has the wrong content."""
 
     exit_code = 4
 
 
 class StageError(Error):
-    """A stage, a simulation or a measurement that could not do its work."""
+    """A stage, a simulation or a measurement failed."""
 
     exit_code = 5
 
 
 class CheckFailed(Error):
-    """The run is complete, but a result is not what its recipe expects. `results` holds it."""
+    """A run is complete, but a result differs from the expectation of its recipe.
+
+    Attributes
+    ----------
+    results : Results
+        All results of the run.
+    """
 
     exit_code = 6
     results: Any = None
 
 
 class BedWarning(UserWarning):
-    """What is odd about a scene or an argument, though it makes sense: issued by Python's `warnings`."""
+    """A scene or an argument is valid, but unusual. Python's `warnings` issues it."""
 
 
 def check_options(function: str, options: Iterable[str], known: frozenset[str]) -> None:
-    """TypeError, as of Python itself, for an option that the function does not have."""
+    """Raise TypeError for an option that the function does not have."""
     for name in options:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
@@ -100,7 +108,7 @@ def input_error(message: str, file: str) -> Error:
     return error
 
 
-# "profile.csv:3: ...", how messages about a file begin.
+# Messages about a file begin with "profile.csv:3: ...".
 _place = re.compile(r"(?P<file>\S[^:\n]*):(?:(?P<line>\d+):)? ")
 
 

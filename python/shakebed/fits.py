@@ -22,7 +22,11 @@ close_packing_density = 2 / math.sqrt(3)
 
 
 class Fit:
-    """The result of `fit_profile`. Temperatures in m g D, lengths in D."""
+    """The result of `fit_profile`.
+
+    Temperatures are in m g D, lengths in D and densities in 1/D^2. A number that the fit does not give raises
+    AttributeError.
+    """
 
     def __init__(self, fit: _core.Fit) -> None:
         self._fit = fit
@@ -38,22 +42,33 @@ class Fit:
 
     @property
     def ok(self) -> bool:
+        """Whether the fit has a result."""
         return self._fit.ok
 
     @property
     def message(self) -> str:
-        """One sentence, when not ok."""
+        """Reason, if there is no result; else empty."""
         return self._fit.message
 
     @property
     def warnings(self) -> list[str]:
+        """Warnings of the fit, one sentence or more each."""
         return self._fit.warnings
 
     def _quantity(self, name: str) -> Quantity:
         entry = self._numbers.get(name)
         if entry is None:
-            raise AttributeError(f"the fit has no {name}: {self.status}")
+            raise AttributeError(f"the fit has no {name}: {self._why_missing(name)}")
         return Quantity(entry["value"], entry.get("std_error"), entry.get("unit", "1"))
+
+    def _why_missing(self, name: str) -> str:
+        if not self.ok:
+            return self.message or self.status
+        if name.endswith("_over_mg"):
+            return 'a length needs the diameter of a disk; call fit_profile with diameter="2.99 mm"'
+        if name == "critical_temperature":
+            return "T_c needs N D/W; call fit_profile with column_number"
+        return self.status
 
     @property
     def temperature(self) -> Quantity:
@@ -62,39 +77,47 @@ class Fit:
 
     @property
     def temperature_over_mg(self) -> Quantity:
-        """T/(m g) in m; only with a diameter."""
+        """T/(m g) in m. It needs a diameter."""
         return self._quantity("temperature_over_mg")
 
     @property
     def solid_height(self) -> Quantity:
-        """zeta_F in D."""
+        """Height zeta_F of the solid, in D."""
         return self._quantity("solid_height")
 
     @property
     def plateau_density(self) -> Quantity:
-        """phi_0 in 1/D^2."""
+        """Density phi_0 of the solid, in 1/D^2."""
         return self._quantity("plateau_density")
 
     @property
     def shift(self) -> Quantity:
-        """Height where the tail reaches phi_0, in D."""
+        """Height at which the fluid part of the model begins, in D."""
         return self._quantity("shift")
 
     @property
     def critical_temperature(self) -> Quantity:
-        """T_c in m g D."""
+        """Critical temperature T_c, in m g D. It needs N D/W."""
         return self._quantity("critical_temperature")
 
     @property
     def chi2_per_dof(self) -> float:
+        """Chi-square per degree of freedom."""
         return float(self._numbers["chi2_per_dof"])
 
     def curve(self) -> dict[str, Array]:
-        """height, density (the bare model) and smoothed_density (what is compared with the data)."""
+        """The fitted model.
+
+        Returns
+        -------
+        dict of ndarray, shape (points,)
+            height (D), density (1/D^2) and smoothed_density (1/D^2): the model before and after smoothing with the
+            kernel. The second is compared with the data.
+        """
         return self._fit.curve()
 
     def to_dict(self) -> dict[str, Any]:
-        """All of fit.json."""
+        """All numbers of fit.json."""
         return self._numbers
 
     def brief(self) -> str:
@@ -102,7 +125,7 @@ class Fit:
         return self._fit.brief()
 
     def full(self) -> str:
-        """The result, a line a number, then the warnings."""
+        """The result with one line per number, then the warnings."""
         return self._fit.full()
 
     def __repr__(self) -> str:
@@ -138,28 +161,57 @@ def fit_profile(
     Parameters
     ----------
     height, density : array_like, shape (heights,)
-        Heights in D above the mean position of the floor, and n D^2.
+        Heights above the mean position of the floor [D] and number densities n D^2 [1/D^2].
     error : array_like, shape (heights,), or float, optional
-        Standard errors of the densities; one number: of all.
+        Standard errors of the densities [1/D^2]. One number stands for all heights.
     covariance : array_like, shape (heights, heights), optional
-        Of the densities, in place of `error`.
+        Covariance of the densities [1/D^4], in place of `error`.
     covariance_samples : int
-        Independent samples behind the covariance; 0: not known.
+        Number of independent samples from which the covariance was estimated; 0: unknown.
     kernel : str
-        The window through which the density was measured: "none", "gaussian:0.5", "top_hat:1", "disk_chord:1" (widths
-        in D).
+        Kernel through which the density was measured: "none", "gaussian:0.5", "top_hat:1" or "disk_chord:1" (widths in
+        D).
     diameter : str or float, optional
-        D ("2.99 mm", or in m), for T/(m g) as a length.
+        Diameter D of a disk ("2.99 mm", or a number in m), for T/(m g) as a length.
     **options
-        model ("enskog-rectangle", "hydrostatic:<equation of state>", "fermi", "rectangle"), plateau_density,
-        plateau_density_free, column_number, constrain_column, fixed_temperature, fixed_shift, window (low, high; None
-        leaves an end to the rule), base,
-        robust, model_error, interval, sweep, compare, confidence.
+        Options of the stage fit:
+
+        model : str
+            "enskog-rectangle" (default), "hydrostatic:<equation of state>", "fermi" or "rectangle".
+        plateau_density : float
+            Density phi_0 of the solid [1/D^2]; 2/sqrt(3) by default.
+        plateau_density_free : bool
+            Whether phi_0 is fitted.
+        column_number : float
+            N D/W, for T_c.
+        constrain_column : bool
+            Whether the shift follows from T and column_number.
+        fixed_temperature, fixed_shift : float
+            Fixed values of T [m g D] and of the shift [D].
+        window : (float, float)
+            Lowest and highest height of the fit [D]; None leaves an end to the rule.
+        base : float
+            Lower edge of the bed [D].
+        robust : bool
+            Whether outliers count linearly (Huber's loss).
+        model_error : bool
+            Whether the misfit of the model is added to the errors.
+        interval : bool
+            Whether an interval of T is computed.
+        sweep, compare : bool
+            Whether other windows and other models are fitted too.
+        confidence : float
+            Confidence level of the intervals, 0.95 by default.
 
     Returns
     -------
     Fit
-        What is wrong with the data is in its status and message; nothing is raised for it.
+        Its `status` and `message` say what is wrong with the data. Bad data raise no exception.
+
+    Raises
+    ------
+    UsageError
+        An argument has the wrong type or shape.
     """
     check_options("fit_profile", options, _fit_options)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
@@ -191,10 +243,25 @@ def find_answer(
 ) -> dict[str, Any]:
     """One temperature from all thermometers, with its whole uncertainty and a verdict (see docs/thermometer.md).
 
-    Parameters are those of `fit_profile`; temperature_x and temperature_z are the kinetic temperatures in m g D, where
-    velocities are known. Returns a dict with verdict, why, advice, temperature, std_error, low, high
-    (m g D), solid_height, thermometer, model, status. Where the status is not "ok", the numbers are None, and why and
-    advice say the reason.
+    Parameters
+    ----------
+    height, density, error, covariance, covariance_samples, kernel
+        As for `fit_profile`.
+    column_number : float, optional
+        N D/W. It makes the answer more precise.
+    temperature_x, temperature_z : Quantity, (float, float) or float, optional
+        Kinetic temperatures [m g D], if velocities are known: a value, or a value with its standard error.
+
+    Returns
+    -------
+    dict
+        verdict, why, advice, status, thermometer, model : str
+        temperature, std_error, low, high : float or None
+            T, its standard error and its interval [m g D].
+        solid_height : float or None
+            Height of the solid [D].
+
+        The numbers are None if the status is not "ok". Then why and advice give the reason.
     """
     return _core.find_answer(height, density, error, covariance, int(covariance_samples), kernel,
                              None if column_number is None else number(column_number, "column_number"),
@@ -222,25 +289,32 @@ def theory(
     Parameters
     ----------
     plateau_density : float
-        phi_0 in 1/D^2.
+        Density phi_0 of the solid [1/D^2].
     equation_of_state : str
         enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, best-of, or all.
     diameter : str or float, optional
-        D ("2.99 mm", or in m), for lengths.
+        Diameter D of a disk ("2.99 mm", or a number in m), for lengths.
     initial_height : str or float, optional
-        Height mu of the bed at rest: a length with its unit, or a number in D. Or give column_number, N D/W.
+        Height mu of the bed at rest: a length with its unit, or a number in D.
+    column_number : float, optional
+        N D/W, in place of initial_height.
     temperature : str or float, optional
         T/(m g) as a length with its unit, or T in m g D.
 
     Returns
     -------
     dict
-        As ``shakebed theory --json`` prints it.
+        The object that ``shakebed theory --json`` prints.
+
+    Raises
+    ------
+    UsageError
+        A value is outside its range, or T is given without the height of the bed.
     """
     plateau_density = _checked_plateau(plateau_density)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
     if initial_height is not None and column_number is not None:
-        raise UsageError("initial_height and column_number say the same thing: give one")
+        raise UsageError("initial_height and column_number are equivalent: give one")
     height = None if initial_height is None else in_diameters(initial_height, length, "initial_height")
     if column_number is not None:
         height = number(column_number, "column_number") / plateau_density
@@ -265,23 +339,30 @@ def gamma_to_temperature(
     restitution: float = 0.0,
     equation_of_state: str = "enskog",
 ) -> dict[str, Any]:
-    """T from Gamma by every reading of the paper's map [QuinnHong2000].
+    """T from Gamma by every formula that the paper allows [QuinnHong2000].
 
     Parameters
     ----------
     gamma : float
-        Peak acceleration of the floor over g; or give its amplitude.
-    frequency, diameter, amplitude, gravity : str or float
-        With their units, or in SI.
+        Peak acceleration of the floor over g.
+    amplitude : str or float
+        Amplitude of the floor with its unit, or in m, in place of gamma.
+    frequency, diameter, gravity : str or float
+        Strings with a unit, or numbers in Hz, m and m/s^2.
     initial_height : str or float
         Height mu of the bed at rest: a length with its unit, or a number in D.
     restitution : float
-        Of the single ball; 0: one flight of a dead ball.
+        Coefficient of restitution of the single ball; 0: one flight without rebound.
+    plateau_density : float
+        Density phi_0 of the solid [1/D^2].
+    equation_of_state : str
+        As for `theory`.
 
     Returns
     -------
     dict
-        As ``shakebed map --json`` prints it: "readings" is a list, each with name, jump_height, temperature, in_range.
+        The object that ``shakebed map --json`` prints. "readings" is a list with one entry per formula: name,
+        jump_height, temperature, in_range and others.
     """
     f = in_si(frequency, "frequency", "frequency")
     g = in_si(gravity, "acceleration", "gravity")

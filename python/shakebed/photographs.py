@@ -29,7 +29,10 @@ def _checked(options: dict[str, Any], known: frozenset[str], function: str) -> d
 
 
 class Disks:
-    """Disks found in one image. Pixels: the centre of the top-left one is (0, 0), x to the right, y downwards."""
+    """Disks found in one image.
+
+    Coordinates are in pixels. The centre of the top-left pixel is (0, 0), x points to the right and y downwards.
+    """
 
     def __init__(self, found: _images.Disks) -> None:
         self._found = found
@@ -37,35 +40,37 @@ class Disks:
 
     @property
     def x(self) -> Array:
-        """Of the centres, in px: shape (disks,)."""
+        """Horizontal positions of the centres [px], shape (disks,)."""
         return self._columns["x"]
 
     @property
     def y(self) -> Array:
+        """Vertical positions of the centres [px], downwards, shape (disks,)."""
         return self._columns["y"]
 
     @property
     def std_error(self) -> Array:
-        """Of the centres, in px, along x and y: shape (disks, 2)."""
+        """Standard errors of the centres along x and y [px], shape (disks, 2)."""
         return np.sqrt(np.column_stack([self._columns["variance_x"], self._columns["variance_y"]]))
 
     @property
     def quality(self) -> Array:
-        """0 to 1; 1 is a bead like all the others."""
+        """Quality from 0 to 1, shape (disks,); 1 is a bead that looks like all others."""
         return self._columns["quality"]
 
     @property
     def probability(self) -> Array:
-        """That it is a bead."""
+        """Probability that the disk is a bead, shape (disks,)."""
         return self._columns["probability"]
 
     @property
     def radius(self) -> float:
-        """Of a bead, in px."""
+        """Radius of a bead [px]."""
         return self._found.radius
 
     @property
     def radius_std_error(self) -> float:
+        """Standard error of the radius [px]."""
         return self._found.radius_std_error
 
     @property
@@ -75,16 +80,17 @@ class Disks:
 
     @property
     def expected_wrong(self) -> float:
-        """Share of the disks that are no beads, by their probabilities."""
+        """Expected share of found disks that are no beads."""
         return self._found.expected_wrong
 
     @property
     def warnings(self) -> list[str]:
+        """Warnings, one sentence or more each."""
         return self._found.warnings
 
     @property
     def message(self) -> str:
-        """Why there are none."""
+        """Reason why no disks were found; else empty."""
         return self._found.message
 
     def __len__(self) -> int:
@@ -95,7 +101,7 @@ class Disks:
         return self._found.brief()
 
     def full(self) -> str:
-        """The result, a line a number, then the warnings."""
+        """The result with one line per number, then the warnings."""
         return self._found.full()
 
     def __repr__(self) -> str:
@@ -108,20 +114,31 @@ class Disks:
 
 
 def find_disks(image: NDArray[Any], **options: Any) -> Disks:
-    """Find the disks of one image, with nothing to guess.
+    """Find the disks of one image. No option is required.
 
     Parameters
     ----------
     image : ndarray, shape (rows, columns)
         Grey levels: uint8, uint16, float32 or float64 (0 to 255). It is read in place, not copied first.
     **options
-        polarity ("dark", "bright"), radius (px, good to a quarter), roi (left, top, width, height in px),
-        keep_half_hidden.
+        polarity : {"dark", "bright"}
+            Whether beads are darker or brighter than the background; left out, found.
+        radius : float
+            Radius of a bead, within 25 % [px]; left out, found.
+        roi : (int, int, int, int)
+            Region of interest: left, top, width, height [px].
+        keep_half_hidden : bool
+            Whether beads that are partly covered are reported.
 
     Returns
     -------
     Disks
-        Of length 0, with a `message`, where there are no beads.
+        If there are no beads, it has length 0 and a `message`.
+
+    Raises
+    ------
+    UsageError
+        The image or an option has the wrong type or shape.
     """
     wanted = _checked(options, _find_options, "find_disks")
     from . import _images
@@ -136,7 +153,7 @@ def find_disks(image: NDArray[Any], **options: Any) -> Disks:
 
 
 def _refuse_unit_range(images: Sequence[NDArray[Any]]) -> None:
-    """Other packages scale floating-point images from 0 to 1: where nothing is found, that is said."""
+    """Raise UsageError for floating-point images with levels from 0 to 1, as other packages have them."""
     if all(image.dtype.kind == "f" and image.max() <= 1 for image in images):
         raise UsageError("levels of floating-point images run from 0 to 255, and the highest here is not above 1: "
                          "multiply them by 255")
@@ -150,46 +167,49 @@ class MeasuredBed:
 
     @property
     def profile(self) -> Profile:
-        """Density against the height above the floor, in D."""
+        """Density [1/D^2] against the height above the floor [D]."""
         return profile_from(self._bed.profile())
 
     @property
     def disks(self) -> dict[str, NDArray[Any]]:
-        """Columns of disks.csv: frame, x_px, y_px, radius_px, x, z (D), quality."""
+        """Columns of disks.csv, each of shape (disks,): frame, x_px, y_px, radius_px [px], x, z [D], quality."""
         columns: dict[str, NDArray[Any]] = dict(self._bed.disks())
         columns["frame"] = columns["frame"].astype(np.int64)
         return columns
 
     @property
     def scale(self) -> float:
-        """m per px."""
+        """Length of a pixel [m/px]."""
         return self._bed.scale
 
     @property
     def width(self) -> float:
-        """Between the walls, in D."""
+        """Distance between the walls [D]."""
         return self._bed.width
 
     @property
     def radius(self) -> float:
-        """Of a bead, in px."""
+        """Radius of a bead [px]."""
         return self._bed.radius
 
     @property
     def floor(self) -> float:
-        """Row of the floor, in px."""
+        """Row of the floor [px]."""
         return self._bed.floor
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return self._bed.frames
 
     @property
     def disks_a_frame(self) -> float:
+        """Mean number of disks per frame."""
         return self._bed.disks_a_frame
 
     @property
     def warnings(self) -> list[str]:
+        """Warnings, one sentence or more each."""
         return self._bed.warnings
 
     def brief(self) -> str:
@@ -197,7 +217,7 @@ class MeasuredBed:
         return self._bed.brief()
 
     def full(self) -> str:
-        """The result, a line a number, then the warnings."""
+        """The result with one line per number, then the warnings."""
         return self._bed.full()
 
     def __repr__(self) -> str:
@@ -231,15 +251,32 @@ def measure_bed(
     frames : str, path, sequence of them, ndarray (frames, rows, columns), or sequence of ndarray (rows, columns)
         Files, folders, wildcards or one film; or grey images in memory.
     diameter : str or float
-        Of a bead: "2.99 mm", or in m.
+        Diameter of a bead: "2.99 mm", or a number in m.
     threads : int
-        The result does not depend on it.
+        Number of threads. The result does not depend on it.
     progress : callable or True, optional
-        Called with the fraction done.
+        Function that is called with the fraction done; True: a bar, if tqdm is installed.
     **options
-        polarity, radius, roi, keep_half_hidden as for `find_disks`; scale (m/px), floor, left_wall, right_wall (px),
-        floor_slope, pixel_aspect, lens_radial, kernel ("gaussian:0.5"), spacing, lowest, highest (D), frame_rate and
-        frequency (Hz).
+        polarity, radius, roi, keep_half_hidden
+            As for `find_disks`.
+        scale : float
+            Length of a pixel [m/px].
+        floor, left_wall, right_wall : float
+            Row of the floor and columns of the walls [px].
+        floor_slope : float
+            Slope of the floor, in pixels down per pixel to the right.
+        pixel_aspect : float
+            Width of a pixel over its height.
+        lens_radial : float
+            Distortion of the lens: outward shift of the corners, in half diagonals.
+        kernel : str
+            Kernel of the density, "gaussian:0.5" by default (width in D).
+        spacing, lowest, highest : float
+            Heights of the profile [D].
+        frame_rate, frequency : float
+            Frame rate of the film and frequency of the shaking [Hz].
+
+        Scale, floor, walls, slope, aspect, lens and frequency are found if they are left out.
 
     Returns
     -------
@@ -248,9 +285,11 @@ def measure_bed(
     Raises
     ------
     InputError
-        With the file, where it cannot be read.
+        A file cannot be read.
     StageError
-        Where there are no beads.
+        There are no beads.
+    UsageError
+        An argument has the wrong type or shape.
     """
     wanted = _checked(options, _measure_options, "measure_bed")
     wanted.update(diameter=in_si(diameter, "length", "diameter"), threads=threads)

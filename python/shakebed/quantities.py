@@ -1,4 +1,4 @@
-"""Numbers with errors and units, and what helps to show them."""
+"""Numbers with errors and units, and functions that show them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,16 @@ Progress = Union[None, bool, Callable[[float], None]]
 
 
 class Quantity(NamedTuple):
-    """A measured number: value, standard error (None where it has none) and unit ("1" for a plain number)."""
+    """A measured number.
+
+    Attributes
+    ----------
+    value : float
+    std_error : float or None
+        Standard error, if known.
+    unit : str
+        Unit of both; "1" for a plain number.
+    """
 
     value: float
     std_error: Optional[float] = None
@@ -55,7 +64,7 @@ def number(value: Any, name: str) -> float:
 
 
 def in_si(value: Union[str, Number], kind: str, name: str) -> float:
-    """A quantity in SI: a string with its unit ("2.99 mm"), or a number that is in SI already.
+    """A quantity in SI, from a string with its unit ("2.99 mm") or a number in SI.
 
     kind is "length", "frequency" or "acceleration".
     """
@@ -79,7 +88,7 @@ def as_json(content: Any) -> str:
             return value.tolist()
         if isinstance(value, os.PathLike):
             return os.fspath(value)
-        raise UsageError(f"{value!r} ({type(value).__name__}) has no place in a recipe")
+        raise UsageError(f"{value!r} ({type(value).__name__}) cannot be part of a recipe")
 
     return json.dumps(content, default=plain)
 
@@ -89,7 +98,7 @@ def in_diameters(value: Union[str, Number], diameter: Optional[float], name: str
     if not isinstance(value, str):
         return float(value)
     if diameter is None:
-        raise UsageError(f"{name}: {value!r} is a length; give the diameter, too, or a number in D")
+        raise UsageError(f"{name}: {value!r} is a length; give the diameter too, or a number in D")
     return in_si(value, "length", name) / diameter
 
 

@@ -1,4 +1,4 @@
-"""Recipes that are run by the program, and the folders of results that it leaves."""
+"""Running recipes by the program, and reading results folders."""
 
 from __future__ import annotations
 
@@ -39,13 +39,14 @@ def program() -> str:
 
 
 class Table:
-    """A CSV of results.
+    """A CSV file of results. table["height"] is a column.
 
     Attributes
     ----------
-    columns : dict of str to ndarray
+    columns : dict of str to ndarray, shape (rows,)
+        Numbers, with nan for an empty cell; or texts.
     units : dict of str to str
-        "1" for a plain number.
+        Unit of each column; "1" for a plain number.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,7 +98,15 @@ def _with_quantities(value: Any) -> Any:
 
 
 class StageResults:
-    """What one stage left: `numbers` (its result file, quantities as Quantity) and `tables` by name."""
+    """The results of one stage.
+
+    Attributes
+    ----------
+    numbers : dict
+        Content of the result file, with quantities as Quantity.
+    tables : dict of str to Table
+        CSV files by name.
+    """
 
     def __init__(self, folder: Path, numbers: Any) -> None:
         self.folder = folder
@@ -108,7 +117,7 @@ class StageResults:
         return {path.stem: Table(path) for path in sorted(self.folder.glob("*.csv"))}
 
     def table(self, name: str) -> Table:
-        """One CSV, by its name without .csv."""
+        """One CSV file, by its name without .csv."""
         path = self.folder / f"{name}.csv"
         if not path.is_file():
             raise input_error(f"{path}: there is no such table; there are "
@@ -131,7 +140,15 @@ class StageResults:
 
 
 class Results:
-    """A folder of results."""
+    """A results folder. results["fit"] is the stage fit.
+
+    Attributes
+    ----------
+    summary, manifest : dict
+        Content of summary.json and manifest.json.
+    stages : dict of str to StageResults
+        Stages of a single bed; empty for a sweep, whose numbers are in `sweep`.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -149,20 +166,26 @@ class Results:
             content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             return content
         except OSError as error:
-            raise input_error(f"{path}: cannot be read: {error.strerror}; is it a folder of results?",
+            raise input_error(f"{path}: cannot be read: {error.strerror}; is it a results folder?",
                               str(path)) from None
         except ValueError as error:
             raise input_error(f"{path}: is no JSON: {error}", str(path)) from None
 
     @property
+    def sweep(self) -> Optional[Table]:
+        """Collected numbers of a sweep (sweep.csv), one row per point; None if the recipe has no sweep."""
+        path = self.folder / "sweep.csv"
+        return Table(path) if path.is_file() else None
+
+    @property
     def answer(self) -> Optional[dict[str, Any]]:
-        """Temperature with its whole uncertainty, and the verdict; None where the recipe asks for none."""
+        """Temperature with its whole uncertainty and the verdict; None if the recipe has no answer."""
         answer: Optional[dict[str, Any]] = _with_quantities(self.summary.get("answer"))
         return answer
 
     @property
     def report(self) -> Path:
-        """The page for people."""
+        """Path of report.html."""
         return self.folder / "report.html"
 
     def __getitem__(self, stage: str) -> StageResults:
@@ -171,7 +194,9 @@ class Results:
         return self.stages[stage]
 
     def __repr__(self) -> str:
-        return f"<shakebed.Results {self.folder}: {', '.join(self.stages)}>"
+        sweep = self.sweep
+        held = f"a sweep of {len(sweep)} points" if sweep is not None else ", ".join(self.stages)
+        return f"<shakebed.Results {self.folder}: {held}>"
 
     def _repr_html_(self) -> str:
         rows: dict[str, Any] = {"stages": ", ".join(self.stages), "report": self.report}
@@ -183,13 +208,22 @@ class Results:
 
 
 def load(out: Union[str, "os.PathLike[str]"]) -> Results:
-    """Read a folder of results.
+    """Read a results folder.
+
+    Parameters
+    ----------
+    out : str or path
 
     Returns
     -------
     Results
-        results["fit"]["temperature"] is a Quantity, results["bed"].table("profile")["height"] an array,
-        results["bed"].trajectory() the frames.
+        results["fit"]["temperature"] is a Quantity, results["bed"].table("profile")["height"] an array, and
+        results["bed"].trajectory() holds the frames.
+
+    Raises
+    ------
+    InputError
+        The folder, or a file in it, is missing or cannot be read.
     """
     folder = Path(out)
     if not folder.is_dir():
@@ -208,23 +242,24 @@ def run(
     force: bool = False,
     progress: Progress = None,
 ) -> Results:
-    """Run a recipe as ``shakebed run`` does; what is up to date in `out` is kept.
+    """Run a recipe as ``shakebed run`` does. Stages that are up to date in `out` are not repeated.
 
     Parameters
     ----------
     recipe : str or path
+        Recipe file.
     out : str or path
-        The folder of the results.
+        Results folder.
     set : mapping of JSON pointer to value, optional
-        Changes, {"/stages/bed/seed": 7}.
+        Changes of the recipe: {"/stages/bed/seed": 7}.
     preset : str, optional
-        Of the recipe, applied before `set`.
+        Preset of the recipe, applied before `set`.
     jobs : int, optional
-        Threads; the results do not depend on it.
+        Number of threads. The results do not depend on it.
     force : bool
-        Run also what is up to date.
+        Whether stages that are up to date are repeated.
     progress : callable or True, optional
-        Called with the fraction of the running stage.
+        Function that is called with the fraction of the running stage; True: a bar, if tqdm is installed.
 
     Returns
     -------
@@ -233,13 +268,13 @@ def run(
     Raises
     ------
     RecipeError
-        With file, pointer and line of every mistake, before anything is run.
+        The recipe has mistakes. Nothing was run.
     InputError, StageError
-        As the stage says.
+        A stage failed.
     CheckFailed
-        A number is not what the recipe expects; its `results` are complete.
+        A number differs from the expectation of the recipe. Its `results` are complete.
     KeyboardInterrupt
-        After Ctrl-C; finished stages are kept and the run can be continued by the same call.
+        After Ctrl-C. Finished stages are kept, and the same call continues the run.
     """
     recipe, out = os.fspath(recipe), os.fspath(out)
     settings = [f"{pointer}={value if isinstance(value, str) else as_json(value)}"
@@ -266,7 +301,7 @@ def run(
 
 
 def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> tuple[int, list[str]]:
-    """Runs the program to its end: its exit code and what it says of errors. Ctrl-C ends it first."""
+    """Run the program; return its exit code and its error messages. Ctrl-C ends the program first."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
                                start_new_session=True)
     errors = []

@@ -31,17 +31,17 @@ class Profile(NamedTuple):
     Attributes
     ----------
     height : ndarray, shape (heights,)
-        In D above the mean position of the floor.
+        Height above the mean position of the floor [D].
     number_density, std_error : ndarray, shape (heights,)
-        n D^2 and its standard error, which allows for correlation in time.
+        n D^2 and its standard error [1/D^2]. The error includes correlation in time.
     covariance : ndarray, shape (heights, heights), or None
-        Of the mean densities.
+        Covariance of the densities [1/D^4].
     covariance_samples : int
-        Independent samples behind the covariance.
+        Number of independent samples from which the covariance was estimated.
     samples : int
-        Snapshots or frames.
+        Number of snapshots or frames.
     kernel : str
-        The window through which the density was measured, "gaussian:0.5" (width in D).
+        Kernel through which the density was measured, such as "gaussian:0.5" (width in D).
     """
 
     height: Array
@@ -74,9 +74,10 @@ class Trajectory(NamedTuple):
     Attributes
     ----------
     array : ndarray, shape (frames, disks, 5)
-        Columns x, z, vx, vz, spin. Not a copy, and not to be written to: copy() gives one.
+        Columns x, z [D], vx, vz [sqrt(g D)], spin [sqrt(g/D)]. It is read-only; copy() gives an array of your own.
     time, phase, floor, floor_velocity : ndarray, shape (frames,)
-        Phase of the floor's cycle, 0 to 1; height of the floor.
+        Time [sqrt(D/g)], phase within the period of the floor from 0 to 1, height [D] and velocity [sqrt(g D)] of the
+        floor.
     """
 
     array: Array
@@ -87,29 +88,33 @@ class Trajectory(NamedTuple):
 
     @property
     def positions(self) -> Array:
-        """x and z: shape (frames, disks, 2)."""
+        """Positions x and z [D], shape (frames, disks, 2)."""
         return self.array[:, :, 0:2]
 
     @property
     def velocities(self) -> Array:
-        """vx and vz: shape (frames, disks, 2)."""
+        """Velocities vx and vz [sqrt(g D)], shape (frames, disks, 2)."""
         return self.array[:, :, 2:4]
 
 
 def read_trajectory(path: Union[str, "os.PathLike[str]"], *, up: str = "z") -> Trajectory:
-    """Read a trajectory in extended XYZ (also compressed, .zst), ours or that of another program.
+    """Read a trajectory in extended XYZ, plain or compressed (.zst), of this or another program.
 
     Parameters
     ----------
     path : str or path
-        Lengths must be in the diameter of a disk. Columns that the file does not have (velocities, say) are 0.
-    up : "z" or "y"
-        The coordinate that is the height, where positions have three. Programs that simulate in a plane often have y.
+        File with lengths in D. Columns that the file does not have, such as velocities, are 0.
+    up : {"z", "y"}
+        Coordinate of the height, if positions have three. Programs that simulate in a plane often use y.
+
+    Returns
+    -------
+    Trajectory
 
     Raises
     ------
     InputError
-        Where the file cannot be read, or all heights are 0.
+        The file cannot be read, or all heights are 0.
     """
     if up not in ("y", "z"):
         raise UsageError(f"up is {up!r}; it must be \"z\" or \"y\"")
@@ -129,18 +134,23 @@ def density_profile(
     Parameters
     ----------
     heights : array_like, shape (frames, disks)
-        Of the centres, in D above the floor; frames in the order of time.
+        Heights of the centres above the floor [D]; frames in the order of time.
     width : float
-        Of the bed, in D.
+        Width of the bed [D].
     kernel : str
-        The window through which the density is seen: "gaussian:0.5", "top_hat:1", "disk_chord:1" (widths in D).
+        Kernel of the density: "gaussian:0.5", "top_hat:1" or "disk_chord:1" (widths in D).
     spacing, lowest, highest : float
-        Heights of the profile, in D; lowest 0 and highest 1 D above the highest disk unless given.
+        Heights of the profile [D]. By default lowest is 0 and highest is 1 D above the highest disk.
 
     Returns
     -------
     Profile
-        Errors and covariance allow for correlation from frame to frame.
+        Errors and covariance include the correlation between frames.
+
+    Raises
+    ------
+    UsageError
+        A shape or a value is invalid.
     """
     z = np.ascontiguousarray(np.asarray(heights, float))
     if z.ndim != 2 or z.size == 0:
@@ -230,7 +240,10 @@ def _at_scene(error: RecipeError, document: _Document) -> RecipeError:
 
 
 class Bed:
-    """A bed that was simulated and measured. Reduced units: D, m, g (weightless: D, m and the initial T)."""
+    """A bed that was simulated and measured.
+
+    Units are D, m and g. Without gravity they are D, m and the initial T.
+    """
 
     def __init__(self, bed: _core.Bed, warnings_of_scene: Sequence[str] = ()) -> None:
         self._bed = bed
@@ -238,7 +251,7 @@ class Bed:
 
     @property
     def warnings(self) -> list[str]:
-        """What is odd about the scene, as ``shakebed run`` says it."""
+        """Warnings about the scene, as ``shakebed run`` gives them."""
         return self._warnings
 
     @property
@@ -253,19 +266,19 @@ class Bed:
 
     @property
     def observables(self) -> dict[str, Quantity]:
-        """Numbers of the bed as a whole, by the names of observables.json."""
+        """Numbers of the whole bed, with the names of observables.json."""
         energy = "T0" if self._bed.weightless else "m g D"
         units = {"center_of_mass": "D", "center_of_mass_rise": "D", "compressibility_factor": "1"}
         return {name: Quantity(*pair, units.get(name, energy)) for name, pair in self._bed.observables().items()}
 
     def trajectory(self) -> Trajectory:
-        """The frames that the scene asks for ("frames"), without copying them."""
+        """The frames that the scene keeps (option "frames"), not copied."""
         bed = self._bed
         return Trajectory(bed.trajectory(), bed.times(), bed.phases(), bed.floor(), bed.floor_velocities())
 
     @property
     def energy(self) -> dict[str, float]:
-        """Where the energy went, in m g D.
+        """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
         """
@@ -278,7 +291,7 @@ class Bed:
 
     @property
     def largest_overlap(self) -> float:
-        """Of two disks at the end, in D."""
+        """Largest overlap of two disks at the end [D]."""
         return self._bed.largest_overlap
 
     @property
@@ -293,7 +306,7 @@ class Bed:
 
     @property
     def width(self) -> float:
-        """Of the box, in D."""
+        """Width of the box [D]."""
         return self._bed.width
 
     @property
@@ -308,12 +321,12 @@ class Bed:
 
     @property
     def periods(self) -> int:
-        """Periods of the floor that were measured (looks of a bed on a still floor)."""
+        """Number of measured periods of the floor; on a still floor, number of samples."""
         return self._bed.periods
 
     @property
     def radius(self) -> Array:
-        """Of each disk, in D: shape (disks,)."""
+        """Radius of each disk [D], shape (disks,)."""
         return self._bed.radius
 
     def brief(self) -> str:
@@ -321,7 +334,7 @@ class Bed:
         return self._bed.brief()
 
     def full(self) -> str:
-        """The result, a line a number."""
+        """The result with one line per number."""
         return self._bed.full()
 
     def __repr__(self) -> str:
@@ -337,12 +350,12 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
     Parameters
     ----------
     scene : dict, str or path
-        The options of the recipe's stage "simulate" (see ``shakebed schema``), or a whole recipe that holds one; a dict,
-        JSON text, or the file that holds it.
+        Options of the stage "simulate" (see ``shakebed reference simulate``), or a whole recipe with one such stage: a
+        dict, JSON text, or a file.
     seed : int, optional
-        In place of the scene's own seed.
+        Seed of the random number generator, in place of that of the scene.
     progress : callable or True, optional
-        Called with the fraction done; True: a bar, where tqdm is installed.
+        Function that is called with the fraction done; True: a bar, if tqdm is installed.
 
     Returns
     -------
@@ -351,19 +364,21 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
     Raises
     ------
     RecipeError
-        With file, pointer and line of every mistake.
+        The scene has mistakes.
+    StageError
+        The simulation failed.
     KeyboardInterrupt
         After Ctrl-C, within about 0.1 s.
 
     Warns
     -----
     BedWarning
-        Of what is odd about the scene (Gamma below 1, a width that locks rows), as ``shakebed run`` does.
+        The scene is unusual: Gamma below 1, a width that locks rows. ``shakebed run`` warns in the same cases.
 
     Notes
     -----
-    One bed is measured: its errors hold for this bed, not for the next one. The same scene with ``"replicas": 1`` gives
-    the same numbers as ``shakebed run``, to the last digit; `run` measures several beds. The GIL is released.
+    One bed is measured. Its errors hold for this bed and not for the next one; `run` measures several beds. With
+    ``"replicas": 1``, ``shakebed run`` gives the same numbers to the last digit. The GIL is released.
     """
     document = _document(scene, seed)
     call, close = reporter(progress, "simulating")
@@ -382,9 +397,9 @@ class Simulation:
     Parameters
     ----------
     scene : dict, str or path
-        As for `simulate`. What it says of settling and measuring is not used.
+        As for `simulate`. The options "settle" and "measure" are not used.
     seed : int, optional
-        In place of the scene's own seed.
+        Seed of the random number generator, in place of that of the scene.
 
     Notes
     -----
@@ -407,16 +422,16 @@ class Simulation:
         self.warnings = _warned(self._stepper.warnings, document)
 
     def advance_to(self, time: float) -> None:
-        """Run to this time since the start. Releases the GIL; stops on Ctrl-C."""
+        """Run to this time since the start [sqrt(D/g)]. The GIL is released, and Ctrl-C stops the run."""
         self._stepper.advance_to(float(time))
 
     def step(self, duration: float) -> None:
-        """Run for this time."""
+        """Run for this duration [sqrt(D/g)]."""
         self.advance_to(self.time + duration)
 
     @property
     def time(self) -> float:
-        """Since the start, in sqrt(D/g)."""
+        """Time since the start [sqrt(D/g)]."""
         return self._stepper.time
 
     @property
@@ -431,33 +446,40 @@ class Simulation:
 
     @property
     def width(self) -> float:
-        """Of the box, in D."""
+        """Width of the box [D]."""
         return self._stepper.width
 
     @property
     def radius(self) -> Array:
-        """Of each disk, in D: shape (disks,)."""
+        """Radius of each disk [D], shape (disks,)."""
         return self._stepper.radius
 
     def snapshot(self) -> dict[str, Any]:
-        """time, floor_position, floor_velocity, and the arrays x, z, vx, vz, spin of shape (disks,)."""
+        """State of the bed now.
+
+        Returns
+        -------
+        dict
+            time [sqrt(D/g)], floor_position [D], floor_velocity [sqrt(g D)], and the arrays x, z [D], vx, vz
+            [sqrt(g D)], spin [sqrt(g/D)] of shape (disks,).
+        """
         return self._stepper.snapshot()
 
     @property
     def positions(self) -> Array:
-        """x and z: shape (disks, 2)."""
+        """Positions x and z [D], shape (disks, 2)."""
         now = self.snapshot()
         return np.column_stack([now["x"], now["z"]])
 
     @property
     def velocities(self) -> Array:
-        """vx and vz: shape (disks, 2)."""
+        """Velocities vx and vz [sqrt(g D)], shape (disks, 2)."""
         now = self.snapshot()
         return np.column_stack([now["vx"], now["vz"]])
 
     @property
     def energy(self) -> dict[str, float]:
-        """Where the energy went, in m g D.
+        """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
         """
@@ -470,11 +492,11 @@ class Simulation:
 
     @property
     def largest_overlap(self) -> float:
-        """Of two disks now, in D."""
+        """Largest overlap of two disks now [D]."""
         return self._stepper.largest_overlap()
 
     def set_bath_temperature(self, temperature: float) -> None:
-        """Another T of the reservoir from now on, in m g D. ValueError where the scene has none."""
+        """Set the temperature of the bath from now on [m g D]. ValueError if the scene has no bath."""
         self._stepper.set_bath_temperature(float(temperature))
 
     def __repr__(self) -> str:

@@ -27,6 +27,12 @@ def test_temperature_of_a_bed_in_equilibrium(curve):
     assert abs(answer["temperature"] - 1) < 4 * answer["std_error"] < 0.5
 
 
+def test_a_length_without_a_diameter_says_what_is_missing(curve):
+    fit = shakebed.fit_profile(curve.height, curve.number_density, curve.std_error, kernel=curve.kernel)
+    with pytest.raises(AttributeError, match="needs the diameter"):
+        fit.temperature_over_mg
+
+
 def test_fit_is_that_of_the_command_line(curve, tmp_path):
     rows = np.column_stack([curve.height, curve.number_density, curve.std_error])
     file = tmp_path / "profile.csv"

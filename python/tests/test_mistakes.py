@@ -56,7 +56,7 @@ def test_scenes_take_numbers_of_numpy_and_paths(short, tmp_path):
     assert shakebed.simulate(short, seed=np.int32(3)).observables == wanted
     (tmp_path / "r.json").write_text(json.dumps(short))
     assert shakebed.simulate(tmp_path / "r.json").observables == wanted
-    with pytest.raises(shakebed.UsageError, match="has no place in a recipe"):
+    with pytest.raises(shakebed.UsageError, match="cannot be part of a recipe"):
         shakebed.simulate(dict(short, seed=1 + 2j))
     for nothing in (None, [1, 2], 3):
         with pytest.raises(shakebed.UsageError, match="a scene is"):

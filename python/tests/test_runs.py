@@ -41,6 +41,18 @@ def test_run_and_load(recipe, tmp_path):
         again["bed"].table("nothing")
 
 
+def test_a_sweep_is_a_table(recipe, tmp_path):
+    assert shakebed.load(shakebed.run(recipe, tmp_path / "one").folder).sweep is None
+    content = json.loads(recipe.read_text())
+    content["sweep"] = {"over": {"/stages/bed/floor/amplitude": ["2 mm", "3 mm"]}, "collect": ["/bed/center_of_mass_rise"]}
+    recipe.write_text(json.dumps(content))
+    results = shakebed.run(recipe, tmp_path / "out", jobs=1)
+    assert len(results.sweep) == 2
+    low, high = results.sweep["bed_center_of_mass_rise"]
+    assert 0 < low < high
+    assert "a sweep of 2 points" in repr(results)
+
+
 def test_mistakes_have_file_pointer_and_line(recipe, tmp_path):
     text = recipe.read_text().replace('"settle": "0.5 s"', '"settle": "0.5 kg"')
     recipe.write_text(text)

@@ -172,7 +172,7 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   ScratchFolder folder;
   write_text(folder / "photo.png", "");
   const ProgramResult result = run_shakebed({"fit-images", "photo.png", "--diameter", "3"}, folder.path());
-  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_NE(result.err.find("Write \"3 mm\""), std::string::npos) << result.err;
   const ProgramResult mapped = run_shakebed(
       {"map", "--gamma", "4", "--frequency", "20 Hz", "--diameter", "3", "--initial-height", "10"}, folder.path());
@@ -185,6 +185,21 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
     EXPECT_EQ(result_of_set.exit_code, 3) << result_of_set.err;
     EXPECT_NE(result_of_set.err.find(says), std::string::npos) << result_of_set.err;
   }
+}
+
+// The simulation would run for its whole time before the camera finds nothing to photograph.
+TEST(PhotographsOfABed, NeedFramesBeforeAnythingRuns) {
+  ScratchFolder folder;
+  const std::string bed = R"({"name": "b", "stages": [{"stage": "simulate", "id": "bed", "measure": "1 s",
+    "disks": {"count": 20, "diameter": "3 mm"}, "box": {"width": "30 mm"}%s}, {"stage": "render", "from": "bed"}]})";
+  const auto validated = [&](const std::string& frames) {
+    write_text(folder / "r.json", std::string(bed).replace(bed.find("%s"), 2, frames));
+    return run_shakebed({"validate", "r.json"}, folder.path());
+  };
+  const ProgramResult without = validated("");
+  EXPECT_EQ(without.exit_code, 3) << without.err;
+  EXPECT_NE(without.err.find("/stages/1/from: the simulated bed keeps no frames"), std::string::npos) << without.err;
+  EXPECT_EQ(validated(R"(, "frames": {"count": 10})").exit_code, 0);
 }
 
 // A preset that is not the one chosen is checked as well.

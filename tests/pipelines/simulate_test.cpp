@@ -223,7 +223,7 @@ TEST(SimulatePrecision, LostStopsTheRunWithItsLastSoundState) {
     pipelines::require_precision(spoilt, {}, folder / "none");
     FAIL();
   } catch (const pipelines::StageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("there is no earlier sound state"));
+    EXPECT_THAT(error.what(), HasSubstr("no earlier state was kept"));
   }
   EXPECT_FALSE(fs::exists(folder / "none"));
 }
