@@ -24,8 +24,8 @@ class Surrogate {
   static Surrogate train(const TrainingSet& runs);
   static std::size_t fewest_runs(std::size_t parameters) { return 4 * (parameters + 2); }
 
-  // Prediction of a further run at each point: mean and variance, point by point, output by output. The variance holds the
-  // surrogate's own error and the scatter between runs.
+  // Prediction of a further run at each point: mean and variance, point by point, output by output. The variance holds
+  // the surrogate's own error and the scatter between runs.
   struct Prediction {
     std::vector<double> mean, variance;
   };
