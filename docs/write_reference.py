@@ -168,7 +168,7 @@ def messages_page():
     for code, title in [*((code, f"Exit code {code}: {meaning}") for code, meaning in MEANING.items()), (0, "Warnings")]:
         rows = [(place, message) for found, place, message in all_messages if found == code]
         if rows:
-            page += [f"## {title}\n", "| from | message |", "|---|---|"]
+            page += [f"## {title}\n", "| part of the program | message |", "|---|---|"]
             page += [f"| `{place}` | {cell(message)} |" for place, message in rows] + [""]
     return "\n".join(page)
 

@@ -9,8 +9,8 @@
 // parameter. Its noise is the scatter between runs. Its few constants maximise the likelihood of the runs.
 namespace shakebed::fit {
 
-// Runs and what they gave. Several outputs share the lengths and the ratio of signal to scatter, each has its own
-// scale: the same number at several phases of the shaking, say.
+// Runs and their outputs. Several outputs, such as one number at several phases of the shaking, share the lengths and
+// the ratio of signal to scatter. Each has its own scale.
 struct TrainingSet {
   std::size_t parameters = 0, outputs = 0;
   std::vector<double> points;  // run by run: the parameters, each scaled to 0 to 1
@@ -24,8 +24,8 @@ class Surrogate {
   static Surrogate train(const TrainingSet& runs);
   static std::size_t fewest_runs(std::size_t parameters) { return 4 * (parameters + 2); }
 
-  // Of a further run at each point: mean and variance, point by point, output by output. The variance holds the
-  // surrogate's own error and the scatter between runs.
+  // Prediction of a further run at each point: mean and variance, point by point, output by output. The variance holds
+  // the surrogate's own error and the scatter between runs.
   struct Prediction {
     std::vector<double> mean, variance;
   };

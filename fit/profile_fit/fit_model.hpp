@@ -9,7 +9,7 @@
 #include "fit/theory/tail.hpp"
 #include "statistics/kernel.hpp"
 
-// The curves a fit can draw, with their derivatives. Internal to fit.
+// The models of a profile, with their derivatives. Internal to fit.
 //
 // Every model has the same three parameters: a temperature, a place (the shift, or for whole columns N D/W), and the
 // plateau density. A model says which of them it uses.
@@ -29,10 +29,10 @@ class FitModel {
   [[nodiscard]] virtual bool place_is_column() const { return false; }
   [[nodiscard]] virtual bool uses_temperature() const { return true; }
   [[nodiscard]] virtual double largest_plateau() const { return close_packing_density; }
-  // The equation of state whose T_c goes with the model.
+  // The equation of state that gives T_c for the model.
   [[nodiscard]] virtual const EquationOfState& equation() const { return enskog(); }
 
-  // Sets the curve; false where there is none.
+  // Sets the parameters; false if the model has no curve for them.
   virtual bool set(const Parameters& parameters) = 0;
   // Of the curve set last.
   [[nodiscard]] virtual double density(double height) const = 0;

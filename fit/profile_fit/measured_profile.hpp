@@ -14,9 +14,9 @@ struct MeasuredProfile {
   std::vector<double> height, density, error;  // ascending heights; error > 0 where errors_known
   std::vector<bool> usable;                    // false: left out (an empty bin without an error)
   Eigen::MatrixXd covariance;                  // empty: diagonal
-  int covariance_samples = 0;                  // independent ones behind it, 0 if not known
+  int covariance_samples = 0;                  // independent samples of the covariance, 0 if unknown
   bool errors_known = false;
-  bool robust = false;   // FitOptions::robust: bins must keep their outliers to themselves
+  bool robust = false;   // FitOptions::robust: the outlier of a bin must not change its neighbours
   double spacing = 0.0;  // median distance of neighbouring heights
   double area = 0.0;
   std::vector<double> one_diameter_mean;  // density averaged over one diameter about each height

@@ -1,5 +1,5 @@
 #pragma once
-// Small helpers of the room: smooth polynomials over a frame, symmetric linear systems, frames reduced by averaging.
+// Helpers of this folder: smooth polynomials over a frame, symmetric linear systems, frames reduced by averaging.
 
 #include <cstddef>
 #include <vector>

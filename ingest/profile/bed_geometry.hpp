@@ -8,7 +8,7 @@
 
 namespace shakebed::ingest {
 
-// The columns of a frame that count.
+// The columns of a frame that belong to the bed.
 struct FrameSides {
   double left = 0, right = 0;
 };

@@ -34,7 +34,7 @@ struct LowestBottoms {
 };
 LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double diameter_px, int width);
 
-// Where the bed's bottom is in a frame: what lies lowest follows the floor, or at least its period.
+// Bottom of the bed in a frame: the lowest beads follow the floor, or at least its period.
 std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms);
 
 // The floor's motion, y = middle - amplitude sin(2 pi (turns + phase)), from what no bead ever passes.

@@ -1,5 +1,5 @@
 #pragma once
-// A row of numbers a frame, all equally long, in one piece of memory: a long film has many.
+// One row of numbers per frame, all of one length, in one block of memory. A long film has many rows.
 
 #include <algorithm>
 #include <cstddef>

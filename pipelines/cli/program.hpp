@@ -1,5 +1,5 @@
-// The program: its commands, and the options that all of them have. Each command is in a file of its own, which adds it
-// with its options, examples and work; shakebed.cpp lists them.
+// The program: its commands, and the options that they share. Each command is in its own file, which adds it with
+// options, examples and function. shakebed.cpp lists the commands.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -29,7 +29,7 @@ class Program {
   // The same for a command that reads the rest of the command line itself.
   CLI::App& add_prefix(const CommandText& text, std::function<int(const Call&)> work);
   CLI::App& add_group(const char* name, const char* help);
-  // Reads the command line and does what it says. Throws Error.
+  // Reads the command line and runs the command. Throws Error.
   int run();
   CLI::App& app() { return app_; }
 

@@ -1,4 +1,4 @@
-// What a finished stage leaves behind, and whether it still counts: by content, never by time stamps.
+// The record of a finished stage, and whether its results are up to date: by content, never by time stamps.
 //
 // OUT/<id>/.record says what the stage was made from (kind, code, options, seed, fingerprints of all inputs) and what
 // it made (fingerprints of all outputs). A stage is up to date when what it would be made from now is the same and its
@@ -17,7 +17,7 @@ namespace shakebed::pipelines {
 
 inline constexpr std::string_view record_name = ".record", cost_name = "cost.json";
 
-// A file and what is in it.
+// A file and the hashes of its content.
 struct Fingerprint {
   std::string file;  // relative to the stage's folder; an external input: its pointer and name
   std::uint64_t bytes = 0;
@@ -42,7 +42,7 @@ struct StageRecord {
 // The record in a stage's folder; nothing when there is none or it cannot be read.
 std::optional<StageRecord> read_record(const std::filesystem::path& stage_directory);
 
-// What a stage took, where and when.
+// What a stage cost, where and when.
 struct StageCost {
   double wall_seconds = 0, cpu_seconds = 0;
   int threads = 0;  // that it was allowed
@@ -60,8 +60,8 @@ StageRecord fresh_record(const PlannedStage& stage, const std::vector<const Stag
 // One hash of all that decides what a stage makes: kind, code, options, seed, inputs. `record` from fresh_record().
 std::string work_key(const StageRecord& record);
 
-// Why the stage must run again, one sentence each; empty: `found` counts. `upstream_ids` name the stages of fresh's
-// inputs.
+// Reasons why the stage must run again, one sentence each; empty if `found` is up to date. `upstream_ids` name the
+// stages of fresh's inputs.
 std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::optional<StageRecord>& found,
                                         const std::filesystem::path& stage_directory);
 

@@ -1,4 +1,4 @@
-// The warnings of many runs: each kind once, with how many runs have it.
+// The warnings of many runs: each kind once, with the number of runs that have it.
 #pragma once
 
 #include <string>

@@ -59,7 +59,7 @@ std::string range_text(const Json& schema) {
 
 class OptionTable {
  public:
-  std::string text = "| option | type | range | default | example | meaning |\n|---|---|---|---|---|---|\n";
+  std::string text = "| option | meaning | type | range | default | example |\n|---|---|---|---|---|---|\n";
 
   void add_all(const Json& object, const std::string& prefix) {
     if (!object.contains("properties")) return;
@@ -77,9 +77,8 @@ class OptionTable {
     const std::string preset = schema.contains("default") ? schema["default"].dump() : "";
     const bool shown = schema.contains("examples") && !schema["examples"].empty();
     const std::string example = shown ? schema["examples"][0].dump() : "";
-    text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, type_text(schema), range_text(schema),
-                        required ? "required" : code(preset), code(example),
-                        cell(schema.value("description", std::string())));
+    text += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, cell(schema.value("description", std::string())),
+                        type_text(schema), range_text(schema), required ? "required" : code(preset), code(example));
     add_all(schema, name + "/");
     if (schema.contains("items")) add_all(schema["items"], name + "/#/");
     if (schema.contains("additionalProperties") && schema["additionalProperties"].is_object())
@@ -139,10 +138,10 @@ std::string results_text(const StageRow& row) {
   row.make()->results(results);
   std::string text = fmt::format(
       "## Numbers in {}\nPointers begin behind the stage's id: `/ID/...`; `#` stands for an index, `*` for a name.\n\n"
-      "{}| pointer | kind | unit | meaning | given |\n|---|---|---|---|---|\n",
+      "{}| pointer | meaning | unit | kind | given |\n|---|---|---|---|---|\n",
       row.result, energy_unit_note(results));
   for (const StatedResult& one : results.all())
-    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", one.pointer, kind_text(one), one.unit, cell(one.meaning),
+    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", one.pointer, cell(one.meaning), one.unit, kind_text(one),
                         when_text(one.given));
   if (!results.tables().empty()) text += "\n## Tables\n";
   for (const StatedTable& table : results.tables()) {

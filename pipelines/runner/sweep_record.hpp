@@ -1,4 +1,4 @@
-// What a point of a sweep leaves behind in its folder, and whether it still counts.
+// The record of a point of a sweep, and whether its results are up to date.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace shakebed::pipelines {
 
-// A point is done when this file says so for the same recipe at the same values.
+// File with the record: a point is done if it names the same recipe and the same values.
 inline constexpr std::string_view point_record = ".point";
 
 // What decides the results of a point, and of each of its stages: kind, code, options, seed, external files and what it

@@ -76,7 +76,7 @@ std::map<std::size_t, FilmDisks> read_disks(const Input& files, const std::set<s
     read_columns(files.file("disk_details.csv"), wanted, {{"probability", &FilmDisks::probability}}, frames);
   for (auto& [frame, disks] : frames) {
     if (!disks.probability.empty() && disks.probability.size() != disks.x.size())
-      throw InputError(fmt::format("{}: disks.csv and disk_details.csv have other disks in frame {}",
+      throw InputError(fmt::format("{}: disks.csv and disk_details.csv do not list the same disks in frame {}",
                                    files.directory.string(), frame));
   }
   return frames;

@@ -329,8 +329,7 @@ Matched match(const FitTask& task, const std::vector<LibraryBed>& beds, const Wi
 // The profile of each frame by itself, in the order of time: from disks.csv or from a trajectory.
 fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& heights, const Kernel& kernel) {
   if (kernel.kind == KernelKind::none)
-    throw InputError(
-        "\"bootstrap\": profiles of single frames are counted through a kernel, and this profile has none");
+    throw InputError("\"bootstrap\": the profile was measured without a kernel, and a bootstrap needs one");
   if (heights.size() < 3) throw InputError("\"bootstrap\": the profile has fewer than three heights");
   const double spacing = (heights.back() - heights.front()) / static_cast<double>(heights.size() - 1);
   const HeightGrid grid{heights.front(), spacing, heights.size()};
@@ -353,7 +352,8 @@ fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& hei
   }
   const Json extracted = source.result();
   const Json* width = find_pointer(extracted, "/width/value");
-  if (width == nullptr || !width->is_number()) throw InputError("\"bootstrap\": the frames do not tell their width");
+  if (width == nullptr || !width->is_number())
+    throw InputError("\"bootstrap\": the width of the bed is not known from the frames");
   const std::filesystem::path path = source.file("disks.csv");
   std::vector<double> z;
   std::string current;
@@ -455,7 +455,7 @@ void Fit::take_bed_facts(const RunContext& context, FitTask& task) const {
   const Json bed = context.input("simulate").result();
   const Json *x = find_pointer(bed, "/temperature_x/value"), *z = find_pointer(bed, "/temperature_z/value");
   if (x == nullptr || z == nullptr || !(x->get<double>() + z->get<double>() > 0))
-    throw InputError("the simulated bed has no kinetic temperature at which T could be held");
+    throw InputError("the simulated bed has no kinetic temperature to which T could be fixed");
   options.fixed_temperature = (x->get<double>() + z->get<double>()) / 2;
 }
 

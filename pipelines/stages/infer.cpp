@@ -517,7 +517,7 @@ void Infer::run(RunContext& context) const {
   for (const std::string& sentence : missing_numbers(options_, found, surrogate)) context.warning(sentence);
   found.posterior = sampled(context, options_, surrogate, found.targets);
   if (!(found.posterior.effective > 0))
-    throw StageError("the targets are so far from every bed that no posterior can be stated");
+    throw StageError("all simulated beds are too far from the targets to give a posterior");
   std::vector<double> inside = found.posterior.points;
   for (double& one : inside) one = std::clamp(one, 0.0, 1.0);
   found.fit = surrogate.fit(inside, found.targets);

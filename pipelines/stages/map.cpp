@@ -285,7 +285,7 @@ class Map : public Stage {
                                                                   : std::optional(question.initial_height);
       if (!value)
         throw InputError(fmt::format(
-            "the table varies the {} of the beads, but no bed in \"from\" states it: give bead_{}", axis, axis));
+            "the table varies the {} of the beads, but no bed in \"from\" gives it: give bead_{}", axis, axis));
       here.push_back(*value);
     }
     return here;

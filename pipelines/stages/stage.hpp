@@ -160,22 +160,22 @@ class Stage {
   // States every number of the result file and every table (see results.hpp). Called when the options are right, before
   // anything runs; list.from() are the stages that it reads.
   virtual void results(ResultList& list) const = 0;
-  // What follows from the options and is worth knowing before a run, as quantities: {"gamma": {...}}.
+  // Quantities that follow from the options and help to check a recipe before a run: {"gamma": {...}}.
   virtual Json facts() const { return Json::object(); }
   // Whether the stage keeps frames of its bed. Called after describe.
   virtual bool keeps_frames() const { return true; }
   virtual void run(RunContext& context) const = 0;
-  // What its options say of the bed that it makes or measures; nothing where it only reads one. Later stages need not
-  // state it again, and may not state it otherwise.
+  // The bed that the stage makes or measures, from its options; empty if it only reads one. Later stages need not
+  // state it again, and must not contradict it.
   virtual std::optional<BedDescription> bed() const { return std::nullopt; }
 
-  // For a stage that runs others. Called once after decoding: whether its chains are good recipes.
+  // For a stage that runs others. Called once after decoding: whether its chains are valid recipes.
   virtual void check_chains(Fields& /*fields*/, const ChainReader& /*read*/) {}
   // The kinds of stages that it runs: their code is part of what its result is made from.
   virtual std::vector<std::string> chain_kinds() const { return {}; }
 };
 
-// --- what a stage adds to the pages for people
+// --- what a stage adds to report, summary and terminal
 
 // A finished stage, with its result file read: an empty object where it has none.
 struct FinishedStage {

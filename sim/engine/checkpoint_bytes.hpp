@@ -25,7 +25,7 @@ void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
   at += sizeof value;
 }
 
-// The last eight bytes: FNV-1a of all others. A state that was damaged on a disk must not be run from: it may never
+// The last eight bytes: FNV-1a of all others. A run must not continue from a damaged state: it may never
 // end.
 inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
   std::uint64_t hash = 0xcbf29ce484222325;
@@ -33,7 +33,7 @@ inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
   return hash;
 }
 
-// The same state, that many intervals (periods of the floor) later: what a run is like that has had so many already.
+// The same state with the count of intervals (periods of the floor) increased by that many: for tests of long runs.
 inline std::vector<std::uint8_t> put_later(std::vector<std::uint8_t> checkpoint, std::uint64_t intervals) {
   std::uint64_t done = 0, sum = 0;
   constexpr std::size_t place = sizeof magic + sizeof(std::uint32_t) + sizeof done;  // of the intervals done

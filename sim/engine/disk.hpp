@@ -1,4 +1,4 @@
-// What the engine knows of one disk, in the one cache line that the hot loop reads.
+// State of one disk for the engine, in one cache line, which is all that the hot loop reads.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ enum Partner : std::int32_t {
   lid_above = -6,
 };
 
-// Bits of Disk::near. They tell what the disk could touch while it stays in its shell. They also tell whether a
+// Bits of Disk::near. They say what the disk could touch while it stays in its shell. They also say if a
 // neighbour could be on the other side of a periodic box's edge, so that nearest images must be found.
 enum Near : std::uint8_t {
   near_left_wall = 1,

@@ -1,4 +1,4 @@
-// What can be asked of an engine: snapshots, energies, overlaps, memory. Included by engine.hpp only.
+// Queries of an engine: snapshots, energies, overlaps, memory. Included by engine.hpp only.
 #pragma once
 
 namespace shakebed::sim {

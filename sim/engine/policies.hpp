@@ -33,8 +33,8 @@ struct PeriodicSidesBox {
 struct Period {
   double length = 0, minus_length = 0, inverse = 0;
   explicit Period(double period = 0) : length(period), minus_length(-period), inverse(period > 0 ? 1 / period : 0) {}
-  // What brings a difference to that of the nearest images: a whole number of periods. The number is rounded by adding
-  // and taking away a large one, which is quicker than the instruction made for it.
+  // Correction of a difference to that of the nearest images: a whole number of periods. The number is rounded by
+  // adding and taking away a large one, which is quicker than the instruction made for it.
   double to_nearest(double difference) const {
     constexpr double large = 0x1.8p52;
     return minus_length * (fused(difference, inverse, large) - large);
@@ -54,7 +54,7 @@ struct Period {
     return fused(all_floats(static_cast<float>(minus_length)),
                  fused(difference, all_floats(static_cast<float>(inverse)), large) - large, difference);
   }
-  // By how much a position is beyond the box: a whole number of periods.
+  // Distance of a position beyond the box, as a whole number of periods.
   double beyond(double position) const { return length * std::floor(position * inverse); }
   double wrapped(double position) const { return position - beyond(position); }
 };

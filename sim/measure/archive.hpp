@@ -1,4 +1,4 @@
-// State to bytes and back, for checkpoints of what has been measured so far. A class names its members once,
+// Serialisation of state, for checkpoints of a measurement. A class names its members once,
 //
 //   template <class Archive> void visit(Archive& archive) { archive(count_, sums_, blocks_); }
 //

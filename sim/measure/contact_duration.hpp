@@ -1,4 +1,4 @@
-// What the contact duration t_c of the TC model does to a measured bed.
+// Effect of the contact duration t_c of the TC model on a measured bed.
 //
 // A contact is made elastic where one of its partners was hit less than t_c before. The energy that the first of each
 // chain of such contacts would have dissipated stays in the bed and may heat it. Its share of what is dissipated is

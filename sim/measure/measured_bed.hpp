@@ -1,11 +1,11 @@
-// A bed measured in one call: it settles, is looked at by equally spaced phases of its floor's period, and what was
-// seen comes back as means with their errors. Reduced units.
+// A bed measured in one call. It settles, is sampled at equally spaced phases of the floor's period, and the result
+// holds means with their errors. Reduced units.
 //
 //   MeasuredBed bed = measure(scene, {.settle = 200, .duration = 800});
 //   if (!bed.ok()) ... bed.message ...
 //   bed.temperature_x.value
 //
-// Errors allow for correlation in time [FlyvbjergPetersen1989]. The same scene, options and seed give the same bytes.
+// Errors include the correlation in time [FlyvbjergPetersen1989]. The same scene, options and seed give the same bytes.
 // Nothing is printed and no global state is kept: any number of threads may measure, each its own bed. The result owns
 // all of its arrays. For observers of one's own, states that are kept, and replicas: measure.hpp.
 #pragma once
@@ -24,18 +24,18 @@ namespace shakebed::sim {
 
 // The recipe's stage `simulate` has the same options under the same names.
 struct MeasureOptions {
-  double settle = 0;          // time before the first look; a shaken bed begins at the next start of a period
+  double settle = 0;          // time before the first sample; a shaken bed begins at the next start of a period
   double duration = 100;      // time over which the bed is measured; whole periods of a shaken floor
-  std::uint32_t phases = 32;  // looks a period of a shaken floor; others are looked at 4 times a unit of time or so
+  std::uint32_t phases = 32;  // samples per period of a shaken floor; other beds: about 4 per unit of time
   double spacing = measuring_spacing;      // of the profile's heights [D]
-  Kernel kernel = measuring_kernel;        // the window through which density is measured
-  std::uint64_t frames = 0;                // snapshots that are kept, equally spaced over the looks
-  std::function<bool()> stop{};            // asked every 0.1 s or so; true ends the run
-  std::function<void(double)> progress{};  // the fraction of the run that is over
+  Kernel kernel = measuring_kernel;        // through which density is measured
+  std::uint64_t frames = 0;                // snapshots that are kept, equally spaced over the samples
+  std::function<bool()> stop{};            // called about every 0.1 s; true ends the run
+  std::function<void(double)> progress{};  // gets the fraction of the run that is done
   std::function<void(const Snapshot&, double phase)>
       frame_sink{};  // receives the frames; MeasuredBed::frames stays empty
 
-  // Why this scene cannot be measured so, one sentence each; empty when it can.
+  // Reasons why this scene cannot be measured with these options, one sentence each; empty if it can.
   [[nodiscard]] std::vector<std::string> validate(const Scene& scene) const;
 
   // The same for a caller with words of its own. too_many_periods: above 1e12, a mistake in the units.
@@ -77,7 +77,7 @@ FilledHeights filled_heights(const Profile& profile);
 enum class MeasureStatus {
   ok,
   stopped,         // options.stop() ended it: nothing was measured
-  bad_input,       // the scene or the options make no sense: see message
+  bad_input,       // the scene or the options are invalid: see message
   precision_lost,  // overlaps, or energy that is not conserved: see message
 };
 std::string_view to_string(MeasureStatus status);
@@ -91,7 +91,7 @@ struct MeasuredBed {
   // Of the mean densities of `profile`, row by row, heights covariance_first to covariance_last - 1.
   std::vector<double> covariance;
   std::size_t covariance_first = 0, covariance_last = 0;
-  std::size_t covariance_samples = 0;  // independent samples behind it, about
+  std::size_t covariance_samples = 0;  // estimated number of independent samples
 
   Measured centre_of_mass;          // height [D]
   Measured centre_of_mass_rise;     // above ideal hexagonal packing [D]
@@ -109,10 +109,10 @@ struct MeasuredBed {
 
   [[nodiscard]] bool ok() const { return status == MeasureStatus::ok; }
   [[nodiscard]] std::string brief() const;  // one line
-  [[nodiscard]] std::string full() const;   // a line a number
+  [[nodiscard]] std::string full() const;   // one line per number
 };
 
-// Does not throw for what is wrong with scene or options: see the status.
+// Does not throw for an invalid scene or invalid options: see the status.
 MeasuredBed measure(const Scene& scene, const MeasureOptions& options);
 
 }  // namespace shakebed::sim

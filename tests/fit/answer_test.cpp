@@ -184,7 +184,7 @@ TEST(Answer, IsARangeWhereTheDepthDecides) {
   const Answer answer = find_answer(input);
   ASSERT_TRUE(answer.ok());
   EXPECT_EQ(answer.verdict, Verdict::no_single_temperature) << answer.why;
-  EXPECT_THAT(answer.why, testing::HasSubstr("depends on the part of the profile"));
+  EXPECT_THAT(answer.why, testing::HasSubstr("depends on the range of heights"));
   EXPECT_LT(answer.interval.low, 0.9);
   EXPECT_GT(answer.interval.high, 1.0);
 }
