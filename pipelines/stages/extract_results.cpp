@@ -18,8 +18,10 @@ void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/quality/median", "1", "median quality of the disks");
   const Given surveyed = given_when("the frames are photographs and the beads' rims were looked at");
   list.number("/expected_wrong", "1", "share of the disks that are no beads, as expected from their rims", surveyed);
-  list.number("/expected_missed", "1",
-              "share of the beads that are seen too poorly to be reported, in the first frames", surveyed);
+  list.number(
+      "/expected_missed", "1",
+      "share of the beads that are not reported: seen too poorly, or at places that edges fill; in the first frames",
+      surveyed);
   const Given against = given_when("something speaks against reading a temperature from the frames");
   list.text("/objections/#/why", "what speaks against reading a temperature from the frames", against);
   list.text("/objections/#/advice", "what to do about it", against);

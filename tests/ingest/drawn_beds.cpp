@@ -30,8 +30,8 @@ struct Scene {
   double blur_px = 0.8, noise = 2;
   double slope_x = 0, slope_y = 0;  // of the light, relative, over the frame
   FaceOf face;
-  double shadow = 0;     // radii: a copy of each bead lies so far below it, behind all beads, ...
-  double shade = 0.75;   // ... and takes this share of the light
+  double shadow = 0;    // radii: a copy of each bead lies so far below it, behind all beads, ...
+  double shade = 0.75;  // ... and takes this share of the light
   bool container = false;
 };
 
@@ -198,7 +198,8 @@ DrawnBed photographed(std::mt19937& random, const Scene& scene, std::vector<Draw
     }
   smear(drawn.frame.pixels, scene.width, scene.height, scene.blur_px);
   for (float& level : drawn.frame.pixels)
-    level = static_cast<float>(std::clamp(std::round(static_cast<double>(level) + scene.noise * gaussian(random)), 0.0, 255.0));
+    level = static_cast<float>(
+        std::clamp(std::round(static_cast<double>(level) + scene.noise * gaussian(random)), 0.0, 255.0));
   drawn.beads = std::move(beads);
   return drawn;
 }
@@ -368,9 +369,8 @@ const std::vector<BedKind>& drawn_beds() {
          Scene s = some_scene(r);
          s.face = fringed(uniform(r, 60, 100), uniform(r, 0, 40));
          const double middle = uniform(r, 11, 17), spread = uniform(r, 0.03, 0.2);
-         return photographed(r, s, pile(r, s, [=](Random& q) {
-                               return middle * std::clamp(1 + spread * gaussian(q), 0.6, 1.5);
-                             }));
+         return photographed(
+             r, s, pile(r, s, [=](Random& q) { return middle * std::clamp(1 + spread * gaussian(q), 0.6, 1.5); }));
        }},
   };
   return kinds;
