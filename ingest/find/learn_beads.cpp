@@ -294,7 +294,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
-  const bool of_one_size = rims.model.gaps->other_size.empty();
+  const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   return calibration_by_rims(frame, rims, options.roi);
 }
