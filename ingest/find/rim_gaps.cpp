@@ -27,7 +27,11 @@ constexpr double least_probability = 0.5;  // of a circle that is reported
 constexpr int most_rounds = 8;             // of circles beside circles
 // Other sizes are accepted when at least this number is expected, and this share of the beads.
 constexpr double fewest_others = 3, least_share_of_others = 0.05;
-constexpr std::size_t most_shared_sizes = 3;
+// Smaller ones than of a spread: specks outside a container passed as beads of 0.35 radii, 4 beside 65.
+constexpr double fewest_small = 6, least_share_of_small = 0.1;
+// Mean probability of sizes outside a spread: drawn beads 0.95 or more, fringes in disks that were missed 0.78 at most.
+constexpr double least_sure_far_off = 0.9;
+constexpr int most_sizes_tried = 3;
 // Radii are tried in steps of this ratio. A circle speaks for a size by what its support exceeds this.
 constexpr double size_step = 1.04, worthless_support = 0.4;
 
@@ -135,17 +139,14 @@ struct WithCopies {
 
  private:
   WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model)
-      : picture(map.edges, map.at.scale, band, model.radius_px, model.polarity,
-                [&](double x, double y) {
-                  return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
-                }) {
+      : picture(map.edges, map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
+          return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
+        }) {
     for (std::size_t k = 0; k < map.copies.size(); ++k)
-      copies.emplace_back(map.copies[k], map.at.scale, band, model.radius_px, model.polarity,
-                          [&](double x, double y) {
-                            const auto [u, v] =
-                                place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
-                            return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
-                          });
+      copies.emplace_back(map.copies[k], map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
+        const auto [u, v] = place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
+        return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
+      });
   }
 };
 
@@ -168,14 +169,15 @@ class OtherSizes {
 
   std::vector<SizeBand> find() {
     std::vector<SizeBand> found;
-    while (found.size() < most_shared_sizes) {
-      const std::optional<SizeBand> shared = next_shared();
-      if (!shared) break;
-      found.push_back(*shared);
-      leave_out(*shared);
+    for (int tried = 0; tried < most_sizes_tried; ++tried) {
+      const std::optional<double> radius = next_radius();
+      if (!radius) break;
+      if (const std::optional<SizeBand> shared = taken_near(*radius)) found.push_back(*shared);
+      leave_out(around(*radius));
     }
     for (const Group& group : groups_) {
-      if (group.band.from_px < smallest_spread * model_.radius_px || group.band.to_px > largest_spread * model_.radius_px)
+      if (group.band.from_px < smallest_spread * model_.radius_px ||
+          group.band.to_px > largest_spread * model_.radius_px)
         continue;
       if (const std::optional<SizeBand> spread = taken_from(group.band, group.search)) found.push_back(*spread);
     }
@@ -189,8 +191,7 @@ class OtherSizes {
   };
 
   void leave_out(const SizeBand& band) {
-    for (Group& group : groups_)
-      group.search.change([&](GapSearch& one) { one.leave_out(band.from_px, band.to_px); });
+    for (Group& group : groups_) group.search.change([&](GapSearch& one) { one.leave_out(band.from_px, band.to_px); });
   }
 
   // What circles near this radius say for a size of their own, px of rims.
@@ -201,8 +202,8 @@ class OtherSizes {
     return gain;
   }
 
-  // The size that most speaks for, with what it takes added to the known beads; nothing when it holds too few.
-  std::optional<SizeBand> next_shared() {
+  // The radius that most speaks for.
+  [[nodiscard]] std::optional<double> next_radius() const {
     struct Seen {
       std::vector<Circle> picture;
       std::vector<std::vector<Circle>> copies;
@@ -219,11 +220,14 @@ class OtherSizes {
         if (gain > best_gain) best_gain = gain, best_radius = radius;
       }
     }
-    if (!(best_gain > 0)) return std::nullopt;
+    return best_gain > 0 ? std::optional<double>(best_radius) : std::nullopt;
+  }
+
+  std::optional<SizeBand> taken_near(double radius) {
+    const SizeBand band = around(radius);
     for (const Group& group : groups_)
-      if (within(best_radius, group.band)) {
+      if (within(radius, group.band)) {
         WithCopies search = group.search;
-        const SizeBand band = around(best_radius);
         search.change([&](GapSearch& one) { one.keep_only(band.from_px, band.to_px); });
         return taken_from(band, search);
       }
@@ -238,10 +242,18 @@ class OtherSizes {
     take_likely(search.picture, band.probability, nullptr, with_these, taken);
     double expected = 0;
     for (const GapCircle& one : taken) expected += one.probability;
-    if (expected < std::max(fewest_others, least_share_of_others * of_one_size_)) return std::nullopt;
+    if (!believed(band, expected, static_cast<double>(taken.size()))) return std::nullopt;
     known_ = std::move(with_these);
     band.radius_px = shared_radius(taken);
     return band;
+  }
+
+  [[nodiscard]] bool believed(const SizeBand& band, double expected, double taken) const {
+    const double middle = 0.5 * (band.from_px + band.to_px) / model_.radius_px;
+    const bool small = middle < smallest_spread, far_off = small || middle > largest_spread;
+    if (far_off && expected < least_sure_far_off * taken) return false;
+    if (small) return expected >= std::max(fewest_small, least_share_of_small * of_one_size_);
+    return expected >= std::max(fewest_others, least_share_of_others * of_one_size_);
   }
 
   // The median radius where the radii hardly differ.
