@@ -14,7 +14,7 @@ namespace shakebed::ingest {
 
 namespace {
 
-// Radii of the beads: the sizes of beads that are looked for, the largest first.
+// Radii of the beads: the sizes of places that are looked for, the largest first. Each counts by its area.
 constexpr std::array<double, 3> sizes = {1.0, 0.8, 0.6};
 constexpr double covered = 0.2;   // radii of the beads: so near to a disk found, an edge is its own
 constexpr double overlap = 0.12;  // of a place's radius, with a disk found

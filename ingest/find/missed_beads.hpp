@@ -1,9 +1,9 @@
 #pragma once
-// How many beads are missed that a search for round rims cannot show: places where a bead fits beside the disks found,
-// and which edges fill as they fill a bead.
+// How many beads are missed. A search for round rims cannot tell this itself.
 //
-// A perfect search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container
-// are too short within a bead's outline to count.
+// Counted are places beside the disks found in which a bead fits, and which edges fill as they fill a bead. A perfect
+// search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container fill too
+// few of a place's directions.
 
 #include <optional>
 #include <vector>
@@ -13,8 +13,8 @@
 
 namespace shakebed::ingest {
 
-// In the frame, or in this region of it; `found` in px of the frame. A place as small as 0.6 of the model's radius
-// counts as one bead.
+// In the frame, or in this region of it; `found` in px of the frame. Places of 0.6, 0.8 and 1 of the model's radius are
+// looked for, and count by their areas.
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region);
 
