@@ -99,14 +99,19 @@ void judge_bed(const ExtractOptions& options, RunContext& context, const ingest:
 void judge_missed(const ExtractOptions& options, RunContext& context, double missed) {
   const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
   if (doubt == ingest::Doubt::little) return;
-  const std::string text = fmt::format(
-      "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits",
-      100 * missed);
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(text +
-                     ". Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure "
-                     "the disks found all the same, give --shape any");
-  context.warning(text + ". Look at the overlays before you use the density.");
+    throw StageError(
+        fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
+                    "bead fits. Look "
+                    "at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the disks "
+                    "found all the "
+                    "same, give --shape any",
+                    100 * missed));
+  context.warning(
+      fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
+                  "bead fits. Look at "
+                  "the overlays before you use the density.",
+                  100 * missed));
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
