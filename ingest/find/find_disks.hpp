@@ -81,7 +81,7 @@ struct FinderCalibration {
   std::vector<std::string> warnings;  // plain sentences
   // Of a film that was surveyed (learn_beads.hpp):
   std::optional<RimModel> rims;
-  double expected_missed = 0;       // share of the beads that are seen too poorly to be reported, by their rims
+  double expected_missed = 0;       // share of the beads that are not reported (missed_beads.hpp)
   bool by_rims = false;             // beads are found by rims alone: light and profile are empty
   bool rims_to_be_checked = false;  // faces without a rim occur, and are dropped
   // Where faces fit, but none has a rim, as in surroundings as bright as the beads: 1 for each pixel that is left out.

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
 
 namespace shakebed::ingest {
@@ -77,11 +78,20 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
   if (found.disks.empty() && found.why_nothing.empty()) found.why_nothing = "no disk has a rim";
 }
 
+// Of all beads: those that rims show and that are not reported, or those that seem to lie between the disks found,
+// whichever are more.
+double share_missed(const GrayFrame& frame, const RimModel& rims, const std::vector<Circle>& found, double by_rims,
+                    const std::optional<PixelRectangle>& region) {
+  const double missed = std::max(by_rims, expected_missed_beads(frame, rims, found, region));
+  return missed / std::max(1.0, static_cast<double>(found.size()) + missed);
+}
+
 struct Agreement {
   double missed = 0;                  // share of the sure rims that no face has
   double missed_beads = 0;            // that rims show and faces do not
   double rimless = 0;                 // share of the faces
   std::vector<Circle> faces, no_rim;  // whole faces with a rim, and without
+  std::vector<Circle> all;            // these and those that are cut
   [[nodiscard]] bool good() const { return missed <= most_missed && rimless <= most_rimless; }
 };
 Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
@@ -99,8 +109,10 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   }
   agreement.missed = sure > 0 ? missed / sure : 1;
   std::vector<Circle> places;
-  for (const FoundDisk& disk : faces.disks)
+  for (const FoundDisk& disk : faces.disks) {
+    agreement.all.push_back(place_of(disk));
     if (!disk.cut) places.push_back(place_of(disk));
+  }
   const std::vector<Circle> circles = rims_at(frame, rims.model, places);
   for (std::size_t k = 0; k < places.size(); ++k)
     (circles[k].support < no_rim ? agreement.no_rim : agreement.faces).push_back(places[k]);
@@ -141,7 +153,7 @@ class FacesAndRims {
       if (agreement.good()) {
         faces.calibration.rims = rims_.model;
         faces.calibration.expected_missed =
-            agreement.missed_beads / (static_cast<double>(agreement.faces.size()) + agreement.missed_beads);
+            share_missed(frame, rims_.model, agreement.all, agreement.missed_beads, asked_.roi);
         faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
         return faces;
       }
@@ -211,7 +223,8 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
   }
 }
 
-CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims) {
+CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims,
+                                      const std::optional<PixelRectangle>& region) {
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
   calibration.polarity = rims.model.polarity;
@@ -229,8 +242,9 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.disks_used = seen.disks.size();
   calibration.rims = rims.model;
   calibration.by_rims = true;
-  calibration.expected_missed =
-      seen.expected_missed / std::max(1.0, static_cast<double>(seen.disks.size()) + seen.expected_missed);
+  std::vector<Circle> found;
+  for (const RimDisk& disk : seen.disks) found.push_back(disk.circle);
+  calibration.expected_missed = share_missed(frame, rims.model, found, seen.expected_missed, region);
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
   if (!result.found) result.why_not = "no rim of " + std::to_string(rims.model.radius_px) + " px is seen";
@@ -280,15 +294,15 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
-  const bool of_one_size = rims.model.gaps->other_size.empty();
+  const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
-  return calibration_by_rims(frame, rims);
+  return calibration_by_rims(frame, rims, options.roi);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
   LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, true);
   learn_gaps(frame, rims, true);
-  return calibration_by_rims(frame, rims);
+  return calibration_by_rims(frame, rims, std::nullopt);
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

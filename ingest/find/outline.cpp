@@ -17,9 +17,9 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr int outline_directions = 48;
-constexpr std::size_t most_outlines = 120;                 // followed: enough for a median
-constexpr double nearest_edge = 0.5, farthest_edge = 1.6;  // radii: where an outline may run
-constexpr double ring_step = 0.5;                          // px
+constexpr std::size_t most_outlines = 120;                                 // followed: enough for a median
+constexpr double nearest_outline_edge = 0.5, farthest_outline_edge = 1.6;  // radii: where an outline may run
+constexpr double ring_step = 0.5;                                          // px
 // An outline of axis ratio 2 leaves the direction of the radius by up to 37 degrees.
 constexpr double least_radial_alignment = 0.7;  // cosine between an edge's gradient and the radius
 constexpr double steepest_path = 0.11;          // radii from one direction to the next: 40 degrees
@@ -124,7 +124,8 @@ class OutlinePath {
  public:
   OutlinePath(const Slopes& slopes, const Circle& circle, double typical_slope)
       : circle_(circle),
-        rings_(static_cast<std::size_t>((farthest_edge - nearest_edge) * circle.radius / ring_step) + 1),
+        rings_(static_cast<std::size_t>((farthest_outline_edge - nearest_outline_edge) * circle.radius / ring_step) +
+               1),
         score_(outline_directions * rings_) {
     for (std::size_t k = 0; k < outline_directions; ++k)
       for (std::size_t ring = 0; ring < rings_; ++ring) {
@@ -141,7 +142,7 @@ class OutlinePath {
   std::array<bool, outline_directions> met{};       // an edge at all
 
  private:
-  [[nodiscard]] double radius_of(double ring) const { return nearest_edge * circle_.radius + ring * ring_step; }
+  [[nodiscard]] double radius_of(double ring) const { return nearest_outline_edge * circle_.radius + ring * ring_step; }
 
   // Three turns, of which the middle one closes well enough.
   void follow() {

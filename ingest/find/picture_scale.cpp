@@ -77,16 +77,14 @@ GrayFrame stretched(const GrayFrame& frame, double ratio, double angle) {
   return out;
 }
 
+double scale_for(double radius_px) {
+  return radius_px < least_radius ? 0.5 : std::max(1, static_cast<int>(radius_px / wanted_radius));
+}
+
 ScaledPicture scaled_for(const GrayFrame& frame, double radius_px) {
   ScaledPicture scaled;
-  if (radius_px < least_radius) {
-    scaled.picture = doubled(frame);
-    scaled.scale = 0.5;
-    return scaled;
-  }
-  const int factor = std::max(1, static_cast<int>(radius_px / wanted_radius));
-  scaled.picture = reduced(frame, factor);
-  scaled.scale = factor;
+  scaled.scale = scale_for(radius_px);
+  scaled.picture = scaled.scale < 1 ? doubled(frame) : reduced(frame, static_cast<int>(scaled.scale));
   return scaled;
 }
 

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "ingest/find/nearby.hpp"
-#include "ingest/find/picture_scale.hpp"
+#include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_gaps.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "statistics/ranks.hpp"
@@ -142,14 +142,15 @@ void measure_open_rims(const std::vector<Circle>& circles, const EdgeMap& edges,
   model.open_radius_px = (steepest + blur_of_map_px2 / (2 * steepest)) * scale;
 }
 
+Circle on_the_map(Circle circle, const ScaledPicture& at) {
+  circle.x = at.from_frame_x(circle.x);
+  circle.y = at.from_frame_y(circle.y);
+  circle.radius /= at.scale;
+  return circle;
+}
 std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPicture& at) {
   std::vector<Circle> circles;
-  for (const RimDisk& disk : disks) {
-    circles.push_back(disk.circle);
-    circles.back().x = at.from_frame_x(disk.circle.x);
-    circles.back().y = at.from_frame_y(disk.circle.y);
-    circles.back().radius = disk.circle.radius / at.scale;
-  }
+  for (const RimDisk& disk : disks) circles.push_back(on_the_map(disk.circle, at));
   return circles;
 }
 
@@ -185,8 +186,10 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
 }
 
 void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
-  const ScaledPicture at = scaled_for(frame, learned.model.radius_px);
-  learned.model.gaps = chances_in_gaps(at, on_the_map(learned.disks, at), learned.model, one_size);
+  PictureMaps maps(frame);
+  std::vector<Circle> beads;
+  for (const RimDisk& disk : learned.disks) beads.push_back(disk.circle);
+  learned.model.gaps = chances_in_gaps(maps, beads, learned.model, one_size);
 }
 
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks) {
@@ -198,8 +201,8 @@ Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std:
 }
 
 RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
-  const ScaledPicture at = scaled_for(frame, model.radius_px);
-  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  PictureMaps maps(frame);
+  const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, model.threshold);
   RimsFound found;
   found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
   const auto drop_faint = [&] {
@@ -208,14 +211,20 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   };
   drop_faint();
   if (!model.gaps) return found;
-  const GapCircles more = circles_in_gaps(edges, on_the_map(found.disks, at), model, at.scale);
+  std::vector<Circle> beads;
+  for (const RimDisk& disk : found.disks) beads.push_back(disk.circle);
+  const GapCircles more = circles_in_gaps(maps, beads, model);
   found.expected_missed = more.expected_missed;
   for (const GapCircle& one : more.circles) {
-    const Circle fine = fit_circle(edges, one.circle, model.polarity, fine_rays);
+    const PictureMap& map = maps.scaled_for(one.circle.radius, model.threshold);
+    const Circle coarse = on_the_map(one.circle, map.at);
+    const Circle fine = fit_circle(map.edges, coarse, model.polarity, fine_rays);
     const bool better = fine.support > 0.7 * one.circle.support;
-    found.disks.push_back(disk_of(better ? fine : one.circle, at, model));
-    found.disks.back().probability = one.probability;
-    found.disks.back().other_size = one.other_size;
+    found.disks.push_back(disk_of(better ? fine : coarse, map.at, model));
+    RimDisk& disk = found.disks.back();
+    disk.probability = one.probability;
+    disk.other_size = one.size != nullptr;
+    if (disk.other_size && one.size->radius_px > 0) disk.circle.radius = one.size->radius_px;
   }
   drop_faint();
   sort_by_place(found.disks);

@@ -16,9 +16,15 @@ namespace shakebed::ingest {
 
 // What a second look beside the beads already found may add (rim_gaps.hpp): probabilities by support, as below, of
 // circles that overlap none of them.
+// Circles of `from_px` to `to_px` but for those of the sizes known before.
+struct SizeBand {
+  double from_px = 0, to_px = 0;
+  double radius_px = 0;  // that its beads share; 0: each has its own
+  std::vector<double> probability;
+};
 struct GapModel {
   std::vector<double> same_size;
-  std::vector<double> other_size;  // empty: all beads are of one size
+  std::vector<SizeBand> other_sizes;  // empty: all beads are of one size
 };
 
 struct RimModel {

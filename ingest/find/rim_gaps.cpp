@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-
 #include <functional>
 #include <numbers>
+#include <optional>
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -16,46 +17,59 @@ namespace {
 
 constexpr double gap_reach = 2;            // radii: so far from a bead's rim a circle's rim may be
 constexpr double nearest_rims = 0.8;       // sums of radii: two circles nearer than that overlap
-constexpr double same_bead_radius = 0.12;  // of the beads' radius, either way
-// In radii of the beads; at half of it, fringes in photoelastic disks are mistaken for beads.
-constexpr double smallest_other = 0.6, largest_other = 1.67;
+constexpr double same_bead_radius = 0.12;  // of the radius that beads share, either way
+// In radii of the beads. At half of it, fringes in photoelastic disks are mistaken for beads, unless there is a size
+// that many share.
+constexpr double smallest_spread = 0.6, largest_spread = 1.67;
+constexpr double smallest_shared = 0.36, largest_shared = 2.8;
+constexpr double least_gap_radius_px = 4;      // of the map: a smaller circle cannot be told from a speck
 constexpr double least_gap_probability = 0.5;  // of a circle that is reported
 constexpr int most_gap_rounds = 8;             // of circles beside circles
 // Other sizes are accepted when at least this number is expected, and this share of the beads.
 constexpr double fewest_others = 3, least_share_of_others = 0.05;
+// Smaller ones than of a spread: specks outside a container passed as beads of 0.35 radii, 4 beside 65.
+constexpr double fewest_small = 6, least_share_of_small = 0.1;
+// Mean probability of sizes outside a spread: drawn beads 0.95 or more, fringes in disks that were missed 0.78 at most.
+constexpr double least_sure_far_off = 0.9;
+constexpr int most_sizes_tried = 3;
+// Radii are tried in steps of this ratio. A circle speaks for a size by what its support exceeds this.
+constexpr double size_step = 1.04, worthless_support = 0.4;
 
 // Where a place of the map is in the picture that the beads were found in.
-using ToPicture = std::function<FramePlace(double x, double y)>;
+using ToFrame = std::function<FramePlace(double x, double y)>;
 
-enum class Sizes { same, other };
-
-// Circles of a map, and which of them lie beside beads and overlap none.
+// Circles of a map, px of the frame, and which of them lie beside beads and overlap none.
 class GapSearch {
  public:
-  GapSearch(const EdgeMap& edges, double radius, Polarity polarity, Sizes sizes, ToPicture to_picture)
-      : radius_(radius), to_picture_(std::move(to_picture)) {
-    const bool same = sizes == Sizes::same;
-    const double from = (same ? 1 - 0.6 * same_bead_radius : smallest_other) * radius;
-    const double to = (same ? 1 + 0.6 * same_bead_radius : largest_other) * radius;
-    circles_ = find_circles(edges, from, to, polarity, faintest_rim_support);
-    std::erase_if(circles_, [&](const Circle& one) {
-      const double ratio = one.radius / radius;
-      const bool like_the_others = std::abs(ratio - 1) <= same_bead_radius;
-      return same ? !like_the_others : like_the_others || ratio < smallest_other || ratio > largest_other;
-    });
+  // Radii in px of the frame, `scale` px of the frame a px of the map. `radius_px`: of the beads found at first.
+  GapSearch(const EdgeMap& edges, double scale, const SizeBand& band, double radius_px, Polarity polarity,
+            const ToFrame& to_frame)
+      : radius_(radius_px) {
+    const double tolerated = 1 + 0.4 * same_bead_radius;
+    const double from = std::max(least_gap_radius_px, band.from_px * tolerated / scale);
+    const double to = band.to_px / tolerated / scale;
+    if (!(from < to)) return;
+    for (Circle& circle : find_circles(edges, from, to, polarity, faintest_rim_support)) {
+      circle.radius *= scale;
+      if (circle.radius < band.from_px || circle.radius > band.to_px) continue;
+      const auto [x, y] = to_frame(circle.x, circle.y);
+      circle.x = x, circle.y = y;
+      circles_.push_back(circle);
+      largest_ = std::max(largest_, circle.radius);
+    }
   }
 
   [[nodiscard]] std::vector<Circle> beside(const std::vector<Circle>& beads) const {
     double largest = radius_;
     for (const Circle& bead : beads) largest = std::max(largest, bead.radius);
-    const Nearby near(beads.size(), largest + (largest_other + gap_reach) * radius_,
+    const Nearby near(beads.size(), largest + largest_ + gap_reach * radius_,
                       [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
     std::vector<Circle> free;
     for (const Circle& circle : circles_) {
-      const auto [x, y] = to_picture_(circle.x, circle.y);
       bool beside = false;
-      const bool overlaps = near.any_near(x, y, [&, x = x, y = y](std::size_t i) {
-        const double away = std::hypot(beads[i].x - x, beads[i].y - y), touching = beads[i].radius + circle.radius;
+      const bool overlaps = near.any_near(circle.x, circle.y, [&](std::size_t i) {
+        const double away = std::hypot(beads[i].x - circle.x, beads[i].y - circle.y);
+        const double touching = beads[i].radius + circle.radius;
         beside = beside || away < touching + gap_reach * radius_;
         return away < nearest_rims * touching;
       });
@@ -64,17 +78,21 @@ class GapSearch {
     return without_doubles(std::move(free), nearest_rims);
   }
 
+  void leave_out(double from_px, double to_px) {
+    std::erase_if(circles_, [&](const Circle& one) { return one.radius >= from_px && one.radius <= to_px; });
+  }
+  void keep_only(double from_px, double to_px) {
+    std::erase_if(circles_, [&](const Circle& one) { return one.radius < from_px || one.radius > to_px; });
+  }
+
  private:
-  double radius_;
-  ToPicture to_picture_;
+  double radius_, largest_ = 1;
   std::vector<Circle> circles_;
 };
 
-FramePlace same_place(double x, double y) { return {x, y}; }
-
 // Adds the likely ones to the beads, then those beside these, until there are no more. Returns the sum of the
 // probabilities of what is left.
-double take_likely(const GapSearch& search, const std::vector<double>& probability, Sizes sizes,
+double take_likely(const GapSearch& search, const std::vector<double>& probability, const SizeBand* size,
                    std::vector<Circle>& beads, std::vector<GapCircle>& taken) {
   for (int round = 0;; ++round) {
     double left = 0;
@@ -84,60 +102,208 @@ double take_likely(const GapSearch& search, const std::vector<double>& probabili
       if (its < least_gap_probability)
         left += its;
       else
-        taken.push_back({circle, its, sizes == Sizes::other});
+        taken.push_back({circle, its, size});
     }
     for (std::size_t k = before; k < taken.size(); ++k) beads.push_back(taken[k].circle);
     if (taken.size() == before || round == most_gap_rounds) return left;
   }
 }
 
+SizeBand around(double radius_px) {
+  SizeBand band;
+  band.from_px = (1 - same_bead_radius) * radius_px;
+  band.to_px = (1 + same_bead_radius) * radius_px;
+  return band;
+}
+
+bool within(double radius, const SizeBand& band) { return radius >= band.from_px && radius <= band.to_px; }
+
+// A search in the picture and the same in its copies.
+struct WithCopies {
+  GapSearch picture;
+  std::vector<GapSearch> copies;
+
+  WithCopies(PictureMaps& maps, const SizeBand& band, const RimModel& model)
+      : WithCopies(maps.with_copies(std::sqrt(band.from_px * band.to_px), model.threshold), band, model) {}
+
+  [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) const {
+    std::vector<std::vector<Circle>> by_chance;
+    for (const GapSearch& copy : copies) by_chance.push_back(copy.beside(beads));
+    return probabilities_by_support(picture.beside(beads), by_chance, true);
+  }
+  template <class Change>
+  void change(const Change& change) {
+    change(picture);
+    for (GapSearch& copy : copies) change(copy);
+  }
+
+ private:
+  WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model)
+      : picture(map.edges, map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
+          return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
+        }) {
+    for (std::size_t k = 0; k < map.copies.size(); ++k)
+      copies.emplace_back(map.copies[k], map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
+        const auto [u, v] = place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
+        return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
+      });
+  }
+};
+
+// The other sizes of beads in a picture.
+class OtherSizes {
+ public:
+  OtherSizes(PictureMaps& maps, const RimModel& model, std::vector<Circle>& known)
+      : model_(model), known_(known), of_one_size_(static_cast<double>(known.size())) {
+    const double radius = model.radius_px;
+    constexpr std::array<double, 5> limits = {smallest_shared, smallest_spread, 1, largest_spread, largest_shared};
+    for (std::size_t k = 0; k + 1 < limits.size(); ++k) {
+      SizeBand band;
+      band.from_px = limits[k] * radius, band.to_px = limits[k + 1] * radius;
+      SizeBand searched = band;
+      searched.from_px *= 1 - same_bead_radius, searched.to_px *= 1 + same_bead_radius;
+      groups_.push_back({band, WithCopies(maps, searched, model)});
+    }
+    leave_out(around(radius));
+  }
+
+  std::vector<SizeBand> find() {
+    std::vector<SizeBand> found;
+    for (int tried = 0; tried < most_sizes_tried; ++tried) {
+      const std::optional<double> radius = next_radius();
+      if (!radius) break;
+      if (const std::optional<SizeBand> shared = taken_near(*radius)) found.push_back(*shared);
+      leave_out(around(*radius));
+    }
+    for (const Group& group : groups_) {
+      if (group.band.from_px < smallest_spread * model_.radius_px ||
+          group.band.to_px > largest_spread * model_.radius_px)
+        continue;
+      if (const std::optional<SizeBand> spread = taken_from(group.band, group.search)) found.push_back(*spread);
+    }
+    return found;
+  }
+
+ private:
+  struct Group {
+    SizeBand band;
+    WithCopies search;
+  };
+
+  void leave_out(const SizeBand& band) {
+    for (Group& group : groups_) group.search.change([&](GapSearch& one) { one.leave_out(band.from_px, band.to_px); });
+  }
+
+  // What circles near this radius say for a size of their own, px of rims.
+  static double gain_near(const std::vector<Circle>& circles, const SizeBand& band) {
+    double gain = 0;
+    for (const Circle& circle : circles)
+      if (within(circle.radius, band)) gain += circle.radius * std::max(0.0, circle.support - worthless_support);
+    return gain;
+  }
+
+  // The radius that most speaks for.
+  [[nodiscard]] std::optional<double> next_radius() const {
+    struct Seen {
+      std::vector<Circle> picture;
+      std::vector<std::vector<Circle>> copies;
+    };
+    double best_gain = 0, best_radius = 0;
+    for (const Group& group : groups_) {
+      Seen seen;
+      seen.picture = group.search.picture.beside(known_);
+      for (const GapSearch& copy : group.search.copies) seen.copies.push_back(copy.beside(known_));
+      for (double radius = group.band.from_px; radius < group.band.to_px; radius *= size_step) {
+        const SizeBand band = around(radius);
+        double gain = gain_near(seen.picture, band);
+        for (const auto& copy : seen.copies) gain -= gain_near(copy, band) / static_cast<double>(seen.copies.size());
+        if (gain > best_gain) best_gain = gain, best_radius = radius;
+      }
+    }
+    return best_gain > 0 ? std::optional<double>(best_radius) : std::nullopt;
+  }
+
+  std::optional<SizeBand> taken_near(double radius) {
+    const SizeBand band = around(radius);
+    for (const Group& group : groups_)
+      if (within(radius, group.band)) {
+        WithCopies search = group.search;
+        search.change([&](GapSearch& one) { one.keep_only(band.from_px, band.to_px); });
+        return taken_from(band, search);
+      }
+    return std::nullopt;
+  }
+
+  // Adds to the known beads what is likely in this band, if that is enough to believe in it.
+  std::optional<SizeBand> taken_from(SizeBand band, const WithCopies& search) {
+    band.probability = search.probabilities(known_);
+    std::vector<Circle> with_these = known_;
+    std::vector<GapCircle> taken;
+    take_likely(search.picture, band.probability, nullptr, with_these, taken);
+    double expected = 0;
+    for (const GapCircle& one : taken) expected += one.probability;
+    if (!believed(band, expected, static_cast<double>(taken.size()))) return std::nullopt;
+    known_ = std::move(with_these);
+    band.radius_px = shared_radius(taken);
+    return band;
+  }
+
+  [[nodiscard]] bool believed(const SizeBand& band, double expected, double taken) const {
+    const double middle = 0.5 * (band.from_px + band.to_px) / model_.radius_px;
+    const bool small = middle < smallest_spread, far_off = small || middle > largest_spread;
+    if (far_off && expected < least_sure_far_off * taken) return false;
+    if (small) return expected >= std::max(fewest_small, least_share_of_small * of_one_size_);
+    return expected >= std::max(fewest_others, least_share_of_others * of_one_size_);
+  }
+
+  // The median radius where the radii hardly differ.
+  static double shared_radius(const std::vector<GapCircle>& taken) {
+    constexpr double hardly = 0.03;  // standard deviation over the mean
+    std::vector<double> radii, deviations;
+    for (const GapCircle& one : taken) radii.push_back(one.circle.radius);
+    const double middle = median_of(radii);
+    for (const double radius : radii) deviations.push_back(std::abs(radius - middle));
+    return 1.4826 * median_of(deviations) < hardly * middle ? middle : 0;
+  }
+
+  const RimModel& model_;
+  std::vector<Circle>& known_;
+  double of_one_size_;
+  std::vector<Group> groups_;
+};
+
 }  // namespace
 
-GapCircles circles_in_gaps(const EdgeMap& edges, const std::vector<Circle>& beads, const RimModel& model,
-                           double scale) {
+GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model) {
   GapCircles out;
   std::vector<Circle> known = beads;
-  const auto take = [&](const std::vector<double>& probability, Sizes sizes) {
-    const GapSearch search(edges, model.radius_px / scale, model.polarity, sizes, same_place);
-    out.expected_missed += take_likely(search, probability, sizes, known, out.circles);
+  const auto take = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size,
+                        const std::vector<SizeBand>& before) {
+    const PictureMap& map = maps.scaled_for(std::sqrt(band.from_px * band.to_px), model.threshold);
+    GapSearch search(map.edges, map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
+      return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
+    });
+    for (const SizeBand& other : before) search.leave_out(other.from_px, other.to_px);
+    out.expected_missed += take_likely(search, probability, size, known, out.circles);
   };
-  take(model.gaps->same_size, Sizes::same);
-  if (!model.gaps->other_size.empty()) take(model.gaps->other_size, Sizes::other);
+  std::vector<SizeBand> before;
+  take(around(model.radius_px), model.gaps->same_size, nullptr, before);
+  before.push_back(around(model.radius_px));
+  for (const SizeBand& size : model.gaps->other_sizes) {
+    take(size, size.probability, &size, before);
+    before.push_back(size);
+  }
   return out;
 }
 
-GapModel chances_in_gaps(const ScaledPicture& at, const std::vector<Circle>& beads, const RimModel& model,
-                         bool one_size) {
-  const double radius = model.radius_px / at.scale;
-  const EdgeMap edges = find_edges(at.picture, model.threshold);
-  std::vector<EdgeMap> copies;
-  std::vector<ToPicture> origins;
-  for (const double turn : {0.0, 0.25, 0.5, 0.75}) {
-    const double angle = turn * std::numbers::pi;
-    copies.push_back(find_edges(stretched(at.picture, decoy_stretch, angle), edges.threshold));
-    origins.emplace_back(
-        [&at, angle](double x, double y) { return place_before_stretching(at.picture, decoy_stretch, angle, x, y); });
-  }
+GapModel chances_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model, bool one_size) {
   GapModel gaps;
   std::vector<Circle> known = beads;
+  const WithCopies same(maps, around(model.radius_px), model);
+  gaps.same_size = same.probabilities(known);
   std::vector<GapCircle> taken;
-  const auto learn = [&](Sizes sizes, std::vector<double>& probability) {
-    const GapSearch search(edges, radius, model.polarity, sizes, same_place);
-    std::vector<std::vector<Circle>> by_chance;
-    for (std::size_t k = 0; k < copies.size(); ++k)
-      by_chance.push_back(GapSearch(copies[k], radius, model.polarity, sizes, origins[k]).beside(known));
-    probability = probabilities_by_support(search.beside(known), by_chance, true);
-    taken.clear();
-    take_likely(search, probability, sizes, known, taken);
-  };
-  learn(Sizes::same, gaps.same_size);
-  if (one_size) return gaps;
-  const double of_one_size = static_cast<double>(known.size());
-  std::vector<double> other_size;
-  learn(Sizes::other, other_size);
-  double expected = 0;
-  for (const GapCircle& one : taken) expected += one.probability;
-  if (expected >= std::max(fewest_others, least_share_of_others * of_one_size)) gaps.other_size = other_size;
+  take_likely(same.picture, gaps.same_size, nullptr, known, taken);
+  if (!one_size) gaps.other_sizes = OtherSizes(maps, model, known).find();
   return gaps;
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double enough_radius_px = 12, large_frame_pixels = 2e6;
 constexpr std::size_t most_surveyed_pixels = 6'000'000;
-constexpr double most_wrong = 0.2, worth_a_word = 0.02;  // shares of disks that may be wrong
+constexpr double most_wrong = 0.2, most_missed = 0.4, worth_a_word = 0.02;  // shares that may be wrong, or missed
 constexpr double levels_16_bit = 65535.0 / 255.0;
 
 std::size_t pixel_bytes(PixelType type) {
@@ -113,15 +113,17 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
   out.measurement.disks = std::move(kept);
   const std::vector<std::string> doubts = doubts_of_bed(out.measurement, options.bead_diameter_m);
   out.measurement.warnings.insert(out.measurement.warnings.begin(), doubts.begin(), doubts.end());
-  const Doubt doubt = doubt_of(out.measurement.expected_wrong);
-  out.status = doubt == Doubt::too_many ? FindStatus::doubtful : FindStatus::ok;
-  if (doubt != Doubt::little) {
-    const std::string warning =
-        formatted("%.1f %% of the disks found may be wrong: look at them before the numbers are used",
-                  100 * out.measurement.expected_wrong);
-    if (!out.ok()) out.message = warning;
+  out.status = FindStatus::ok;
+  const auto judge = [&](Doubt doubt, const char* words, double share) {
+    if (doubt == Doubt::little) return;
+    const std::string warning = formatted(words, 100 * share);
+    if (doubt == Doubt::too_many) out.status = FindStatus::doubtful, out.message = warning;
     out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
-  }
+  };
+  const double missed = out.measurement.finder.expected_missed, wrong = out.measurement.expected_wrong;
+  judge(doubt_of_missed(missed), "%.0f %% of the beads may be missed: look at the picture before the numbers are used",
+        missed);
+  judge(doubt_of(wrong), "%.1f %% of the disks found may be wrong: look at them before the numbers are used", wrong);
   const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
   if (out.measurement.contacts.far_apart(diameter_px)) {
     out.status = FindStatus::doubtful;
@@ -198,6 +200,11 @@ Doubt doubt_of(double expected_wrong) {
   return expected_wrong > worth_a_word ? Doubt::some : Doubt::little;
 }
 
+Doubt doubt_of_missed(double expected_missed) {
+  if (expected_missed > most_missed) return Doubt::too_many;
+  return expected_missed > worth_a_word ? Doubt::some : Doubt::little;
+}
+
 DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   DisksFound out;
   if (const auto problems = options.validate(); !problems.empty()) {
@@ -230,6 +237,11 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   out.status = FindStatus::ok;
   out.disks = std::move(found.disks);
   out.expected_wrong = wrong_share(out.disks);
+  std::vector<std::string>& warnings = out.calibration.warnings;
+  if (const double missed = out.calibration.expected_missed; doubt_of_missed(missed) != Doubt::little)
+    warnings.insert(warnings.begin(), formatted("%.0f %% of the beads may be missed", 100 * missed));
+  if (doubt_of(out.expected_wrong) != Doubt::little)
+    warnings.insert(warnings.begin(), formatted("%.1f %% of the disks found may be wrong", 100 * out.expected_wrong));
   return out;
 }
 
@@ -291,6 +303,7 @@ std::string DisksFound::full() const {
   out += formatted("noise            %.3g grey levels\n", calibration.noise_level);
   out += formatted("contrast         %.4g grey levels\n", calibration.contrast_level);
   out += formatted("expected wrong   %.2g %% of the disks\n", 100 * expected_wrong);
+  out += formatted("expected missed  %.2g %% of the beads\n", 100 * calibration.expected_missed);
   for (const std::string& warning : calibration.warnings) out += "warning          " + warning + "\n";
   return out;
 }

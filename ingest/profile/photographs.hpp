@@ -36,7 +36,7 @@ GrayFrame frame_of(const ImageView& image);
 enum class FindStatus {
   ok,
   no_beads,   // nothing that is a bead by the survey, or by the finder
-  doubtful,   // too many of the disks found may be wrong (doubt_of())
+  doubtful,   // too many of the disks found may be wrong, or too many beads missed (doubt_of())
   bad_input,  // the image is empty, or the options make no sense
 };
 std::string_view to_string(FindStatus status);
@@ -74,6 +74,9 @@ int reduction_for(int width, int height, double radius_px);
 // above 20 %, nothing is measured.
 enum class Doubt { little, some, too_many };
 Doubt doubt_of(double expected_wrong);
+// The same of the share of beads that may be missed: `some` above 2 %, `too_many` above 40 %. Disks that are found hold
+// all the same, and the share is known less well.
+Doubt doubt_of_missed(double expected_missed);
 
 struct BedFound {
   FindStatus status = FindStatus::bad_input;

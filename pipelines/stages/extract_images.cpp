@@ -95,6 +95,25 @@ void judge_bed(const ExtractOptions& options, RunContext& context, const ingest:
   for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
 }
 
+// Refuses, or warns, when many beads seem to be missed.
+void judge_missed(const ExtractOptions& options, RunContext& context, double missed) {
+  const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
+  if (doubt == ingest::Doubt::little) return;
+  if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
+    throw StageError(
+        fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
+                    "bead fits. Look "
+                    "at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the disks "
+                    "found all the "
+                    "same, give --shape any",
+                    100 * missed));
+  context.warning(
+      fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
+                  "bead fits. Look at "
+                  "the overlays before you use the density.",
+                  100 * missed));
+}
+
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
 void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
   constexpr double far_off = 0.2;
@@ -110,12 +129,8 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
         fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
                     "numbers.",
                     100 * wrong));
+  judge_missed(options, context, missed);
   judge_bed(options, context, found);
-  if (ingest::doubt_of(missed) != ingest::Doubt::little)
-    context.warning(fmt::format(
-        "About {:.0f} % of the beads are seen too poorly to be reported, and may be missed; what is not seen at all "
-        "comes on top. Look at the overlays before you use the density.",
-        100 * missed));
   if (!options.bead_number) return;
   const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
   const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",

@@ -93,6 +93,8 @@ StagePages extract_pages() {
       .warnings = {
           {"may be wrong", measurement,
            "Look through the film with the colours by quality: what is marked and is no bead?"},
+          {"beads may be missed", measurement,
+           "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone."},
           {"do not touch", measurement,
            "Look through the film: are the circles as large as your beads? Give the length of a pixel (\"scale\")."},
           {"disks found overlap", measurement,

@@ -18,8 +18,11 @@ void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/quality/median", "1", "median quality of the disks");
   const Given surveyed = given_when("the frames are photographs and the beads' rims were examined");
   list.number("/expected_wrong", "1", "expected share of found disks that are no beads, from their rims", surveyed);
-  list.number("/expected_missed", "1",
-              "expected share of beads that are seen too poorly to be reported, from the first frames", surveyed);
+  list.number(
+      "/expected_missed", "1",
+      "expected share of beads that are not reported, in the first frames: beads seen too poorly, and places that "
+      "edges fill",
+      surveyed);
   const Given against = given_when("there are reasons against a temperature from the frames");
   list.text("/objections/#/why", "reason against a temperature from the frames", against);
   list.text("/objections/#/advice", "what to do", against);

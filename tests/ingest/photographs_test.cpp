@@ -97,6 +97,10 @@ TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
   EXPECT_EQ(doubt_of(0.021), Doubt::some);
   EXPECT_EQ(doubt_of(0.199), Doubt::some);
   EXPECT_EQ(doubt_of(0.201), Doubt::too_many);
+  EXPECT_EQ(doubt_of_missed(0.019), Doubt::little);
+  EXPECT_EQ(doubt_of_missed(0.021), Doubt::some);
+  EXPECT_EQ(doubt_of_missed(0.399), Doubt::some);
+  EXPECT_EQ(doubt_of_missed(0.401), Doubt::too_many);
 }
 
 TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {

@@ -110,7 +110,7 @@ TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
   ASSERT_TRUE(learned.found) << learned.why_not;
   for (const FoundDisk& disk : find_beads(frame, learned.calibration, options).disks) EXPECT_FALSE(disk.other_size);
   options.one_size = true;
-  EXPECT_TRUE(learn_beads({&frame}, options).calibration.rims->gaps->other_size.empty());
+  EXPECT_TRUE(learn_beads({&frame}, options).calibration.rims->gaps->other_sizes.empty());
 }
 
 // A shadow's round end, of a tenth of the beads' contrast.

@@ -1,0 +1,151 @@
+#include "ingest/find/missed_beads.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+#include "ingest/find/edge_map.hpp"
+#include "ingest/find/picture_scale.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Radii of the beads: the sizes of places that are looked for, the largest first. Each counts by its area.
+constexpr std::array<double, 3> sizes = {1.0, 0.8, 0.6};
+constexpr double covered = 0.2;   // radii of the beads: so near to a disk found, an edge is its own
+constexpr double overlap = 0.12;  // of a place's radius, with a disk found
+// Of a place's radius: between these its edges are looked for, in as many directions.
+constexpr double nearest_edge = 0.35, farthest_edge = 1.15;
+constexpr int directions = 24;
+// Of the directions that no disk covers: a straight line is met in 0.3, two that are parallel in 0.6.
+constexpr double least_met = 0.65;
+constexpr int fewest_open = 6;
+// Of the beads' contrast.
+constexpr double faintest_edge = 0.25;
+constexpr double places_per_radius = 6;
+constexpr double farthest_gap = 1.5;  // radii of the beads, from a place to the nearest disk found
+
+// Places of a map of edges that no disk covers.
+class FreePlaces {
+ public:
+  FreePlaces(const EdgeMap& edges, const std::vector<Circle>& found, double radius, double contrast)
+      : edges_(edges),
+        radius_(radius),
+        clearance_(edges.x.size(), static_cast<float>(4 * radius)),
+        edge_(edges.x.size(), 0) {
+    for (const Circle& disk : found) cover(disk.x, disk.y, disk.radius);
+    to_disk_ = clearance_;
+    for (const RidgePixel& pixel : edges.ridge) {
+      const int column = static_cast<int>(pixel.x), row = static_cast<int>(pixel.y);
+      const std::size_t at = edges.at(column, row);
+      const double step = step_per_slope * static_cast<double>(std::hypot(edges.x[at], edges.y[at]));
+      if (static_cast<double>(clearance_[at]) < covered * radius || step < faintest_edge * contrast) continue;
+      for (int y = std::max(0, row - 1); y <= std::min(edges.height - 1, row + 1); ++y)
+        for (int x = std::max(0, column - 1); x <= std::min(edges.width - 1, column + 1); ++x)
+          edge_[edges.at(x, y)] = 1;
+    }
+  }
+
+  // Places of this radius, the fullest first; each covers what it lies on.
+  double take(double radius, const PixelRectangle& region) {
+    struct Place {
+      double met, x, y;
+    };
+    std::vector<Place> places;
+    const double step = std::max(1.0, radius / places_per_radius);
+    for (double y = region.top + radius; y <= region.top + region.height - radius; y += step)
+      for (double x = region.left + radius; x <= region.left + region.width - radius; x += step)
+        if (is_free(x, y, radius) && is_beside_a_disk(x, y, radius))
+          if (const double met = share_met(x, y, radius); met >= least_met) places.push_back({met, x, y});
+    std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.met > b.met; });
+    double taken = 0;
+    for (const Place& place : places) {
+      if (!is_free(place.x, place.y, radius)) continue;
+      ++taken;
+      cover(place.x, place.y, radius);
+    }
+    return taken;
+  }
+
+ private:
+  [[nodiscard]] bool is_free(double x, double y, double radius) const {
+    return static_cast<double>(clearance_[edges_.at(static_cast<int>(x), static_cast<int>(y))]) >=
+           (1 - overlap) * radius;
+  }
+
+  [[nodiscard]] bool is_beside_a_disk(double x, double y, double radius) const {
+    return static_cast<double>(to_disk_[edges_.at(static_cast<int>(x), static_cast<int>(y))]) <
+           radius + farthest_gap * radius_;
+  }
+
+  void cover(double x, double y, double radius) {
+    const double far = radius + 3 * radius_;
+    const int left = std::max(0, static_cast<int>(x - far)), top = std::max(0, static_cast<int>(y - far));
+    const int right = std::min(edges_.width - 1, static_cast<int>(x + far));
+    const int bottom = std::min(edges_.height - 1, static_cast<int>(y + far));
+    for (int row = top; row <= bottom; ++row)
+      for (int column = left; column <= right; ++column) {
+        float& clearance = clearance_[edges_.at(column, row)];
+        clearance = std::min(clearance, static_cast<float>(std::hypot(column - x, row - y) - radius));
+      }
+  }
+
+  // Of the directions from a place that are not covered, the share in which an edge is met.
+  [[nodiscard]] double share_met(double x, double y, double radius) const {
+    int open = 0, met = 0;
+    for (int k = 0; k < directions; ++k) {
+      const double angle = 2 * std::numbers::pi * k / directions, cosine = std::cos(angle), sine = std::sin(angle);
+      bool edge = false, uncovered = false;
+      for (double away = nearest_edge * radius; away <= farthest_edge * radius; away += 1) {
+        const int column = static_cast<int>(x + away * cosine + 0.5), row = static_cast<int>(y + away * sine + 0.5);
+        if (column < 0 || row < 0 || column >= edges_.width || row >= edges_.height) continue;
+        const std::size_t at = edges_.at(column, row);
+        uncovered = uncovered || (away > 0.8 * radius && static_cast<double>(clearance_[at]) > covered * radius_);
+        edge = edge || edge_[at] != 0;
+      }
+      open += uncovered;
+      met += uncovered && edge;
+    }
+    return open < fewest_open ? 0 : static_cast<double>(met) / open;
+  }
+
+  const EdgeMap& edges_;
+  double radius_;
+  std::vector<float> clearance_;    // px to the nearest disk or place taken, below 0 inside
+  std::vector<float> to_disk_;      // the same, to disks alone
+  std::vector<std::uint8_t> edge_;  // 1 within a pixel of an edge that is no disk's
+};
+
+}  // namespace
+
+double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
+                             const std::optional<PixelRectangle>& region) {
+  const ScaledPicture at = scaled_for(frame, model.radius_px);
+  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  std::vector<Circle> disks = found;
+  for (Circle& disk : disks) {
+    disk.x = at.from_frame_x(disk.x);
+    disk.y = at.from_frame_y(disk.y);
+    disk.radius /= at.scale;
+  }
+  PixelRectangle searched{1, 1, edges.width - 2, edges.height - 2};
+  if (region) {
+    searched.left = std::max(1, static_cast<int>(region->left / at.scale));
+    searched.top = std::max(1, static_cast<int>(region->top / at.scale));
+    searched.width =
+        std::min(edges.width - 1, static_cast<int>((region->left + region->width) / at.scale)) - searched.left;
+    searched.height =
+        std::min(edges.height - 1, static_cast<int>((region->top + region->height) / at.scale)) - searched.top;
+  }
+  const double radius = model.radius_px / at.scale;
+  FreePlaces places(edges, disks, radius, model.contrast);
+  double missed = 0;
+  for (const double size : sizes) missed += size * size * places.take(size * radius, searched);
+  return missed;
+}
+
+}  // namespace shakebed::ingest

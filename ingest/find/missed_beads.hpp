@@ -1,0 +1,21 @@
+#pragma once
+// How many beads are missed. A search for round rims cannot tell this itself.
+//
+// Counted are places beside the disks found in which a bead fits, and which edges fill as they fill a bead. A perfect
+// search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container fill too
+// few of a place's directions.
+
+#include <optional>
+#include <vector>
+
+#include "ingest/find/rim_finder.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest {
+
+// In the frame, or in this region of it; `found` in px of the frame. Places of 0.6, 0.8 and 1 of the model's radius are
+// looked for, and count by their areas.
+double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
+                             const std::optional<PixelRectangle>& region);
+
+}  // namespace shakebed::ingest

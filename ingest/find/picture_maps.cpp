@@ -1,0 +1,35 @@
+#include "ingest/find/picture_maps.hpp"
+
+#include <numbers>
+#include <utility>
+
+#include "ingest/find/circle_search.hpp"
+
+namespace shakebed::ingest {
+
+double copy_angle(std::size_t copy) {
+  return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretched_copies);
+}
+
+PictureMaps::One& PictureMaps::made_for(double radius_px, float threshold) {
+  const double scale = scale_for(radius_px);
+  for (One& one : made_)
+    if (one.scale == scale && one.threshold == threshold) return one;
+  ScaledPicture at = ingest::scaled_for(frame_, radius_px);
+  EdgeMap edges = find_edges(at.picture, threshold);
+  made_.push_back({scale, threshold, {std::move(at), std::move(edges), {}}});
+  return made_.back();
+}
+
+const PictureMap& PictureMaps::scaled_for(double radius_px, float threshold) {
+  return made_for(radius_px, threshold).map;
+}
+
+const PictureMap& PictureMaps::with_copies(double radius_px, float threshold) {
+  PictureMap& map = made_for(radius_px, threshold).map;
+  for (std::size_t k = map.copies.size(); k < stretched_copies; ++k)
+    map.copies.push_back(find_edges(stretched(map.at.picture, decoy_stretch, copy_angle(k)), map.edges.threshold));
+  return map;
+}
+
+}  // namespace shakebed::ingest

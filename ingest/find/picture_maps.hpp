@@ -1,0 +1,44 @@
+#pragma once
+// Maps of a picture's edges, each scaled for the beads that are searched in it; each is made once.
+
+#include <cstddef>
+#include <list>
+#include <vector>
+
+#include "ingest/find/edge_map.hpp"
+#include "ingest/find/picture_scale.hpp"
+
+namespace shakebed::ingest {
+
+struct PictureMap {
+  ScaledPicture at;
+  EdgeMap edges;
+  std::vector<EdgeMap> copies;  // stretched, once asked for; see copy_angle()
+};
+
+// Directions in which the copies are stretched: four, so that what is oval in one of them is round in another.
+inline constexpr std::size_t stretched_copies = 4;
+double copy_angle(std::size_t copy);
+
+// The frame must outlive it; not for several threads at once.
+class PictureMaps {
+ public:
+  explicit PictureMaps(const GrayFrame& frame) : frame_(frame) {}
+  // `threshold` as in find_edges().
+  const PictureMap& scaled_for(double radius_px, float threshold = 0);
+  // The same, with its copies.
+  const PictureMap& with_copies(double radius_px, float threshold = 0);
+
+ private:
+  struct One {
+    double scale;
+    float threshold;
+    PictureMap map;
+  };
+  One& made_for(double radius_px, float threshold);
+
+  const GrayFrame& frame_;
+  std::list<One> made_;
+};
+
+}  // namespace shakebed::ingest

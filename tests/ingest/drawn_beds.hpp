@@ -1,0 +1,44 @@
+#pragma once
+// Drawn photographs of beds whose beads are known: touching beads, beads of two sizes, fringes, poor contrast, shading,
+// beads cut by the border, walls. What is varied within a kind is drawn at random.
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ingest/find/find_disks.hpp"
+#include "ingest/frames/frames.hpp"
+
+namespace shakebed::ingest::test {
+
+struct DrawnBead {
+  double x = 0, y = 0, radius = 0;  // px
+  bool whole = false;               // all of it is in the frame
+};
+
+struct DrawnBed {
+  GrayFrame frame;
+  std::vector<DrawnBead> beads;
+};
+
+struct BedKind {
+  std::string name;
+  DrawnBed (*draw)(std::mt19937& random);
+};
+const std::vector<BedKind>& drawn_beds();
+
+// Two sizes: the smaller radius is the larger over `ratio`, and this share of the beads has it.
+DrawnBed bed_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px);
+
+// Found disks beside the truth. A disk is right when its centre lies within a quarter of the radius of a bead's. Beads
+// that the border cuts count neither as missed nor, when they are found, as wrong.
+struct BedScore {
+  double beads = 0, found = 0, hits = 0;
+  double worst_radius = 0;  // largest relative error of a radius among the hits
+  [[nodiscard]] double missed() const { return beads - hits; }
+  [[nodiscard]] double wrong() const { return found - hits; }
+  [[nodiscard]] double f1() const { return beads + found > 0 ? 2 * hits / (beads + found) : 1; }
+};
+BedScore score_of(const std::vector<FoundDisk>& disks, const std::vector<DrawnBead>& beads);
+
+}  // namespace shakebed::ingest::test
