@@ -360,7 +360,7 @@ TEST(ExtractObjections, NameWhatThePhotographsShow) {
   found.floor_out_of_view = true;
   EXPECT_TRUE(has(only(found, false), "the floor is not in view"));
   found.surface_out_of_view = true;
-  EXPECT_TRUE(has(only(found, false), "as from above"));
+  EXPECT_TRUE(has(only(found, false), "neither floor nor surface is in view"));
   found = good, found.surface_out_of_view = true;
   EXPECT_EQ(objections_json(found, false), Json::array()) << "disks may fly out of the picture";
   found = good, found.disk_total = 29;
