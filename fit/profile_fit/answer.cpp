@@ -234,8 +234,8 @@ class AnswerFinder {
       return;
     }
     if (farthest_ != nullptr) {
-      answer_.why = "T depends on the range of heights that is fitted: " + number(chosen_->temperature) +
-                    " m g D (" + chosen_->thermometer + ") or " + number(farthest_->temperature) + " m g D (" +
+      answer_.why = "T depends on the range of heights that is fitted: " + number(chosen_->temperature) + " m g D (" +
+                    chosen_->thermometer + ") or " + number(farthest_->temperature) + " m g D (" +
                     farthest_->thermometer + ").";
       answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
       return;

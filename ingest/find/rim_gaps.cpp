@@ -22,7 +22,7 @@ constexpr double same_bead_radius = 0.12;  // of the radius that beads share, ei
 // that many share.
 constexpr double smallest_spread = 0.6, largest_spread = 1.67;
 constexpr double smallest_shared = 0.36, largest_shared = 2.8;
-constexpr double least_gap_radius_px = 4;      // of the map: a smaller circle cannot be told from a speck
+constexpr double least_gap_radius_px = 4;      // of the map: a smaller circle looks like dust
 constexpr double least_gap_probability = 0.5;  // of a circle that is reported
 constexpr int most_gap_rounds = 8;             // of circles beside circles
 // Other sizes are accepted when at least this number is expected, and this share of the beads.

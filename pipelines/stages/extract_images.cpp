@@ -83,8 +83,8 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   return !chosen->not_round;
 }
 
-// Refuses holes and printed dots, and warns where heights or scale mean nothing.
-void judge_bed(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
+// Refuses holes and printed dots.
+void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
   const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
   if (options.shape == BeadShape::round && found.contacts.far_apart(diameter_px))
     throw StageError(fmt::format(
@@ -92,26 +92,20 @@ void judge_bed(const ExtractOptions& options, RunContext& context, const ingest:
         "printed dots look so, beads of a bed do not. Look at fit-images --preview. If they are your beads, give "
         "--shape any, or --radius if a bead is larger than the circle",
         found.disk_total, found.contacts.nearest_px / diameter_px));
-  for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
 }
 
 // Refuses, or warns, when many beads seem to be missed.
 void judge_missed(const ExtractOptions& options, RunContext& context, double missed) {
   const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
   if (doubt == ingest::Doubt::little) return;
+  const std::string what = fmt::format(
+      "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. ",
+      100 * missed);
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(
-        fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
-                    "bead fits. Look "
-                    "at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the disks "
-                    "found all the "
-                    "same, give --shape any",
-                    100 * missed));
-  context.warning(
-      fmt::format("About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a "
-                  "bead fits. Look at "
-                  "the overlays before you use the density.",
-                  100 * missed));
+    throw StageError(what +
+                     "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the "
+                     "disks found all the same, give --shape any");
+  context.warning(what + "Look at the overlays before you use the density.");
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
@@ -129,8 +123,9 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
         fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
                     "numbers.",
                     100 * wrong));
+  judge_contacts(options, found);
   judge_missed(options, context, missed);
-  judge_bed(options, context, found);
+  for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
   if (!options.bead_number) return;
   const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
   const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",

@@ -340,8 +340,8 @@ void draw_cells(const MapPicture& picture, const std::filesystem::path& director
     const int symbol = symbols[number % symbols.size()];
     body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 1.0*scale lw 4 lc rgb '#ffffff' notitle", file,
                         k + 1, symbol);
-    body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}", file,
-                        k + 1, symbol, gnuplot_text(plain(label)));
+    body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}",
+                        file, k + 1, symbol, gnuplot_text(plain(label)));
   }
   run_gnuplot(directory, picture.name, twice(picture.name, {560, ""}, {170, ""}, body + "\n"));
 }

@@ -20,7 +20,8 @@ namespace shakebed::pipelines {
 //   "frames": numbers of the frames
 //   "pictures": base64
 //   "marks": [{"missed": [x, y, ...], "false": [number of the disk]}], if the true centres are known
-// All frames are in it as long as pictures and disks stay within film_bytes. Else it holds every second or fourth frame.
+// All frames are in it as long as pictures and disks stay within film_bytes. Else it holds every second or fourth
+// frame.
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
                 const DisksOnTheWay& on_the_way, std::optional<double> rate);
 

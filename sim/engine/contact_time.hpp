@@ -34,23 +34,16 @@ template <class Number>
 struct SeenDisks {
   Number x, z, vx, vz, own_time, event_time, contact_squared;
 };
-inline SeenDisks<TwoLanes> first_half(const SeenDisks<Lanes>& all) {
-  return {first_half(all.x),
-          first_half(all.z),
-          first_half(all.vx),
-          first_half(all.vz),
-          first_half(all.own_time),
-          first_half(all.event_time),
-          first_half(all.contact_squared)};
-}
-inline SeenDisks<TwoLanes> second_half(const SeenDisks<Lanes>& all) {
-  return {second_half(all.x),
-          second_half(all.z),
-          second_half(all.vx),
-          second_half(all.vz),
-          second_half(all.own_time),
-          second_half(all.event_time),
-          second_half(all.contact_squared)};
+// Two of the four: half is first_half or second_half.
+template <class Half>
+SeenDisks<TwoLanes> half_of(const SeenDisks<Lanes>& all, const Half& half) {
+  return {half(all.x),
+          half(all.z),
+          half(all.vx),
+          half(all.vz),
+          half(all.own_time),
+          half(all.event_time),
+          half(all.contact_squared)};
 }
 
 // A wall across a direction in which nothing accelerates. gap: free distance to it (slightly negative counts as

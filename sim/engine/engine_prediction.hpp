@@ -97,8 +97,8 @@ template <bool images, bool others_ahead>
   if constexpr (fused_takes_long && !images) {
     const LaneMask may = may_meet<others_ahead>(others, me);
     const TwoLanes none = both(never);
-    return joined((may[0] | may[1]) == 0 ? none : meetings<false, others_ahead>(first_half(others), me),
-                  (may[2] | may[3]) == 0 ? none : meetings<false, others_ahead>(second_half(others), me));
+    return joined((may[0] | may[1]) == 0 ? none : meetings<false, others_ahead>(half_of(others, first_half), me),
+                  (may[2] | may[3]) == 0 ? none : meetings<false, others_ahead>(half_of(others, second_half), me));
   } else {
     return meetings<images, others_ahead>(others, me);
   }

@@ -26,8 +26,9 @@ struct Profile {
 double ideal_centre_of_mass(std::uint32_t count, double width, bool hard_sides);
 double ideal_centre_of_mass(const Scene& scene);
 
-// Why the run has lost its precision, for instance "two disks overlap by 3e-7 D ..."; empty if it has not. Precise means:
-// all numbers are finite, no overlap exceeds that of the bed, and the energy balance closes to 1e-6 of the energy moved.
+// Why the run has lost its precision, for instance "two disks overlap by 3e-7 D ..."; empty if it has not. Precise
+// means: all numbers are finite, no overlap exceeds that of the bed, and the energy balance closes to 1e-6 of the
+// energy moved.
 std::string precision_lost(const Simulation& simulation);
 
 // Collects snapshots taken at `phases` moments of each period, in order, and averages over whole periods.
