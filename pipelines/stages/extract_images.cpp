@@ -98,14 +98,17 @@ void judge_contacts(const ExtractOptions& options, const ingest::Measurement& fo
 void judge_missed(const ExtractOptions& options, RunContext& context, double missed) {
   const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
   if (doubt == ingest::Doubt::little) return;
-  const std::string what = fmt::format(
-      "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. ",
-      100 * missed);
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(what +
-                     "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the "
-                     "disks found all the same, give --shape any");
-  context.warning(what + "Look at the overlays before you use the density.");
+    throw StageError(fmt::format(
+        "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
+        "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the disks found "
+        "all "
+        "the same, give --shape any",
+        100 * missed));
+  context.warning(fmt::format(
+      "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
+      "Look at the overlays before you use the density.",
+      100 * missed));
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
