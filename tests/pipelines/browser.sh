@@ -119,7 +119,7 @@ else
   "$shakebed" fit-images o/render/frames --diameter "3 mm" --out f \
     --quiet >/dev/null 2>&1 || [ $? = 6 ] || complain "the frames are not measured"
   "$shakebed" bench map --quick --out b --quiet >/dev/null 2>&1 || complain "no bench"
-  timeout 400 "$node" "$here/browser/report.mjs" "$browser" o s "$axe" m/report.html f/report.html b/bench.html || complain "the pages do not do what they should"
+  timeout 800 "$node" "$here/browser/report.mjs" "$browser" o s "$axe" m/report.html f/report.html b/bench.html || complain "the pages do not do what they should"
 fi
 [ "$bad" = 0 ] && echo "the pages are whole, alone, move, and fit"
 exit "$bad"

@@ -10,7 +10,10 @@ export class Browser {
     self.profile = mkdtempSync(join(tmpdir(), "shakebed-browser-"));
     self.process = spawn(program, ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
       "--disable-background-networking", "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP * ~NOTFOUND",
-      "--remote-debugging-pipe", `--user-data-dir=${self.profile}`, "about:blank"], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
+      "--remote-debugging-pipe", `--user-data-dir=${self.profile}`, "about:blank"], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"], detached: true });
+    const kill = self.kill = () => { try { process.kill(-self.process.pid, "SIGKILL"); } catch { /* it is gone already */ } };
+    process.on("exit", kill);
+    for (const signal of ["SIGTERM", "SIGINT"]) process.on(signal, () => process.exit(1));
     self.waiting = new Map();
     self.listeners = new Set();
     self.number = 0;
@@ -86,8 +89,9 @@ export class Browser {
   async stop() {
     try { await Promise.race([this.send("Browser.close", {}, null), new Promise(done => setTimeout(done, 2000))]); } catch { /* it is gone already */ }
     const ended = this.process.exitCode !== null ? Promise.resolve() : new Promise(done => this.process.once("exit", done));
-    if (this.process.exitCode === null) this.process.kill();
+    this.kill();  // with its children, which would go on writing into the profile
     await Promise.race([ended, new Promise(done => setTimeout(done, 5000))]);
-    rmSync(this.profile, { recursive: true, force: true, maxRetries: 60, retryDelay: 500 });  // its children write a little longer
+    // A profile that cannot be removed is no fault of the page. The waits add up to 3 s.
+    try { rmSync(this.profile, { recursive: true, force: true, maxRetries: 7, retryDelay: 100 }); } catch (error) { console.log(`left behind: ${error.message}`); }
   }
 }

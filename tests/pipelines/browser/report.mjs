@@ -33,8 +33,8 @@ try {
   await times();
   for (const place of others) await firstPaint(place);
   check("no console message and no request", browser.complaints.length === 0, browser.complaints);
+  console.log(failures ? `${failures} of ${checks} checks failed` : `${checks} checks of the pages in the browser hold`);
 } finally { await browser.stop(); }
-console.log(failures ? `${failures} of ${checks} checks failed` : `${checks} checks of the pages in the browser hold`);
 process.exit(failures ? 1 : 0);
 
 // The headline of the page and the first lines of summary.json are one number.
