@@ -281,6 +281,9 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 // The numbers of an array or of what numpy makes one of. They are read here and not in Python: a fit is short.
 Doubles numbers_of(const py::object& values, const char* name) {
+  const bool plain_array = reinterpret_cast<PyObject*>(Py_TYPE(values.ptr())) ==
+                           reinterpret_cast<PyObject*>(py::detail::npy_api::get().PyArray_Type_);
+  if (plain_array && Doubles::check_(values)) return py::reinterpret_borrow<Doubles>(values);
   if (py::hasattr(values, "mask"))
     throw Mistake(std::string(name) + " is a masked array; pass the values that count, " + name + "[~" + name +
                   ".mask]");

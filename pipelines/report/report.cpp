@@ -67,7 +67,7 @@ class Report {
   // Ours beside the published: label, ours, published, verdict.
   struct Row {
     std::string label{}, ours{}, published{}, place{}, verdict{};
-    bool agrees = false;
+    bool agrees = false, beside_answer = false;
   };
   std::vector<Row> published_rows() const {
     std::vector<Row> rows;
@@ -119,7 +119,8 @@ class Report {
             .ours = "–",
             .published = number.value,
             .place = number.place,
-            .verdict = "not measured"};
+            .verdict = "not measured",
+            .beside_answer = number.beside_answer};
     const Json* found = number_at(number.pointer);
     if (found == nullptr || !found->is_object() || !found->contains("value") || !(*found)["value"].is_number())
       return row;
@@ -223,19 +224,19 @@ class Report {
     return text;
   }
 
-  // Beside the answer: the first published number, and what stages measured besides; the rest is in tables below.
+  // Beside the answer: published numbers with ours, and what stages measured besides; the rest is in tables below.
   std::string facts() {
-    std::string own = sections(ReportPlace::facts);
-    if (const std::vector<Row> rows = published_rows(); !rows.empty()) {
-      const Row& row = rows.front();
-      own.insert(
-          0,
-          fmt::format("<div><dt>{0}</dt><dd>{1} <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>the "
-                      "same in print</dt><dd>{2} <span class=\"tag published\">published</span> <span "
-                      "class=\"verdict {3}\">{4}</span></dd></div>\n",
-                      prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad",
-                      html(row.verdict)));
+    std::string own;
+    const std::vector<Row> rows = published_rows();
+    for (const Row& row : rows) {
+      if (&row != &rows.front() && !row.beside_answer) continue;
+      own += fmt::format(
+          "<div><dt>{0}</dt><dd>{1} <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>the same in "
+          "print</dt><dd>{2} <span class=\"tag published\">published</span> <span class=\"verdict "
+          "{3}\">{4}</span></dd></div>\n",
+          prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad", html(row.verdict));
     }
+    own += sections(ReportPlace::facts);
     if (own.empty()) return "";
     return "<section class=\"answer beside\" aria-label=\"numbers beside the answer\"><dl class=\"facts\">\n" + own +
            "</dl></section>\n";

@@ -25,6 +25,9 @@ void describe_published(Fields& f, PublishedNumber& number) {
   f.text("place", number.place, {.help = "place in the paper"});
   f.number("relative", number.relative,
            {.help = "relative difference up to which the numbers agree", .range = non_negative});
+  f.boolean(
+      "beside_answer", number.beside_answer,
+      {.help = "whether it stands beside the answer, at the top of the report. The first of the list always does"});
   if (!f.decoding()) return;
   try {
     if (!number.value.empty()) parse_quantity(number.value);

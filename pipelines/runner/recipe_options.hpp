@@ -21,6 +21,7 @@ struct PublishedNumber {
   std::string value;      // a quantity; its unit decides in which ours is shown
   std::string place;      // where it is printed
   double relative = 0.1;  // nearer than this part of it counts as agreement
+  bool beside_answer = false;
 };
 struct AssumedInput {
   std::string pointer;  // into the recipe: "/stages/bed/floor/frequency"

@@ -16,6 +16,7 @@ namespace {
 using namespace shakebed::tests;
 using shakebed::pipelines::Json;
 using testing::HasSubstr;
+using testing::Not;
 
 // A fit of a profile of the user's own, beside numbers in several units.
 class PublishedNumbers : public testing::Test {
@@ -47,6 +48,19 @@ std::string cell(const char* format, double a, double b) {
   char text[100];
   std::snprintf(text, sizeof text, format, a, b);
   return text;
+}
+
+TEST_F(PublishedNumbers, StandBesideTheAnswerWhereTheRecipeSaysSoAndTheFirstAlways) {
+  run(R"({ "number": "/fit/temperature", "label": "first", "value": "1.25" },
+         { "number": "/fit/temperature", "label": "second", "value": "1.26" },
+         { "number": "/fit/temperature_over_mg", "label": "third", "value": "3 mm", "beside_answer": true })");
+  const std::size_t begin = page_.find("aria-label=\"numbers beside the answer\"");
+  ASSERT_NE(begin, std::string::npos);
+  const std::string beside = page_.substr(begin, page_.find("</section>", begin) - begin);
+  EXPECT_THAT(beside, HasSubstr("<dt>first</dt>"));
+  EXPECT_THAT(beside, Not(HasSubstr("<dt>second</dt>")));
+  const double mm = 1e3 * value("temperature_over_mg"), mm_error = 1e3 * error("temperature_over_mg");
+  EXPECT_THAT(beside, HasSubstr("<dt>third</dt><dd>" + cell("%.4g ± %.2g mm", mm, mm_error)));
 }
 
 TEST_F(PublishedNumbers, StandBesideOursInTheUnitOfThePrint) {
