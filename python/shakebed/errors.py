@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from typing import Any, Iterable
 
@@ -83,6 +82,8 @@ def check_options(function: str, options: Iterable[str], known: frozenset[str]) 
     """Raise TypeError for an option that the function does not have."""
     for name in options:
         if name not in known:
+            import difflib  # only for mistakes: it takes a while to load
+
             near = difflib.get_close_matches(name, known, 1)
             meant = f"did you mean {near[0]!r}? " if near else ""
             raise TypeError(f"{function}() has no option {name!r}; {meant}it has {', '.join(sorted(known))}")

@@ -6,9 +6,7 @@ import csv
 import json
 import os
 import re
-import shutil
 import signal
-import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, KeysView, Mapping, Optional, Union
 
@@ -33,6 +31,8 @@ def program() -> str:
     beside = (Path(__file__).resolve().parent / _program_place).resolve()
     if beside.is_file():
         return str(beside)
+    import shutil  # here, as below: `import shakebed` shall be quick
+
     if found := shutil.which("shakebed"):
         return found
     raise StageError(f"the program shakebed is neither at {beside} nor on the PATH; install it with this module")
@@ -302,6 +302,8 @@ def run(
 
 def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> tuple[int, list[str]]:
     """Run the program; return its exit code and its error messages. Ctrl-C ends the program first."""
+    import subprocess
+
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
                                start_new_session=True)
     errors = []
