@@ -50,7 +50,8 @@ class FrameFinder {
   FindResult find() {
     disks_ = disks_at(candidates_by({calibration_.profile, radius_, edge_}, flat_, noise_, least_candidate_score));
     if (disks_.empty()) {
-      result_.why_nothing = "no place in the frame looks like a bead of radius " + std::to_string(radius_) + " px";
+      result_.why_nothing = "no place in the frame looks like a bead of radius " +
+                            std::to_string(radius_ * calibration_.recorded_px) + " px";
       return std::move(result_);
     }
     fit_.set_table(&exact_);
@@ -238,7 +239,7 @@ class FrameFinder {
     result_.steps = fit_.steps();
     if (disks.empty()) {
       result_.why_nothing = std::to_string(dropped_) + " places were tried, but none is filled like a bead of radius " +
-                            std::to_string(radius_) + " px";
+                            std::to_string(radius_ * calibration_.recorded_px) + " px";
       return;
     }
     result_.residual_level = std::abs(calibration_.contrast_level) * result_.light.gain *

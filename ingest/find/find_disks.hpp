@@ -54,6 +54,7 @@ struct FindOptions {
   bool learn_profile = true;      // false keeps the ideal disk with a Gaussian-blurred edge
   bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
   bool learn_rim = false;         // fill FindResult::profile
+  double recorded_px = 1;         // px as recorded to one px of the frame: messages state the former
 
   // Why nothing can be found with these options, one sentence each; empty when it can.
   [[nodiscard]] std::vector<std::string> validate() const;
@@ -73,6 +74,7 @@ struct FinderCalibration {
   double tone_exponent = 1;         // recorded level = light^exponent, from the rims; 1 for a linear camera
   bool solid_borders = false;       // floor, walls or lid are in view; each frame is searched without them
   int width = 0, height = 0;        // of the frames it was learned from
+  double recorded_px = 1;           // px as recorded to one px of these frames (FindOptions)
   BeadProfile profile;
   LightField light;
   std::vector<float> level_deciles;  // of the first of its frames: 10 %, 20 % .. 90 %

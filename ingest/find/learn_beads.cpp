@@ -218,15 +218,15 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
     std::snprintf(text, sizeof text,
                   "Beads of several sizes were found, with radii from %.1f to %.1f px. In the first frame %.0f of %zu "
                   "beads do not have the most frequent size, to which the diameter refers.",
-                  smallest, largest, others, seen.disks.size());
+                  smallest * calibration.recorded_px, largest * calibration.recorded_px, others, seen.disks.size());
     calibration.warnings.emplace_back(text);
   }
 }
 
-CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims,
-                                      const std::optional<PixelRectangle>& region) {
+CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims, const FindOptions& options) {
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
+  calibration.recorded_px = options.recorded_px;
   calibration.polarity = rims.model.polarity;
   calibration.radius_px = calibration.rim_radius_px = rims.model.open_radius_px;
   // Rims of an unknown blur are known to a fifth of a pixel at best.
@@ -244,10 +244,11 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.by_rims = true;
   std::vector<Circle> found;
   for (const RimDisk& disk : seen.disks) found.push_back(disk.circle);
-  calibration.expected_missed = share_missed(frame, rims.model, found, seen.expected_missed, region);
+  calibration.expected_missed = share_missed(frame, rims.model, found, seen.expected_missed, options.roi);
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
-  if (!result.found) result.why_not = "no rim of " + std::to_string(rims.model.radius_px) + " px is seen";
+  if (!result.found)
+    result.why_not = "no rim of " + std::to_string(rims.model.radius_px * options.recorded_px) + " px is seen";
   return result;
 }
 
@@ -280,7 +281,8 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
                                          disk.y_px >= options.roi->top + options.roi->height - 0.5);
     if (!outside) result.disks.push_back(disk);
   }
-  if (result.disks.empty()) result.why_nothing = "no rim of " + std::to_string(calibration.radius_px) + " px is seen";
+  if (result.disks.empty())
+    result.why_nothing = "no rim of " + std::to_string(calibration.radius_px * calibration.recorded_px) + " px is seen";
   return result;
 }
 
@@ -296,13 +298,13 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
-  return calibration_by_rims(frame, rims, options.roi);
+  return calibration_by_rims(frame, rims, options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
   LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, true);
   learn_gaps(frame, rims, true);
-  return calibration_by_rims(frame, rims, std::nullopt);
+  return calibration_by_rims(frame, rims, {});
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

@@ -118,6 +118,7 @@ class BeadLearner {
     calibration.width = frames.front()->width;
     calibration.height = frames.front()->height;
     calibration.polarity = start.polarity;
+    calibration.recorded_px = options.recorded_px;
     for (const GrayFrame* frame : frames)
       if (frame->width == calibration.width && frame->height == calibration.height) recorded_.push_back(frame);
     edge_ = start.before ? start.before->edge_width_px : std::clamp(0.08 * radius_, 0.6, 1.5);
@@ -156,7 +157,7 @@ class BeadLearner {
 
  private:
   [[nodiscard]] std::string suspected(const std::string& circles) const {
-    return circles + " of " + std::to_string(radius_) + " px were suspected, but ";
+    return circles + " of " + std::to_string(radius_ * options_.recorded_px) + " px were suspected, but ";
   }
 
   Learned refused(const std::string& why) {

@@ -188,8 +188,9 @@ class RadiusFromRims {
       calibration_.warnings.push_back(
           "The rims are steeper on their dark side, as in pictures encoded for display. The radius was therefore "
           "measured in light: " +
-          std::to_string(calibration_.radius_px) + " px. From the recorded levels it would be " +
-          std::to_string(rim_radius_) + " px.");
+          std::to_string(calibration_.radius_px * calibration_.recorded_px) +
+          " px. From the recorded levels it would be " + std::to_string(rim_radius_ * calibration_.recorded_px) +
+          " px.");
     calibration_.radius_std_error_px = radius_error(calibration_, spread_, total_, doubt_);
   }
 
@@ -278,7 +279,7 @@ class RadiusFromRims {
                   "The rims do not show whether grey levels are proportional to light (radius %.2f px) or encoded for "
                   "display (%.2f px). The radius lies between the two, and its error covers both. Give the length of a "
                   "pixel to remove this doubt.",
-                  tone.linear.radius_px, tone.encoded.radius_px);
+                  tone.linear.radius_px * calibration_.recorded_px, tone.encoded.radius_px * calibration_.recorded_px);
     calibration_.warnings.emplace_back(text);
   }
 

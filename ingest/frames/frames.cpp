@@ -27,6 +27,8 @@ InputError::InputError(std::string path, std::string problem, std::string why, s
 
 namespace {
 
+constexpr std::size_t most_kept_pixels = 4'000'000;  // of a picture that is kept for the next pass
+
 // frame2 before frame10.
 bool natural_less(const std::string& a, const std::string& b) {
   const auto digit = [](char c) { return c >= '0' && c <= '9'; };
@@ -114,6 +116,10 @@ struct FrameSource::State {
 
   std::size_t index = 0;  // of the next item of the unstrided stream
 
+  // The picture that settled the rule, unless it is large: after a rewind it is not decoded again.
+  std::shared_ptr<const GrayFrame> first_picture;
+  std::size_t first_index = 0;
+
   std::size_t page_count(std::size_t which) {
     if (!pages[which]) {
       quiet_opencv();
@@ -158,7 +164,10 @@ struct FrameSource::State {
       }
       ++index;
       if (skip) return item;
-      prepare_decoding(current, current_page, item);
+      if (first_picture && item.index == first_index)
+        item.decode = [frame = first_picture] { return *frame; };
+      else
+        prepare_decoding(current, current_page, item);
       return item;
     }
     return std::nullopt;
@@ -204,6 +213,8 @@ struct FrameSource::State {
     try {
       auto frame = std::make_shared<GrayFrame>(read_image(current.path, current.kind, current_page, options, *rule));
       rule_decided = true;
+      if (frame->pixels.size() <= most_kept_pixels)
+        first_picture = std::make_shared<const GrayFrame>(*frame), first_index = item.index;
       item.decode = [frame] { return std::move(*frame); };
     } catch (const InputError& error) {
       item.decode = [error]() -> GrayFrame { throw error; };
@@ -294,6 +305,18 @@ void FrameSource::rewind() {
   state_->page = 0;
   state_->index = 0;
   state_->film.reset();
+}
+
+std::vector<FrameOrigin> FrameSource::first_origins(std::size_t most) {
+  rewind();
+  std::vector<FrameOrigin> origins;
+  while (origins.size() < most) {
+    const auto item = state_->step(true);
+    if (!item) break;
+    if (item->index % state_->options.stride == 0) origins.push_back(item->origin);
+  }
+  rewind();
+  return origins;
 }
 
 std::optional<double> FrameSource::film_rate_hz() const {

@@ -65,8 +65,11 @@ const char* name_of(Channel channel);
 
 struct FrameSourceOptions {
   Channel channel = Channel::automatic;
-  // Pixels beyond which a frame is refused (a located error), so that memory stays bounded.
+  // Pixels beyond which a frame is refused (a located error), so that memory stays bounded. They are counted once the
+  // frame is reduced.
   std::size_t largest_frame_pixels = 150'000'000;
+  // Pixels beyond which a picture is not decoded at all.
+  std::size_t largest_decoded_pixels = 1'000'000'000;
   // Frames are averaged over squares of so many pixels; pixels left over at the right and at the bottom are dropped.
   int reduction = 1;
   // Keep every `stride`-th frame of the stream, the first included.
@@ -105,6 +108,8 @@ class FrameSource {
   std::optional<GrayFrame> next(FrameOrigin* origin = nullptr);
   // Back to the first frame.
   void rewind();
+  // Where the first frames come from, at most `most`. Nothing is decoded into memory; the stream is rewound.
+  std::vector<FrameOrigin> first_origins(std::size_t most);
   // Frames in the stream if known without decoding films; TIFF files are counted by page.
   [[nodiscard]] std::optional<std::size_t> count_if_known() const;
   // Frames a second of the stream as stated in the film; nothing unless the stream is one film that does.

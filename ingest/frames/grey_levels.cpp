@@ -57,7 +57,15 @@ Channel best_channel(const cv::Mat& picture) {
   return static_cast<Channel>(winner);
 }
 
+// Blue, green and red of a pixel.
+template <class Level>
+cv::Vec3f colour_in(const Level* row, int column) {
+  const Level* at = row + static_cast<std::ptrdiff_t>(3) * column;
+  return cv::Vec3f(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]));
+}
+
 // The mean of the pixels in the fullest of 16 x 16 x 16 cells of colour.
+template <class Level>
 cv::Vec3f most_frequent_colour(const cv::Mat& picture) {
   constexpr int cells = 16;
   double least = 0, most = 1;
@@ -68,7 +76,7 @@ cv::Vec3f most_frequent_colour(const cv::Mat& picture) {
   const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(picture.total()) / 40000.0)));
   for (int row = 0; row < picture.rows; row += stride)
     for (int column = 0; column < picture.cols; column += stride) {
-      const cv::Vec3f colour = picture.at<cv::Vec3f>(row, column);
+      const cv::Vec3f colour = colour_in(picture.ptr<Level>(row), column);
       std::size_t cell = 0;
       for (int k = 0; k < 3; ++k)
         cell = cell * cells + static_cast<std::size_t>(
@@ -82,16 +90,16 @@ cv::Vec3f most_frequent_colour(const cv::Mat& picture) {
 }
 
 // One level a pixel from three (blue, green, red), float.
-cv::Mat mixed(const cv::Mat& picture, GreyRule& rule) {
-  cv::Mat colours;
-  picture.convertTo(colours, CV_32F);
-  if (rule.channel == Channel::background_distance && !rule.background) rule.background = most_frequent_colour(colours);
-  cv::Mat level(colours.rows, colours.cols, CV_32F);
-  for (int row = 0; row < colours.rows; ++row) {
-    const cv::Vec3f* from = colours.ptr<cv::Vec3f>(row);
+template <class Level>
+cv::Mat mixed_of(const cv::Mat& picture, GreyRule& rule) {
+  if (rule.channel == Channel::background_distance && !rule.background)
+    rule.background = most_frequent_colour<Level>(picture);
+  cv::Mat level(picture.rows, picture.cols, CV_32F);
+  for (int row = 0; row < picture.rows; ++row) {
+    const Level* from = picture.ptr<Level>(row);
     float* to = level.ptr<float>(row);
-    for (int column = 0; column < colours.cols; ++column) {
-      const cv::Vec3f& c = from[column];
+    for (int column = 0; column < picture.cols; ++column) {
+      const cv::Vec3f c = colour_in(from, column);
       if (rule.channel == Channel::grey) {
         to[column] = 0.114F * c[0] + 0.587F * c[1] + 0.299F * c[2];  // ITU-R BT.601
       } else if (rule.channel == Channel::saturation) {
@@ -103,6 +111,11 @@ cv::Mat mixed(const cv::Mat& picture, GreyRule& rule) {
     }
   }
   return level;
+}
+cv::Mat mixed(const cv::Mat& picture, GreyRule& rule) {
+  if (picture.depth() == CV_8U) return mixed_of<std::uint8_t>(picture, rule);
+  if (picture.depth() == CV_16U) return mixed_of<std::uint16_t>(picture, rule);
+  return mixed_of<float>(picture, rule);
 }
 
 // 8 bit, 16 bit or float, with one component or three (blue, green, red).
@@ -195,15 +208,9 @@ cv::Mat averaged(const cv::Mat& picture, int factor) {
 bool has_colour(const cv::Mat& picture) {
   if (picture.channels() < 3) return false;
   constexpr double faint = 0.01;  // of the brightest level: what compression leaves of grey
-  cv::Mat colours;
-  picture.convertTo(colours, CV_32F);
+  const cv::Mat colours = of_usual_kind(picture);
   GreyRule rule;
   rule.channel = Channel::saturation;
-  if (colours.channels() == 4) {
-    cv::Mat three(colours.rows, colours.cols, CV_32FC3);
-    cv::mixChannels(std::vector<cv::Mat>{colours}, std::vector<cv::Mat>{three}, {0, 0, 1, 1, 2, 2});
-    colours = three;
-  }
   double most = 0;
   cv::minMaxLoc(colours.reshape(1), nullptr, &most);
   return cv::mean(mixed(colours, rule))[0] > faint * most;
@@ -211,7 +218,8 @@ bool has_colour(const cv::Mat& picture) {
 
 GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
   if (given.empty()) throw InputError(path, "no picture", "it decodes to nothing", "save it again");
-  if (given.total() > options.largest_frame_pixels)
+  const auto reduction = static_cast<std::size_t>(options.reduction);
+  if (given.total() / (reduction * reduction) > options.largest_frame_pixels)
     throw InputError(
         path, "frame of " + std::to_string(given.cols) + " x " + std::to_string(given.rows) + " px is too large",
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",

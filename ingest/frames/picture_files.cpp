@@ -54,8 +54,13 @@ Kind kind_of_name(const fs::path& path) {
   throw InputError(path, "the picture cannot be read", why, "check that the file is complete, or export it again");
 }
 
-// Size from the header of a PNG or BMP, so that an enormous picture is refused before it is decoded.
-void refuse_if_enormous(const std::string& path, std::ifstream& file, const FrameSourceOptions& options) {
+// zlib packs at most 1032 bytes into one, and a pixel of a PNG or BMP may be a bit: more are not in the file.
+constexpr std::uint64_t most_pixels_per_byte = 8256;
+
+// Size from the header of a PNG or BMP, so that an enormous picture is refused before it is decoded, and so is one
+// that only claims to be large.
+void refuse_if_enormous(const std::string& path, std::ifstream& file, std::uintmax_t bytes,
+                        const FrameSourceOptions& options) {
   std::array<unsigned char, 32> head{};
   file.seekg(0);
   file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
@@ -76,11 +81,14 @@ void refuse_if_enormous(const std::string& path, std::ifstream& file, const Fram
     }
     if (height > 0x7fffffffU) height = 0x100000000U - height;
   }
-  if (width * height > options.largest_frame_pixels)
+  if (width * height > options.largest_decoded_pixels)
     throw InputError(
         path, "frame of " + std::to_string(width) + " x " + std::to_string(height) + " px is too large",
-        "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",
+        "more than " + std::to_string(options.largest_decoded_pixels) + " pixels are refused to bound memory",
         "crop it or reduce it");
+  if (width * height > options.largest_frame_pixels && width * height / most_pixels_per_byte > bytes)
+    throw_unreadable(path, "it states " + std::to_string(width) + " x " + std::to_string(height) +
+                               " px, more than its " + std::to_string(bytes) + " bytes can hold: damaged or truncated");
 }
 
 }  // namespace
@@ -103,7 +111,7 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   if (bytes == 0) throw InputError(path, "the file is empty", "it holds 0 bytes", "copy it again from the camera");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path, "the file cannot be opened", "no permission to read it", "check its permissions");
-  refuse_if_enormous(path, file, options);
+  refuse_if_enormous(path, file, bytes, options);
   char head[2] = {};
   file.clear();
   file.seekg(0);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "statistics/ranks.hpp"
@@ -22,14 +24,31 @@ constexpr double least_enlargement = 2, on_lattice_px = 0.8, most_off_lattice = 
 constexpr double least_seen = 0.5;
 // The two sides are enlarged alike_steps.
 constexpr double alike_steps = 0.05;
+// So many changes of a byte are counted in 32 bits.
+constexpr int most_rows_of_bytes = 16'000'000;
+
+// Adds up the changes from column to column. `Sum` holds a whole column of them without loss.
+template <class Level, class Sum>
+std::vector<double> changes_of(const cv::Mat& levels) {
+  std::vector<Sum> changes(static_cast<std::size_t>(levels.cols - 1), 0);
+  for (int row = 0; row < levels.rows; ++row) {
+    const Level* line = levels.ptr<Level>(row);
+    for (std::size_t k = 0; k < changes.size(); ++k) {
+      if constexpr (std::is_integral_v<Level>)
+        changes[k] += static_cast<Sum>(std::abs(static_cast<int>(line[k + 1]) - static_cast<int>(line[k])));
+      else
+        changes[k] += static_cast<Sum>(std::abs(line[k + 1] - line[k]));
+    }
+  }
+  return {changes.begin(), changes.end()};
+}
 
 // Columns after which the picture changes.
 std::vector<double> steps_between_columns(const cv::Mat& levels) {
-  std::vector<double> changes(static_cast<std::size_t>(levels.cols - 1), 0.0);
-  for (int row = 0; row < levels.rows; ++row) {
-    const float* line = levels.ptr<float>(row);
-    for (std::size_t k = 0; k < changes.size(); ++k) changes[k] += static_cast<double>(std::abs(line[k + 1] - line[k]));
-  }
+  const std::vector<double> changes = levels.depth() == CV_8U && levels.rows < most_rows_of_bytes
+                                          ? changes_of<std::uint8_t, std::uint32_t>(levels)
+                                      : levels.depth() == CV_16U ? changes_of<std::uint16_t, double>(levels)
+                                                                 : changes_of<float, double>(levels);
   const double high = quantile_of(changes, 0.9);
   std::vector<double> steps;
   for (std::size_t k = 0; k < changes.size(); ++k)
@@ -95,7 +114,7 @@ double smooth_repeated_pixels(cv::Mat& picture) {
     return 1;
   cv::Mat levels;
   cv::extractChannel(picture, levels, picture.channels() > 1 ? 1 : 0);
-  levels.convertTo(levels, CV_32F);
+  if (levels.depth() != CV_8U && levels.depth() != CV_16U) levels.convertTo(levels, CV_32F);
   const auto across = lattice_of(steps_between_columns(levels));
   if (!across) return 1;
   const auto down = lattice_of(steps_between_columns(levels.t()));

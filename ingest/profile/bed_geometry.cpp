@@ -54,8 +54,9 @@ class GeometryFinder {
     bed_.scale_relative_std_error = bed_.scale_given ? 0 : refined_.radius_std_error_px / refined_.radius_px;
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
     if (bed_.scale_given && std::abs(2 * refined_.radius_px / diameter_px_ - 1) > fair_scale)
-      warnings_.push_back("The scale given makes a bead " + std::to_string(diameter_px_) +
-                          " px wide, but the frames show " + std::to_string(2 * refined_.radius_px) + " px.");
+      warnings_.push_back("The scale given makes a bead " + std::to_string(diameter_px_ * refined_.recorded_px) +
+                          " px wide, but the frames show " +
+                          std::to_string(2 * refined_.radius_px * refined_.recorded_px) + " px.");
   }
 
   void set_floor() {

@@ -38,10 +38,20 @@ cv::Mat colours_of(const std::filesystem::path& source, std::size_t page, int mo
 
 }  // namespace
 
-void write_candidate_picture(const std::filesystem::path& path, const std::filesystem::path& source, std::size_t page,
-                             const SurveyCandidate* candidate, int most_px) {
+struct CandidatePictures::State {
   double scale = 1;
-  cv::Mat picture = colours_of(source, page, most_px, scale);
+  cv::Mat picture;
+};
+
+CandidatePictures::CandidatePictures(const std::filesystem::path& source, std::size_t page, int most_px)
+    : state_(std::make_unique<State>()) {
+  state_->picture = colours_of(source, page, most_px, state_->scale);
+}
+CandidatePictures::~CandidatePictures() = default;
+
+void CandidatePictures::write(const std::filesystem::path& path, const SurveyCandidate* candidate) const {
+  const double scale = state_->scale;
+  const cv::Mat picture = state_->picture.clone();
   constexpr int shift = 4;  // sub-pixel drawing: 1/16 px
   const auto fixed = [&](double px) { return static_cast<int>(std::lround(px * (1 << shift))); };
   if (candidate != nullptr)

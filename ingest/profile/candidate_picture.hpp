@@ -1,15 +1,30 @@
 #pragma once
 // A survey's candidates drawn into the picture they were seen in.
 
+#include <cstddef>
 #include <filesystem>
+#include <memory>
 
 #include "ingest/find/survey.hpp"
 
 namespace shakebed::ingest {
 
-// Writes a PNG of picture number `page` of `source` in its own colours, at most `most_px` wide and high. Magenta
-// circles: beads of probability 0.9 or more. Yellow circles: the others. Atomic. Throws InputError, OutputError.
-void write_candidate_picture(const std::filesystem::path& path, const std::filesystem::path& source, std::size_t page,
-                             const SurveyCandidate* candidate, int most_px = 1400);
+// Picture number `page` of `source`, decoded once, in its own colours, at most `most_px` wide and high. Throws
+// InputError.
+class CandidatePictures {
+ public:
+  explicit CandidatePictures(const std::filesystem::path& source, std::size_t page = 0, int most_px = 1400);
+  ~CandidatePictures();
+  CandidatePictures(const CandidatePictures&) = delete;
+  CandidatePictures& operator=(const CandidatePictures&) = delete;
+
+  // Writes it as PNG with the candidate's circles, if one is given. Magenta: beads of probability 0.9 or more. Yellow:
+  // the others. Atomic. Throws OutputError.
+  void write(const std::filesystem::path& path, const SurveyCandidate* candidate) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace shakebed::ingest

@@ -221,10 +221,11 @@ class FilmLearner {
       film_.second = std::move(result.calibration);
     else
       film_.warnings.push_back("No beads of the second diameter were found: " +
-                               (result.found ? "the beads found instead have a radius of " +
-                                                   std::to_string(result.calibration.radius_px) + " px instead of " +
-                                                   std::to_string(expected) + " px."
-                                             : result.why_not + "."));
+                               (result.found
+                                    ? "the beads found instead have a radius of " +
+                                          std::to_string(result.calibration.radius_px * find_.recorded_px) +
+                                          " px instead of " + std::to_string(expected * find_.recorded_px) + " px."
+                                    : result.why_not + "."));
   }
 
   static bool is_second(const CalibrationResult& one, double expected) {

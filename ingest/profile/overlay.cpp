@@ -12,10 +12,6 @@ namespace shakebed::ingest {
 
 namespace {
 
-// Pixels: a larger overlay takes longer to write than the disks to find, and pages cannot hold it. Ten million pixels
-// are more than a screen shows.
-constexpr double most_overlay_pixels = 1e7;
-
 // As asked for, or less; a large frame is reduced by a whole number.
 double magnification_for(const GrayFrame& frame, int wanted) {
   const double pixels = static_cast<double>(frame.width) * frame.height;

@@ -10,6 +10,10 @@
 
 namespace shakebed::ingest {
 
+// Pixels: a larger overlay takes longer to write than the disks to find, and pages cannot hold it. Ten million pixels
+// are more than a screen shows.
+inline constexpr double most_overlay_pixels = 1e7;
+
 struct OverlayOptions {
   int magnification = 2;           // px of the overlay per px of the frame; large frames are reduced instead
   std::optional<double> floor_px;  // draw the floor: y_px at the left edge of the frame ...

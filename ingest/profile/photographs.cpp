@@ -191,8 +191,19 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
 }
 
 int reduction_for(int width, int height, double radius_px) {
-  if (static_cast<double>(width) * height <= large_frame_pixels) return 1;
-  return std::max(1, static_cast<int>(radius_px / enough_radius_px));
+  const double pixels = static_cast<double>(width) * height;
+  if (pixels <= large_frame_pixels) return 1;
+  const auto most_pixels = static_cast<double>(FrameSourceOptions().largest_frame_pixels);
+  return std::max({1, static_cast<int>(radius_px / enough_radius_px),
+                   static_cast<int>(std::ceil(std::sqrt(pixels / most_pixels)))});
+}
+
+std::string why_reduced(int width, int height, int reduction) {
+  if (static_cast<double>(width) * height <= static_cast<double>(FrameSourceOptions().largest_frame_pixels)) return {};
+  return formatted(
+      "The picture has %d x %d px. It was averaged over squares of %d x %d px to bound memory. All lengths in pixels "
+      "are those of the picture itself.",
+      width, height, reduction, reduction);
 }
 
 Doubt doubt_of(double expected_wrong) {
@@ -251,23 +262,24 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     return refused(FindStatus::bad_input, problems.front());
   MeasureOptions measure = options;
   FrameSourceOptions source = source_options;
+  std::string reduced_why;
   if (!measure.find.seen) {
     FrameSource names = FrameSource::open(paths, source);
-    std::vector<FrameOrigin> pictures;
-    for (auto item = names.next_item(); item && pictures.size() < most_tried; item = names.next_item())
-      pictures.push_back(item->origin);
-    const auto look = look_at_first(pictures, survey_options(options.find), source);
+    const auto look = look_at_first(names.first_origins(most_tried), survey_options(options.find), source);
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
       measure.find.seen = seen_in(look->survey);
       source.channel = look->survey.candidates.front().channel;
       source.reduction = measure.reduction = reduction_for(look->width, look->height, measure.find.seen->radius_px);
+      reduced_why = why_reduced(look->width, look->height, source.reduction);
     }
   }
   FrameSource frames = FrameSource::open(paths, source);
   if (!measure.frame_rate_hz) measure.frame_rate_hz = frames.film_rate_hz();
-  return measured(frames, std::move(measure));
+  BedFound found = measured(frames, std::move(measure));
+  if (!reduced_why.empty()) found.measurement.warnings.push_back(reduced_why);
+  return found;
 }
 
 BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions& options) {

@@ -67,8 +67,11 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
                                        const FrameSourceOptions& source = {});
 
 // By which factor frames of this size may be averaged (FrameSourceOptions::reduction): large beads need not be seen by
-// every pixel, a radius of 12 to 24 px is enough. 1 below two million pixels.
+// every pixel, a radius of 12 to 24 px is enough. 1 below two million pixels. Frames of more pixels than are held in
+// memory (FrameSourceOptions::largest_frame_pixels) are always reduced.
 int reduction_for(int width, int height, double radius_px);
+// The sentence that says so for the latter; empty for smaller frames.
+std::string why_reduced(int width, int height, int reduction);
 
 // What the share of disks that may be wrong means for a measurement: `some` above 2 %, worth a warning; `too_many`
 // above 20 %, nothing is measured.

@@ -28,6 +28,7 @@ PixelRectangle reduced_rectangle(const PixelRectangle& recorded, const Enlargeme
 MeasureOptions reduced_options(const MeasureOptions& recorded, const Enlargement& by) {
   MeasureOptions options = recorded;
   options.reduction = 1;
+  options.find.recorded_px = by.length(1);
   if (options.scale_m_per_px) options.scale_m_per_px = by.length(*options.scale_m_per_px);
   for (std::optional<double>* place : {&options.left_wall_px, &options.right_wall_px})
     if (*place) *place = by.reduced_place(**place);

@@ -97,10 +97,12 @@ void add_density(const ExtractOptions& options, const ingest::Measurement& found
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
   if (found.second_finder) {
     const ingest::FinderCalibration& finder = *found.second_finder;
+    const double px = found.finder.recorded_px;
     double second = 0;  // in the frames used, as disks_per_frame
     for (const ingest::FrameReport& frame : found.frames) second += static_cast<double>(frame.second);
-    result["second_species"] = Json{{"radius", quantity_json(finder.radius_px, "px", finder.radius_std_error_px)},
-                                    {"disks_per_frame", second / samples}};
+    result["second_species"] =
+        Json{{"radius", quantity_json(finder.radius_px * px, "px", finder.radius_std_error_px * px)},
+             {"disks_per_frame", second / samples}};
   }
 }
 
@@ -130,8 +132,8 @@ Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
 
 Table bead_table(Table table, const ingest::FinderCalibration& finder) {
   for (std::size_t k = 0; k < finder.profile.level.size(); ++k)
-    table.add(
-        {static_cast<double>(k) * finder.profile.step_px, finder.profile.level[k], finder.profile.fourth_harmonic[k]});
+    table.add({static_cast<double>(k) * finder.profile.step_px * finder.recorded_px, finder.profile.level[k],
+               finder.profile.fourth_harmonic[k]});
   return table;
 }
 
@@ -182,6 +184,10 @@ void write_profiles(RunContext& context, const ingest::Measurement& found, doubl
   write_covariance_csv(context.output("covariance.csv"), heights, covariance, found.profile.independent_samples);
 }
 
+int FilmFiles::reduction_shown(double wanted) const {
+  return std::clamp(static_cast<int>(std::ceil(wanted)), 1, source.reduction);
+}
+
 std::string count_figure(const std::vector<ingest::FrameReport>& frames) {
   constexpr double left = 60, top = 20, wide = 560, high = 200;
   std::size_t most = 1;
@@ -212,9 +218,12 @@ void draw_overlays(RunContext& context, const FilmFiles& film, const ingest::Mea
   const auto to_draw = on_the_way.to_draw();
   if (to_draw.empty()) return;
   const ingest::BedCalibration& bed = found.calibration;
-  ingest::FrameSourceOptions whole = film.source;
-  whole.reduction = 1;
-  ingest::FrameSource again = ingest::FrameSource::open(film.paths, whole);
+  ingest::FrameSourceOptions shown_source = film.source;
+  const double pixels = static_cast<double>(found.finder.width) * found.finder.height;
+  const int reduction = shown_source.reduction =
+      film.reduction_shown(std::sqrt(pixels / ingest::most_overlay_pixels) * film.source.reduction);
+  const auto place = [&](double px) { return (px + 0.5) / reduction - 0.5; };  // in the reduced frame
+  ingest::FrameSource again = ingest::FrameSource::open(film.paths, shown_source);
   bool first = film.source.reduction == 1 && !found.finder.by_rims;  // then there is a model of the frame
   for (auto item = again.next_item(); item && item->index <= to_draw.rbegin()->first; item = again.next_item()) {
     const auto at = to_draw.find(item->index);
@@ -227,15 +236,17 @@ void draw_overlays(RunContext& context, const FilmFiles& film, const ingest::Mea
     shown.light = found.frames.at(item->index).light;
     for (const ingest::MeasuredDisk& disk : at->second) {
       ingest::FoundDisk circle;
-      const ingest::PixelPlace place = lens.to_true({disk.x_px, disk.y_px});
-      circle.x_px = place.x, circle.y_px = place.y, circle.radius_px = disk.radius_px;
+      const ingest::PixelPlace at_true = lens.to_true({place(disk.x_px), place(disk.y_px)});
+      circle.x_px = at_true.x, circle.y_px = at_true.y, circle.radius_px = disk.radius_px / reduction;
       circle.quality = disk.quality, circle.cut = disk.cut, circle.half_hidden = disk.half_hidden;
       shown.disks.push_back(circle);
     }
     ingest::OverlayOptions overlay;
     overlay.magnification = frame.width <= 700 ? 2 : 1;
-    overlay.floor_px = bed.floor_px, overlay.floor_slope = bed.floor_slope;
-    if (!bed.walls_are_frame_sides) overlay.left_wall_px = bed.left_wall_px, overlay.right_wall_px = bed.right_wall_px;
+    overlay.floor_px = place(bed.floor_px + bed.floor_slope * 0.5 * (reduction - 1));
+    overlay.floor_slope = bed.floor_slope;
+    if (!bed.walls_are_frame_sides)
+      overlay.left_wall_px = place(bed.left_wall_px), overlay.right_wall_px = place(bed.right_wall_px);
     ingest::write_overlay(context.output(fmt::format("overlay_{:06d}.png", item->index)), frame, shown.disks, overlay);
     if (first) {
       ingest::GrayFrame residual = ingest::residual_frame(frame, shown, found.finder);

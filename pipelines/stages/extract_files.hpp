@@ -36,6 +36,8 @@ std::string count_figure(const std::vector<ingest::FrameReport>& frames);
 struct FilmFiles {
   std::vector<std::string> paths;
   ingest::FrameSourceOptions source;
+  // The factor, at most that of the search, by which frames are reduced when they are only looked at.
+  [[nodiscard]] int reduction_shown(double wanted) const;
 };
 
 // The frames kept with the disks found, and of the first of them what the model leaves.

@@ -18,6 +18,9 @@ constexpr std::size_t bytes_of_disk = 10;
 // Disks of 20 px in frames 620 px wide are 12 px wide then; at this quality their rims are still sharp (looked at).
 constexpr int picture_width = 400, picture_quality = 32;
 
+// Widths of the picture: a frame is not reduced below them before it is drawn.
+constexpr double least_reduced = 2;
+
 struct Kept {
   std::size_t frame = 0, disks = 0;
   std::string picture{};
@@ -61,9 +64,10 @@ Json marks_json(const DisksOnTheWay::Marks* marks) {
 
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
                 const DisksOnTheWay& on_the_way, std::optional<double> rate) {
-  ingest::FrameSourceOptions whole = film.source;
-  whole.reduction = 1;
-  ingest::FrameSource source = ingest::FrameSource::open(film.paths, whole);
+  ingest::FrameSourceOptions shown = film.source;
+  const double recorded_width = static_cast<double>(found.finder.width) * film.source.reduction;
+  shown.reduction = film.reduction_shown(std::floor(recorded_width / (least_reduced * picture_width)));
+  ingest::FrameSource source = ingest::FrameSource::open(film.paths, shown);
   Thinning thinned;
   std::size_t good = 0;
   int width = 0, height = 0;
@@ -74,7 +78,7 @@ void write_film(RunContext& context, const FilmFiles& film, const ingest::Measur
     if (!thinned.wants(number)) continue;
     context.check_interrupted();
     const ingest::GrayFrame frame = item->decode();
-    width = frame.width, height = frame.height;
+    width = frame.width * shown.reduction, height = frame.height * shown.reduction;
     thinned.add(number, {item->index, report.disks, ingest::small_webp(frame, picture_width, picture_quality)});
   }
   if (thinned.kept().empty()) return;

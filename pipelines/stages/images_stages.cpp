@@ -17,8 +17,8 @@ namespace {
 std::string preview_images(const PreviewRequest& request) {
   ingest::FrameSource source = ingest::FrameSource::open(request.files, {});
   std::vector<std::string> paths;
-  for (auto item = source.next_item(); item && paths.size() < ingest::most_tried; item = source.next_item())
-    if (paths.empty() || paths.back() != item->origin.path) paths.push_back(item->origin.path);
+  for (const ingest::FrameOrigin& origin : source.first_origins(ingest::most_tried))
+    if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
   write_preview(request.folder, *look, request.files, request.diameter);

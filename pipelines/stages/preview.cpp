@@ -83,12 +83,13 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
   const ingest::Survey& survey = look.survey;
   body += survey.found ? "<p>The first candidate is used unless options say otherwise.</p>\n"
                        : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
+  const ingest::CandidatePictures pictures(look.path);
   for (std::size_t k = 0; k < std::min(most_shown, survey.candidates.size()); ++k) {
-    ingest::write_candidate_picture(folder / fmt::format("preview_{}.png", k + 1), look.path, 0, &survey.candidates[k]);
+    pictures.write(folder / fmt::format("preview_{}.png", k + 1), &survey.candidates[k]);
     body += section_of(survey.candidates[k], k + 1, command);
   }
   if (survey.candidates.empty()) {
-    ingest::write_candidate_picture(folder / "preview_1.png", look.path, 0, nullptr);
+    pictures.write(folder / "preview_1.png", nullptr);
     body += "<p><img src=\"preview_1.png\" alt=\"the picture\"></p>\n";
   }
   write_file_atomically(

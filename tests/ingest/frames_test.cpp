@@ -120,6 +120,29 @@ TEST(Frames, StrideKeepsEveryKth) {
   EXPECT_EQ(count, 7U);
 }
 
+TEST(Frames, FirstOriginsAreThoseOfTheFramesAndLeaveTheStreamAtItsBegin) {
+  const ScratchFolder folder;
+  std::vector<std::string> files;
+  for (int k = 0; k < 7; ++k) {
+    files.push_back(folder / ("frame" + std::to_string(k) + ".png"));
+    write_png(files.back(), ramp(20, 10, static_cast<float>(10 * k)));
+  }
+  FrameSource source = FrameSource::open(files, {.stride = 2});
+  const std::vector<FrameOrigin> origins = source.first_origins(3);
+  ASSERT_EQ(origins.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(origins[k].path, files[2 * k]);
+  EXPECT_EQ(source.first_origins(100).size(), 4U);
+  for (int pass = 0; pass < 2; ++pass) {  // the second pass gives the same frames
+    for (int k = 0; k < 7; k += 2) {
+      const auto frame = source.next();
+      ASSERT_TRUE(frame.has_value());
+      EXPECT_EQ(frame->pixels, ramp(20, 10, static_cast<float>(10 * k)).pixels);
+    }
+    EXPECT_FALSE(source.next().has_value());
+    source.rewind();
+  }
+}
+
 TEST(Frames, SixteenBitsOfWhichTwelveAreUsedFillTheRange) {
   const ScratchFolder folder;
   write_tiff(folder / "deep.tif", 4, 2, {{0, 1000, 2000, 3000, 4095, 10, 20, 30}}, 16);

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/synthetic/synthetic_frames.hpp"
@@ -110,6 +111,47 @@ TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
     EXPECT_EQ(by, std::max(1, static_cast<int>(radius / 12)));
     EXPECT_LT(radius / by, 24);
   }
+}
+
+TEST(Photographs, FramesBeyondWhatMemoryHoldsAreReducedAndSaySo) {
+  const double most = static_cast<double>(FrameSourceOptions().largest_frame_pixels);
+  for (const auto& [width, height] : {std::pair(12'300, 12'300), std::pair(20'000, 15'000), std::pair(30'000, 30'000)})
+    for (const double radius : {5.0, 13.0, 60.0}) {
+      const int by = reduction_for(width, height, radius);
+      EXPECT_LE(static_cast<double>(width / by) * (height / by), most);
+      EXPECT_GE(by, static_cast<int>(radius / 12)) << "large beads are reduced as before";
+      EXPECT_NE(why_reduced(width, height, by).find(std::to_string(width)), std::string::npos);
+    }
+  EXPECT_EQ(reduction_for(12'200, 12'200, 10), 1);
+  EXPECT_EQ(why_reduced(12'200, 12'200, 1), "");
+}
+
+// A bed of beads that are 60 px wide in a frame of three million pixels: it is measured in a frame reduced by two.
+TEST(Photographs, LengthsOfAReducedBedAreThoseOfThePicture) {
+  const test::ScratchFolder folder;
+  constexpr double radius = 30;
+  const auto disks = make_synthetic_bed(
+      {.left_wall_px = 40, .right_wall_px = 1960, .floor_px = 1440, .radius_px = radius, .rows = 8, .jitter_px = 1});
+  write_png(
+      folder / "bed.png",
+      render_frame(
+          disks,
+          {.width = 2000, .height = 1500, .background_level = 60, .bead_level = 190, .blur_px = 1, .read_noise = 4}));
+  const BedFound bed = measure_bed({folder / "bed.png"}, {.bead_diameter_m = 3e-3});
+  ASSERT_TRUE(bed.ok()) << bed.message;
+  const Measurement& measured = bed.measurement;
+  ASSERT_EQ(measured.finder.recorded_px, 2);
+  EXPECT_NEAR(measured.calibration.radius_px, radius, 0.1);
+  EXPECT_NEAR(measured.finder.rim_radius_px * measured.finder.recorded_px, radius, 0.1);
+  ASSERT_EQ(measured.disks.size(), disks.size());
+  double squares = 0;
+  for (const MeasuredDisk& disk : measured.disks) {
+    double nearest = 1e9;
+    for (const RenderedDisk& one : disks)
+      nearest = std::min(nearest, std::pow(disk.x_px - one.x_px, 2) + std::pow(disk.y_px - one.y_px, 2));
+    squares += nearest;
+  }
+  EXPECT_LT(std::sqrt(0.5 * squares / static_cast<double>(disks.size())), 0.03) << "px per axis";
 }
 
 TEST(Photographs, PicturesThatCannotBeReadAreSkippedInTheFirstLook) {

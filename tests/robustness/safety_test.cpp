@@ -252,11 +252,13 @@ std::string png(std::uint32_t width, std::uint32_t height, const std::string& da
 TEST(Safety, PicturesThatClaimToBeHugeAreRefused) {
   ScratchFolder folder;
   write_text(folder / "bomb.png", png(60'000, 60'000, std::string("\x78\x9c\x63\x60\x60\x00\x00\x00\x04\x00\x01", 11)));
+  write_text(folder / "large.png",
+             png(16'000, 16'000, std::string("\x78\x9c\x63\x60\x60\x00\x00\x00\x04\x00\x01", 11)));
   write_text(folder / "bomb.pgm", "P5\n60000 60000\n255\nx");
   std::string bmp("BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x60\xea\0\0\x60\xea\0\0\x01\0\x08\0", 30);
   bmp += std::string(1100, '\0');
   write_text(folder / "bomb.bmp", bmp);
-  for (const char* name : {"bomb.png", "bomb.pgm", "bomb.bmp"}) {
+  for (const char* name : {"bomb.png", "large.png", "bomb.pgm", "bomb.bmp"}) {
     const ProgramResult result =
         within(4ull << 30, {"fit-images", name, "--diameter", "3 mm", "--out", "o"}, folder.path());
     EXPECT_EQ(result.exit_code, 4) << name << " " << result.err;

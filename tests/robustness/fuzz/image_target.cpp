@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                           : bytes.size() > 1 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' ? ".pgm"
                                                                                                       : ".png";
   FrameSourceOptions options;
-  options.largest_frame_pixels = 1'000'000;
+  options.largest_frame_pixels = options.largest_decoded_pixels = 1'000'000;
   try {
     const GrayFrame frame = read_frame(shakebed::fuzz::as_file(bytes, extension), 0, options);
     if (frame.width < 1 || frame.height < 1 ||
