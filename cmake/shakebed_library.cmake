@@ -76,10 +76,16 @@ function(shakebed_finish_libraries)
     list(APPEND inputs ${found})
   endforeach()
   set(stamp "${PROJECT_BINARY_DIR}/public_headers.stamp")
+  string(REPLACE ";" "," commas "${headers}")
+  set(write ${CMAKE_COMMAND} "-DSOURCE_DIR=${PROJECT_SOURCE_DIR}" "-DOUTPUT=${PROJECT_BINARY_DIR}/include"
+            "-DHEADERS=${commas}" "-DSTAMP=${stamp}" -P "${script}")
+  # Written now to know their names: an object that includes one waits for the command and is compiled again after it.
+  execute_process(COMMAND ${write} COMMAND_ERROR_IS_FATAL ANY)
+  file(GLOB_RECURSE written "${PROJECT_BINARY_DIR}/include/shakebed/*.hpp")
   add_custom_command(
     OUTPUT "${stamp}"
-    COMMAND ${CMAKE_COMMAND} "-DSOURCE_DIR=${PROJECT_SOURCE_DIR}" "-DOUTPUT=${PROJECT_BINARY_DIR}/include"
-            "-DHEADERS=${headers}" "-DSTAMP=${stamp}" -P "${script}"
+    BYPRODUCTS ${written}
+    COMMAND ${write}
     DEPENDS ${inputs}
     COMMENT "Writing the public headers"
     VERBATIM)

@@ -1,11 +1,12 @@
 # Writes the headers that users of the libraries include.
 #
-#   cmake -DSOURCE_DIR=<tree> -DOUTPUT=<include folder> "-DHEADERS=sim/scene/scene.hpp;..." -P write_public_headers.cmake
+#   cmake -DSOURCE_DIR=<tree> -DOUTPUT=<include folder> -DHEADERS=sim/scene/scene.hpp,... -P write_public_headers.cmake
 #
 # A header of the list, <room>/<folder>/<name>.hpp, becomes <OUTPUT>/shakebed/<room>/<name>.hpp. A header that it needs
 # and that is not of the list becomes <OUTPUT>/shakebed/<room>/detail/<name>.hpp. The #include lines are rewritten. Files
 # that did not change are not touched.
 cmake_minimum_required(VERSION 3.25)
+string(REPLACE "," ";" HEADERS "${HEADERS}")
 
 # The place of a header below <OUTPUT>.
 function(public_place header variable)

@@ -127,7 +127,7 @@ case $case in
       -DCMAKE_DISABLE_FIND_PACKAGE_GSL=ON
     no_flags_leak
     for room in sim ingest fit; do
-      readelf -d "$folder/build/with_$room" | grep -q "libshakebed_$room.so.0.1" || fail "with_$room does not use the shared library"
+      readelf -d "$folder/build/with_$room" | grep -q "libshakebed_$room.so.1" || fail "with_$room does not use the shared library"
     done
     for library in $(find "$work/shared-moved" -name 'libshakebed_*.so'); do
       nm --dynamic --defined-only -C "$library" | no_symbols_outside "$library"
