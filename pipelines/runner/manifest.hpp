@@ -8,7 +8,7 @@
 
 namespace shakebed::pipelines {
 
-std::string program_version();  // "1.0.0"
+std::string program_version();  // that of CMakeLists.txt: "major.minor.patch"
 std::string source_revision();  // git commit of the build, "-dirty" if changed; "" outside git
 std::string compiler_text();
 std::string utc_now();  // 2026-11-21T02:27:48Z
