@@ -424,12 +424,14 @@ void bind_fits(py::module_& m) {
   m.def("find_answer", [](const py::object& height, const py::object& density, const py::object& error,
                           const py::object& covariance, int covariance_samples, const std::string& kernel,
                           std::optional<double> column_number, std::optional<std::pair<double, double>> temperature_x,
-                          std::optional<std::pair<double, double>> temperature_z) {
+                          std::optional<std::pair<double, double>> temperature_z,
+                          const std::vector<std::pair<std::string, std::string>>& objections) {
     fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
                            .kernel = kernel_named(kernel),
                            .column_number = column_number};
     if (temperature_x) input.temperature_x = fit::Estimate{temperature_x->first, temperature_x->second};
     if (temperature_z) input.temperature_z = fit::Estimate{temperature_z->first, temperature_z->second};
+    for (const auto& [why, advice] : objections) input.objections.push_back({why, advice});
     fit::Answer answer;
     {
       const py::gil_scoped_release release;

@@ -253,6 +253,12 @@ PYBIND11_MODULE(_images, m) {
       .def_property_readonly("frames", [](const ingest::BedFound& f) { return f.measurement.frames.size(); })
       .def_property_readonly("disks_a_frame", [](const ingest::BedFound& f) { return f.measurement.disk_count_mean; })
       .def_property_readonly("warnings", [](const ingest::BedFound& f) { return f.measurement.warnings; })
+      .def("objections",
+           [](const ingest::BedFound& f) {
+             std::vector<std::pair<std::string, std::string>> all;
+             for (const ingest::Objection& one : ingest::objections_to(f.measurement)) all.emplace_back(one.why, one.advice);
+             return all;
+           })
       .def("profile", [](const ingest::BedFound& f) { return profile_of(f.measurement.profile); })
       .def("disks", [](const ingest::BedFound& f) { return table_of(f.measurement.disks); })
       .def("brief", &ingest::BedFound::brief)

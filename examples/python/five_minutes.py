@@ -32,10 +32,7 @@ print("fastest disk: %.2f sqrt(g D)" % np.hypot(*np.moveaxis(trajectory.velociti
 # Is there one temperature? Its density profile is asked, and its velocities.
 
 # %%
-profile = bed.profile
-answer = shakebed.find_answer(profile.height, profile.number_density, profile.std_error, kernel=profile.kernel,
-                              column_number=bed.column_number, temperature_x=bed.observables["temperature_x"],
-                              temperature_z=bed.observables["temperature_z"])
+answer = bed.answer()
 print(answer["verdict"], "T = %.2f +- %.2f m g D" % (answer["temperature"], answer["std_error"]))
 print(answer["why"])
 

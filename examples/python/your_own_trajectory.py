@@ -32,6 +32,6 @@ else:
     heights = np.array([frame.positions[:, "xyz".index(up)] for frame in ase.io.read(file, index=":")])
 print("frames x disks:", heights.shape)
 profile = shakebed.density_profile(heights, width, highest=15)
-fit = shakebed.fit_profile(profile.height, profile.number_density, profile.std_error, kernel=profile.kernel)
+fit = shakebed.fit_profile(profile)
 print(fit.brief())
 print(fit.full())

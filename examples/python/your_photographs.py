@@ -32,9 +32,10 @@ print(bed.brief())
 for warning in bed.warnings:
     print("warning:", warning)
 profile = bed.profile
-fit = shakebed.fit_profile(profile.height, profile.number_density, profile.std_error, kernel=profile.kernel,
-                           diameter=diameter)
+fit = shakebed.fit_profile(profile, diameter=diameter)
 print(fit.brief())
+answer = bed.answer()
+print(answer["verdict"] + ":", answer["why"])
 
 # %%
 try:

@@ -140,6 +140,7 @@ class ProfileFitter {
     result_.p_value = good.p_value;
     result_.aic = good.aic;
     result_.bic = good.bic;
+    result_.misfit = good.misfit;
     result_.errors_scaled = good.scaled;
     result_.model_error = fitted_.model_error;
   }

@@ -181,6 +181,7 @@ struct FitResult {
   int dof = 0;
   double chi2_per_dof = 0.0;
   double p_value = 0.0;  // chance of a chi2 at least as large, were the model true and the errors right
+  bool misfit = false;   // the model does not describe the data: that chance is below 1e-3
   double aic = 0.0, bic = 0.0;
   int iterations = 0;
   int evaluations = 0;  // of the model

@@ -32,7 +32,8 @@ std::vector<std::string> FitOptions::validate() const {
 std::string FitResult::brief() const {
   if (!ok()) return std::string(to_string(status)) + ": " + message;
   return model + ": T = " + estimate_text(temperature) + " m g D, solid height " + estimate_text(solid_height) +
-         " D, chi2/dof = " + number(chi2_per_dof, 3) + " (" + std::to_string(bins) + " heights)";
+         " D, chi2/dof = " + number(chi2_per_dof, 3) + " (" + std::to_string(bins) + " heights" +
+         (misfit ? "; the model does not fit)" : ")");
 }
 
 std::string FitResult::full() const {

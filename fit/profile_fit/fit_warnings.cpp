@@ -13,8 +13,6 @@ constexpr std::size_t range_bins = 5;
 // Densities this much above close packing, and areas this far from N D/W, are named; an area this far off is a wrong
 // unit.
 constexpr double density_margin = 1.02, area_margin = 0.1, unit_ratio = 1.5;
-// The chance of chi2 below which the model does not describe the data.
-constexpr double misfit_chance = 1e-3;
 // A bin so many standard errors off that makes more than this part of chi2 is an outlier.
 constexpr double outlier_errors = 8.0, outlier_share = 0.5;
 // T depends on the window when it moves by so many standard errors and by this part of itself.
@@ -24,8 +22,8 @@ constexpr double sum_rule_change = 0.1, sum_rule_errors = 4.0;
 // phi_0 with an error above this part of it is not determined.
 constexpr double undetermined_plateau = 0.1;
 
-void warn_about_misfit(const MeasuredProfile& measured, FitResult& result) {
-  if (!measured.errors_known || result.dof <= 0 || !(result.p_value < misfit_chance)) return;
+void warn_about_misfit(FitResult& result) {
+  if (!result.misfit) return;
   result.warnings.push_back(
       "The model does not fit: chi2/dof = " + number(result.chi2_per_dof) + ", p = " + number(result.p_value, 2) + "." +
       (result.model_error > 0.0
@@ -127,7 +125,7 @@ void warn_about_fit(const MeasuredProfile& measured, const FitOptions& options, 
     result.warnings.emplace_back(
         "no solid: the fitted curve does not reach the plateau density above the floor (T > T_c)");
   }
-  warn_about_misfit(measured, result);
+  warn_about_misfit(result);
   warn_about_an_outlier(measured, options.robust, result);
   warn_about_the_window(result);
   if (options.column_number) warn_about_the_sum_rule(result);

@@ -108,7 +108,8 @@ Goodness goodness(const Solution& solution, const Bins& bins, int parameters, co
     g.aic = log_variance + 2.0 * (k + 1.0);
     g.bic = log_variance + (k + 1.0) * std::log(n);
   }
-  g.scaled = !options.robust && g.dof > 0 && (!options.errors_known || g.p_value < misfit_chance);
+  g.misfit = options.errors_known && g.dof > 0 && g.p_value < misfit_chance;
+  g.scaled = !options.robust && g.dof > 0 && (!options.errors_known || g.misfit);
   if (g.scaled) g.error_scale = std::sqrt(g.chi2_per_dof);
   if (bins.whitening.size() > 0 && bins.samples > 0) g.error_scale *= weight_noise(bins.samples, n, k);
   if (options.robust && !options.errors_known) g.scaled = true;

@@ -12,6 +12,7 @@ namespace shakebed::fit {
 struct Goodness {
   double chi2_per_dof = 0.0, p_value = 1.0, aic = 0.0, bic = 0.0, error_scale = 1.0;
   int dof = 0;
+  bool misfit = false;  // the model does not describe the data
   bool scaled = false;
 };
 

@@ -163,6 +163,12 @@ struct Measurement {
 // instead.
 Measurement measure_bed(FrameSource& source, const MeasureOptions& options);
 
+// What the frames show against reading a temperature from their profile: why, and what to do; a sentence or more each.
+struct Objection {
+  std::string why, advice;
+};
+std::vector<Objection> objections_to(const Measurement& found);
+
 // Rows of that table, to be written while frames come in: heads and lines end with a newline.
 inline constexpr const char* disks_csv_head = "frame,x_px,y_px,radius_px,x,z,quality\n";
 std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks);

@@ -51,18 +51,19 @@ void Fields::finish() {
   for (const JsonMember& member : node_->members) {
     if (member.key == "$comment" || std::find(known_.begin(), known_.end(), member.key) != known_.end()) continue;
     const std::string nearest = nearest_name(member.key, known_);
-    std::string suggestion;
+    std::string suggestion, meant;
     if (const auto elsewhere = keys_elsewhere_.find(member.key); elsewhere != keys_elsewhere_.end()) {
       suggestion = "It belongs to " + elsewhere->second + ".";
     } else if (!nearest.empty()) {
       suggestion = fmt::format("Did you mean \"{}\"?", nearest);
+      meant = pointer_join(pointer_, nearest);
     } else {
       for (const std::string& name : known_) suggestion += (suggestion.empty() ? "Known here: " : ", ") + name;
     }
     source_.problems->push_back({member.value.from_command_line ? "--set" : source_.file,
                                  member.value.from_command_line ? Position{} : member.at,
                                  pointer_join(pointer_, member.key), fmt::format("unknown key \"{}\"", member.key),
-                                 suggestion});
+                                 suggestion, false, std::move(meant)});
   }
 }
 
@@ -490,7 +491,9 @@ void Fields::require(bool holds, std::string_view key, const std::string& what, 
 }
 
 void Fields::problem(std::string_view pointer_below, const std::string& what, const std::string& suggestion) {
-  if (mode_ == Mode::decode) source_.problems->push_back(located(pointer_below, what, suggestion));
+  if (mode_ != Mode::decode) return;
+  source_.problems->push_back(located(pointer_below, what, suggestion));
+  source_.problems->back().is_rule = true;
 }
 
 void Fields::warn(std::string_view kind, std::string_view pointer_below, const std::string& what,

@@ -31,6 +31,8 @@ struct Problem {
   std::string what;        // the problem and what was expected
   std::string suggestion;  // what to do; may be empty
   bool is_input = false;   // a missing or unreadable input file rather than a mistake in the recipe
+  std::string meant = {};  // of a misspelt key: pointer of the key that was probably meant
+  bool is_rule = false;    // values that do not go together, each of which could be read
 };
 
 // What is odd but not wrong. Warnings of one kind at one pointer are counted together where many recipes are read.

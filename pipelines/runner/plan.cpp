@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace shakebed::pipelines {
 namespace {
@@ -47,6 +48,7 @@ struct Draft {  // a stage before its place in the order is known
   const StageRow* row = nullptr;
   std::size_t index = 0;            // in the recipe
   std::vector<std::size_t> arrows;  // the drafts it reads from
+  bool reads_unread = false;        // one of those it reads from is of no known kind
 };
 
 class PlanBuilder {
@@ -66,6 +68,7 @@ class PlanBuilder {
     order_stages();
     for (const std::size_t i : order_) read_options(i);
     check_pointers();
+    drop_consequences();
     throw_problems();
     write_resolved();
     return std::move(plan_);
@@ -83,6 +86,36 @@ class PlanBuilder {
       return std::pair(a.at.line, a.at.column) < std::pair(b.at.line, b.at.column);
     });
     throw ConfigError(std::move(problems_));
+  }
+
+  // One mistake gives one error. Removed are: of a misspelt key, that the key meant is missing; rules between keys,
+  // where a key of the stage is misspelt or a stage it reads from has a mistake (they saw defaults, or nothing).
+  void drop_consequences() {
+    const auto any = [&](const Draft& draft, const auto& holds) {
+      const std::string pointer = pointer_join("/stages", draft.index);
+      return std::any_of(problems_.begin(), problems_.end(), [&](const Problem& one) {
+        return (one.pointer + '/').starts_with(pointer + '/') && holds(one);
+      });
+    };
+    std::vector<std::string> clouded;  // stages whose rules cannot be judged
+    std::vector<bool> wrong(drafts_.size(), false);
+    for (const std::size_t i : order_) {
+      const Draft& draft = drafts_[i];
+      const bool reads_wrong = draft.reads_unread || std::any_of(draft.arrows.begin(), draft.arrows.end(),
+                                                                 [&](std::size_t k) { return wrong[k]; });
+      wrong[i] = reads_wrong || any(draft, [](const Problem&) { return true; });
+      if (reads_wrong || any(draft, [](const Problem& one) { return !one.meant.empty(); }))
+        clouded.push_back(pointer_join("/stages", draft.index) + '/');
+    }
+    std::vector<std::string> meant;
+    for (const Problem& one : problems_)
+      if (!one.meant.empty()) meant.push_back(one.meant);
+    std::erase_if(problems_, [&](const Problem& one) {
+      const bool unjudged = std::any_of(clouded.begin(), clouded.end(), [&](const std::string& pointer) {
+        return (one.pointer + '/').starts_with(pointer);
+      });
+      return (one.is_rule && unjudged) || std::find(meant.begin(), meant.end(), one.pointer) != meant.end();
+    });
   }
 
   void check_document() {
@@ -140,10 +173,13 @@ class PlanBuilder {
     }
     if (!item.is_object())
       return problem(item, pointer, fmt::format("expected a stage, an object; got {}", item.described()));
-    const StageRow* row = read_kind(item, pointer);
-    if (row == nullptr) return;
-    Draft draft{.node = &item, .id = std::string(row->name), .row = row, .index = index, .arrows = {}};
     const JsonNode* id = item.find("id");
+    const StageRow* row = read_kind(item, pointer);
+    if (row == nullptr) {
+      if (id != nullptr && id->is_string()) unread_.insert(id->text);
+      return;
+    }
+    Draft draft{.node = &item, .id = std::string(row->name), .row = row, .index = index, .arrows = {}};
     if (id != nullptr && id->is_string()) {
       draft.id = id->text;
       check_id(*id, pointer);
@@ -168,6 +204,7 @@ class PlanBuilder {
     const StageRow* row = find_stage(kind->text);
     if (row == nullptr) {
       const std::string nearest = nearest_name(kind->text, kinds);
+      unread_.insert({kind->text, nearest});
       problem(*kind, pointer + "/stage", fmt::format("there is no stage \"{}\"", kind->text),
               nearest.empty() ? fmt::format("There are {}", fmt::join(kinds, ", "))
                               : fmt::format("Did you mean \"{}\"?", nearest));
@@ -201,7 +238,7 @@ class PlanBuilder {
     if (count < row.fewest_inputs) {
       problem(
           from != nullptr ? *from : *draft.node, pointer,
-          fmt::format("{} needs the results of {} {}", row.name, row.fewest_inputs == row.most_inputs ? "" : "at least",
+          fmt::format("{} needs the results of {}{}", row.name, row.fewest_inputs == row.most_inputs ? "" : "at least ",
                       row.fewest_inputs == 1 ? "one stage" : fmt::format("{} stages", row.fewest_inputs)),
           fmt::format("Name a stage of these kinds by its id: {}", fmt::join(row.accepts, ", ")));
     } else if (count > row.most_inputs) {
@@ -218,6 +255,10 @@ class PlanBuilder {
     for (const Draft& one : drafts_) ids.push_back(one.id);
     const auto found = std::find(ids.begin(), ids.end(), node.text);
     if (found == ids.end()) {
+      if (unread_.contains(node.text)) {
+        draft.reads_unread = true;
+        return;
+      }
       const std::string nearest = nearest_name(node.text, ids);
       return problem(node, where, fmt::format("there is no stage with the id \"{}\"", node.text),
                      nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
@@ -394,6 +435,7 @@ class PlanBuilder {
   std::vector<Problem> problems_;
   Fields::Source source_;
   std::vector<Draft> drafts_;
+  std::set<std::string> unread_;                 // ids of stages of no known kind
   std::vector<std::size_t> order_;               // of drafts
   std::map<std::size_t, std::size_t> position_;  // of a draft in Plan::stages
 };

@@ -41,8 +41,10 @@ class RecipeReader {
 
   Plan read() {
     std::optional<Plan> plan = try_preset(changes_.preset);
+    const bool no_stages =
+        std::any_of(problems_.begin(), problems_.end(), [](const Problem& one) { return one.meant == "/stages"; });
     for (const std::string& name : preset_names(document_)) {
-      if (name != changes_.preset) try_preset(name);
+      if (name != changes_.preset && !no_stages) try_preset(name);
     }
     if (!problems_.empty()) throw ConfigError(std::move(problems_));
     return std::move(*plan);

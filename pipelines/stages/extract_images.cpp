@@ -15,7 +15,6 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
-#include "pipelines/stages/extract_objections.hpp"
 #include "pipelines/stages/film.hpp"
 #include "pipelines/stages/preview.hpp"
 
@@ -270,6 +269,16 @@ class Extraction {
                       *measure_.frame_rate_hz * static_cast<double>(options_.stride)));
   }
 
+  // The fit takes them into its answer.
+  void add_objections(const ingest::Measurement& found, Json& result) const {
+    std::vector<ingest::Objection> all = ingest::objections_to(found);
+    if (!round_)
+      all.push_back({"The outlines are not those of disks, and the theory is one of disks.",
+                     "Use positions and numbers of beads only."});
+    for (const ingest::Objection& one : all)
+      result["objections"].push_back(Json{{"why", one.why}, {"advice", one.advice}});
+  }
+
   void write(const ingest::Measurement& found, DisksOnTheWay& on_the_way) {
     write_profiles(context_, found, found.disk_count_mean / found.calibration.width);
     frames_table(context_.table("frames.csv"), found.frames).write(context_.output("frames.csv"));
@@ -277,7 +286,7 @@ class Extraction {
     result["quality"] = on_the_way.quality();
     result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
     add_velocities(on_the_way, result);
-    if (const Json against = objections_json(found, !round_); !against.empty()) result["objections"] = against;
+    add_objections(found, result);
     if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
     write_file(context_.output("extract.json"), dump(result));
     const BedDescription bed =

@@ -2,9 +2,7 @@
 
 >>> import shakebed
 >>> bed = shakebed.simulate("bed.json")
->>> fit = shakebed.fit_profile(bed.profile.height, bed.profile.number_density, bed.profile.std_error,
-...                            kernel=bed.profile.kernel)
->>> print(fit.brief())
+>>> print(shakebed.fit_profile(bed.profile).brief())
 
 Lengths are in D (the diameter of a disk) and temperatures in m g D, unless a unit is named. Arguments with a unit are
 strings ("2.99 mm") or numbers in SI.

@@ -65,6 +65,7 @@ def find_answer(
     height: Any, density: Any, error: Any, covariance: Any,
     covariance_samples: int, kernel: str, column_number: Optional[float],
     temperature_x: Optional[tuple[float, float]], temperature_z: Optional[tuple[float, float]],
+    objections: list[tuple[str, str]],
 ) -> dict[str, Any]: ...
 def theory(
     equation: str, plateau_density: float, diameter: Optional[float], initial_height: Optional[float],

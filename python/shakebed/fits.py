@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from .errors import UsageError, check_options
 from .quantities import Number, Quantity, in_diameters, in_si, number, table_html
+from .scenes import Profile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -121,8 +122,12 @@ class Fit:
         return self._numbers
 
     def brief(self) -> str:
-        """The result in one line."""
-        return self._fit.brief()
+        """The result in one line, with T/(m g) in mm if the diameter was given."""
+        length = self._numbers.get("temperature_over_mg") if self.ok else None
+        if length is None:
+            return self._fit.brief()
+        error = f" +- {1e3 * length['std_error']:.2g}" if "std_error" in length else ""
+        return f"{self._fit.brief()}; T/(m g) = {1e3 * length['value']:.4g}{error} mm"
 
     def full(self) -> str:
         """The result with one line per number, then the warnings."""
@@ -145,14 +150,32 @@ _fit_options = frozenset({
     "model", "model_error", "plateau_density", "plateau_density_free", "robust", "sweep", "window"})
 
 
+def _data(
+    height: Any, density: Any, error: Any, covariance: Any, covariance_samples: int, kernel: Optional[str]
+) -> tuple[Any, ...]:
+    """What the compiled module takes, from a Profile or from arrays."""
+    if isinstance(height, Profile):
+        given = {"density": density, "error": error, "covariance": covariance,
+                 "covariance_samples": covariance_samples or None, "kernel": kernel}
+        twice = [name for name, value in given.items() if value is not None]
+        if twice:
+            raise UsageError(f"{', '.join(twice)}: a Profile has its own; pass the profile alone, or arrays")
+        profile = height
+        return (profile.height, profile.number_density, profile.std_error, profile.covariance,
+                profile.covariance_samples, profile.kernel)
+    if density is None:
+        raise UsageError("density is missing: pass height and density, or a Profile")
+    return height, density, error, covariance, int(covariance_samples), kernel or "none"
+
+
 def fit_profile(
     height: Any,
-    density: Any,
+    density: Any = None,
     error: Any = None,
     *,
     covariance: Any = None,
     covariance_samples: int = 0,
-    kernel: str = "none",
+    kernel: Optional[str] = None,
     diameter: Union[None, str, Number] = None,
     **options: Any,
 ) -> Fit:
@@ -161,7 +184,8 @@ def fit_profile(
     Parameters
     ----------
     height, density : array_like, shape (heights,)
-        Heights above the mean position of the floor [D] and number densities n D^2 [1/D^2].
+        Heights above the mean position of the floor [D] and number densities n D^2 [1/D^2]. Or one `Profile` in place
+        of all columns: its errors, covariance and kernel are used.
     error : array_like, shape (heights,), or float, optional
         Standard errors of the densities [1/D^2]. One number stands for all heights.
     covariance : array_like, shape (heights, heights), optional
@@ -169,8 +193,8 @@ def fit_profile(
     covariance_samples : int
         Number of independent samples from which the covariance was estimated; 0: unknown.
     kernel : str
-        Kernel through which the density was measured: "none", "gaussian:0.5", "top_hat:1" or "disk_chord:1" (widths in
-        D).
+        Kernel through which the density was measured: "none" (default), "gaussian:0.5", "top_hat:1" or "disk_chord:1"
+        (widths in D).
     diameter : str or float, optional
         Diameter D of a disk ("2.99 mm", or a number in m), for T/(m g) as a length.
     **options
@@ -215,8 +239,8 @@ def fit_profile(
     """
     check_options("fit_profile", options, _fit_options)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
-    return Fit(_core.fit_profile(height, density, error, covariance, int(covariance_samples),
-                                 options | {"kernel": kernel}, length))
+    *columns, kernel = _data(height, density, error, covariance, covariance_samples, kernel)
+    return Fit(_core.fit_profile(*columns, options | {"kernel": kernel}, length))
 
 
 def _estimate(given: Any, name: str) -> Optional[tuple[float, float]]:
@@ -231,12 +255,12 @@ def _estimate(given: Any, name: str) -> Optional[tuple[float, float]]:
 
 def find_answer(
     height: Any,
-    density: Any,
+    density: Any = None,
     error: Any = None,
     *,
     covariance: Any = None,
     covariance_samples: int = 0,
-    kernel: str = "none",
+    kernel: Optional[str] = None,
     column_number: Optional[float] = None,
     temperature_x: Union[None, Quantity, tuple[float, float], Number] = None,
     temperature_z: Union[None, Quantity, tuple[float, float], Number] = None,
@@ -262,10 +286,11 @@ def find_answer(
             Height of the solid [D].
 
         The numbers are None if the status is not "ok". Then why and advice give the reason.
+        `Bed.answer` and `MeasuredBed.answer` pass all that is known of a bed.
     """
-    return _core.find_answer(height, density, error, covariance, int(covariance_samples), kernel,
+    return _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
                              None if column_number is None else number(column_number, "column_number"),
-                             _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"))
+                             _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [])
 
 
 def _checked_plateau(plateau_density: Any) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Sequence, Union
 
 import numpy as np
 
+from . import _core
 from .errors import StageError, UsageError, check_options
 from .quantities import Number, Progress, in_si, reporter, table_html
 from .scenes import Profile, profile_from
@@ -169,6 +170,17 @@ class MeasuredBed:
     def profile(self) -> Profile:
         """Density [1/D^2] against the height above the floor [D]."""
         return profile_from(self._bed.profile())
+
+    def answer(self) -> dict[str, Any]:
+        """One temperature from all thermometers, as `find_answer` gives it.
+
+        It is read from the profile and the mean number of disks. What the photographs show against it, such as a
+        floor that is not in view, is taken into account.
+        """
+        profile = self.profile
+        return _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
+                                 profile.covariance_samples, profile.kernel, self.disks_a_frame / self.width, None, None,
+                                 self._bed.objections())
 
     @property
     def disks(self) -> dict[str, NDArray[Any]]:

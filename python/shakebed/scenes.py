@@ -271,6 +271,18 @@ class Bed:
         units = {"center_of_mass": "D", "center_of_mass_rise": "D", "compressibility_factor": "1"}
         return {name: Quantity(*pair, units.get(name, energy)) for name, pair in self._bed.observables().items()}
 
+    def answer(self) -> dict[str, Any]:
+        """One temperature from all thermometers, as `find_answer` gives it.
+
+        It is read from the profile, N D/W and the kinetic temperatures. A recipe also simulates longer contacts and
+        adds what they change.
+        """
+        from .fits import find_answer
+
+        seen = self.observables
+        return find_answer(self.profile, column_number=self.column_number, temperature_x=seen.get("temperature_x"),
+                           temperature_z=seen.get("temperature_z"))
+
     def trajectory(self) -> Trajectory:
         """The frames that the scene keeps (option "frames"), not copied."""
         bed = self._bed

@@ -10,7 +10,6 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
-#include "pipelines/stages/extract_objections.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -348,28 +347,27 @@ TEST_F(ExtractTables, HoldTemperaturesByTheFramesReadAndByGravity) {
 TEST(ExtractObjections, NameWhatThePhotographsShow) {
   ingest::Measurement good = a_measurement();
   good.disk_total = 200;
-  EXPECT_EQ(objections_json(good, false), Json::array());
-  const auto only = [](const ingest::Measurement& found, bool not_round) {
-    const Json all = objections_json(found, not_round);
-    EXPECT_EQ(all.size(), 1U) << all;
-    EXPECT_FALSE(all[0]["advice"].get<std::string>().empty());
-    return all[0]["why"].get<std::string>();
+  EXPECT_TRUE(objections_to(good).empty());
+  const auto only = [](const ingest::Measurement& found) {
+    const std::vector<ingest::Objection> all = objections_to(found);
+    EXPECT_EQ(all.size(), 1U);
+    EXPECT_FALSE(all[0].advice.empty());
+    return all[0].why;
   };
   const auto has = [](const std::string& text, const char* words) { return text.find(words) != std::string::npos; };
   ingest::Measurement found = good;
   found.floor_out_of_view = true;
-  EXPECT_TRUE(has(only(found, false), "the floor is not in view"));
+  EXPECT_TRUE(has(only(found), "the floor is not in view"));
   found.surface_out_of_view = true;
-  EXPECT_TRUE(has(only(found, false), "neither floor nor surface is in view"));
+  EXPECT_TRUE(has(only(found), "neither floor nor surface is in view"));
   found = good, found.surface_out_of_view = true;
-  EXPECT_EQ(objections_json(found, false), Json::array()) << "disks may fly out of the picture";
+  EXPECT_TRUE(objections_to(found).empty()) << "disks may fly out of the picture";
   found = good, found.disk_total = 29;
-  EXPECT_TRUE(has(only(found, false), "Only 29 beads"));
+  EXPECT_TRUE(has(only(found), "Only 29 beads"));
   found = good, found.finder.expected_missed = 0.09;
-  EXPECT_TRUE(has(only(found, false), "2 % of the disks found may be wrong, and 9 % of the beads may be missed"));
+  EXPECT_TRUE(has(only(found), "2 % of the disks found may be wrong, and 9 % of the beads may be missed"));
   found = good, found.calibration.floor_tilt_degrees = -12;
-  EXPECT_TRUE(has(only(found, false), "tilted by 12 degrees"));
-  EXPECT_TRUE(has(only(good, true), "not those of disks"));
+  EXPECT_TRUE(has(only(found), "tilted by 12 degrees"));
 }
 
 }  // namespace

@@ -229,6 +229,7 @@ TEST_F(Images, WhatIsNotRoundIsRefusedAndMeasuredOnDemand) {
   EXPECT_THAT(measured.err, HasSubstr("the outlines are not those of disks"));
   const Json extract = read_json(*folder_ / "ovals/extract/extract.json");
   EXPECT_NEAR(value(extract["disks_per_frame"]), 54, 1) << measured.err;
+  EXPECT_THAT(extract["objections"].dump(), HasSubstr("the theory is one of disks"));
 }
 
 TEST_F(Images, SameSeedGivesTheSameFrames) {

@@ -10,7 +10,7 @@
   const button = figure.querySelector("button"), slider = figure.querySelector("input"), text = figure.querySelector("output");
   const profile = scene.profile ? new shakebed.Profile(figure.querySelector(".side"), scene.profile) : null;
   figure.classList.add("plays");
-  let shown = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, since = 0;
+  let shown = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, since = 0, seen = true, asked = false;
   const draw = () => {
     const ratio = devicePixelRatio || 1, width = canvas.clientWidth, margin = 0.6;
     if (!width) return;
@@ -42,15 +42,17 @@
     figure.dataset.drawn = Number(figure.dataset.drawn || 0) + 1;
   };
   const step = now => {
-    if (playing) {
-      if (now - since >= 50) { since = now; shown = (shown + 1) % frames; draw(); }
-      requestAnimationFrame(step);
-    }
+    asked = false;
+    if (now - since >= 50) { since = now; shown = (shown + 1) % frames; draw(); }
+    goOn();
   };
-  const set = on => { playing = on && frames > 1; button.textContent = playing ? "Pause" : "Play"; if (playing) requestAnimationFrame(step); };
+  // Out of view it rests: its drawing would slow what is looked at.
+  const goOn = () => { if (playing && seen && !asked) { asked = true; requestAnimationFrame(step); } };
+  const set = on => { playing = on && frames > 1; button.textContent = playing ? "Pause" : "Play"; goOn(); };
   button.onclick = () => set(!playing);
   slider.max = frames - 1;
   slider.oninput = () => { set(false); shown = Number(slider.value); draw(); };
+  new IntersectionObserver(entries => { seen = entries[entries.length - 1].isIntersecting; goOn(); }).observe(canvas);
   new ResizeObserver(() => requestAnimationFrame(draw)).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   draw(); set(playing);
