@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "python/module.hpp"
 
@@ -152,37 +153,49 @@ py::dict table_of(const std::vector<ingest::MeasuredDisk>& disks) {
 }
 
 // Runs `work` on a thread of its own while this one waits: signals and the caller's progress function belong to the
-// thread that called. Ctrl-C and exceptions of that function end the work after the frame it is at.
+// thread that called. Ctrl-C and exceptions of that function end the work within half a second. `done`: share of the
+// work.
 struct Stopped : std::exception {};
-ingest::BedFound measured(const std::function<ingest::BedFound(const ingest::MeasureOptions&)>& work,
-                          const py::dict& wanted, py::object progress, std::size_t frames) {
-  ingest::MeasureOptions options = measure_options(wanted);
-  std::atomic<std::size_t> frames_done{0};
+template <class Work>
+auto stoppable(const Work& work, py::object progress, const std::atomic<double>& done) {
   std::atomic<bool> stop{false};
-  options.progress = [&](std::size_t done) {
-    frames_done = done;
-    if (stop) throw Stopped();
-  };
   Caller caller(std::move(progress));
-  const auto show = [&](std::size_t done) {
-    if (frames > 0) caller.progress(static_cast<double>(done) / static_cast<double>(frames));
+  const auto under_question = [&] {
+    const ingest::StopQuestion question([&] {
+      if (stop) throw Stopped();
+    });
+    return work();
   };
-  ingest::BedFound found;
+  decltype(work()) found;
   {
     const py::gil_scoped_release release;
-    std::future<ingest::BedFound> future = std::async(std::launch::async, [&] { return work(options); });
-    std::size_t shown = 0;
+    auto future = std::async(std::launch::async, under_question);
+    double shown = 0;
+    const auto show = [&] {
+      if (const double now = done; now != shown) caller.progress(shown = now);
+    };
     while (future.wait_for(time_between_questions) != std::future_status::ready) {
-      if (const std::size_t done = frames_done; done != shown) show(shown = done);
+      show();
       if (caller.stop()) stop = true;
     }
     try {
       found = future.get();
-      show(frames_done);
+      show();
     } catch (const Stopped&) {}
   }
   caller.raise_if_stopped();
   return found;
+}
+
+ingest::BedFound measured(const std::function<ingest::BedFound(const ingest::MeasureOptions&)>& work,
+                          const py::dict& wanted, py::object progress, std::size_t frames) {
+  ingest::MeasureOptions options = measure_options(wanted);
+  std::atomic<double> share{0};
+  options.progress = [&](std::size_t done) {
+    if (frames > 0) share = static_cast<double>(done) / static_cast<double>(frames);
+    ingest::StopQuestion::ask();
+  };
+  return stoppable([&] { return work(options); }, std::move(progress), share);
 }
 
 // The arrays are read where they lie; `images` keeps them alive.
@@ -238,8 +251,8 @@ PYBIND11_MODULE(_images, m) {
   m.def("find_disks", [](const py::array& image, const py::dict& options) {
     const ingest::ImageView view = view_of(image);
     const ingest::FindOptions wanted = find_options(options);
-    const py::gil_scoped_release release;
-    return ingest::find_disks(view, wanted);
+    const std::atomic<double> nothing_shown{0};
+    return stoppable([&] { return ingest::find_disks(view, wanted); }, py::none(), nothing_shown);
   });
   py::class_<ingest::BedFound>(m, "Bed")
       .def_property_readonly("status", [](const ingest::BedFound& f) { return std::string(to_string(f.status)); })
@@ -256,7 +269,8 @@ PYBIND11_MODULE(_images, m) {
       .def("objections",
            [](const ingest::BedFound& f) {
              std::vector<std::pair<std::string, std::string>> all;
-             for (const ingest::Objection& one : ingest::objections_to(f.measurement)) all.emplace_back(one.why, one.advice);
+             for (const ingest::Objection& one : ingest::objections_to(f.measurement))
+               all.emplace_back(one.why, one.advice);
              return all;
            })
       .def("profile", [](const ingest::BedFound& f) { return profile_of(f.measurement.profile); })

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "ingest/find/nearby.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
@@ -326,6 +327,7 @@ std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, P
   for (int k = 0; k < count; ++k) {
     const double radius = from * std::pow(radius_ratio, k);
     for (const Circle& peak : votes.peaks(radius, sign)) {
+      StopQuestion::ask();
       const Circle circle = fit_circle(edges, peak, polarity);
       if (circle.support >= least_support) found.push_back(circle);
     }

@@ -8,6 +8,7 @@
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/vector_lanes.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "ingest/frames/stop_question.hpp"
 
 namespace shakebed::ingest {
 
@@ -513,6 +514,7 @@ class NewtonStep {
 
 double JointFit::step_together(const GrayFrame& flat, std::vector<ModelDisk>& disks, double largest_step, double bound,
                                double still) {
+  StopQuestion::ask();
   const Nearby near(disks.size(), 2 * table_->reach_, [&](std::size_t i) { return std::pair(disks[i].x, disks[i].y); });
   const std::vector<std::size_t> moving = moving_beads(disks, near, still);
   const std::size_t n = moving.size();

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/bed_geometry.hpp"
 #include "ingest/profile/coverage.hpp"
@@ -43,7 +44,11 @@ class OrderedFrames {
   using TakeUp = std::function<void(FrameFindings frame, std::size_t waiting)>;
   void run(const TakeUp& take_up) {
     const std::size_t threads = std::max<std::size_t>(1, threads_);
-    for_each_index(threads, static_cast<int>(threads), [&](std::size_t) { work(take_up); });
+    const std::function<void()> question = StopQuestion::of_thread();
+    for_each_index(threads, static_cast<int>(threads), [&](std::size_t) {
+      const StopQuestion asked(question);
+      work(take_up);
+    });
     if (failure_) std::rethrow_exception(failure_);
   }
 

@@ -50,9 +50,12 @@ void Console::progress(std::string_view what, double fraction, std::string_view 
   progress_shown_ = now;
   shown_fraction_ = fraction;
   std::string left;
-  if (fraction > 0.02 && elapsed > 0.5)
+  if (fraction <= 0)
+    left = fmt::format(", for {}", duration_text(elapsed));
+  else if (fraction > 0.02 && elapsed > 0.5)
     left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / fraction));
-  const std::string line = fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
+  const std::string line = fraction <= 0 ? fmt::format("  {}: {}{}", what, note, left)
+                                         : fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
   if (terminal_) {
     std::fputs(("\r\033[K" + line.substr(0, 118)).c_str(), stderr);
     std::fflush(stderr);

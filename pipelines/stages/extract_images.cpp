@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <optional>
 #include <set>
 
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/overlay.hpp"
@@ -60,7 +62,6 @@ const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const Ext
 // their outlines are those of disks.
 bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
                     ingest::MeasureOptions& measure) {
-  context.progress(0, "looking for beads");
   const std::optional<FirstLook> look = look_at_first(film.paths, options);
   if (!look) return true;  // measure_bed() says which files cannot be read
   if (!look->survey.found) refuse(options, context, *look);
@@ -188,6 +189,11 @@ class Extraction {
       : options_(options), context_(context), rendered_(context.find_input("render")), measure_(asked_for(options)) {}
 
   void run() {
+    const ingest::StopQuestion question([this] {
+      context_.check_interrupted();
+      const double done = done_;
+      context_.progress(done, done > 0 ? "finding disks" : "looking for beads");
+    });
     measure_.threads = static_cast<unsigned>(context_.jobs());
     film_.source.stride = options_.stride;
     film_.source.channel = channel_of(options_.channel);
@@ -233,9 +239,8 @@ class Extraction {
         options_.frame_rate ? *options_.frame_rate / static_cast<double>(options_.stride) : source.film_rate_hz();
     const std::optional<std::size_t> total = source.count_if_known();
     measure_.progress = [&](std::size_t done) {
-      context_.check_interrupted();
-      if (total && *total > 0)
-        context_.progress(static_cast<double>(done) / static_cast<double>(*total), "finding disks");
+      if (total && *total > 0) done_ = static_cast<double>(done) / static_cast<double>(*total);
+      ingest::StopQuestion::ask();
     };
     measure_.disk_sink = [&](const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks) {
       on_the_way.take(frame, disks);
@@ -314,7 +319,8 @@ class Extraction {
   const Input* rendered_;  // the render stage, if the frames are its
   ingest::MeasureOptions measure_;
   FilmFiles film_;
-  bool round_ = true;  // the outlines are those of disks
+  bool round_ = true;             // the outlines are those of disks
+  std::atomic<double> done_ = 0;  // share of the frames
 };
 
 }  // namespace

@@ -152,7 +152,7 @@ _fit_options = frozenset({
 
 def _data(
     height: Any, density: Any, error: Any, covariance: Any, covariance_samples: int, kernel: Optional[str]
-) -> tuple[Any, ...]:
+) -> tuple[Any, Any, Any, Any, int, str]:
     """What the compiled module takes, from a Profile or from arrays."""
     if isinstance(height, Profile):
         given = {"density": density, "error": error, "covariance": covariance,
@@ -239,8 +239,8 @@ def fit_profile(
     """
     check_options("fit_profile", options, _fit_options)
     length = None if diameter is None else in_si(diameter, "length", "diameter")
-    *columns, kernel = _data(height, density, error, covariance, covariance_samples, kernel)
-    return Fit(_core.fit_profile(*columns, options | {"kernel": kernel}, length))
+    z, n, errors, matrix, samples, measured_through = _data(height, density, error, covariance, covariance_samples, kernel)
+    return Fit(_core.fit_profile(z, n, errors, matrix, samples, options | {"kernel": measured_through}, length))
 
 
 def _estimate(given: Any, name: str) -> Optional[tuple[float, float]]:

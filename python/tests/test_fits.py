@@ -33,6 +33,20 @@ def test_a_length_without_a_diameter_says_what_is_missing(curve):
         fit.temperature_over_mg
 
 
+def test_a_profile_brings_its_covariance_and_kernel(curve):
+    columns = (curve.height, curve.number_density, curve.std_error)
+    whole = dict(covariance=curve.covariance, covariance_samples=curve.covariance_samples, kernel=curve.kernel)
+    fit = shakebed.fit_profile(curve, diameter="3 mm")
+    assert fit.to_dict() == shakebed.fit_profile(*columns, **whole, diameter="3 mm").to_dict()
+    assert fit.temperature != shakebed.fit_profile(*columns, kernel=curve.kernel).temperature  # errors alone
+    assert shakebed.find_answer(curve) == shakebed.find_answer(*columns, **whole)
+    assert f"T/(m g) = {1e3 * fit.temperature_over_mg.value:.4g}" in fit.brief() and fit.brief().endswith(" mm")
+    with pytest.raises(shakebed.UsageError, match="error: a Profile has its own"):
+        shakebed.fit_profile(curve, error=curve.std_error)
+    with pytest.raises(shakebed.UsageError, match="density is missing"):
+        shakebed.fit_profile(curve.height)
+
+
 def test_fit_is_that_of_the_command_line(curve, tmp_path):
     rows = np.column_stack([curve.height, curve.number_density, curve.std_error])
     file = tmp_path / "profile.csv"

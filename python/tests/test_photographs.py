@@ -68,11 +68,40 @@ def frames(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     pictures = place / "out" / "film" / "frames"
     recipe = {"name": "extract", "stages": [
-        {"stage": "extract", "id": "seen", "images": [str(pictures)], "diameter": "3 mm"}]}
+        {"stage": "extract", "id": "seen", "images": [str(pictures)], "diameter": "3 mm"},
+        {"stage": "fit", "from": "seen"}]}
     (place / "e.json").write_text(json.dumps(recipe))
     done = shakebed_program("run", place / "e.json", "--out", place / "seen", "--quiet")
     assert done.returncode == 0, done.stderr
     return pictures, shakebed.load(place / "seen")["seen"]
+
+
+def test_the_answer_is_that_of_the_command_line(frames):
+    pictures, _ = frames
+    printed = json.loads((pictures.parents[2] / "seen/fit/fit.json").read_text())["answer"]
+    answer = shakebed.measure_bed(pictures, "3 mm").answer()
+    assert (answer["verdict"], answer["why"], answer["advice"]) == (printed["verdict"], printed["why"], printed["advice"])
+    assert answer["temperature"] == printed.get("temperature", {}).get("value")
+    # Fewer than 30 beads in all: what the photographs show against a temperature is passed on.
+    image, _ = drawn_image(count=12)
+    assert "Only 12 beads" in shakebed.measure_bed([image], "3 mm").answer()["why"]
+
+
+def test_control_c_ends_the_search_in_one_picture():
+    code = (
+        "import sys, time, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
+        "image = drawn_image(shape=(900, 900), count=600)[0]\n"
+        "print('ready', flush=True)\n"
+        "try:\n    shakebed.find_disks(image)\n"
+        "except KeyboardInterrupt:\n    sys.exit(42)\n"
+        "print('it ended by itself')\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"ready\n"
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=30) == 42
+    process.stdout.close()
 
 
 def test_a_measured_bed_is_that_of_the_command_line(frames):

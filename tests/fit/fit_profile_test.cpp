@@ -676,6 +676,8 @@ TEST(FitHardCases, AProfileOfAnotherModelIsDenounced) {
   for (const double d : data.number_density) data.std_error.push_back(synthetic::bin_error(d, 0.005));
   const FitResult fit = fit_profile(data, full_options());
   EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("The model does not fit")));
+  EXPECT_TRUE(fit.misfit);
+  EXPECT_THAT(fit.brief(), testing::HasSubstr("the model does not fit"));
   EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("changes with the window")));
   EXPECT_TRUE(fit.errors_scaled);
 }

@@ -2,14 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <mutex>
+#include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/test_files.hpp"
 
@@ -36,6 +41,50 @@ std::vector<Level> levels_of(const GrayFrame& frame, int row_length, float scale
     for (int column = 0; column < frame.width; ++column)
       out[static_cast<std::size_t>(row * row_length + column)] = static_cast<Level>(scale * frame.at(column, row));
   return out;
+}
+
+struct GivenUp {};
+
+// The question is asked while one picture is searched, by measure_bed() on its threads too, and by nobody else. What it
+// throws comes out.
+TEST(StopQuestion, EndsWorkWithinAPicture) {
+  const GrayFrame frame = drawn(1);
+  const std::vector<ImageView> film(6, view_of(frame));
+  std::atomic<int> asked = 0;
+  {
+    const StopQuestion outer([] { ADD_FAILURE() << "the inner one hides it"; });
+    const StopQuestion question([&] { ++asked; });
+    ASSERT_TRUE(find_disks(view_of(frame)).ok());
+  }
+  const int in_one_picture = asked;
+  EXPECT_GT(in_one_picture, 100);
+  ASSERT_TRUE(find_disks(view_of(frame)).ok());
+  EXPECT_EQ(asked, in_one_picture) << "its question is gone";
+  for (const int at : {1, in_one_picture / 2, in_one_picture - 1}) {
+    asked = 0;
+    const StopQuestion question([&] {
+      if (++asked == at) throw GivenUp();
+    });
+    EXPECT_THROW(find_disks(view_of(frame)), GivenUp) << at;
+  }
+  asked = 0;
+  std::set<std::thread::id> threads;
+  std::mutex mutex;
+  {
+    const StopQuestion question([&] {
+      ++asked;
+      const std::lock_guard<std::mutex> lock(mutex);
+      threads.insert(std::this_thread::get_id());
+    });
+    ASSERT_TRUE(measure_bed(film, {.bead_diameter_m = 3e-3, .threads = 2}).ok());
+  }
+  EXPECT_EQ(threads.size(), 2U);
+  const int in_film = asked;
+  asked = 0;
+  const StopQuestion question([&] {
+    if (++asked == in_film - in_film / 20) throw GivenUp();  // while the frames are gone through
+  });
+  EXPECT_THROW(measure_bed(film, {.bead_diameter_m = 3e-3, .threads = 2}), GivenUp);
 }
 
 TEST(Photographs, LevelsAreTheSameInAllTypesAndRowLengths) {

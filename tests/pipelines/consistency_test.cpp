@@ -2,6 +2,8 @@
 // runs. The recipes are in consistency/.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <tuple>
 
@@ -73,6 +75,37 @@ INSTANTIATE_TEST_SUITE_P(All, WrongRecipe, testing::ValuesIn(refused_recipes),
                            std::erase(name, '-');
                            return name;
                          });
+
+// One mistake gives one error: what only follows from it is not listed.
+TEST(WrongRecipe, OneMistakeGivesOneError) {
+  ScratchFolder folder;
+  ASSERT_EQ(run_shakebed({"init", "bed.json"}, folder.path()).exit_code, 0);
+  const std::string good = read_text(folder / "bed.json");
+  const auto errors = [&](const std::string& written, const std::string& instead) {
+    std::string text = good;
+    const std::size_t place = text.find(written);
+    EXPECT_NE(place, std::string::npos) << written;
+    text.replace(place, written.size(), instead);
+    write_text(folder / "wrong.json", text);
+    const ProgramResult result = run_shakebed({"validate", "wrong.json"}, folder.path());
+    EXPECT_EQ(result.exit_code, 3) << result.err;
+    return result.err;
+  };
+  const auto count = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
+  for (const char* key :
+       {"disks", "count", "diameter", "restitution", "width", "sides", "floor", "amplitude", "frequency", "settle",
+        "frames", "scale", "from", "model", "plateau_density", "expect", "stages"}) {
+    const std::string written = '"' + std::string(key) + '"';
+    const std::string err = errors(written, '"' + std::string(key).substr(0, std::strlen(key) - 1) + "x\"");
+    EXPECT_EQ(count(err), 1) << key << ":\n" << err;
+    EXPECT_NE(err.find("Did you mean " + written + "?"), std::string::npos) << err;
+  }
+  EXPECT_EQ(count(errors("\"3 mm\"", "\"3 kg\"")), 1) << "stages after it cannot be judged";
+  EXPECT_EQ(count(errors("\"stage\": \"simulate\"", "\"stage\": \"simulatr\"")), 1);
+  // Mistakes that have nothing to do with one another are all listed.
+  const std::string two = errors("\"blur\": 0.8, \"noise\": 5", "\"blurr\": 0.8, \"noise\": \"loud\"");
+  EXPECT_EQ(count(two), 2) << two;
+}
 
 struct Odd {
   const char* name;     // of the recipe
