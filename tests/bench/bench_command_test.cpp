@@ -40,6 +40,17 @@ TEST(BenchCommand, WritesOnePageThatNeedsNothingElseAndComparesWithItself) {
   EXPECT_EQ(again["against"]["rows"].size(), json["stages"][0]["metrics"].size());
 }
 
+// All of its hard cases, and every kind of bed it times.
+TEST(BenchCommandLong, SimulateRunsToItsEndAndItsHardCasesHold) {
+  ScratchFolder folder;
+  const ProgramResult done =
+      run_shakebed({"bench", "simulate", "--quick", "--json", "--quiet", "--out", "o"}, folder.path());
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const Json json = Json::parse(done.out);
+  EXPECT_GT(json["stages"][0]["hard_cases"].size(), 15U);
+  for (const Json& one : json["stages"][0]["hard_cases"]) EXPECT_TRUE(one["pass"].get<bool>()) << one;
+}
+
 TEST(BenchCommand, RefusesWhatItCannotCompareWithBeforeItBegins) {
   ScratchFolder folder;
   write_text(folder / "other.json", "{\"kind\": \"something else\"}");

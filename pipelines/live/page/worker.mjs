@@ -4,7 +4,7 @@ import { Engine } from "./engine.mjs";
 
 const sliceMilliseconds = 12; // of work between two looks at the messages
 const eventsAtOnce = 4000; // between two looks at the clock
-const frameMilliseconds = 15;
+const frameMilliseconds = 33; // the drawing takes time from the bed where cores share a unit
 const numbersMilliseconds = 700; // a fit takes some tens of milliseconds
 const mostPeriods = 20000; // then it is known well enough
 

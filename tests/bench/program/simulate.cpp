@@ -102,7 +102,7 @@ BedRun run_bed(const sim::Scene& scene, std::uint64_t periods, const Effort& eff
   constexpr double settling = 100;  // periods
   const double period = 1 / std::get<sim::SinusoidalFloor>(scene.box.floor).frequency;
   sim::Observing<sim::BedObserver> bed([&](const sim::DiskProperties& disks) {
-    return sim::BedObserver(scene, disks, 32, {-2, 0.25, 240}, {});
+    return sim::BedObserver(scene, disks, 32, {-2, 0.25, 240}, measuring_kernel);
   });
   RunCost cost;
   sim::RunControl control;
@@ -324,8 +324,12 @@ double relative_imbalance(const sim::Simulation& simulation) {
   return std::abs(e.imbalance()) / scale;
 }
 
+// Largest overlap [D]: of hard disks by rounding, of a bed that is pressed on the floor by its springs.
+constexpr double hard_overlap = 1e-9, pressed_overlap = 2.5e-3;
+
 // Runs to a time; the error is the energy that does not close, the overlap is judged with it.
-void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effort& effort) {
+void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effort& effort,
+               double most_overlap = hard_overlap) {
   const auto problems = sim::check(scene);
   if (!problems.empty()) {
     one.status = "refused", one.note = problems.front().where + ": " + problems.front().what;
@@ -347,9 +351,10 @@ void run_scene(HardCase& one, const sim::Scene& scene, double until, const Effor
   const double overlap = simulation->largest_overlap();
   one.note += fmt::format("{}{} contacts, overlap {:.1e} D", one.note.empty() ? "" : "; ",
                           simulation->counters().collisions(), overlap);
-  if (!(overlap <= 1e-9)) one.pass = false;
+  if (!(overlap <= most_overlap)) one.pass = false;
 }
 
+// Of hard disks, pressed or not: what is hard to follow by events.
 sim::Scene pile(std::uint32_t count, double width, double restitution, double contact_duration) {
   sim::Scene scene;
   scene.gravity = sim::UniformGravity{};
@@ -360,6 +365,12 @@ sim::Scene pile(std::uint32_t count, double width, double restitution, double co
   scene.box.sides = sim::HardSides{{restitution, 0, 0}};
   scene.box.floor_surface = {restitution, 0, 0};
   scene.start_temperature = 1;
+  scene.presses = false;
+  return scene;
+}
+
+sim::Scene pressed(sim::Scene scene) {
+  scene.presses = true;
   return scene;
 }
 
@@ -400,6 +411,8 @@ class HardCases {
   void beds_at_rest() {
     add("inelastic collapse: pile comes to rest, contact clock", 1e-10, 10,
         [&](HardCase& one) { run_scene(one, pile(200, 15, 0.5, 1e-3), 30, effort_); });
+    add("the same, pressed on the floor as soft disks", 1e-10, 10,
+        [&](HardCase& one) { run_scene(one, pressed(pile(200, 15, 0.5, 1e-3)), 30, effort_, pressed_overlap); });
     // Infinitely many contacts in a finite time, which no run can follow: it must stop and say why.
     add("inelastic collapse: the same without a contact clock", 0, 10, [&](HardCase& one) {
       try {
