@@ -35,6 +35,8 @@ struct VelocityMeasurement {
   double linked_share = 0;            // of the disks that could have been linked
   double mean_step = 0;               // D between frames
   std::vector<std::string> warnings;  // plain sentences, e.g. that the frames follow too slowly
+  // Enough disks are found again in the next frame for a temperature. With fewer, the links themselves are in doubt.
+  [[nodiscard]] bool usable() const { return linked_share >= 0.9; }
 };
 
 // Links each disk to the only one nearer than largest_step in the next frame, if both agree that they are nearest.

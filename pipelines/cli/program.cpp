@@ -68,6 +68,22 @@ void Program::refuse_unknown_command() const {
                                nearest.empty() ? "see shakebed --help" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
+// An option that is not known is named before one that is missing: the latter may be the former, misspelt.
+void Program::refuse_unknown_option() const {
+  for (const CLI::App* command : app_.get_subcommands()) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& word : command->remaining()) {
+      if (!word.starts_with("--") || word.size() < 3) continue;
+      const std::string given = word.substr(0, word.find('='));
+      const std::string nearest = nearest_name(given, names);
+      throw UsageError(fmt::format("{} has no option {}; {}", command->get_name(), given,
+                                   nearest.empty() ? "see --help" : fmt::format("did you mean {}?", nearest)));
+    }
+  }
+}
+
 int Program::run() {
   // For the install rules: manual pages and completions.
   if (argc_ == 3 && std::string_view(argv_[1]) == "--write-command-pages") {
@@ -80,6 +96,7 @@ int Program::run() {
   } catch (const CLI::ParseError& error) {
     // --help and --version come as "errors" with code 0.
     if (error.get_exit_code() == 0) return app_.exit(error) == 0 ? exit_ok : exit_usage;
+    refuse_unknown_option();
     throw UsageError(std::string(error.what()) + "; see --help");
   }
   return chosen_(call_);

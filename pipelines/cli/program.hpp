@@ -35,6 +35,7 @@ class Program {
 
  private:
   void refuse_unknown_command() const;
+  void refuse_unknown_option() const;
   int argc_;
   char** argv_;
   CLI::App app_;

@@ -71,8 +71,8 @@ void ResultList::number(std::string pointer, std::string unit, std::string meani
 void ResultList::text(std::string pointer, std::string meaning, Given given) {
   results_.push_back({std::move(pointer), ResultKind::text, "", std::move(meaning), std::move(given), false});
 }
-void ResultList::truth(std::string pointer, std::string meaning, Given given) {
-  results_.push_back({std::move(pointer), ResultKind::truth, "", std::move(meaning), std::move(given), false});
+void ResultList::truth(std::string pointer, std::string meaning, Given given, bool may_be_null) {
+  results_.push_back({std::move(pointer), ResultKind::truth, "", std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::table(StatedTable table) { tables_.push_back(std::move(table)); }
 

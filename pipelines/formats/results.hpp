@@ -69,7 +69,7 @@ class ResultList {
   // A plain number.
   void number(std::string pointer, std::string unit, std::string meaning, Given given = {}, bool may_be_null = false);
   void text(std::string pointer, std::string meaning, Given given = {});
-  void truth(std::string pointer, std::string meaning, Given given = {});
+  void truth(std::string pointer, std::string meaning, Given given = {}, bool may_be_null = false);
   void table(StatedTable table);
 
   const std::vector<StatedResult>& all() const { return results_; }

@@ -28,7 +28,8 @@ void put_temperature(Json& out, const std::string& name, double value, double st
 KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter) {
   const Json result = input.result();
   KineticTemperatures found{estimate_at(result, "/temperature_x", 1), estimate_at(result, "/temperature_z", 1)};
-  if (!found.x && diameter) {
+  const Json* usable = find_pointer(result, "/velocities/usable");
+  if (!found.x && diameter && usable != nullptr && *usable == true) {
     found.x = estimate_at(result, "/velocities/temperature_x_over_mg", 1 / *diameter);
     found.z = estimate_at(result, "/velocities/temperature_z_over_mg", 1 / *diameter);
   }

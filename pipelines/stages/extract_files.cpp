@@ -126,6 +126,7 @@ Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
   };
   return Json{{"temperature_x_over_mg", temperature(velocities.horizontal)},
               {"temperature_z_over_mg", temperature(velocities.vertical)},
+              {"usable", velocities.usable()},
               {"linked_share", velocities.linked_share},
               {"mean_step", quantity_json(velocities.mean_step, "D")}};
 }

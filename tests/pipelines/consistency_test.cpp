@@ -107,6 +107,16 @@ TEST(WrongRecipe, OneMistakeGivesOneError) {
   EXPECT_EQ(count(two), 2) << two;
 }
 
+TEST(CommandLine, AMistypedOptionIsNamedBeforeOneThatIsMissing) {
+  ScratchFolder folder;
+  const ProgramResult result = run_shakebed({"fit-images", "photos", "--diamter", "3 mm"}, folder.path());
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("fit-images has no option --diamter; did you mean --diameter?"), std::string::npos)
+      << result.err;
+  EXPECT_NE(run_shakebed({"fit-images", "photos"}, folder.path()).err.find("--diameter is required"),
+            std::string::npos);
+}
+
 struct Odd {
   const char* name;     // of the recipe
   const char* pointer;  // the warning names it

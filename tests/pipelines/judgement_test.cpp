@@ -58,6 +58,12 @@ TEST(FirstLine, OfBedsThatAgreeSaysThatTheNumbersHold) {
   EXPECT_EQ(bed.observed["judgement"]["verdict"], "holds");
 }
 
+TEST(FirstLine, OfABedThatLiesStillSaysSo) {
+  const Judged bed = judged({.gamma = 0.7});
+  EXPECT_EQ(bed.observed["judgement"]["verdict"], "at rest");
+  EXPECT_THAT(bed.first_line, HasSubstr("the disks hardly move"));
+}
+
 TEST(FirstLine, OfOneBedSaysThatItsErrorIsNotTheNextBeds) {
   const Judged bed = judged({.more = R"(, "replicas": 1)"});
   EXPECT_THAT(bed.first_line, HasSubstr("One bed: The errors are those of a single bed. Another seed"));

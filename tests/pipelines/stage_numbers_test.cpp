@@ -289,7 +289,7 @@ TEST(KineticTemperatures, AreTakenFromABedOrFromAFilm) {
   write_text(stage.file("s/observables.json"), R"({"temperature_x": {"value": 0.3, "std_error": 0.02},
       "temperature_z": {"value": 0.5, "std_error": 0.03}})");
   // D = 4 mm: T/(m g) = 1.2 mm is 0.3 m g D.
-  write_text(stage.file("e/extract.json"), R"({"velocities": {
+  write_text(stage.file("e/extract.json"), R"({"velocities": {"usable": true,
       "temperature_x_over_mg": {"value": 0.0012, "std_error": 0.00008},
       "temperature_z_over_mg": {"value": 0.002, "std_error": 0.00012}}})");
   for (const Input& input : stage.inputs()) {
@@ -301,6 +301,11 @@ TEST(KineticTemperatures, AreTakenFromABedOrFromAFilm) {
     EXPECT_NEAR(found.z->std_error, 0.03, 1e-12) << input.id;
   }
   EXPECT_FALSE(kinetic_temperatures(stage.inputs()[1], std::nullopt).x) << "a length is none without a diameter";
+  // Of disks that could not be followed: none.
+  write_text(stage.file("e/extract.json"), R"({"velocities": {"usable": false,
+      "temperature_x_over_mg": {"value": 0.0012, "std_error": 0.00008},
+      "temperature_z_over_mg": {"value": 0.002, "std_error": 0.00012}}})");
+  EXPECT_FALSE(kinetic_temperatures(stage.inputs()[1], 0.004).x);
 }
 
 }  // namespace
