@@ -61,7 +61,7 @@ TEST(FirstLine, OfBedsThatAgreeSaysThatTheNumbersHold) {
 TEST(FirstLine, OfABedThatLiesStillSaysSo) {
   const Judged bed = judged({.gamma = 0.7});
   EXPECT_EQ(bed.observed["judgement"]["verdict"], "at rest");
-  EXPECT_THAT(bed.first_line, HasSubstr("the disks hardly move"));
+  EXPECT_THAT(bed.first_line, HasSubstr("At rest: The disks hardly move"));
 }
 
 TEST(FirstLine, OfOneBedSaysThatItsErrorIsNotTheNextBeds) {
