@@ -370,14 +370,6 @@ py::dict curve_of(const fit::FitResult& result) {
   return out;
 }
 
-py::dict estimate(const fit::Estimate& value) {
-  py::dict out;
-  out["value"] = value.value;
-  out["std_error"] = value.std_error;
-  out["fixed"] = value.fixed;
-  return out;
-}
-
 // Without an answer there are no numbers: None.
 py::dict answer_of(const fit::Answer& answer) {
   py::dict out;
@@ -397,7 +389,8 @@ py::dict answer_of(const fit::Answer& answer) {
   number("low", answer.interval.low);
   number("high", answer.interval.high);
   number("confidence", answer.interval.confidence);
-  out["solid_height"] = answer.ok() ? py::object(estimate(answer.solid_height)) : py::object(py::none());
+  number("solid_height", answer.solid_height.value);
+  number("solid_height_std_error", answer.solid_height.std_error);
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;
   return out;

@@ -59,8 +59,9 @@ struct Met {
 Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double sine, float sign, double reach) {
   Met met;
   const int steps = static_cast<int>(std::ceil(reach / ray_step));
-  std::array<float, 130> along{};
   const int used = std::min(steps, 64);
+  std::array<float, 130> along;  // along[k + used]; 0 outside the picture. Clearing all of it took a fifth of the time
+  std::fill_n(along.begin(), 2 * used + 1, 0.0F);
   float best = edges.threshold;
   int best_step = 0;
   bool found = false;

@@ -23,7 +23,8 @@ double quantity_argument(const std::string& name, const std::string& text, const
   try {
     return parse_quantity(text, wanted);
   } catch (const std::invalid_argument& problem) {
-    throw UsageError(fmt::format("{}: {}", name, problem.what()));
+    throw UsageError(
+        fmt::format("{}: {}: expected {} such as \"{}\"", name, problem.what(), name_of(wanted), example_of(wanted)));
   }
 }
 
@@ -37,7 +38,7 @@ double diameter_argument(const std::string& text) {
 
 double diameters_argument(const std::string& name, const std::string& text, std::optional<double> diameter) {
   try {
-    const Quantity quantity = parse_quantity(text);
+    const Quantity quantity = parse_quantity(text, &dimension::length);
     if (!quantity.has_unit) return quantity.value;
     if (quantity.dimension != dimension::length) throw UsageError(fmt::format("{}: \"{}\" is no length", name, text));
     if (!diameter)

@@ -51,7 +51,10 @@ int preview_images(const Call& call, const ImageArguments& image) {
   const fs::path folder = call.out.value_or("shakebed-preview");
   fs::create_directories(folder);
   request.folder = folder.string();
-  print(fmt::format("{}\nsee {}\n", images_module().preview(request), (folder / "preview.html").string()));
+  const Previewed previewed = images_module().preview(request);
+  const std::string page = (folder / "preview.html").string();
+  if (!previewed.found) throw StageError(fmt::format("{}. See {}", previewed.sentence, page));
+  print(fmt::format("{}\nsee {}\n", previewed.sentence, page));
   return exit_ok;
 }
 
@@ -140,12 +143,33 @@ void check_arguments(const ImageArguments& image) {
   }
 }
 
+// "/stages/0/bead_number" → "--bead-number": the user has written options, not a recipe.
+Problem in_words_of_options(Problem problem) {
+  constexpr std::string_view extract = "/stages/0/", images = "images";
+  problem.file.clear();
+  problem.at = {};
+  if (!problem.pointer.starts_with(extract)) return problem;
+  std::string key = problem.pointer.substr(extract.size());
+  key.resize(std::min(key.size(), key.find('/')));
+  std::replace(key.begin(), key.end(), '_', '-');
+  problem.pointer = key == images ? "" : "--" + key;
+  return problem;
+}
+
+Plan plan_of(const ImageArguments& image) {
+  try {
+    return read_recipe_text(dump(recipe_of(image)), "(command line)", fs::current_path(), changes_of(image.run));
+  } catch (const ConfigError& error) {
+    std::vector<Problem> problems;
+    for (const Problem& problem : error.problems()) problems.push_back(in_words_of_options(problem));
+    throw ConfigError(std::move(problems));
+  }
+}
+
 int fit_images(const Call& call, const ImageArguments& image) {
   check_arguments(image);
   if (image.preview) return preview_images(call, image);
-  return run_plan_command(
-      call, image.run,
-      read_recipe_text(dump(recipe_of(image)), "(command line)", fs::current_path(), changes_of(image.run)));
+  return run_plan_command(call, image.run, plan_of(image));
 }
 
 // What is in the picture.

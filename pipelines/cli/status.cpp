@@ -66,6 +66,23 @@ std::pair<Json, std::string> stage_status(const fs::path& out, const std::string
                                        damaged.empty() ? "" : fmt::format("  damaged: {}", fmt::join(damaged, ", ")))};
 }
 
+// How the last run ended, from what is to be printed with --json.
+std::string last_run(const Json& json) {
+  if (json["running"].get<bool>()) return "running now";
+  if (!json.contains("exit_code")) return "no finished run";
+  const std::string when = json.value("finished", "");
+  switch (const int code = json.value("exit_code", 0); code) {
+    case exit_ok:
+      return fmt::format("finished {}", when);
+    case exit_check_failed:
+      return fmt::format("finished {}; a check failed", when);
+    case exit_interrupted:
+      return fmt::format("interrupted {}. The same command, started again, continues", when);
+    default:
+      return fmt::format("failed {} with exit code {}", when, code);
+  }
+}
+
 int status(const Call& call, const fs::path& out) {
   std::error_code error;
   if (!fs::is_directory(out, error)) throw InputError(fmt::format("{}: there is no such folder", out.string()));
@@ -77,20 +94,16 @@ int status(const Call& call, const fs::path& out) {
     for (const char* key : {"pipeline", "finished", "exit_code", "error", "wall_seconds"})
       if (manifest.contains(key)) json[key] = manifest[key];
   }
-  std::string text = fmt::format(
-      "{}: {}\n", out.string(),
-      json["running"].get<bool>() ? "running now"
-      : json.contains("exit_code")
-          ? fmt::format("finished {} with exit code {}", json.value("finished", ""), json.value("exit_code", 0))
-          : "no finished run");
+  std::string text = fmt::format("{}: {}\n", out.string(), last_run(json));
   json["stages"] = Json::array();
   for (const auto& [id, record] : records_in(out)) {
     auto [row, line] = stage_status(out, id, record);
     json["stages"].push_back(std::move(row));
     text += line;
   }
-  if (json["stages"].empty()) text += "  no finished stage\n";
-  if (const Json sweep = sweep_status(out); !sweep.is_null()) {
+  const Json sweep = sweep_status(out);
+  if (json["stages"].empty() && sweep.is_null()) text += "  no finished stage\n";
+  if (!sweep.is_null()) {
     json["sweep"] = sweep;
     text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
                         sweep["points"].get<std::uint64_t>(), sweep["failed"].get<std::uint64_t>());

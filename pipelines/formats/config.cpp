@@ -168,7 +168,7 @@ bool Fields::read_quantity(const JsonNode& node, std::string_view key, const Dim
     read = node.number;
   } else if (node.is_string()) {
     try {
-      const Quantity quantity = parse_quantity(node.text);
+      const Quantity quantity = parse_quantity(node.text, &wanted);
       if (reduced_ && quantity.has_unit && quantity.dimension != dimension::none) {
         complain(node, key, fmt::format("expected {}, got {}", expected, node.described()),
                  "In reduced units lengths are in D, masses in m, and g or the starting T is 1");

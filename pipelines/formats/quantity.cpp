@@ -77,12 +77,15 @@ const Unit* find_unit(std::string_view name) {
   return found == units.end() ? nullptr : &*found;
 }
 
-std::string_view nearest_unit(std::string_view name) {
+// The unit that was meant, or "". At most half of a word may differ: "rpm" is no misspelled "m". A unit that stands
+// alone is of the dimension wanted.
+std::string_view nearest_unit(std::string_view name, const Dimension* wanted) {
   std::string_view best;
-  int best_distance = 3;
+  int best_distance = 1 + static_cast<int>(name.size()) / 2;
   for (const Unit& unit : units) {
     const int distance = edit_distance(unit.name, name);
-    if (distance < best_distance) best_distance = distance, best = unit.name;
+    if ((wanted == nullptr || unit.dimension == *wanted) && distance < best_distance)
+      best_distance = distance, best = unit.name;
   }
   return best;
 }
@@ -94,7 +97,7 @@ struct ReadUnit {
 };
 
 // unit = term {('*' | '·' | ' ' | '/') term}, term = name ['^' integer | ² | ³]
-ReadUnit read_unit(std::string_view text, std::string_view whole) {
+ReadUnit read_unit(std::string_view text, std::string_view whole, const Dimension* wanted) {
   ReadUnit result;
   std::size_t i = 0;
   int sign = 1;
@@ -110,7 +113,7 @@ ReadUnit read_unit(std::string_view text, std::string_view whole) {
     if (name.empty()) throw std::invalid_argument(fmt::format("\"{}\": a unit is missing", whole));
     const Unit* unit = find_unit(name);
     if (unit == nullptr) {
-      const std::string_view nearest = nearest_unit(name);
+      const std::string_view nearest = nearest_unit(name, name.size() == text.size() ? wanted : nullptr);
       throw std::invalid_argument(fmt::format("\"{}\": there is no unit \"{}\"{}", whole, name,
                                               nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
     }
@@ -207,7 +210,7 @@ std::string example_of(const Dimension& d) {
   return "1 " + si_unit(d);
 }
 
-Quantity parse_quantity(std::string_view whole) {
+Quantity parse_quantity(std::string_view whole, const Dimension* wanted) {
   const std::string_view text = without_spaces(whole);
   if (text.empty()) throw std::invalid_argument("an empty string is no quantity");
   // The number: what from_chars takes, checked for words that it takes too.
@@ -224,7 +227,7 @@ Quantity parse_quantity(std::string_view whole) {
   const std::string_view unit_text =
       without_spaces(std::string_view(end, static_cast<std::size_t>(text.data() + text.size() - end)));
   ReadUnit unit;
-  if (!unit_text.empty()) unit = read_unit(unit_text, whole);
+  if (!unit_text.empty()) unit = read_unit(unit_text, whole, wanted);
   // Shift the decimal exponent in the text, so that 2.99 mm is rounded once.
   const std::size_t e = number.find_first_of("eE");
   long exponent = unit.exponent;
@@ -246,7 +249,7 @@ Quantity parse_quantity(std::string_view whole) {
 }
 
 double parse_quantity(std::string_view text, const Dimension& wanted) {
-  const Quantity quantity = parse_quantity(text);
+  const Quantity quantity = parse_quantity(text, &wanted);
   if (!quantity.has_unit) return quantity.value;
   if (quantity.dimension != wanted) {
     throw std::invalid_argument(

@@ -48,8 +48,8 @@ struct Quantity {
 };
 
 // Reads "number unit". Throws std::invalid_argument with a sentence: no number, unknown unit (did you mean), number
-// beyond a double, NaN or infinity.
-Quantity parse_quantity(std::string_view text);
+// beyond a double, NaN or infinity. A dimension that is wanted narrows the units that are suggested, nothing else.
+Quantity parse_quantity(std::string_view text, const Dimension* wanted = nullptr);
 
 // Reads a quantity of the dimension wanted; a plain number counts as SI. Throws std::invalid_argument.
 double parse_quantity(std::string_view text, const Dimension& wanted);

@@ -471,12 +471,12 @@ std::string published_text(const Plan& plan, const RunOutcome& outcome) {
 
 std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
   const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
-  std::string out = fmt::format("# {}\n\n**{}**\n", markdown(title),
-                                outcome.code == exit_ok             ? "Passed"
+  std::string out = fmt::format("# {}\n\n**{}**\n\n", markdown(title),
+                                outcome.code == exit_ok             ? "Finished"
                                 : outcome.code == exit_check_failed ? "A check failed"
                                 : outcome.code == exit_interrupted  ? "Interrupted"
                                                                     : "Stopped");
-  if (!outcome.error.empty()) out += fmt::format("\n> {}\n", markdown(outcome.error));
+  if (!outcome.error.empty()) out += fmt::format("> {}\n\n", markdown(outcome.error));
   const Report report(plan, outcome);
   out += report.markdown_of_stages();
   if (const auto rows = report.published_rows(); !rows.empty()) {

@@ -162,6 +162,9 @@ std::string explanation_text(const std::vector<StageOutcome>& stages) {
 
 namespace {
 
+constexpr const char* interrupted_words =
+    "interrupted. What is finished is kept; the same command, started again, continues";
+
 // The stages of a plan, one after another.
 class StagesRun {
  public:
@@ -184,7 +187,7 @@ class StagesRun {
  private:
   // False: it did not finish, and what follows does not run.
   bool finish(std::size_t i) {
-    if (interrupt_requested()) return stop(i, StageState::interrupted, exit_interrupted, "interrupted");
+    if (interrupt_requested()) return stop(i, StageState::interrupted, exit_interrupted, interrupted_words);
     StageOutcome& result = outcome_.stages[i];
     std::optional<StageRecord> found = read_record(options_.out / result.id);
     if (!selected_[i]) {
@@ -201,7 +204,7 @@ class StagesRun {
       make(i, std::move(found));
       return true;
     } catch (const Interrupted&) {
-      return stop(i, StageState::interrupted, exit_interrupted, "interrupted");
+      return stop(i, StageState::interrupted, exit_interrupted, interrupted_words);
     } catch (const Error& error) {
       return stop(i, StageState::failed, error.code(), error.what());
     } catch (const fs::filesystem_error& error) {

@@ -324,6 +324,7 @@ class SweepRun {
       fmt::print("{} of {} points done{} in {}\n", there_, all_.size(),
                  failed_ > 0 ? fmt::format(", {} failed: run again to retry them alone", failed_.load()) : "",
                  duration_text(seconds));
+      if (interrupted_) fmt::print("interrupted: the same command, started again, runs the rest\n");
       if (!verdicts_.empty()) fmt::print("{}\n", verdicts_text(verdicts_));
       fmt::print("table: {}\n", (options_.out / "sweep.csv").string());
     }

@@ -112,9 +112,14 @@ AnswerScale answer_scale(const Json& answer) {
   return {"T/(m g)", "mm", 1e3 * length->get<double>() / plain->get<double>()};
 }
 
+std::string verdict_text(const Json& answer) {
+  const bool number = find_pointer(answer, "/temperature/value") != nullptr;
+  return answer.value("verdict", "") + (number ? "" : " (none can be read)");
+}
+
 std::string answer_text(const Json& answer) {
   const Json* value = find_pointer(answer, "/temperature/value");
-  const std::string verdict = capitalized(answer.value("verdict", "")) + ": " + answer.value("why", "");
+  const std::string verdict = capitalized(verdict_text(answer)) + ": " + answer.value("why", "");
   if (value == nullptr) return verdict;
   const AnswerScale scale = answer_scale(answer);
   const auto number = [&](const char* pointer) {

@@ -41,8 +41,10 @@ AnswerScale answer_scale(const Json& answer);
 // Adds to the answer's reason and advice what speaks against the numbers of the simulated bed it was read from.
 void add_judgement(const Json& observables, Json& answer);
 
-// "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why."; "No single temperature: why." where
-// there is no number. Ends without a line break.
+// The verdict for people, who also learn from it where the answer has no number.
+std::string verdict_text(const Json& answer);
+// "T/(m g) = 0.62 ± 0.05 mm (95 %: 0.52 to 0.72 mm). One temperature: why."; "No single temperature (none
+// can be read): why." where there is no number. Ends without a line break.
 std::string answer_text(const Json& answer);
 
 }  // namespace shakebed::pipelines

@@ -25,22 +25,26 @@ namespace {
 
 constexpr std::size_t most_bad_frames_named = 5;
 
+namespace fs = std::filesystem;
+
+// Where the pictures of a refusal stay: beside the folders of the stages, since this stage leaves none.
+fs::path refusal_folder(const RunContext& context) { return context.output_directory().parent_path() / "no-beads"; }
+
 // Says what the first frame shows instead of beads.
 [[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look) {
   const ingest::Survey& survey = look.survey;
   const std::string diameter = fmt::format("{:g} mm", 1e3 * options.diameter);
-  write_preview(context.scratch(), look, options.images.texts, diameter);
+  const fs::path folder = refusal_folder(context);
+  fs::create_directories(folder);
+  write_preview(folder, look, options.images.texts, diameter);
   std::string message =
-      fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (context.scratch() / "preview.html").string());
+      fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (folder / "preview.html").string());
   message += survey.candidates.empty()
                  ? ". If there are beads, give their radius in pixels (--radius) and a region (--roi)"
                  : ". If the beads are those of one of its pictures, crop to them with --roi, or give";
   for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
     message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
-  const bool any = std::any_of(survey.candidates.begin(), survey.candidates.end(),
-                               [](const ingest::SurveyCandidate& one) { return !one.disks.empty(); });
-  if (any) throw StageError(message);
-  throw InputError(message);
+  throw StageError(message);
 }
 
 // The most credible beads; where their number is given, of what may be beads, the kind that is as numerous.
@@ -63,6 +67,8 @@ const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const Ext
 bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
                     ingest::MeasureOptions& measure) {
   const std::optional<FirstLook> look = look_at_first(film.paths, options);
+  std::error_code error;
+  fs::remove_all(refusal_folder(context), error);
   if (!look) return true;  // measure_bed() says which files cannot be read
   if (!look->survey.found) refuse(options, context, *look);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);

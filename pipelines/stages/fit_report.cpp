@@ -53,14 +53,13 @@ std::string number_html(const Json& answer, const AnswerScale& scale) {
 // A headline with number, verdict and reason; then T_x, T_z, the solid's height as facts, and the advice.
 std::string answer_html(const Json& answer) {
   const AnswerScale scale = answer_scale(answer);
-  const std::string verdict = answer.value("verdict", "");
-  const bool one = is_one_temperature(verdict);
+  const bool one = is_one_temperature(answer.value("verdict", ""));
   std::string out = fmt::format(
       "<section class=\"answer {}\" aria-label=\"the answer\">\n<p class=\"headline\"><span class=\"number\">{}</span> "
       "<span "
       "class=\"verdict {}\">{}</span></p>\n<p>{}</p>\n",
       one ? "good-answer" : "bad-answer", number_html(answer, scale), one ? "good" : "bad",
-      escape_markup(capitalised(verdict)), prose(capitalised(answer.value("why", ""))));
+      escape_markup(capitalised(verdict_text(answer))), prose(capitalised(answer.value("why", ""))));
   std::string facts;
   const auto low = in_scale(answer, "/interval/low/value", scale.factor),
              high = in_scale(answer, "/interval/high/value", scale.factor);

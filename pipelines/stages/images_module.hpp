@@ -72,13 +72,17 @@ struct PreviewRequest {
   std::string folder;      // for preview.html
 };
 
+struct Previewed {
+  bool found = false;    // beads
+  std::string sentence;  // what is seen
+};
+
 class ImagesModule {
  public:
   virtual ~ImagesModule() = default;
   virtual void render(const RenderOptions& options, RunContext& context) const = 0;
   virtual void extract(const ExtractOptions& options, RunContext& context) const = 0;
-  // A sentence that says what is seen.
-  virtual std::string preview(const PreviewRequest& request) const = 0;
+  virtual Previewed preview(const PreviewRequest& request) const = 0;
 };
 
 // Loads the module once. It lies beside the program, or in the library folder it was installed to. Throws StageError

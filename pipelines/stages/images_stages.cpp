@@ -14,7 +14,7 @@
 namespace shakebed::pipelines {
 namespace {
 
-std::string preview_images(const PreviewRequest& request) {
+Previewed preview_images(const PreviewRequest& request) {
   ingest::FrameSource source = ingest::FrameSource::open(request.files, {});
   std::vector<std::string> paths;
   for (const ingest::FrameOrigin& origin : source.first_origins(ingest::most_tried))
@@ -22,11 +22,11 @@ std::string preview_images(const PreviewRequest& request) {
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
   write_preview(request.folder, *look, request.files, request.diameter);
-  if (!look->survey.found) return fmt::format("no beads: {}", look->survey.why_not);
+  if (!look->survey.found) return {false, fmt::format("{}: no beads: {}", look->path, look->survey.why_not)};
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
-  return fmt::format("{} {} beads of {:.2f} px radius in channel {}; expected share of wrong ones {:.1f} %",
-                     best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                     best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong);
+  return {true, fmt::format("{} {} beads of {:.2f} px radius in channel {}; expected share of wrong ones {:.1f} %",
+                            best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                            best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong)};
 }
 
 // ingest's own errors become ours.
@@ -49,10 +49,10 @@ class Module : public ImagesModule {
   void extract(const ExtractOptions& options, RunContext& context) const override {
     translated([&] { extract_disks(options, context); });
   }
-  std::string preview(const PreviewRequest& request) const override {
-    std::string sentence;
-    translated([&] { sentence = preview_images(request); });
-    return sentence;
+  Previewed preview(const PreviewRequest& request) const override {
+    Previewed previewed;
+    translated([&] { previewed = preview_images(request); });
+    return previewed;
   }
 };
 

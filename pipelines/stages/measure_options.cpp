@@ -1,11 +1,21 @@
 #include "pipelines/stages/measure_options.hpp"
 
+#include <cmath>
 #include <string>
 
 #include "pipelines/formats/quantity.hpp"
 #include "pipelines/stages/kernel_options.hpp"
 
 namespace shakebed::pipelines {
+namespace {
+
+// To four digits: what is advised is accepted.
+double rounded_up(double value) {
+  const double step = std::pow(10, std::floor(std::log10(value)) - 3);
+  return std::ceil(value / step) * step;
+}
+
+}  // namespace
 
 void BedMeasureOptions::describe(Fields& fields) {
   fields.quantity("settle", settle_, dimension::time,
@@ -46,7 +56,7 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
   for (const MeasureProblem problem : options.problems(floor_period)) {
     if (problem == MeasureProblem::shorter_than_a_period)
       fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
-                     "Give " + quantity_text(floor_period * time_unit, dimension::time) + " or more");
+                     "Give " + handy_text(rounded_up(floor_period * time_unit), dimension::time) + " or more");
     if (problem == MeasureProblem::too_many_periods)
       fields.require(false, "measure", "the floor would shake more than 1e12 times: no run can reach that",
                      "Measure shorter, or shake more slowly");

@@ -20,6 +20,8 @@ constexpr double least_width = 5;  // [D]
 // Cells of experiments are some cm to a metre wide; in a wider one, fewer disks than one a diameter of width are no
 // bed.
 constexpr double widest_cell = 5;  // [m]
+// Shaken beds that are studied are some ten to a hundred disks high.
+constexpr double highest_bed = 300;  // [D]
 // A bed forgets its start over tens of periods; fewer than ten are certainly too few.
 constexpr double least_settle_periods = 10;
 // A width so near n D, or (n + 1/2) D where rows alternate, lets rows of disks lock between hard sides. The second
@@ -124,6 +126,13 @@ void SceneOptions::warn_of_size(Fields& fields) const {
                 fmt::format("the box is {} wide, {:.4g} diameters, and holds {} disks: they hardly ever meet",
                             length_text(box_.width), width, disks_.count),
                 fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", box_.width));
+  if (gravity_ && height_at_rest() > highest_bed)
+    fields.warn(
+        "high bed", "/disks/count",
+        fmt::format("{} disks in a box {:.4g} diameters wide make a bed {:.0f} diameters high: shaking from below "
+                    "hardly reaches its top, and the run takes long",
+                    disks_.count, width, height_at_rest()),
+        "Take fewer disks, or a wider box");
   const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
   const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion);
   const double top = height_at_rest() * length_unit() + (sine != nullptr ? sine->amplitude : 0);

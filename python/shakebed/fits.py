@@ -264,6 +264,7 @@ def find_answer(
     column_number: Optional[float] = None,
     temperature_x: Union[None, Quantity, tuple[float, float], Number] = None,
     temperature_z: Union[None, Quantity, tuple[float, float], Number] = None,
+    diameter: Union[None, str, Number] = None,
 ) -> dict[str, Any]:
     """One temperature from all thermometers, with its whole uncertainty and a verdict (see docs/thermometer.md).
 
@@ -275,6 +276,8 @@ def find_answer(
         N D/W. It makes the answer more precise.
     temperature_x, temperature_z : Quantity, (float, float) or float, optional
         Kinetic temperatures [m g D], if velocities are known: a value, or a value with its standard error.
+    diameter : str or float, optional
+        Diameter D of a disk ("2.99 mm", or a number in m). With it T/(m g) is given as a length.
 
     Returns
     -------
@@ -282,15 +285,27 @@ def find_answer(
         verdict, why, advice, status, thermometer, model : str
         temperature, std_error, low, high : float or None
             T, its standard error and its interval [m g D].
-        solid_height : float or None
-            Height of the solid [D].
+        temperature_over_mg, std_error_over_mg, low_over_mg, high_over_mg : float or None
+            The same as T/(m g) [m], if the diameter is known.
+        solid_height, solid_height_std_error : float or None
+            Height of the solid and its standard error [D].
 
         The numbers are None if the status is not "ok". Then why and advice give the reason.
         `Bed.answer` and `MeasuredBed.answer` pass all that is known of a bed.
     """
-    return _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
-                             None if column_number is None else number(column_number, "column_number"),
-                             _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [])
+    length = None if diameter is None else in_si(diameter, "length", "diameter")
+    answer = _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
+                               None if column_number is None else number(column_number, "column_number"),
+                               _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [])
+    return with_lengths(answer, length)
+
+
+def with_lengths(answer: dict[str, Any], diameter: Optional[float]) -> dict[str, Any]:
+    """The answer, and its temperatures as T/(m g) [m] if the diameter [m] is known."""
+    if diameter is not None:
+        for name in ("temperature", "std_error", "low", "high"):
+            answer[name + "_over_mg"] = None if answer[name] is None else answer[name] * diameter
+    return answer
 
 
 def _checked_plateau(plateau_density: Any) -> float:

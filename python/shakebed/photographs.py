@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _core
 from .errors import StageError, UsageError, check_options
+from .fits import with_lengths
 from .quantities import Number, Progress, in_si, reporter, table_html
 from .scenes import Profile, profile_from
 
@@ -163,8 +164,8 @@ def _refuse_unit_range(images: Sequence[NDArray[Any]]) -> None:
 class MeasuredBed:
     """A bed measured in photographs."""
 
-    def __init__(self, bed: _images.Bed) -> None:
-        self._bed = bed
+    def __init__(self, bed: _images.Bed, diameter: float) -> None:
+        self._bed, self._diameter = bed, diameter
 
     @property
     def profile(self) -> Profile:
@@ -178,9 +179,10 @@ class MeasuredBed:
         floor that is not in view, is taken into account.
         """
         profile = self.profile
-        return _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
-                                 profile.covariance_samples, profile.kernel, self.disks_a_frame / self.width, None, None,
-                                 self._bed.objections())
+        answer = _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
+                                   profile.covariance_samples, profile.kernel, self.disks_a_frame / self.width, None, None,
+                                   self._bed.objections())
+        return with_lengths(answer, self._diameter)
 
     @property
     def disks(self) -> dict[str, NDArray[Any]]:
@@ -326,4 +328,4 @@ def measure_bed(
         raise UsageError(bed.message)
     if not bed.ok:
         raise StageError(bed.message)
-    return MeasuredBed(bed)
+    return MeasuredBed(bed, wanted["diameter"])

@@ -279,9 +279,9 @@ class Bed:
         """
         from .fits import find_answer
 
-        seen = self.observables
+        seen, in_metres = self.observables, self.length_unit != 1
         return find_answer(self.profile, column_number=self.column_number, temperature_x=seen.get("temperature_x"),
-                           temperature_z=seen.get("temperature_z"))
+                           temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None)
 
     def trajectory(self) -> Trajectory:
         """The frames that the scene keeps (option "frames"), not copied."""

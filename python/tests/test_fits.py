@@ -60,8 +60,13 @@ def test_fit_is_that_of_the_command_line(curve, tmp_path):
     numbers = dict(fit.to_dict())
     assert numbers.pop("warnings") == said[: len(fit.warnings)]
     assert fit.ok and numbers == printed
-    found = shakebed.find_answer(*rows.T, kernel=curve.kernel)
+    found = shakebed.find_answer(*rows.T, kernel=curve.kernel, diameter="3 mm")
     assert (answer["verdict"], answer["temperature"]["value"]) == (found["verdict"], found["temperature"])
+    assert answer["temperature_over_mg"]["value"] == found["temperature_over_mg"] == found["temperature"] * 3e-3
+    assert answer["temperature_over_mg"]["std_error"] == found["std_error_over_mg"] == found["std_error"] * 3e-3
+    assert found["low_over_mg"] == answer["interval"]["low"]["value"] * 3e-3 < found["high_over_mg"]
+    solid = answer["solid_height"] or {"value": 0, "std_error": 0}  # null where there is no solid
+    assert (solid["value"], solid["std_error"]) == (found["solid_height"], found["solid_height_std_error"])
     assert fit.temperature_over_mg.value == pytest.approx(fit.temperature.value * 3e-3, rel=1e-12)
     assert "temperature" in fit._repr_html_() and fit.brief() in repr(fit)
     drawn = fit.curve()

@@ -82,6 +82,7 @@ def test_the_answer_is_that_of_the_command_line(frames):
     answer = shakebed.measure_bed(pictures, "3 mm").answer()
     assert (answer["verdict"], answer["why"], answer["advice"]) == (printed["verdict"], printed["why"], printed["advice"])
     assert answer["temperature"] == printed.get("temperature", {}).get("value")
+    assert answer["temperature_over_mg"] == printed.get("temperature_over_mg", {}).get("value")
     # Fewer than 30 beads in all: what the photographs show against a temperature is passed on.
     image, _ = drawn_image(count=12)
     assert "Only 12 beads" in shakebed.measure_bed([image], "3 mm").answer()["why"]
@@ -181,3 +182,5 @@ def test_twelve_lines_go_from_photographs_to_a_plot(frames, tmp_path):
     done = subprocess.run([sys.executable, script, frames[0], "3 mm"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "profile.png").read_bytes().startswith(b"\x89PNG")
+    alone = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
+    assert alone.returncode == 1 and alone.stderr.startswith("usage: ")

@@ -135,6 +135,8 @@ const Odd odd[] = {
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},
     {"alternate-rows-lock", "/stages/0/box/width: the box is 30.5 diameters wide", "alternate rows can lock"},
+    {"high-bed", "/stages/0/disks/count: 12000 disks in a box 30.5 diameters wide make a bed 347 diameters high",
+     "Take fewer disks"},
 };
 
 class OddRecipe : public testing::TestWithParam<Odd> {};

@@ -21,6 +21,7 @@ using namespace shakebed::pipelines;
 using shakebed::tests::ScratchFolder;
 using shakebed::tests::write_text;
 using testing::HasSubstr;
+using testing::Not;
 
 // --- JSON
 
@@ -116,6 +117,23 @@ TEST(Quantity, GarbageIsRefusedWithASentence) {
   } catch (const std::invalid_argument& problem) {
     EXPECT_THAT(problem.what(), HasSubstr("did you mean \"m"));
   }
+}
+
+TEST(Quantity, AUnitIsSuggestedOnlyWhereItIsOfTheKindWanted) {
+  const auto told = [](const char* text, const Dimension& wanted) -> std::string {
+    try {
+      parse_quantity(text, wanted);
+    } catch (const std::invalid_argument& problem) {
+      return problem.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(told("20 rpm", dimension::frequency), Not(HasSubstr("did you mean")));
+  EXPECT_THAT(told("20 hz", dimension::frequency), HasSubstr("did you mean \"Hz\"?"));
+  EXPECT_THAT(told("3 mn", dimension::length), HasSubstr("did you mean \"m"));
+  EXPECT_THAT(told("3 mn", dimension::time), HasSubstr("did you mean \"m")) << "ms or min";
+  EXPECT_THAT(told("3 mn", dimension::time), Not(HasSubstr("\"mm\"")));
+  EXPECT_THAT(told("3 m/sc", dimension::velocity), HasSubstr("did you mean \"s\"?"));
 }
 
 TEST(Quantity, TextComesBackTheSame) {

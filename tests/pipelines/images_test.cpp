@@ -176,7 +176,7 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   EXPECT_EQ(overlays, 2u);
 }
 
-TEST_F(Images, FramesWithoutDisksAreAnInputError) {
+TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
   write_text(
       *folder_ / "noise.pgm", "P2\n64 64\n255\n" + [] {
         std::string pixels;
@@ -185,7 +185,21 @@ TEST_F(Images, FramesWithoutDisksAreAnInputError) {
       }());
   const ProgramResult result =
       run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--out", "n"}, folder_->path());
-  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_EQ(result.exit_code, 5) << result.err;
+  EXPECT_NE(result.err.find("n/no-beads/preview.html"), std::string::npos) << result.err;
+  EXPECT_TRUE(fs::is_regular_file(*folder_ / "n/no-beads/preview.html"));
+  const ProgramResult preview =
+      run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--preview", "--out", "p"}, folder_->path());
+  EXPECT_EQ(preview.exit_code, 5) << preview.err;
+  EXPECT_TRUE(preview.out.empty() && fs::is_regular_file(*folder_ / "p/preview.html"));
+  fs::create_directory(*folder_ / "empty");
+  const ProgramResult empty = run_shakebed({"fit-images", "empty", "--diameter", "3 mm"}, folder_->path());
+  EXPECT_EQ(empty.exit_code, 4);
+  EXPECT_NE(empty.err.find("error: the folder \""), std::string::npos) << empty.err;
+  const ProgramResult scale =
+      run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--scale", "0.2 mm"}, folder_->path());
+  EXPECT_EQ(scale.exit_code, 3);
+  EXPECT_NE(scale.err.find("error: --scale: \"0.2 mm\" is a length"), std::string::npos) << scale.err;
   write_text(*folder_ / "broken.png", "\x89PNG\r\n\x1a\nnot an image");
   EXPECT_EQ(run_shakebed({"fit-images", "broken.png", "--diameter", "3 mm", "--out", "n"}, folder_->path()).exit_code,
             4);
