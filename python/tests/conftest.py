@@ -40,10 +40,10 @@ def drawn_image(seed=1, shape=(180, 220), radius=9.0, count=40):
         place = random.uniform([radius + 2, radius + 2], [shape[1] - radius - 3, shape[0] - radius - 3])
         if all(np.hypot(*(place - other)) > 2 * radius + 1 for other in centres):
             centres.append(place)
-    y, x = np.mgrid[: shape[0], : shape[1]]
     image = np.full(shape, 200.0)
     for cx, cy in centres:
-        inside = np.clip(radius + 0.5 - np.hypot(x - cx, y - cy), 0, 1)
-        image -= 140 * inside
+        around = slice(int(cy - radius) - 1, int(cy + radius) + 3), slice(int(cx - radius) - 1, int(cx + radius) + 3)
+        y, x = np.mgrid[around]
+        image[around] -= 140 * np.clip(radius + 0.5 - np.hypot(x - cx, y - cy), 0, 1)
     image += random.normal(0, 3, shape)
     return np.clip(np.round(image), 0, 255).astype(np.uint8), np.array(centres)

@@ -24,11 +24,22 @@ Long gap(const SinusoidalFloor& floor, const Flight& f, Long t) {
          floor.amplitude * std::sin(2 * pi * floor.frequency * (f.now + t));
 }
 
+// Whether the floor is above the point: in double precision where this decides it.
+bool below_floor(const SinusoidalFloor& floor, const Flight& f, Long at) {
+  const auto t = static_cast<double>(at);
+  const double rough = f.bottom + f.vz * t - 0.5 * f.gravity * t * t -
+                       floor.amplitude * std::sin(2 * std::numbers::pi * floor.frequency * (f.now + t));
+  constexpr double surely = 1e-11;  // a thousand times what rounding makes of terms below 1e3
+  return std::abs(rough) > surely ? rough < 0 : gap(floor, f, at) < 0;
+}
+
 // The first downward crossing found by walking in steps far smaller than anything moves, then bisecting.
 Long first_crossing(const SinusoidalFloor& floor, const Flight& f, Long horizon) {
   const Long step = 1e-4L / floor.frequency;
+  bool before = below_floor(floor, f, 0);
   for (Long t = 0; t < horizon; t += step) {
-    if (gap(floor, f, t) >= 0 && gap(floor, f, t + step) < 0) {
+    const bool after = below_floor(floor, f, t + step);
+    if (!before && after) {
       Long low = t, high = t + step;
       for (int i = 0; i < 80; ++i) {
         const Long middle = (low + high) / 2;
@@ -36,6 +47,7 @@ Long first_crossing(const SinusoidalFloor& floor, const Flight& f, Long horizon)
       }
       return low;
     }
+    before = after;
   }
   return std::numeric_limits<Long>::infinity();
 }
