@@ -18,6 +18,7 @@ constexpr double smallest_at_level = 5, largest_at_level = 10.4;  // px, radii s
 constexpr int census_window = 640;                                // px, of the busiest part searched at each level
 constexpr double mode_width = 0.1;                                // radii of one hypothesis, either way
 constexpr double faintest_census_support = 0.35;
+constexpr double asked_tolerance = 1.25;     // a radius that is given holds within this factor
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
@@ -30,12 +31,21 @@ ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
   return level;
 }
 
+struct RadiusRange {
+  double from, to;  // px of the level
+};
+RadiusRange radii_at(double scale, const CensusOptions& options) {
+  if (!options.radius_px) return {smallest_at_level, largest_at_level};
+  return {std::max(smallest_at_level, *options.radius_px / asked_tolerance / scale),
+          std::min(largest_at_level, *options.radius_px * asked_tolerance / scale)};
+}
+
 // From twice the resolution down, until no circle fits in any more.
 std::vector<ScaledPicture> pyramid_of(const GrayFrame& frame, const CensusOptions& options) {
   std::vector<ScaledPicture> levels;
   const auto wanted = [&](double scale) {
-    if (!options.radius_px) return largest_at_level * scale > options.smallest_radius_px;
-    return *options.radius_px * 1.25 > smallest_at_level * scale && *options.radius_px * 0.8 < largest_at_level * scale;
+    const RadiusRange range = radii_at(scale, options);
+    return range.from < range.to && largest_at_level * scale > options.smallest_radius_px;
   };
   if (wanted(0.5)) {
     ScaledPicture half = windowed(frame, 1, census_window / 2);
@@ -138,7 +148,8 @@ class Census {
           return find_circles(map, smallest_at_level, largest_at_level, polarity, faintest_census_support);
         };
         const Found found{circles(edges), {circles(one), circles(other)}};
-        for (double radius = smallest_at_level; radius < largest_at_level; radius *= 1.05) {
+        const RadiusRange range_of_radii = radii_at(level.scale, options_);
+        for (double radius = range_of_radii.from; radius < range_of_radii.to; radius *= 1.05) {
           double by_chance = 0;
           CircleHypothesis hypothesis = weigh(found, radius, range, &by_chance);
           census_.best_by_chance_px = std::max(census_.best_by_chance_px, by_chance * level.scale);

@@ -291,7 +291,7 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
   const GrayFrame& frame = *frames.back();
-  LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px, true);
+  LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px, Known::beads);
   learn_gaps(frame, rims, options.one_size);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
@@ -302,7 +302,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
-  LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, true);
+  LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, Known::beads);
   learn_gaps(frame, rims, true);
   return calibration_by_rims(frame, rims, {});
 }

@@ -158,7 +158,7 @@ std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPi
 
 double RimModel::probability_of(double support) const { return probability_at(probability, support); }
 
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, bool beads_are_there) {
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
   LearnedRims learned;
   RimModel& model = learned.model;
   model.polarity = polarity;
@@ -176,7 +176,7 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
     circles = circles_of(edges, radius, polarity);
     std::vector<std::vector<Circle>> by_chance;
     for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, polarity));
-    model.probability = probabilities_by_support(circles, by_chance, beads_are_there);
+    model.probability = probabilities_by_support(circles, by_chance, known);
     measure_rims(circles, at.scale, model);
   }
   learned.disks = likely_ones(circles, edges, at, model);

@@ -11,6 +11,7 @@
 
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/outline.hpp"
+#include "ingest/find/rim_probability.hpp"
 
 namespace shakebed::ingest {
 
@@ -55,9 +56,9 @@ struct LearnedRims {
   double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
 };
 
-// Learns from one frame, starting from a radius good to a tenth. Where a survey has shown `beads_are_there`, poor
+// Learns from one frame, starting from a radius good to a tenth. Where beads are known to be there, poor
 // circles of chance, as the copies of beads of another size make, say nothing against circles that are seen well.
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, bool beads_are_there = false);
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known = Known::nothing);
 
 // Whether the outlines of the disks are round.
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);

@@ -129,7 +129,7 @@ struct WithCopies {
   [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) const {
     std::vector<std::vector<Circle>> by_chance;
     for (const GapSearch& copy : copies) by_chance.push_back(copy.beside(beads));
-    return probabilities_by_support(picture.beside(beads), by_chance, true);
+    return probabilities_by_support(picture.beside(beads), by_chance, Known::beads);
   }
   template <class Change>
   void change(const Change& change) {

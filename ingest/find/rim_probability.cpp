@@ -10,11 +10,15 @@ namespace {
 constexpr std::size_t support_steps = 20;  // of the table of probabilities
 // Before any is seen: circles that chance makes up in a class of support, fewer the better the support.
 constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
+// Classes of support in which the picture has no circle: so many below one that has count for it. What chance makes up
+// of much poorer rims says nothing of it: ovals of large beads pass as half of a small circle.
+constexpr std::size_t near_classes = 4;
 
 // Circles of one class of support, in the frame and (the mean) in its copies.
 struct SupportClass {
   double here = 0, chance = 0, support_sum = 0;
-  std::size_t classes = 1;  // that were put together
+  std::size_t classes = 1;   // that were put together
+  bool joined_near = false;  // the classes just below it that have no circle
   [[nodiscard]] double doubt() const { return here > 0 ? chance / here : chance > 0 ? HUGE_VAL : 0; }
 };
 
@@ -22,10 +26,18 @@ std::size_t class_of(double support) {
   return std::min(support_steps, static_cast<std::size_t>(std::lround(support * support_steps)));
 }
 
+// Of classes without a circle only those just below `above`, which begins at `end`.
+void join_near(const std::vector<SupportClass>& classes, std::size_t end, SupportClass& below, SupportClass& above) {
+  for (std::size_t near = end - near_classes; near < end; ++near) above.chance += classes[near].chance;
+  above.classes += near_classes;
+  below.classes -= near_classes;
+  above.joined_near = true;
+}
+
 }  // namespace
 
 std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
-                                             const std::vector<std::vector<Circle>>& copies, bool few_circles) {
+                                             const std::vector<std::vector<Circle>>& copies, Known known) {
   std::vector<SupportClass> classes(support_steps + 1);
   for (const Circle& circle : seen) {
     SupportClass& its = classes[class_of(circle.support)];
@@ -36,15 +48,20 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
     for (const Circle& circle : copy)
       classes[class_of(circle.support)].chance += 1 / static_cast<double>(copies.size());
   std::vector<SupportClass> pooled;
-  for (const SupportClass& one : classes) {
-    pooled.push_back(one);
+  for (std::size_t k = 0; k < classes.size(); ++k) {
+    pooled.push_back(classes[k]);
     while (pooled.size() > 1) {
       SupportClass& below = pooled[pooled.size() - 2];
-      const SupportClass& above = pooled.back();
-      const bool below_says_something = below.here > 0 || (few_circles && below.chance > 0);
+      SupportClass& above = pooled.back();
+      const bool below_says_something = below.here > 0 || (known == Known::beads && below.chance > 0);
       if (below_says_something && above.here > 0 && below.doubt() >= above.doubt()) break;
+      if (known == Known::radius && below.here == 0 && below.chance > 0 && above.here > 0 &&
+          below.classes > near_classes) {
+        if (!above.joined_near) join_near(classes, k + 1 - above.classes, below, above);
+        break;
+      }
       below = {below.here + above.here, below.chance + above.chance, below.support_sum + above.support_sum,
-               below.classes + above.classes};
+               below.classes + above.classes, above.joined_near};
       pooled.pop_back();
     }
   }

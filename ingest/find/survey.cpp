@@ -165,6 +165,11 @@ void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
   }
 }
 
+bool within_a_quarter(double radius, double given) {
+  constexpr double tolerance = 1.25;
+  return radius < tolerance * given && given < tolerance * radius;
+}
+
 void enlarge(SurveyCandidate& candidate, int factor) {
   const double scale = factor, shift = 0.5 * (scale - 1);
   candidate.rims.radius_px *= scale;
@@ -199,7 +204,8 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
     SurveyCandidate candidate;
     candidate.channel = channels[hypothesis.channel]->channel;
-    LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px);
+    LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px,
+                                     options.radius_px ? Known::radius : Known::nothing);
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
     judge(candidate, learned.edge_length_px);
@@ -208,8 +214,12 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     if (candidate.why_not.empty())
       judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
                   options.any_shape);
-    candidate.credible = candidate.why_not.empty();
     enlarge(candidate, frames.reduction);
+    if (options.radius_px && !within_a_quarter(candidate.rims.radius_px, *options.radius_px))
+      candidate.why_not =
+          formatted("the circles seen have a radius of %.1f px, not one within 25 %% of the %.1f px given",
+                    candidate.rims.radius_px, *options.radius_px);
+    candidate.credible = candidate.why_not.empty();
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;

@@ -168,8 +168,8 @@ TEST(Sizes, FewWellSeenCirclesAreNotDoubtedForPoorOnesOfChance) {
   std::vector<Circle> seen(4), poor(2);
   for (Circle& circle : seen) circle.support = 1;
   for (Circle& circle : poor) circle.support = 0.35;
-  EXPECT_GT(probability_at(probabilities_by_support(seen, {poor, poor}, true), 1), 0.95);
-  EXPECT_LT(probability_at(probabilities_by_support(seen, {poor, poor}, false), 1), 0.6);
+  EXPECT_GT(probability_at(probabilities_by_support(seen, {poor, poor}, Known::beads), 1), 0.95);
+  EXPECT_LT(probability_at(probabilities_by_support(seen, {poor, poor}, Known::nothing), 1), 0.6);
   EXPECT_EQ(probability_at({}, 1), 0);
 }
 

@@ -67,12 +67,12 @@ const Place* bead_at(const std::vector<Place>& places, double radius, double x, 
   return nullptr;
 }
 
-Survey survey_of(const std::vector<ChannelFrames::One>& channels) {
+Survey survey_of(const std::vector<ChannelFrames::One>& channels, const SurveyOptions& options = {}) {
   ChannelFrames frames;
   frames.channels = channels;
   frames.width = channels.front().frame.width;
   frames.height = channels.front().frame.height;
-  return take_survey(frames);
+  return take_survey(frames, options);
 }
 
 struct Score {
@@ -95,7 +95,7 @@ Score score(const Disks& disks, const std::vector<Place>& truth, double radius, 
 
 // All of them, or at least `least`, and nothing else.
 void expect_all(const Survey& survey, const std::vector<Place>& truth, double radius, double least = 1) {
-  ASSERT_TRUE(survey.found) << survey.why_not;
+  ASSERT_TRUE(survey.found) << survey.why_not << ", radius " << radius << ", " << survey.candidates.size();
   const SurveyCandidate& best = survey.candidates.front();
   EXPECT_NEAR(best.rims.radius_px, radius, 0.06 * radius);
   const Score found = score(best.disks, truth, radius, [](const RimDisk& d) { return Place{d.circle.x, d.circle.y}; });
@@ -142,6 +142,28 @@ TEST(Survey, ALargerOutlineWinsOverTheHighlightInIt) {
     return std::hypot(x - bead->x + 3, y - bead->y + 3) < 6 ? 240.0 : 70.0;
   });
   expect_all(survey_of({{Channel::automatic, frame}}), truth, radius);
+}
+
+// Beads of 10 and of 20 px. The radius that is given decides which are meant; one that no bead has finds none.
+TEST(Survey, AGivenRadiusIsObeyedOrContradicted) {
+  const std::vector<Place> places = scattered(50, 44, 520, 500, 4);
+  std::vector<Place> small, large;
+  for (std::size_t k = 0; k < places.size(); ++k) (k % 2 == 0 ? small : large).push_back(places[k]);
+  const GrayFrame frame = painted(520, 500, [&](double x, double y) {
+    return bead_at(small, 10, x, y) != nullptr || bead_at(large, 20, x, y) != nullptr ? 60.0 : 190.0;
+  });
+  const auto given = [&](double radius) {
+    SurveyOptions options;
+    options.radius_px = radius;
+    return survey_of({{Channel::automatic, frame}}, options);
+  };
+  for (const double radius : {8.5, 10.0, 12.0}) expect_all(given(radius), small, 10);
+  for (const double radius : {17.0, 20.0, 24.0}) expect_all(given(radius), large, 20);
+  for (const double radius : {5.0, 14.2, 40.0}) {
+    const Survey survey = given(radius);
+    EXPECT_FALSE(survey.found) << radius;
+    EXPECT_FALSE(survey.why_not.empty());
+  }
 }
 
 TEST(Survey, RefusesPicturesWithoutBeads) {
@@ -253,7 +275,7 @@ TEST(Survey, DarkSurroundingsHoldNoBeads) {
     return bead_at(truth, radius, x, y) != nullptr ? 40.0 : 200.0;
   });
   const Survey survey = survey_of({{Channel::automatic, frame}});
-  ASSERT_TRUE(survey.found) << survey.why_not;
+  ASSERT_TRUE(survey.found) << survey.why_not << ", radius " << radius << ", " << survey.candidates.size();
   MeasureOptions options;
   options.bead_diameter_m = 0.006;
   options.find.seen = BeadsSeen{survey.candidates.front().rims.polarity, survey.candidates.front().rims.radius_px};
