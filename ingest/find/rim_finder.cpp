@@ -154,11 +154,8 @@ std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPi
   return circles;
 }
 
-}  // namespace
-
-double RimModel::probability_of(double support) const { return probability_at(probability, support); }
-
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
+// Learns at the scale of this radius, on the copies too.
+LearnedRims learn_rims_at(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
   LearnedRims learned;
   RimModel& model = learned.model;
   model.polarity = polarity;
@@ -170,9 +167,14 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
   for (const double turn : {0.0, 0.25, 0.5, 0.75})
     copies.push_back(find_edges(stretched(at.picture, decoy_stretch, turn * std::numbers::pi), edges.threshold));
   std::vector<Circle> circles;
-  constexpr int rounds = 2;
-  for (int round = 0; round < rounds; ++round) {
-    const double radius = model.radius_px / at.scale;
+  // Until the radius settles: with beads of several sizes it starts between two of them.
+  constexpr int fewest_rounds = 2, most_rounds = 6;
+  constexpr double settled = 0.02;
+  double radius = 0;
+  for (int round = 0;
+       round < fewest_rounds || (round < most_rounds && std::abs(model.radius_px / at.scale / radius - 1) > settled);
+       ++round) {
+    radius = model.radius_px / at.scale;
     circles = circles_of(edges, radius, polarity);
     std::vector<std::vector<Circle>> by_chance;
     for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, polarity));
@@ -182,6 +184,18 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
   learned.disks = likely_ones(circles, edges, at, model);
   learned.edge_length_px = edge_length(edges, model.contrast) * at.scale;
   measure_open_rims(on_the_map(learned.disks, at), edges, at.scale, model);
+  return learned;
+}
+
+}  // namespace
+
+double RimModel::probability_of(double support) const { return probability_at(probability, support); }
+
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
+  LearnedRims learned = learn_rims_at(frame, polarity, radius_px, known);
+  // Frames are searched at the scale of the radius that was learned: what was learned must be of that scale, too.
+  const double radius = learned.model.radius_px;
+  if (scale_for(radius) != scale_for(radius_px)) learned = learn_rims_at(frame, polarity, radius, known);
   return learned;
 }
 
