@@ -31,8 +31,16 @@ TABLES = {
         "fig2-bottom.csv": "bottom/table.csv",
         "fig2-melting.csv": "melting/table.csv",
         "fig2-claims.csv": "claims/claims.csv",
+        "fig2-controls.csv": "controls/table.csv",
+        "fig2-higher.csv": "higher/table.csv",
+        "fig2-control-claims.csv": "control-claims/claims.csv",
     },
-    "quinn-hong-eq6": {"eq6-shaken.csv": "shaken/table.csv", "eq6-claims.csv": "claims/claims.csv"},
+    "quinn-hong-eq6": {
+        "eq6-shaken.csv": "shaken/table.csv",
+        "eq6-claims.csv": "claims/claims.csv",
+        "eq6-repeated.csv": "repeated/table.csv",
+        "eq6-control-claims.csv": "control-claims/claims.csv",
+    },
     "quinn-hong-beyond": {
         "beyond-dissipation.csv": "dissipation/table.csv",
         "beyond-hot.csv": "hot/table.csv",
