@@ -43,9 +43,10 @@ def write_pages(program):
 
 
 def of_run(folder):
-    claims = json.loads((folder / "claims" / "claims.json").read_text())["claims"]
     manifest = json.loads((folder / "manifest.json").read_text())
     resolved = json.loads((folder / "resolved.json").read_text())
+    stages = [stage.get("id") or "claims" for stage in resolved["stages"] if stage["stage"] == "claims"]
+    claims = [claim for stage in stages for claim in json.loads((folder / stage / "claims.json").read_text())["claims"]]
     preset = resolved.get("$preset", "full")
     return f"preset {preset}, shakebed {manifest['shakebed']} ({manifest['git'][:12]})", \
         [{key: claim[key] for key in KEPT if key in claim} for claim in claims]
@@ -56,7 +57,7 @@ def measured_text(value, error):
         return "–"
     if not error and abs(float(value)) < 1e-10:
         return "below 1e-10"
-    if not error:
+    if not error or abs(float(error)) < 1e-12 * abs(float(value)):
         return f"{float(value):.4g}"
     return f"{float(value):.4g} ± {float(error):.2g}"
 
@@ -84,7 +85,11 @@ def main():
         figure = json.loads((HERE.parent / "pipelines/recipes" / recipe / "figure.json").read_text())
         stage = next(stage for stage in figure["stages"] if stage["stage"] == "claims")
         mains = {i for i, claim in enumerate(stage["claims"]) if claim.get("main")}
-        write(recipe, "preset full (reference-data/quinn-hong-2000/measured)", of_table(measured / f"{short}-claims.csv", mains))
+        claims = of_table(measured / f"{short}-claims.csv", mains)
+        controls = measured / f"{short}-control-claims.csv"
+        if controls.exists():
+            claims += of_table(controls, set())
+        write(recipe, "preset full (reference-data/quinn-hong-2000/measured)", claims)
 
 
 if __name__ == "__main__":
