@@ -31,17 +31,28 @@ void Console::detail(std::string_view line) {
 void Console::warning(std::string_view line) { write("warning: ", line); }
 void Console::error(std::string_view line) { write("error: ", line); }
 
-void Console::progress(std::string_view what, double fraction, std::string_view note) {
+namespace {
+// What says so early that some of it is done was begun before.
+constexpr double taken_up_again = 1;  // [s]
+}  // namespace
+
+void Console::progress(std::string_view what, double fraction, std::string_view note,
+                       std::optional<double> seconds_left) {
   if (level_ == Level::quiet) return;
   const std::lock_guard lock(mutex_);
   const auto now = Clock::now();
   if (what != progress_of_) {
     progress_of_ = what;
     progress_since_ = progress_shown_ = now;
-    shown_fraction_ = 0;
+    shown_fraction_ = first_fraction_ = 0;
     return;
   }
   fraction = std::clamp(fraction, 0.0, 1.0);
+  if (first_fraction_ <= 0 && fraction > 0 &&
+      std::chrono::duration<double>(now - progress_since_).count() < taken_up_again) {
+    progress_since_ = now;
+    first_fraction_ = fraction;
+  }
   const double since_shown = std::chrono::duration<double>(now - progress_shown_).count();
   const double elapsed = std::chrono::duration<double>(now - progress_since_).count();
   const bool show =
@@ -50,10 +61,13 @@ void Console::progress(std::string_view what, double fraction, std::string_view 
   progress_shown_ = now;
   shown_fraction_ = fraction;
   std::string left;
-  if (fraction <= 0)
+  const double done = fraction - first_fraction_;
+  if (seconds_left)
+    left = fmt::format(", {} left", duration_text(*seconds_left));
+  else if (fraction <= 0)
     left = fmt::format(", for {}", duration_text(elapsed));
-  else if (fraction > 0.02 && elapsed > 0.5)
-    left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / fraction));
+  else if (done > 0.02 && elapsed > 0.5)
+    left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / done));
   const std::string line = fraction <= 0 ? fmt::format("  {}: {}{}", what, note, left)
                                          : fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
   if (terminal_) {
@@ -70,15 +84,6 @@ void Console::end_progress() {
   if (line_open_) std::fputs("\r\033[K", stderr);
   line_open_ = false;
   progress_of_.clear();
-}
-
-std::string duration_text(double seconds) {
-  if (seconds < 0.0995) return fmt::format("{:.0f} ms", seconds * 1e3);
-  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
-  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
-  const auto whole = static_cast<long>(std::lround(seconds));
-  if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
-  return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
 }
 
 }  // namespace shakebed::pipelines

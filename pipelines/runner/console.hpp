@@ -3,8 +3,11 @@
 
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "pipelines/formats/duration.hpp"
 
 namespace shakebed::pipelines {
 
@@ -19,8 +22,11 @@ class Console {
   void detail(std::string_view line);   // only when verbose
   void warning(std::string_view line);  // always
   void error(std::string_view line);    // always
-  // One line that is overwritten on a terminal; elsewhere a plain line every 10 %, or 20 s at most.
-  void progress(std::string_view what, double fraction, std::string_view note = {});
+  // One line that is overwritten on a terminal; elsewhere a plain line every 10 %, or 20 s at most. The fraction is the
+  // share of the time that is over, from which the time left follows where it is not given. Call it with 0 at the
+  // start: work that is taken up again says soon afterwards how much is done.
+  void progress(std::string_view what, double fraction, std::string_view note = {},
+                std::optional<double> seconds_left = {});
   void end_progress();
   Level level() const { return level_; }
 
@@ -34,9 +40,7 @@ class Console {
   std::string progress_of_;
   Clock::time_point progress_since_{}, progress_shown_{};
   double shown_fraction_ = -1;
+  double first_fraction_ = 0;  // at progress_since_
 };
-
-// "3.2 s", "4 min 10 s", "120 ms".
-std::string duration_text(double seconds);
 
 }  // namespace shakebed::pipelines

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct RunOptions {
   int jobs = 0;                                  // threads; 0: as many as there are processors
   std::vector<std::string> command_line;         // for the manifest
   std::vector<Setting> settings;                 // for the manifest: what --set changed
+  // Told the share of a stage's time that is over, by its id. Called from any thread.
+  std::function<void(const std::string& id, double fraction)> on_progress{};
 };
 
 enum class StageState { ran, kept, not_selected, failed, interrupted, waiting };

@@ -12,9 +12,11 @@
 #include <cstdio>
 #include <ctime>
 #include <mutex>
+#include <numeric>
 #include <thread>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/runner/expected_time.hpp"
 #include "pipelines/runner/manifest.hpp"
 
 namespace shakebed::pipelines {
@@ -90,13 +92,14 @@ void check_inputs_stayed(const StageWork& work, const fs::path& out) {
 
 class StageRun : public RunContext {
  public:
-  StageRun(const PlannedStage& stage, std::vector<Input> inputs, fs::path directory, fs::path scratch, int jobs,
-           Console* console)
+  StageRun(const PlannedStage& stage, std::vector<Input> inputs, fs::path directory, fs::path scratch,
+           const RunOptions& options, Console* console)
       : stage_(stage),
         inputs_(std::move(inputs)),
         directory_(std::move(directory)),
         scratch_(std::move(scratch)),
-        jobs_(jobs),
+        jobs_(options.jobs > 0 ? options.jobs : processors()),
+        on_progress_(options.on_progress),
         console_(console) {}
 
   const std::vector<Input>& inputs() const override { return inputs_; }
@@ -114,11 +117,12 @@ class StageRun : public RunContext {
     return scratch_;
   }
   void progress(double fraction, std::string_view what) override {
-    if (console_ == nullptr) return;
+    if (console_ == nullptr && !on_progress_) return;
     const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
     auto last = last_progress_.load(std::memory_order_relaxed);
     if (now - last < progress_interval || !last_progress_.compare_exchange_strong(last, now)) return;
-    console_->progress(stage_.id, fraction, what);
+    if (on_progress_) on_progress_(stage_.id, fraction);
+    if (console_ != nullptr) console_->progress(stage_.id, fraction, what);
   }
   bool interrupted() const override { return interrupt_requested(); }
   void log(std::string_view line) override {
@@ -133,6 +137,9 @@ class StageRun : public RunContext {
     warnings.emplace_back(sentence);
     if (console_ != nullptr) console_->warning(fmt::format("{}: {}", stage_.id, sentence));
   }
+  void notice(std::string_view sentence) override {
+    if (console_ != nullptr) console_->warning(fmt::format("{}: {}", stage_.id, sentence));
+  }
   void timing(std::string_view name, double value) override {
     const std::lock_guard lock(mutex_);
     timings[std::string(name)] = value;
@@ -141,7 +148,8 @@ class StageRun : public RunContext {
     const std::lock_guard lock(mutex_);
     failed_checks.emplace_back(sentence);
   }
-  std::vector<Input> run_chain(const JsonNode& recipe, const fs::path& folder) override;
+  std::vector<Input> run_chain(const JsonNode& recipe, const fs::path& folder, const Progress& progress) override;
+  double trial_of_chain(const JsonNode& recipe) const override;
   const std::string& log_text() const { return log_; }
 
   std::vector<std::string> warnings, failed_checks;
@@ -152,19 +160,29 @@ class StageRun : public RunContext {
   std::vector<Input> inputs_;
   fs::path directory_, scratch_;
   int jobs_;
+  const std::function<void(const std::string&, double)>& on_progress_;
   Console* console_;
   std::mutex mutex_;
   std::string log_;
   std::atomic<std::int64_t> last_progress_{0};
 };
 
-std::vector<Input> StageRun::run_chain(const JsonNode& recipe, const fs::path& folder) {
+double StageRun::trial_of_chain(const JsonNode& recipe) const {
+  const std::vector<double> seconds = trial_seconds(make_plan(recipe, "(chain)", fs::current_path()));
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0);
+}
+
+std::vector<Input> StageRun::run_chain(const JsonNode& recipe, const fs::path& folder, const Progress& progress) {
   const Plan plan = make_plan(recipe, "(chain)", fs::current_path());
   RunOptions options;
   options.out = folder;
   options.jobs = 1;
   fs::create_directories(folder);
   remove_leftovers(folder);
+  if (progress)
+    options.on_progress = [&](const std::string& id, double fraction) {
+      progress(fraction_of_plan(plan, {}, plan.index_of(id), fraction));
+    };
   RunOutcome outcome;
   outcome.out = folder;
   run_stages(plan, options, nullptr, outcome);
@@ -220,7 +238,7 @@ FinishedWork run_stage(StageWork work, const RunOptions& options, Console* conso
   StageCost& cost = finished.cost;
   cost.threads = options.jobs > 0 ? options.jobs : processors();
   cost.host = host_name();
-  StageRun context(stage, std::move(work.inputs), working.path(), scratch, cost.threads, console);
+  StageRun context(stage, std::move(work.inputs), working.path(), scratch, options, console);
   stage.stage->run(context);
   context.check_interrupted();
   check_inputs_stayed(work, options.out);

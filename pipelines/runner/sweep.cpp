@@ -16,6 +16,7 @@
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/pages.hpp"
 #include "pipelines/runner/shared_stages.hpp"
+#include "pipelines/runner/sweep_progress.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 #include "pipelines/runner/sweep_table.hpp"
 #include "statistics/parallel.hpp"
@@ -26,8 +27,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t most_failures = 20;      // that are listed one by one
-constexpr std::size_t most_point_pages = 200;  // a page is 0.1 to 3 MB; points of larger sweeps have none
+constexpr std::size_t most_failures = 20;           // that are listed one by one
+constexpr std::size_t most_learned = 50;            // points done before that say what stages take
+constexpr std::int64_t show_interval = 90'000'000;  // [ns]
+constexpr std::size_t most_point_pages = 200;       // a page is 0.1 to 3 MB; points of larger sweeps have none
 
 struct Shard {
   std::uint64_t number = 1, of = 1;  // 1 to of
@@ -94,6 +97,7 @@ class SweepRun {
     PointKeys keys;
     std::optional<int> earlier;  // how it ended before
     bool done = false;
+    std::size_t to_run = 0;  // its place among those that are run
   };
 
   // Every point's recipe is read before any runs: a mistake in the last one is found now, not tomorrow.
@@ -101,7 +105,7 @@ class SweepRun {
     for (const SweepPoint& point : all_) {
       PointKeys keys = keys_of(plan_at(plan_, point));
       shared_.count(keys);
-      if (point.index % shard_.of == shard_.number - 1) mine_.push_back({&point, std::move(keys), {}, false});
+      if (point.index % shard_.of == shard_.number - 1) mine_.push_back({&point, std::move(keys), {}, false, 0});
     }
     for (Mine& one : mine_) {
       one.earlier = code_of_point(points_dir_ / one.point->name, one.keys.point);
@@ -143,8 +147,28 @@ class SweepRun {
         fmt::format("{} points, {} up to date, {} to run on {} threads", mine_.size(), kept_, to_run_, workers));
     const std::size_t threads =
         std::min<std::size_t>(static_cast<std::size_t>(workers), std::max<std::size_t>(1, to_run_));
+    if (to_run_ > 0) foresee(static_cast<int>(threads));
     for_each_index(threads, workers, [this](std::size_t) { work(); });
     console_.end_progress();
+  }
+
+  // What the points will take, and which of them far more than the others.
+  void foresee(int threads) {
+    std::vector<PointToRun> points;
+    std::size_t learned = 0;
+    for (Mine& one : mine_) {
+      if (one.done) continue;
+      one.to_run = points.size();
+      points.push_back({one.point, &one.keys});
+    }
+    progress_.emplace(plan_, std::move(points), threads);
+    for (const Mine& one : mine_) {
+      if (one.done && learned++ < most_learned) progress_->learn(points_dir_ / one.point->name);
+    }
+    console_.progress("points", 0);
+    progress_->trials([] { return interrupt_requested(); });
+    for (const std::string& sentence : progress_->long_points()) console_.warning(sentence);
+    show_progress();
   }
 
   void work() {
@@ -153,18 +177,20 @@ class SweepRun {
       if (i >= mine_.size()) return;
       if (mine_[i].done) continue;
       RunOutcome outcome;
+      progress_->begin(mine_[i].to_run);
       try {
         const PointEnd end = run_point(mine_[i], outcome);
         if (end == PointEnd::interrupted) return;
         if (end == PointEnd::busy) {
           ++busy_;
+          progress_->drop(mine_[i].to_run);
           continue;
         }
       } catch (const std::exception& error) {
         outcome.code = exit_stage_failed;
         outcome.error = error.what();
       }
-      count(*mine_[i].point, outcome);
+      count(mine_[i], outcome);
     }
   }
 
@@ -175,6 +201,10 @@ class SweepRun {
     RunOptions alone = options_;
     alone.out = outcome.out = points_dir_ / one.point->name;
     alone.jobs = 1;
+    alone.on_progress = [this, &one](const std::string& stage, double fraction) {
+      progress_->reached(one.to_run, stage, fraction);
+      show_progress();
+    };
     fs::create_directories(alone.out);
     std::optional<FolderLock> lock;
     try {
@@ -217,18 +247,32 @@ class SweepRun {
     }
   }
 
-  void count(const SweepPoint& point, const RunOutcome& outcome) {
+  void count(const Mine& one, const RunOutcome& outcome) {
     ++finished_;
+    if (is_done(outcome.code))
+      progress_->end(one.to_run, points_dir_ / one.point->name);
+    else
+      progress_->drop(one.to_run);
     if (outcome.code == exit_check_failed) ++checks_;
     if (!is_done(outcome.code)) {
       ++failed_;
       const std::lock_guard lock(failures_mutex_);
-      if (failures_.size() < most_failures) failures_.push_back(fmt::format("point {}: {}", point.name, outcome.error));
+      if (failures_.size() < most_failures)
+        failures_.push_back(fmt::format("point {}: {}", one.point->name, outcome.error));
     }
-    console_.progress("points", static_cast<double>(finished_) / static_cast<double>(to_run_),
+    show_progress();
+  }
+
+  // As often as eyes see: the time left of many points takes a while to compute.
+  void show_progress() {
+    const auto now = Clock::now().time_since_epoch().count();
+    auto last = last_shown_.load(std::memory_order_relaxed);
+    if (now - last < show_interval || !last_shown_.compare_exchange_strong(last, now)) return;
+    console_.progress("points", progress_->fraction(),
                       fmt::format("({}/{}, {:.3g}/s{})", finished_.load(), to_run_,
                                   static_cast<double>(finished_) / std::max(seconds_since(start_), 1e-3),
-                                  failed_ > 0 ? fmt::format(", {} failed", failed_.load()) : ""));
+                                  failed_ > 0 ? fmt::format(", {} failed", failed_.load()) : ""),
+                      progress_->seconds_left());
   }
 
   // Every point of the whole sweep that is there, whoever ran it.
@@ -360,6 +404,8 @@ class SweepRun {
   SharedStages shared_;
   std::vector<Mine> mine_;
   std::size_t kept_ = 0, to_run_ = 0;
+  std::optional<SweepProgress> progress_;
+  std::atomic<std::int64_t> last_shown_{0};
   Clock::time_point start_;
   std::atomic<std::size_t> next_{0}, finished_{0}, failed_{0}, checks_{0}, busy_{0};
   std::mutex failures_mutex_;

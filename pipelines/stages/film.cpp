@@ -63,7 +63,8 @@ Json marks_json(const DisksOnTheWay::Marks* marks) {
 }  // namespace
 
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
-                const DisksOnTheWay& on_the_way, std::optional<double> rate) {
+                const DisksOnTheWay& on_the_way, std::optional<double> rate,
+                const std::function<void(double)>& progress) {
   ingest::FrameSourceOptions shown = film.source;
   const double recorded_width = static_cast<double>(found.finder.width) * film.source.reduction;
   shown.reduction = film.reduction_shown(std::floor(recorded_width / (least_reduced * picture_width)));
@@ -77,6 +78,7 @@ void write_film(RunContext& context, const FilmFiles& film, const ingest::Measur
     const std::size_t number = good++;
     if (!thinned.wants(number)) continue;
     context.check_interrupted();
+    progress(static_cast<double>(item->index) / static_cast<double>(found.frames.size()));
     const ingest::GrayFrame frame = item->decode();
     width = frame.width * shown.reduction, height = frame.height * shown.reduction;
     thinned.add(number, {item->index, report.disks, ingest::small_webp(frame, picture_width, picture_quality)});

@@ -2,6 +2,7 @@
 // the viewer of the page. Which disks were found is in disks.csv.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "ingest/profile/measure_bed.hpp"
@@ -23,6 +24,7 @@ namespace shakebed::pipelines {
 // All frames are in it as long as pictures and disks stay within film_bytes. Else it holds every second or fourth
 // frame.
 void write_film(RunContext& context, const FilmFiles& film, const ingest::Measurement& found,
-                const DisksOnTheWay& on_the_way, std::optional<double> rate);
+                const DisksOnTheWay& on_the_way, std::optional<double> rate,
+                const std::function<void(double)>& progress);  // the share of the frames that is drawn
 
 }  // namespace shakebed::pipelines

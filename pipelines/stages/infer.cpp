@@ -4,14 +4,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <random>
+#include <string_view>
+#include <utility>
 
 #include "pipelines/formats/embedded.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "statistics/parallel.hpp"
+#include "statistics/time_left.hpp"
 
 namespace shakebed::pipelines {
 
@@ -25,6 +27,17 @@ constexpr std::size_t most_corners = 64;
 constexpr double distance_of_best = 0.3;
 // Streams of seeds: beds of the design count from 1.
 constexpr std::uint64_t best_stream = 1'000'000, calibration_stream = 2'000'000;
+
+// All beds that the stage will run, in their order. What is computed between the rounds is quick beside them.
+struct BedsAhead {
+  TimeLeft time;
+  std::size_t next = 0;  // the first that has not been begun
+};
+struct BedToRun {
+  TimeLeft& time;
+  std::size_t number;  // among all
+  std::string_view what;
+};
 
 class Infer : public Stage {
  public:
@@ -42,12 +55,13 @@ class Infer : public Stage {
   std::vector<ScaledTarget> scaled_targets(const RunContext& context) const;
   std::vector<RunBed> stored_beds() const;
   std::vector<double> numbers_of_run(RunContext& context, const std::string& name, const std::vector<double>& values,
-                                     std::uint64_t stream, double measure) const;
+                                     std::uint64_t stream, double measure, const BedToRun& bed) const;
   std::vector<RunBed> run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
-                               const std::vector<std::vector<double>>& values) const;
-  std::vector<RunBed> design(RunContext& context, const std::vector<ScaledTarget>& targets) const;
-  std::vector<BestBed> best_beds(RunContext& context, const Inference& found) const;
-  std::vector<CalibrationRow> calibrate(RunContext& context, const Inference& found) const;
+                               const std::vector<std::vector<double>>& values, BedsAhead& ahead) const;
+  std::vector<RunBed> design(RunContext& context, const std::vector<ScaledTarget>& targets, BedsAhead& ahead) const;
+  std::vector<BestBed> best_beds(RunContext& context, const Inference& found, BedsAhead& ahead) const;
+  std::vector<CalibrationRow> calibrate(RunContext& context, const Inference& found, BedsAhead& ahead) const;
+  std::vector<double> bed_times() const;
   SceneOptions scene_at(const std::vector<double>& values) const;
 
   InferOptions options_;
@@ -300,27 +314,36 @@ std::vector<RunBed> Infer::stored_beds() const {
 
 // Of one bed; of one that was run before the stage was interrupted, as it was kept.
 std::vector<double> Infer::numbers_of_run(RunContext& context, const std::string& name,
-                                          const std::vector<double>& values, std::uint64_t stream,
-                                          double measure) const {
+                                          const std::vector<double>& values, std::uint64_t stream, double measure,
+                                          const BedToRun& bed) const {
   const std::filesystem::path file = context.scratch() / name;
-  if (std::filesystem::exists(file)) return numbers_in(read_json(file));
+  if (std::filesystem::exists(file)) {
+    bed.time.drop(bed.number);
+    return numbers_in(read_json(file));
+  }
+  bed.time.begin(bed.number);
+  const auto progress = [&](double fraction) {
+    bed.time.reached(bed.number, fraction);
+    context.progress(bed.time.fraction(), bed.what);
+  };
   const std::vector<double> numbers =
-      options_.bed.run(scene_at(values), replica_seed(context.seed(), stream), measure, context);
+      options_.bed.run(scene_at(values), replica_seed(context.seed(), stream), measure, context, progress);
   write_file_atomically(file, dump(Json(numbers)));
+  bed.time.end(bed.number);
   return numbers;
 }
 
 std::vector<RunBed> Infer::run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
-                                    const std::vector<std::vector<double>>& values) const {
+                                    const std::vector<std::vector<double>>& values, BedsAhead& ahead) const {
   std::vector<RunBed> beds(values.size());
-  std::atomic<std::size_t> done = 0;
+  const std::size_t first = std::exchange(ahead.next, ahead.next + values.size());
+  const std::string what = fmt::format("round {}, {} beds", round, values.size());
   for_each_index(values.size(), context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     const std::size_t number = first_number + i;
     beds[i] = {round, values[i],
-               numbers_of_run(context, fmt::format("bed-{}.json", number), values[i], number, options_.bed.measure)};
-    context.progress(static_cast<double>(++done) / static_cast<double>(values.size()),
-                     fmt::format("round {}, {} beds", round, values.size()));
+               numbers_of_run(context, fmt::format("bed-{}.json", number), values[i], number, options_.bed.measure,
+                              {ahead.time, first + i, what})};
   });
   return beds;
 }
@@ -351,14 +374,15 @@ fit::Posterior sampled(const RunContext& context, const InferOptions& options, c
 }
 
 // The beds of all rounds.
-std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledTarget>& targets) const {
+std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledTarget>& targets,
+                                  BedsAhead& ahead) const {
   if (!options_.stored.empty()) return stored_beds();
   const std::size_t d = options_.dimensions();
   const std::vector<double> places = fit::even_points(d, options_.first, context.seed());
   std::vector<std::vector<double>> values;
   for (std::size_t i = 0; i < options_.first; ++i)
     values.push_back(values_at(options_, std::span<const double>(places).subspan(i * d, d)));
-  std::vector<RunBed> beds = run_beds(context, 0, 1, values);
+  std::vector<RunBed> beds = run_beds(context, 0, 1, values, ahead);
   for (std::uint32_t round = 1; round <= options_.rounds; ++round) {
     const BedSurrogate surrogate(options_, beds, targets, context.jobs());
     const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
@@ -369,14 +393,14 @@ std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledT
     values.clear();
     for (const std::size_t i : fit::spread_out(d, points, options_.each, 0))
       values.push_back(values_at(options_, std::span<const double>(points).subspan(i * d, d)));
-    const std::vector<RunBed> further = run_beds(context, round, 1 + beds.size(), values);
+    const std::vector<RunBed> further = run_beds(context, round, 1 + beds.size(), values, ahead);
     beds.insert(beds.end(), further.begin(), further.end());
   }
   return beds;
 }
 
 // Those of greatest likelihood, apart from one another, run several times each.
-std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& found) const {
+std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& found, BedsAhead& ahead) const {
   const std::size_t views = options_.bed.views.size(), d = options_.dimensions();
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t i = 0; i < found.posterior.size(); ++i) {
@@ -402,21 +426,23 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
                     {}});
     beds.back().runs.resize(options_.replicas);
   }
-  std::atomic<std::size_t> done = 0;
-  const std::size_t all = beds.size() * options_.replicas;
+  const std::size_t all = beds.size() * options_.replicas, first = ahead.next;
+  const std::string what = fmt::format("{} of the best beds", all);
+  ahead.next += options_.best * options_.replicas;  // there may be fewer
+  for (std::size_t i = first + all; i < ahead.next; ++i) ahead.time.drop(i);
   for_each_index(all, context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     BestBed& bed = beds[i / options_.replicas];
     std::vector<double>& run = bed.runs[i % options_.replicas];
     run = numbers_of_run(context, fmt::format("best-{}.json", i), bed.values, best_stream + i,
-                         options_.best_measure > 0 ? options_.best_measure : options_.bed.measure);
-    context.progress(static_cast<double>(++done) / static_cast<double>(all), fmt::format("{} of the best beds", all));
+                         options_.best_measure > 0 ? options_.best_measure : options_.bed.measure,
+                         {ahead.time, first + i, what});
   });
   return beds;
 }
 
 // Beds with known parameters, each inferred from the beds of the first round.
-std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inference& found) const {
+std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inference& found, BedsAhead& ahead) const {
   std::vector<CalibrationRow> rows;
   if (options_.calibration == 0) return rows;
   std::vector<RunBed> first;
@@ -432,7 +458,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     for (double& one : place) one = uniform();
     values.push_back(values_at(options_, place));
   }
-  const std::vector<RunBed> beds = run_beds(context, 0, calibration_stream, values);
+  const std::vector<RunBed> beds = run_beds(context, 0, calibration_stream, values, ahead);
   std::size_t incomplete = 0;
   for (std::size_t i = 0; i < beds.size(); ++i) {
     double chance = uniform();
@@ -466,8 +492,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
       row.high_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.975);
       rows.push_back(row);
     }
-    context.progress(static_cast<double>(i + 1) / static_cast<double>(beds.size()),
-                     "inferring the beds of the calibration");
+    context.progress(ahead.time.fraction(), "inferring the beds of the calibration");
   }
   if (rows.empty()) throw StageError("no bed of the calibration gave all target numbers");
   if (incomplete > 0)
@@ -508,11 +533,26 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
   return sentences;
 }
 
+// Of all beds in their order, relative to one another: they are expected to take as their times do.
+std::vector<double> Infer::bed_times() const {
+  const BedOfInference& bed = options_.bed;
+  const double best_measure = options_.best_measure > 0 ? options_.best_measure : bed.measure;
+  const std::size_t design =
+      options_.stored.empty() ? options_.first + std::size_t{options_.rounds} * options_.each : 0;
+  std::vector<double> times(design, bed.settle + bed.measure);
+  times.insert(times.end(), std::size_t{options_.best} * options_.replicas, bed.settle + best_measure);
+  times.insert(times.end(), options_.calibration, bed.settle + bed.measure);
+  return times;
+}
+
 void Infer::run(RunContext& context) const {
   Inference found;
+  const std::vector<double> times = bed_times();
+  BedsAhead ahead{TimeLeft(times.size(), context.jobs())};
+  for (std::size_t i = 0; i < times.size(); ++i) ahead.time.expect(i, times[i]);
   found.targets = scaled_targets(context);
-  found.beds = design(context, found.targets);
-  context.progress(0, "surrogate and posterior");
+  found.beds = design(context, found.targets, ahead);
+  context.progress(ahead.time.fraction(), "surrogate and posterior");
   const BedSurrogate surrogate(options_, found.beds, found.targets, context.jobs());
   for (const std::string& sentence : missing_numbers(options_, found, surrogate)) context.warning(sentence);
   found.posterior = sampled(context, options_, surrogate, found.targets);
@@ -540,8 +580,8 @@ void Infer::run(RunContext& context) const {
     for (; view + 1 < views && chance > share[i][view]; ++view) chance -= share[i][view];
     found.draw_views.push_back(view);
   }
-  found.best = best_beds(context, found);
-  found.calibration = calibrate(context, found);
+  found.best = best_beds(context, found, ahead);
+  found.calibration = calibrate(context, found, ahead);
   Json stored{{"made_from", Json::parse(made_from())}, {"beds", Json::array()}};
   for (const RunBed& bed : found.beds)
     stored["beds"].push_back(Json{{"round", bed.round}, {"values", bed.values}, {"numbers", bed.numbers}});

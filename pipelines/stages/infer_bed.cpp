@@ -210,7 +210,7 @@ std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& sc
 }  // namespace
 
 std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t seed, double duration,
-                                        const RunContext& context) const {
+                                        const RunContext& context, const std::function<void(double)>& progress) const {
   const sim::Scene scene_at = bed.scene(seed);
   sim::MeasurementSchedule times;
   times.period = bed.period();
@@ -242,6 +242,7 @@ std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t s
                                 2 * static_cast<double>(times.looks()) + 1000;
   double questions = 0;
   control.events_between_questions = events_between_questions;
+  control.progress = [&](double fraction, sim::RunPart) { progress(fraction); };
   control.stop = [&] { return context.interrupted() || ++questions > most_questions; };
   if (!sim::measure(scene_at, times, observers, control).finished) {
     context.check_interrupted();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -74,9 +75,9 @@ struct BedOfInference {
   SceneOptions at(const Parameters& parameters, const std::vector<double>& values,
                   std::vector<Problem>& problems) const;
   // The numbers of observables(), view by view; not a number where a fit does not succeed, or where the bed chatters
-  // and is given up. Throws Interrupted.
-  std::vector<double> run(const SceneOptions& bed, std::uint64_t seed, double duration,
-                          const RunContext& context) const;
+  // and is given up. `progress` is told the share of the run that is over. Throws Interrupted.
+  std::vector<double> run(const SceneOptions& bed, std::uint64_t seed, double duration, const RunContext& context,
+                          const std::function<void(double)>& progress) const;
 };
 
 }  // namespace shakebed::pipelines

@@ -26,6 +26,7 @@
 #include "sim/engine/random.hpp"
 #include "sim/measure/contact_duration.hpp"
 #include "sim/measure/measure.hpp"
+#include "statistics/time_left.hpp"
 
 namespace shakebed::pipelines {
 
@@ -54,6 +55,9 @@ class Simulate : public Stage {
   Json facts() const override { return bed_.facts(); }
   bool keeps_frames() const override { return measure_.keeps_frames(); }
   void run(RunContext& context) const override;
+  double trial_seconds() const override {
+    return replicas() * pipelines::trial_seconds(bed_.scene(1), looks().schedule);
+  }
   std::optional<BedDescription> bed() const override;
 
  private:
@@ -248,9 +252,15 @@ std::optional<BedDescription> Simulate::bed() const {
 
 void Simulate::run(RunContext& context) const {
   std::vector<std::unique_ptr<BedRun>> runs(replicas());
+  TimeLeft time(replicas(), context.jobs());
   sim::each_replica(replicas(), context.jobs(), [&](std::uint32_t replica) {
-    auto run = std::make_unique<BedRun>(run_plan(context, replica), context);
+    time.begin(replica);
+    auto run = std::make_unique<BedRun>(run_plan(context, replica), context, [&](double fraction, sim::RunPart part) {
+      time.reached(replica, fraction);
+      context.progress(time.fraction(), name_of(part));
+    });
     (*run)();
+    time.end(replica);
     runs[replica] = std::move(run);
     return true;
   });

@@ -32,11 +32,24 @@ double thread_cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+// Of a trial: the share of the run, and the processor time [s].
+constexpr double trial_share = 0.02, longest_trial = 0.1;
+constexpr std::uint64_t events_of_trial = 10'000;  // between two looks at the clock
+
+}  // namespace
+
 const char* name_of(sim::RunPart part) {
   return part == sim::RunPart::annealing ? "annealing" : part == sim::RunPart::settling ? "settling" : "measuring";
 }
 
-}  // namespace
+double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule) {
+  const double start = thread_cpu_seconds();
+  const std::unique_ptr<sim::Simulation> simulation = sim::simulate(scene);
+  const double made = thread_cpu_seconds(), until = trial_share * schedule.end();
+  while (!simulation->advance_towards(until, events_of_trial) && thread_cpu_seconds() - made < longest_trial) {}
+  const double reached = std::max(simulation->time(), 1e-6 * until);
+  return made - start + (thread_cpu_seconds() - made) * schedule.end() / reached;
+}
 
 // ------------------------------------------------------------------------------------------------ observers
 
@@ -82,9 +95,10 @@ void CpuClock::save(sim::ArchiveWriter& out) {
 
 // ------------------------------------------------------------------------------------------------ the run
 
-BedRun::BedRun(RunPlan plan, RunContext& context)
+BedRun::BedRun(RunPlan plan, RunContext& context, Progress progress)
     : plan_(std::move(plan)),
       context_(context),
+      progress_(std::move(progress)),
       checkpoint_(plan_.folder / "checkpoint"),
       annealing_(plan_.annealing, plan_.bath_temperature),
       measurement_(plan_) {
@@ -124,8 +138,7 @@ sim::RunResult BedRun::measured(const std::vector<std::uint8_t>& kept) {
 sim::RunControl BedRun::control() {
   sim::RunControl control;
   control.stop = [this] { return context_.interrupted(); };
-  if (plan_.lead)
-    control.progress = [this](double fraction, sim::RunPart part) { context_.progress(fraction, name_of(part)); };
+  control.progress = progress_;
   control.gone_on = [this](const sim::Simulation& simulation) {
     context_.log(fmt::format("goes on at {:.6g} of {:.6g} time units", simulation.time(), plan_.schedule.end()));
   };

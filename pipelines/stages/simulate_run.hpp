@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,8 +34,11 @@ struct RunPlan {
   FramePlan frames;
   double checkpoint_seconds = 0;
   std::filesystem::path folder;  // for checkpoints and the growing trajectory
-  bool lead = true;              // the run whose trajectory is kept and whose progress is shown
+  bool lead = true;              // the run whose trajectory is kept
 };
+
+// About how many seconds of a processor the run takes, by its first fiftieth or 0.1 s of it.
+double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule);
 
 // BedMeasurement and the trajectory as observers of a run.
 class RunMeasurement final : public sim::RunObserver {
@@ -80,7 +84,8 @@ class CpuClock final : public sim::RunObserver {
 
 class BedRun {
  public:
-  BedRun(RunPlan plan, RunContext& context);
+  using Progress = std::function<void(double, sim::RunPart)>;  // the share of the run that is over
+  BedRun(RunPlan plan, RunContext& context, Progress progress = {});
 
   // Runs the bed to its end, from its checkpoint where there is one. Throws StageError, Interrupted.
   void operator()();
@@ -104,6 +109,7 @@ class BedRun {
 
   RunPlan plan_;
   RunContext& context_;
+  Progress progress_;
   std::filesystem::path checkpoint_;
   Annealing annealing_;
   RunMeasurement measurement_;
@@ -116,6 +122,9 @@ class BedRun {
   double keep_at_ = 0;  // of the run's time
   Clock::time_point last_saved_, kept_at_, keep_after_;
 };
+
+// "annealing", "settling", "measuring".
+const char* name_of(sim::RunPart part);
 
 // Writes the state from which a killed run continues, behind its hash.
 void write_checkpoint(const std::filesystem::path& path, const std::vector<std::uint8_t>& state);

@@ -118,21 +118,28 @@ class RunContext {
   virtual const std::filesystem::path& scratch() = 0;
 
   // --- on the way. May be called from any thread.
-  virtual void progress(double fraction, std::string_view what = {}) = 0;  // cheap: call as often as you like
-  virtual bool interrupted() const = 0;                                    // cheap: an atomic flag
+  // The share of the run's time that is over: the time left is stated by it (statistics/time_left.hpp makes it of work
+  // in parts). Cheap: call as often as you like.
+  virtual void progress(double fraction, std::string_view what = {}) = 0;
+  virtual bool interrupted() const = 0;  // cheap: an atomic flag
   void check_interrupted() const {
     if (interrupted()) throw Interrupted();
   }
-  virtual void log(std::string_view line) = 0;          // into OUT/<id>/log.txt, and to stderr with --verbose
-  virtual void warning(std::string_view sentence) = 0;  // shown at once, kept in the manifest and first in the report
+  virtual void log(std::string_view line) = 0;           // into OUT/<id>/log.txt, and to stderr with --verbose
+  virtual void warning(std::string_view sentence) = 0;   // shown at once, kept in the manifest and first in the report
+  virtual void notice(std::string_view /*sentence*/) {}  // shown at once as a warning, kept nowhere: of times, say
   virtual void timing(std::string_view name, double value) = 0;  // a measured speed or time: into cost.json only
   virtual void check_failed(std::string_view sentence) = 0;      // the stage is done, but the run ends with exit 6
 
   // --- stages inside of a stage. May be called from several threads, with a folder each.
   // Runs a recipe in a folder, on one thread; what is up to date there is kept. Its stages, finished, in the order of
-  // the work. Throws ConfigError, StageError with the words of the stage that failed, Interrupted. A failed check is no
-  // failure.
-  virtual std::vector<Input> run_chain(const JsonNode& recipe, const std::filesystem::path& folder) = 0;
+  // the work. `progress`, if any, is told the share of the chain's time that is over. Throws ConfigError, StageError
+  // with the words of the stage that failed, Interrupted. A failed check is no failure.
+  using Progress = std::function<void(double)>;
+  virtual std::vector<Input> run_chain(const JsonNode& recipe, const std::filesystem::path& folder,
+                                       const Progress& progress) = 0;
+  // About how many seconds of a processor the chain takes: Stage::trial_seconds() of its stages. Throws ConfigError.
+  virtual double trial_of_chain(const JsonNode& /*recipe*/) const { return 0; }
 };
 
 // A chain of stages inside of a stage, as far as the stage that holds it must know it.
@@ -165,6 +172,9 @@ class Stage {
   // Whether the stage keeps frames of its bed. Called after describe.
   virtual bool keeps_frames() const { return true; }
   virtual void run(RunContext& context) const = 0;
+  // About how many seconds of a processor run() takes, by a trial of a fiftieth of its work at most; 0: little, or
+  // unknown. The trial leaves no trace: it is for the time left alone. May throw what run() throws.
+  virtual double trial_seconds() const { return 0; }
   // The bed that the stage makes or measures, from its options; empty if it only reads one. Later stages need not
   // state it again, and must not contradict it.
   virtual std::optional<BedDescription> bed() const { return std::nullopt; }

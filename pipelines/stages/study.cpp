@@ -1,17 +1,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <map>
 
 #include "pipelines/formats/csv.hpp"
+#include "pipelines/formats/duration.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/stage.hpp"
 #include "pipelines/stages/study.hpp"
+#include "pipelines/stages/study_numbers.hpp"
 #include "statistics/parallel.hpp"
+#include "statistics/time_left.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -44,47 +46,10 @@ struct Collected {
   std::optional<double> least, most;  // of `by`
   double times = 1, plus = 0;
 };
-// A number of one run: missing where the chain does not give it.
-struct Number {
-  double value = NAN, std_error = NAN;
-};
 // A CSV of the chain, averaged over the replicas row by row.
 struct Tabulated {
   std::string at;   // "/bed/velocities.csv"
   std::string key;  // the column that says which rows are the same
-};
-// Of one run: key → cell by cell of its row.
-struct Rows {
-  std::vector<std::string> header;
-  std::vector<std::vector<std::string>> rows;
-};
-Rows read_rows(const fs::path& path) {
-  Rows out;
-  each_csv_line(read_file(path), [&](std::vector<std::string> cells, std::size_t) {
-    if (out.header.empty())
-      out.header = std::move(cells);
-    else
-      out.rows.push_back(std::move(cells));
-  });
-  return out;
-}
-// Mean and its standard error from the spread; of one value, its own error.
-struct Mean {
-  double n = 0, mean = NAN, error = NAN;
-  explicit Mean(const std::vector<Number>& numbers) {
-    double sum = 0, squares = 0;
-    for (const Number& number : numbers) {
-      if (!std::isfinite(number.value)) continue;
-      n += 1, sum += number.value, error = number.std_error;
-    }
-    if (n == 0) return;
-    mean = sum / n;
-    if (n == 1) return;
-    for (const Number& number : numbers) {
-      if (std::isfinite(number.value)) squares += std::pow(number.value - mean, 2);
-    }
-    error = std::sqrt(squares / (n - 1) / n);
-  }
 };
 
 class Study : public Stage {
@@ -103,18 +68,20 @@ class Study : public Stage {
   std::vector<Point> points() const;
   JsonNode recipe_at(const Point& point, std::uint64_t seed) const;
   void check_chain(Fields& fields, const Chain& chain) const;
-  std::vector<Number> numbers(const std::vector<Input>& chain) const;
-  Json run_once(RunContext& context, const Point& point, const fs::path& folder) const;
+  std::vector<RunNumber> numbers(const std::vector<Input>& chain) const;
+  Json run_once(RunContext& context, const Point& point, const fs::path& folder,
+                const RunContext::Progress& progress) const;
+  std::vector<double> trials(RunContext& context, const std::vector<Point>& all, const std::vector<bool>& done) const;
   void write_described(RunContext& context, const std::string& file, const std::string& csv) const;
   void write_tables(RunContext& context, const std::vector<Point>& all, const std::vector<Json>& kept) const;
   std::vector<Json> run_all(RunContext& context, const std::vector<Point>& all) const;
-  std::string replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const;
+  std::string replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<RunNumber>>& found) const;
   struct Averages {
     std::string csv;
     Json series = Json::object();
     std::size_t missing = 0;
   };
-  Averages average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const;
+  Averages average(const std::vector<Point>& all, const std::vector<std::vector<RunNumber>>& found) const;
   std::vector<Kind> kinds() const;
   std::vector<StatedColumn> place_columns() const;
   std::string place_header() const;
@@ -146,8 +113,8 @@ const StatedTable* table_at(const Chain& chain, const std::string& at) {
 }
 
 // Of one run: no number where no row of the table lies within the places asked for.
-Number taken(const Collected& c, const fs::path& path) {
-  const Rows rows = read_rows(path);
+RunNumber taken(const Collected& c, const fs::path& path) {
+  const RunRows rows = read_run_rows(path);
   const std::size_t y = csv_column(rows.header, c.column, path.string()),
                     x = csv_column(rows.header, c.by, path.string());
   const bool largest = c.take == Take::largest || c.take == Take::place_of_largest;
@@ -158,7 +125,7 @@ Number taken(const Collected& c, const fs::path& path) {
     sum += *value, used += 1;
     if (std::isnan(best) || (largest ? *value > best : *value < best)) best = *value, place = *at;
   }
-  Number number;
+  RunNumber number;
   const double one = takes_place(c.take) ? place : c.take == Take::mean && used > 0 ? sum / used : best;
   number.value = c.plus + c.times * one;
   return number;
@@ -448,9 +415,9 @@ JsonNode Study::recipe_at(const Point& point, std::uint64_t seed) const {
   return document;
 }
 
-std::vector<Number> Study::numbers(const std::vector<Input>& chain) const {
+std::vector<RunNumber> Study::numbers(const std::vector<Input>& chain) const {
   std::map<std::string, Json> results;
-  std::vector<Number> out;
+  std::vector<RunNumber> out;
   for (const auto& [name, collected] : collect_) {
     const std::vector<std::string> tokens = split_pointer(collected.at);
     const std::string& id = tokens.front();
@@ -462,7 +429,7 @@ std::vector<Number> Study::numbers(const std::vector<Input>& chain) const {
     if (!results.contains(id))
       results[id] = std::find_if(chain.begin(), chain.end(), [&](const Input& i) { return i.id == id; })->result();
     const Json& result = results[id];
-    Number number;
+    RunNumber number;
     // What says of itself that it did not succeed has no numbers.
     const bool good = !result.contains("status") || result["status"] == "ok";
     const Json* found =
@@ -490,9 +457,9 @@ std::string quoted(const std::string& name) {
   return out + "\"";
 }
 // The numbers of a run, as run_once() wrote them.
-std::vector<Number> kept_numbers(const Json& run) {
+std::vector<RunNumber> kept_numbers(const Json& run) {
   const auto number = [](const Json& j) { return j.is_number() ? j.get<double>() : NAN; };
-  std::vector<Number> out;
+  std::vector<RunNumber> out;
   for (const Json& pair : run["numbers"]) out.push_back({number(pair[0]), number(pair[1])});
   return out;
 }
@@ -508,19 +475,20 @@ std::string Study::place_cells(const Point& point) const {
 }
 
 // Runs the chain at one point: {"numbers": [[value, error], ...], "tables": [{"header", "rows"}, ...]}.
-Json Study::run_once(RunContext& context, const Point& point, const fs::path& folder) const {
+Json Study::run_once(RunContext& context, const Point& point, const fs::path& folder,
+                     const RunContext::Progress& progress) const {
   std::vector<Input> chain;
   try {
-    chain = context.run_chain(recipe_at(point, context.seed()), folder);
+    chain = context.run_chain(recipe_at(point, context.seed()), folder, progress);
   } catch (const StageError& error) {
     throw StageError(fmt::format("{}, {} = {}, replica {}: {}", kinds_[point.series].name, parameter_.name,
                                  parameter_.values[point.value], point.replica, error.what()));
   }
   Json found{{"numbers", Json::array()}, {"tables", Json::array()}};
-  for (const Number& n : numbers(chain)) found["numbers"].push_back(Json::array({n.value, n.std_error}));
+  for (const RunNumber& n : numbers(chain)) found["numbers"].push_back(Json::array({n.value, n.std_error}));
   for (const auto& [name, table] : tables_) {
     const auto tokens = split_pointer(table.at);
-    const Rows rows = read_rows(folder / tokens[0] / tokens[1]);
+    const RunRows rows = read_run_rows(folder / tokens[0] / tokens[1]);
     if (std::find(rows.header.begin(), rows.header.end(), table.key) == rows.header.end())
       throw InputError(fmt::format("tables/{}: {} has no column \"{}\"", name, table.at, table.key));
     found["tables"].push_back(Json{{"header", rows.header}, {"rows", rows.rows}});
@@ -543,7 +511,7 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
     std::string text;
     std::vector<std::string> header;
     for (std::size_t i = 0; i < all.size(); i += replicas_) {
-      std::map<double, std::vector<std::vector<Number>>> columns;  // key → column → runs
+      std::map<double, std::vector<std::vector<RunNumber>>> columns;  // key → column → runs
       for (std::size_t r = i; r < i + replicas_; ++r) {
         const Json& one = kept[r]["tables"][k];
         if (header.empty()) {
@@ -570,7 +538,7 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
         text += place_cells(all[i]) + "," + cell(key);
         for (std::size_t c = 0; c < header.size(); ++c) {
           if (header[c] == table.key) continue;
-          const Mean mean(values[c]);
+          const MeanOfRuns mean(values[c]);
           text += "," + cell(mean.mean) + "," + cell(mean.error);
         }
         text += fmt::format(",{}\n", values.front().size());
@@ -580,39 +548,79 @@ void Study::write_tables(RunContext& context, const std::vector<Point>& all, con
   }
 }
 
+// The seconds that the run of every point will take, by a trial of its first replica that is not done.
+std::vector<double> Study::trials(RunContext& context, const std::vector<Point>& all,
+                                  const std::vector<bool>& done) const {
+  std::vector<double> seconds(all.size(), 0);
+  const std::size_t places = all.size() / replicas_;
+  const auto one = [&](std::size_t place) {
+    for (std::size_t i = place * replicas_; i < (place + 1) * replicas_; ++i) {
+      if (done[i] || context.interrupted()) continue;
+      const double trial = context.trial_of_chain(recipe_at(all[i], context.seed()));
+      for (std::size_t k = i; k < (place + 1) * replicas_; ++k) seconds[k] = done[k] ? 0 : trial;
+      return;
+    }
+  };
+  one(0);
+  if (done[0] || seconds[0] > 0)  // of a chain that has no trial one point is asked, not all
+    for_each_index(places - 1, context.jobs(), [&](std::size_t i) { one(i + 1); });
+  return seconds;
+}
+
 // Every point once, on as many threads as allowed. A run that is kept from an earlier attempt is not run again.
 std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& all) const {
   std::vector<Json> kept(all.size());
   const fs::path scratch = context.scratch();
-  std::atomic<std::size_t> done{0};
+  const auto file_of = [&](std::size_t i) { return scratch / fmt::format("run-{}.json", i); };
+  TimeLeft time(all.size(), context.jobs());
+  std::vector<bool> there(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    there[i] = fs::exists(file_of(i));
+    if (there[i]) time.drop(i);
+  }
+  const std::vector<double> seconds = trials(context, all, there);
+  for (std::size_t i = 0; i < all.size(); ++i) time.expect(i, seconds[i]);
+  for (const LongPart& part : long_parts(seconds))
+    context.notice(
+        fmt::format("the run of {}, {} = {} {}. To save the time, stop with Ctrl-C and leave this value out or "
+                    "measure for a shorter time",
+                    kinds_[all[part.part].series].name, parameter_.name, parameter_.values[all[part.part].value],
+                    long_part_text(part)));
+  const std::string runs = fmt::format("{} runs", all.size());
   for_each_index(all.size(), context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
-    const fs::path file = scratch / fmt::format("run-{}.json", i), folder = scratch / fmt::format("run-{}", i);
-    if (!fs::exists(file)) {
-      write_file_atomically(file, dump(run_once(context, all[i], folder)));
+    const fs::path file = file_of(i), folder = scratch / fmt::format("run-{}", i);
+    if (!there[i]) {
+      time.begin(i);
+      const auto progress = [&](double fraction) {
+        time.reached(i, fraction);
+        context.progress(time.fraction(), runs);
+      };
+      write_file_atomically(file, dump(run_once(context, all[i], folder, progress)));
       fs::remove_all(folder);
+      time.end(i);
     }
     kept[i] = read_json(file);
-    context.progress(static_cast<double>(++done) / static_cast<double>(all.size()), fmt::format("{} runs", all.size()));
+    context.progress(time.fraction(), runs);
   });
   return kept;
 }
 
 // replicas.csv: every run with its numbers.
-std::string Study::replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
+std::string Study::replicas_csv(const std::vector<Point>& all, const std::vector<std::vector<RunNumber>>& found) const {
   std::string text = place_header() + ",replica";
   for (const auto& [name, ignored] : collect_) text += "," + name;
   text += "\n";
   for (std::size_t i = 0; i < all.size(); ++i) {
     text += place_cells(all[i]) + fmt::format(",{}", all[i].replica);
-    for (const Number& number : found[i]) text += "," + cell(number.value);
+    for (const RunNumber& number : found[i]) text += "," + cell(number.value);
     text += "\n";
   }
   return text;
 }
 
 // table.csv and the rows of study.json: means over the replicas of a point, with their errors.
-Study::Averages Study::average(const std::vector<Point>& all, const std::vector<std::vector<Number>>& found) const {
+Study::Averages Study::average(const std::vector<Point>& all, const std::vector<std::vector<RunNumber>>& found) const {
   Averages out;
   out.csv = place_header();
   for (const auto& [name, ignored] : collect_) out.csv += fmt::format(",{0},{0}_error", name);
@@ -623,9 +631,9 @@ Study::Averages Study::average(const std::vector<Point>& all, const std::vector<
     row[parameter_.name] = parameter_.values[all[i].value];
     if (kinds_[all[i].series].second) row[second_->name] = *kinds_[all[i].series].second;
     for (std::size_t c = 0; c < collect_.size(); ++c) {
-      std::vector<Number> values;
+      std::vector<RunNumber> values;
       for (std::size_t r = i; r < i + replicas_; ++r) values.push_back(found[r][c]);
-      const auto [n, mean, error] = Mean(values);
+      const auto [n, mean, error] = MeanOfRuns(values);
       out.missing += replicas_ - static_cast<std::size_t>(n);
       out.csv += "," + cell(mean) + "," + cell(error);
       Json quantity{{"value", std::isfinite(mean) ? Json(mean) : Json()}};
@@ -642,7 +650,7 @@ Study::Averages Study::average(const std::vector<Point>& all, const std::vector<
 void Study::run(RunContext& context) const {
   const std::vector<Point> all = points();
   const std::vector<Json> kept = run_all(context, all);
-  std::vector<std::vector<Number>> found;
+  std::vector<std::vector<RunNumber>> found;
   for (const Json& one : kept) found.push_back(kept_numbers(one));
   const Averages averages = average(all, found);
   if (averages.missing > 0)

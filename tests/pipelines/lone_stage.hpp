@@ -64,7 +64,8 @@ class LoneStage : public pipelines::RunContext {
   void timing(std::string_view /*name*/, double /*value*/) override {}
   void check_failed(std::string_view sentence) override { warnings.emplace_back(sentence); }
   std::vector<pipelines::Input> run_chain(const pipelines::JsonNode& /*recipe*/,
-                                          const std::filesystem::path& /*folder*/) override {
+                                          const std::filesystem::path& /*folder*/,
+                                          const Progress& /*progress*/) override {
     throw std::runtime_error("a lone stage runs no others");
   }
 

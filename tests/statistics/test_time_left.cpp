@@ -1,0 +1,177 @@
+// Work of made-up durations by a made-up clock: what is said of the time left beside the truth.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "statistics/time_left.hpp"
+
+namespace shakebed {
+namespace {
+
+struct Part {
+  double takes;              // seconds of its thread, also what it took before it was interrupted
+  double expected = 0;       // by a trial
+  double reports_every = 0;  // seconds; 0: it says nothing until it is over
+  double from = 0;           // it is taken up again at this fraction
+  bool fails = false;        // at its end
+};
+
+// Runs the parts in their order on threads of a made-up clock, and asks at every step of it.
+class MadeUpWork {
+ public:
+  MadeUpWork(std::vector<Part> parts, int threads)
+      : parts_(std::move(parts)),
+        time_(parts_.size(), threads, [this] { return now_; }),
+        runs_(static_cast<std::size_t>(threads)),
+        began_(parts_.size()),
+        reported_(parts_.size(), -std::numeric_limits<double>::infinity()) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) time_.expect(i, parts_[i].expected);
+    while (over_ < parts_.size()) {
+      for (auto& thread : runs_) go_on(thread);
+      if (over_ == parts_.size()) break;
+      if (const auto left = time_.seconds()) said_.emplace_back(now_ - start, *left);
+      now_ += 0.05;
+    }
+    end_ = now_ - start;
+  }
+  double fraction_at_the_end() const { return time_.fraction(); }
+
+  // The largest factor by which what was said differs from the truth, from a tenth of the run to `last` of it.
+  double worst_factor(double last = 0.95) const {
+    double worst = said_.empty() || said_.front().first > 0.1 * end_ ? std::numeric_limits<double>::infinity() : 1;
+    for (const auto& [at, left] : said_) {
+      if (at < 0.1 * end_ || at > last * end_) continue;
+      const double truth = end_ - at;
+      worst = std::max({worst, left / truth, truth / std::max(left, 1e-9)});
+    }
+    return worst;
+  }
+
+ private:
+  void go_on(std::optional<std::size_t>& thread) {
+    if (thread && now_ - began_[*thread] >= parts_[*thread].takes * (1 - parts_[*thread].from) - 1e-9) {
+      if (parts_[*thread].fails)
+        time_.drop(*thread);
+      else
+        time_.end(*thread);
+      ++over_;
+      thread.reset();
+    }
+    if (!thread && next_ < parts_.size()) {
+      thread = next_++;
+      began_[*thread] = now_;
+      time_.begin(*thread);
+    }
+    if (!thread) return;
+    const Part& part = parts_[*thread];
+    if (part.reports_every <= 0 || now_ < reported_[*thread] + part.reports_every) return;
+    time_.reached(*thread, part.from + (now_ - began_[*thread]) / part.takes);
+    reported_[*thread] = now_;
+  }
+
+  static constexpr double start = 1000;
+  std::vector<Part> parts_;
+  double now_ = start, end_ = 0;
+  TimeLeft time_;
+  std::vector<std::optional<std::size_t>> runs_;
+  std::vector<double> began_, reported_;
+  std::vector<std::pair<double, double>> said_;  // at which second, seconds left
+  std::size_t next_ = 0, over_ = 0;
+};
+
+TEST(TimeLeft, IsUnknownWhileNothingIsKnown) {
+  double now = 0;
+  TimeLeft time(3, 1, [&] { return now; });
+  EXPECT_FALSE(time.seconds());
+  EXPECT_EQ(time.fraction(), 0);
+  time.begin(0);
+  now = 5;
+  EXPECT_FALSE(time.seconds());
+  time.end(0);
+  ASSERT_TRUE(time.seconds());
+  EXPECT_NEAR(*time.seconds(), 10, 1e-12);  // two more of 5 s
+  EXPECT_NEAR(time.fraction(), 5.0 / 15, 1e-12);
+}
+
+TEST(TimeLeft, OfEvenPartsIsTheTruth) {
+  EXPECT_LT(MadeUpWork(std::vector<Part>(20, {3, 0, 0.1}), 1).worst_factor(), 1.02);
+  EXPECT_LT(MadeUpWork(std::vector<Part>(20, {3, 0, 0.1}), 2).worst_factor(), 1.02);
+}
+
+// Three threads have four replicas: at three quarters of the work, half of the time is left.
+TEST(TimeLeft, KnowsThatThreadsStandIdle) {
+  EXPECT_LT(MadeUpWork(std::vector<Part>(4, {10, 0, 0.1}), 3).worst_factor(), 1.02);
+  EXPECT_LT(MadeUpWork(std::vector<Part>(1, {10, 0, 0.1}), 8).worst_factor(), 1.02);
+}
+
+TEST(TimeLeft, OfUnevenPartsIsWithinAFactorOfTwo) {
+  // The expensive points stand first, last, or in the middle; the trial is off by up to 1.5 and the machine is three
+  // times as slow as when the trial ran.
+  const std::vector<std::vector<double>> orders{
+      {60, 8, 4, 2, 1, 1, 1, 1}, {1, 1, 1, 1, 2, 4, 8, 60}, {1, 2, 60, 1, 1, 4, 8, 1}, {10, 20, 30, 5, 40, 5, 20, 15}};
+  for (const auto& order : orders) {
+    for (const int threads : {1, 2, 4}) {
+      std::vector<Part> parts;
+      for (std::size_t i = 0; i < order.size(); ++i)
+        parts.push_back({order[i], order[i] / 3 * (i % 2 == 0 ? 1.25 : 0.8), 0.1});
+      EXPECT_LT(MadeUpWork(parts, threads).worst_factor(), 2) << order[0] << " on " << threads;
+    }
+  }
+}
+
+TEST(TimeLeft, OfUnevenPartsThatSayNothingIsWithinAFactorOfTwo) {
+  const std::vector<double> takes{12, 4, 9, 2, 1, 6, 30, 5, 8, 3};
+  std::vector<Part> parts;
+  for (std::size_t i = 0; i < takes.size(); ++i) parts.push_back({takes[i], takes[i] * (i % 2 == 0 ? 1.2 : 0.85), 0});
+  // The last of them is known as well as its trial, not better: so until three quarters of the run.
+  EXPECT_LT(MadeUpWork(parts, 1).worst_factor(0.75), 2);
+  EXPECT_LT(MadeUpWork(parts, 2).worst_factor(0.75), 2);
+}
+
+// What was done before the interruption took no time now.
+TEST(TimeLeft, OfWorkThatIsTakenUpAgainCountsWhatIsLeft) {
+  EXPECT_LT(MadeUpWork({{100, 0, 0.1, 0.6}}, 1).worst_factor(), 1.05);
+  std::vector<Part> parts(6, {20, 10, 0.1});
+  parts[0].from = 0.9, parts[1].from = 0.3;
+  EXPECT_LT(MadeUpWork(parts, 2).worst_factor(), 1.5);
+}
+
+TEST(TimeLeft, IgnoresHowLongAFailureTook) {
+  std::vector<Part> parts(12, {10, 0, 0.1});
+  for (std::size_t i = 0; i < 3; ++i) parts[4 * i] = {0.1, 0, 0, 0, true};
+  EXPECT_LT(MadeUpWork(parts, 1).worst_factor(), 2);
+  for (Part& part : parts) part.expected = 5;
+  EXPECT_LT(MadeUpWork(parts, 2).worst_factor(), 2);
+}
+
+TEST(TimeLeft, OfDroppedPartsIsNothing) {
+  double now = 0;
+  TimeLeft time(4, 1, [&] { return now; });
+  for (std::size_t i = 0; i < 4; ++i) time.expect(i, 7);
+  EXPECT_NEAR(*time.seconds(), 28, 1e-12);
+  time.drop(1);
+  time.drop(2);
+  EXPECT_NEAR(*time.seconds(), 14, 1e-12);
+}
+
+TEST(TimeLeft, EndsAtNothing) { EXPECT_NEAR(MadeUpWork({{3, 1, 0.1}, {5, 2, 0.1}}, 1).fraction_at_the_end(), 1, 1e-9); }
+
+// Expected 10 s, and it goes on and on without a word: the time left never becomes zero.
+TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
+  double now = 0;
+  TimeLeft time(1, 1, [&] { return now; });
+  time.expect(0, 10);
+  time.begin(0);
+  now = 4;
+  EXPECT_NEAR(*time.seconds(), 6, 1e-12);
+  now = 50;
+  EXPECT_NEAR(*time.seconds(), 10, 1e-12);
+}
+
+}  // namespace
+}  // namespace shakebed
