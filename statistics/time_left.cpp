@@ -48,12 +48,15 @@ void TimeLeft::reached(std::size_t part, double fraction) {
   fraction = std::clamp(fraction, 0.0, 1.0);
   if (!one.reported) {
     one.reported = true;
-    one.from = one.reached = fraction;
-    one.from_time = one.reached_time = clock_();
+    one.from = one.reached = one.earlier = one.later = fraction;
+    one.from_time = one.reached_time = one.earlier_time = one.later_time = clock_();
   }
   if (fraction <= one.reached) return;
   one.reached = fraction;
   one.reached_time = clock_();
+  if (one.reached_time - one.from_time < 2 * (one.later_time - one.from_time)) return;
+  one.earlier = one.later, one.earlier_time = one.later_time;
+  one.later = one.reached, one.later_time = one.reached_time;
 }
 
 void TimeLeft::end(std::size_t part) {
@@ -98,7 +101,8 @@ double TimeLeft::left_of(const Part& part, const Scale& scale, double now) const
   const double took = now - part.from_time, done = part.reached - part.from;
   double left = whole * (1 - part.reached);  // at its last report
   if (done > 0) {
-    const double by_itself = (part.reached_time - part.from_time) * (1 - part.reached) / done;
+    const double of_late = (part.reached_time - part.earlier_time) / (part.reached - part.earlier);
+    const double by_itself = of_late * (1 - part.reached);
     const double trust = done / (done + trust_in_part);
     left = trust * by_itself + (1 - trust) * left;
   }

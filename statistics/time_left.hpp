@@ -45,6 +45,9 @@ class TimeLeft {
     // The first report, and what was reached last: time and fraction.
     bool reported = false;
     double from_time = 0, from = 0, reached_time = 0, reached = 0;
+    // Two earlier reports: the pace of late counts, for a part may become slower. The second one moves on whenever the
+    // part's time has doubled since, the first follows it: it lies in the first half of the part's time.
+    double earlier_time = 0, earlier = 0, later_time = 0, later = 0;
     double ended = 0;
   };
   struct Scale {

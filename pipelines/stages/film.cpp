@@ -1,6 +1,7 @@
 #include "pipelines/stages/film.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -43,6 +44,8 @@ class Thinning {
     }
   }
   std::size_t every() const { return every_; }
+  // How many like the kept ones fit into the film.
+  std::size_t fit() const { return bytes_ == 0 ? 1 : film_bytes * kept_.size() / bytes_; }
   const std::vector<std::pair<std::size_t, Kept>>& kept() const { return kept_; }
 
  private:
@@ -50,6 +53,20 @@ class Thinning {
   std::vector<std::pair<std::size_t, Kept>> kept_;
   std::size_t every_ = 1, bytes_ = 0;
 };
+
+// The pictures that are drawn of so many frames where at most `fit` of them are kept: later ones ever more rarely.
+std::size_t pictures_drawn(std::size_t frames, std::size_t fit) {
+  std::size_t every = 1, kept = 0, drawn = 0;
+  for (std::size_t number = 0; number < frames; number += every) {
+    ++drawn;
+    if (++kept > std::max<std::size_t>(fit, 1)) {
+      kept = (kept + 1) / 2;
+      every *= 2;
+      number -= number % every;
+    }
+  }
+  return drawn;
+}
 
 Json marks_json(const DisksOnTheWay::Marks* marks) {
   Json out{{"missed", Json::array()}, {"false", Json::array()}};
@@ -70,7 +87,10 @@ void write_film(RunContext& context, const FilmFiles& film, const ingest::Measur
   shown.reduction = film.reduction_shown(std::floor(recorded_width / (least_reduced * picture_width)));
   ingest::FrameSource source = ingest::FrameSource::open(film.paths, shown);
   Thinning thinned;
-  std::size_t good = 0;
+  const auto frames = static_cast<std::size_t>(
+      std::count_if(found.frames.begin(), found.frames.end(),
+                    [](const ingest::FrameReport& one) { return one.status == ingest::FrameStatus::good; }));
+  std::size_t good = 0, drawn = 0, to_draw = frames;
   int width = 0, height = 0;
   for (auto item = source.next_item(); item && item->index < found.frames.size(); item = source.next_item()) {
     const ingest::FrameReport& report = found.frames[item->index];
@@ -78,10 +98,11 @@ void write_film(RunContext& context, const FilmFiles& film, const ingest::Measur
     const std::size_t number = good++;
     if (!thinned.wants(number)) continue;
     context.check_interrupted();
-    progress(static_cast<double>(item->index) / static_cast<double>(found.frames.size()));
+    progress(static_cast<double>(drawn++) / static_cast<double>(to_draw));
     const ingest::GrayFrame frame = item->decode();
     width = frame.width * shown.reduction, height = frame.height * shown.reduction;
     thinned.add(number, {item->index, report.disks, ingest::small_webp(frame, picture_width, picture_quality)});
+    if (std::has_single_bit(drawn)) to_draw = std::max(drawn + 1, pictures_drawn(frames, thinned.fit()));
   }
   if (thinned.kept().empty()) return;
   Json out{{"kind", "webp"},

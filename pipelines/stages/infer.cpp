@@ -12,6 +12,7 @@
 #include "pipelines/formats/embedded.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/replica_seed.hpp"
+#include "pipelines/stages/simulate_run.hpp"
 #include "statistics/parallel.hpp"
 #include "statistics/time_left.hpp"
 
@@ -29,9 +30,33 @@ constexpr double distance_of_best = 0.3;
 constexpr std::uint64_t best_stream = 1'000'000, calibration_stream = 2'000'000;
 
 // All beds that the stage will run, in their order. What is computed between the rounds is quick beside them.
-struct BedsAhead {
+class BedsAhead {
+ public:
+  // `times`: what is settled and measured of each.
+  BedsAhead(std::vector<double> times, int threads) : time(times.size(), threads), times_(std::move(times)) {}
+  // The next beds, each with the seconds that it takes by a trial; 0: it need not run. The others are expected to take
+  // as long for their times as all that were tried.
+  std::size_t next(const std::vector<double>& trials) {
+    const std::size_t first = next_;
+    for (const double seconds : trials) {
+      time.expect(next_, seconds);
+      if (seconds > 0) tried_seconds_ += seconds, tried_times_ += times_[next_];
+      ++next_;
+    }
+    if (tried_times_ > 0)
+      for (std::size_t i = next_; i < times_.size(); ++i) time.expect(i, times_[i] * tried_seconds_ / tried_times_);
+    return first;
+  }
+  void leave_out(std::size_t beds) {
+    for (std::size_t i = 0; i < beds; ++i) time.drop(next_++);
+  }
+
   TimeLeft time;
-  std::size_t next = 0;  // the first that has not been begun
+
+ private:
+  std::vector<double> times_;
+  std::size_t next_ = 0;  // the first that has not been begun
+  double tried_seconds_ = 0, tried_times_ = 0;
 };
 struct BedToRun {
   TimeLeft& time;
@@ -62,6 +87,7 @@ class Infer : public Stage {
   std::vector<BestBed> best_beds(RunContext& context, const Inference& found, BedsAhead& ahead) const;
   std::vector<CalibrationRow> calibrate(RunContext& context, const Inference& found, BedsAhead& ahead) const;
   std::vector<double> bed_times() const;
+  double trial(RunContext& context, const std::string& name, const std::vector<double>& values, double measure) const;
   SceneOptions scene_at(const std::vector<double>& values) const;
 
   InferOptions options_;
@@ -333,10 +359,22 @@ std::vector<double> Infer::numbers_of_run(RunContext& context, const std::string
   return numbers;
 }
 
+// Seconds that a bed will take; 0 where it was run before the stage was interrupted.
+double Infer::trial(RunContext& context, const std::string& name, const std::vector<double>& values,
+                    double measure) const {
+  if (context.interrupted() || std::filesystem::exists(context.scratch() / name)) return 0;
+  const SceneOptions bed = scene_at(values);
+  return pipelines::trial_seconds(bed.scene(1), options_.bed.schedule(bed, measure));
+}
+
 std::vector<RunBed> Infer::run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
                                     const std::vector<std::vector<double>>& values, BedsAhead& ahead) const {
   std::vector<RunBed> beds(values.size());
-  const std::size_t first = std::exchange(ahead.next, ahead.next + values.size());
+  std::vector<double> trials(values.size(), 0);
+  for_each_index(values.size(), context.jobs(), [&](std::size_t i) {
+    trials[i] = trial(context, fmt::format("bed-{}.json", first_number + i), values[i], options_.bed.measure);
+  });
+  const std::size_t first = ahead.next(trials);
   const std::string what = fmt::format("round {}, {} beds", round, values.size());
   for_each_index(values.size(), context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
@@ -426,16 +464,21 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
                     {}});
     beds.back().runs.resize(options_.replicas);
   }
-  const std::size_t all = beds.size() * options_.replicas, first = ahead.next;
+  const std::size_t all = beds.size() * options_.replicas;
+  const double measure = options_.best_measure > 0 ? options_.best_measure : options_.bed.measure;
+  std::vector<double> trials;
+  for (std::size_t i = 0; i < all; ++i)
+    trials.push_back(i % options_.replicas == 0 || !(trials.back() > 0)
+                         ? trial(context, fmt::format("best-{}.json", i), beds[i / options_.replicas].values, measure)
+                         : trials.back());
+  const std::size_t first = ahead.next(trials);
+  ahead.leave_out((options_.best - beds.size()) * options_.replicas);
   const std::string what = fmt::format("{} of the best beds", all);
-  ahead.next += options_.best * options_.replicas;  // there may be fewer
-  for (std::size_t i = first + all; i < ahead.next; ++i) ahead.time.drop(i);
   for_each_index(all, context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     BestBed& bed = beds[i / options_.replicas];
     std::vector<double>& run = bed.runs[i % options_.replicas];
-    run = numbers_of_run(context, fmt::format("best-{}.json", i), bed.values, best_stream + i,
-                         options_.best_measure > 0 ? options_.best_measure : options_.bed.measure,
+    run = numbers_of_run(context, fmt::format("best-{}.json", i), bed.values, best_stream + i, measure,
                          {ahead.time, first + i, what});
   });
   return beds;
@@ -533,7 +576,7 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
   return sentences;
 }
 
-// Of all beds in their order, relative to one another: they are expected to take as their times do.
+// Of all beds in their order: what is settled and measured.
 std::vector<double> Infer::bed_times() const {
   const BedOfInference& bed = options_.bed;
   const double best_measure = options_.best_measure > 0 ? options_.best_measure : bed.measure;
@@ -547,9 +590,7 @@ std::vector<double> Infer::bed_times() const {
 
 void Infer::run(RunContext& context) const {
   Inference found;
-  const std::vector<double> times = bed_times();
-  BedsAhead ahead{TimeLeft(times.size(), context.jobs())};
-  for (std::size_t i = 0; i < times.size(); ++i) ahead.time.expect(i, times[i]);
+  BedsAhead ahead(bed_times(), context.jobs());
   found.targets = scaled_targets(context);
   found.beds = design(context, found.targets, ahead);
   context.progress(ahead.time.fraction(), "surrogate and posterior");

@@ -209,15 +209,20 @@ std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& sc
 
 }  // namespace
 
-std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t seed, double duration,
-                                        const RunContext& context, const std::function<void(double)>& progress) const {
-  const sim::Scene scene_at = bed.scene(seed);
+sim::MeasurementSchedule BedOfInference::schedule(const SceneOptions& bed, double duration) const {
   sim::MeasurementSchedule times;
   times.period = bed.period();
   times.settle = std::ceil(settle / bed.time_unit() / times.period * (1 - 1e-12)) * times.period;
   times.periods =
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(duration / bed.time_unit() / times.period * (1 + 1e-12)));
   times.phases = phases;
+  return times;
+}
+
+std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t seed, double duration,
+                                        const RunContext& context, const std::function<void(double)>& progress) const {
+  const sim::Scene scene_at = bed.scene(seed);
+  const sim::MeasurementSchedule times = schedule(bed, duration);
   const double column = scene_at.count() / scene_at.box.width;
   const double lowest = -std::ceil((6 * kernel_width + 3) / profile_spacing) * profile_spacing;
   const HeightGrid grid{lowest, profile_spacing, static_cast<std::size_t>((5 * column + 30) / profile_spacing)};

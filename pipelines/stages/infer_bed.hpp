@@ -10,6 +10,7 @@
 
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/stage.hpp"
+#include "sim/measure/measure.hpp"
 
 namespace shakebed::pipelines {
 
@@ -74,6 +75,7 @@ struct BedOfInference {
   // The scene with these parameters; what is wrong with it is added to `problems`.
   SceneOptions at(const Parameters& parameters, const std::vector<double>& values,
                   std::vector<Problem>& problems) const;
+  sim::MeasurementSchedule schedule(const SceneOptions& bed, double duration) const;
   // The numbers of observables(), view by view; not a number where a fit does not succeed, or where the bed chatters
   // and is given up. `progress` is told the share of the run that is over. Throws Interrupted.
   std::vector<double> run(const SceneOptions& bed, std::uint64_t seed, double duration, const RunContext& context,

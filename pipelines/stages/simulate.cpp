@@ -56,7 +56,12 @@ class Simulate : public Stage {
   bool keeps_frames() const override { return measure_.keeps_frames(); }
   void run(RunContext& context) const override;
   double trial_seconds() const override {
-    return replicas() * pipelines::trial_seconds(bed_.scene(1), looks().schedule);
+    RunPlan plan;
+    plan.scene = bed_.scene(1);
+    plan.schedule = looks().schedule;
+    plan.measurement = measurement_plan(plan.scene);
+    RunMeasurement measurement(plan);
+    return replicas() * pipelines::trial_seconds(plan.scene, plan.schedule, {&measurement});
   }
   std::optional<BedDescription> bed() const override;
 

@@ -32,8 +32,8 @@ double thread_cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Of a trial: the share of the run, and the processor time [s].
-constexpr double trial_share = 0.02, longest_trial = 0.1;
+// Of a trial: the share of the run, periods to settle at least, the processor time [s].
+constexpr double trial_share = 0.02, shortest_trial = 1, longest_trial = 0.1;
 constexpr std::uint64_t events_of_trial = 10'000;  // between two looks at the clock
 
 }  // namespace
@@ -42,13 +42,50 @@ const char* name_of(sim::RunPart part) {
   return part == sim::RunPart::annealing ? "annealing" : part == sim::RunPart::settling ? "settling" : "measuring";
 }
 
-double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule) {
+namespace {
+
+// Looks at the processor's clock while a trial settles and measures.
+class TrialClock final : public sim::RunObserver {
+ public:
+  void prepare(sim::Simulation&) override { prepared = last = thread_cpu_seconds(); }
+  void begin(sim::Simulation& simulation) override {
+    settled = thread_cpu_seconds();
+    settled_at = simulation.time();
+  }
+  // After the other observers.
+  void look(sim::Simulation& simulation, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {
+    last = thread_cpu_seconds();
+    last_at = simulation.time();
+  }
+  void save(sim::ArchiveWriter&) override {}
+  void load(sim::ArchiveReader&) override {}
+
+  double prepared = 0, settled = 0, last = 0;  // [s]
+  double settled_at = 0, last_at = 0;          // reduced
+};
+
+}  // namespace
+
+double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule,
+                     std::vector<sim::RunObserver*> observers) {
+  sim::MeasurementSchedule part;
+  part.period = schedule.period, part.phases = schedule.phases;
+  part.settle = std::min(schedule.settle, std::max(trial_share * schedule.settle, shortest_trial * schedule.period));
+  part.periods = std::min(schedule.periods, 1 + static_cast<std::uint64_t>(trial_share * schedule.periods));
+  TrialClock clock;
+  observers.push_back(&clock);
   const double start = thread_cpu_seconds();
-  const std::unique_ptr<sim::Simulation> simulation = sim::simulate(scene);
-  const double made = thread_cpu_seconds(), until = trial_share * schedule.end();
-  while (!simulation->advance_towards(until, events_of_trial) && thread_cpu_seconds() - made < longest_trial) {}
-  const double reached = std::max(simulation->time(), 1e-6 * until);
-  return made - start + (thread_cpu_seconds() - made) * schedule.end() / reached;
+  sim::RunControl control;
+  control.events_between_questions = events_of_trial;
+  control.stop = [&] { return thread_cpu_seconds() - clock.prepared > longest_trial; };
+  const sim::RunResult result = sim::measure(scene, part, observers, control);
+  const double now = thread_cpu_seconds(), made = clock.prepared - start;
+  if (!(clock.last_at > clock.settled_at))  // it was stopped before it measured
+    return made + (now - clock.prepared) * schedule.end() / std::max(result.simulation->time(), 1e-6 * part.end());
+  const double measuring =
+      (clock.last - clock.settled) / (clock.last_at - clock.settled_at) * (schedule.end() - schedule.settle);
+  const double settling = part.settle > 0 ? (clock.settled - clock.prepared) / part.settle * schedule.settle : 0;
+  return made + settling + measuring;
 }
 
 // ------------------------------------------------------------------------------------------------ observers

@@ -37,8 +37,9 @@ struct RunPlan {
   bool lead = true;              // the run whose trajectory is kept
 };
 
-// About how many seconds of a processor the run takes, by its first fiftieth or 0.1 s of it.
-double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule);
+// About how many seconds of a processor the run takes, by a fiftieth of it (at least two periods) or 0.1 s.
+double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& schedule,
+                     std::vector<sim::RunObserver*> observers = {});
 
 // BedMeasurement and the trajectory as observers of a run.
 class RunMeasurement final : public sim::RunObserver {

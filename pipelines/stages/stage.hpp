@@ -172,7 +172,7 @@ class Stage {
   // Whether the stage keeps frames of its bed. Called after describe.
   virtual bool keeps_frames() const { return true; }
   virtual void run(RunContext& context) const = 0;
-  // About how many seconds of a processor run() takes, by a trial of a fiftieth of its work at most; 0: little, or
+  // About how many seconds of a processor run() takes, by a short trial of its work, 0.1 s or less; 0: little, or
   // unknown. The trial leaves no trace: it is for the time left alone. May throw what run() throws.
   virtual double trial_seconds() const { return 0; }
   // The bed that the stage makes or measures, from its options; empty if it only reads one. Later stages need not

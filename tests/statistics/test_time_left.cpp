@@ -161,6 +161,23 @@ TEST(TimeLeft, OfDroppedPartsIsNothing) {
 
 TEST(TimeLeft, EndsAtNothing) { EXPECT_NEAR(MadeUpWork({{3, 1, 0.1}, {5, 2, 0.1}}, 1).fraction_at_the_end(), 1, 1e-9); }
 
+// Half of the work in 10 s, then ten times as slow: soon afterwards the new pace is believed.
+TEST(TimeLeft, FollowsAPartThatBecomesSlower) {
+  double now = 0;
+  TimeLeft time(1, 1, [&] { return now; });
+  time.begin(0);
+  double reached = 0;
+  for (int i = 0; i <= 1000; ++i, now += 0.1) {
+    time.reached(0, reached);
+    reached += now < 10 ? 0.005 : 0.0005;
+    if (now > 35 && reached < 0.95) {
+      const double truth = (1 - reached) / 0.0005 * 0.1;
+      EXPECT_GT(*time.seconds(), truth / 2) << now;
+      EXPECT_LT(*time.seconds(), truth * 2) << now;
+    }
+  }
+}
+
 // Expected 10 s, and it goes on and on without a word: the time left never becomes zero.
 TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
   double now = 0;
