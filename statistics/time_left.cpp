@@ -36,7 +36,7 @@ void TimeLeft::begin(std::size_t part) {
   const std::lock_guard lock(mutex_);
   Part& one = parts_[part];
   one.state = Part::State::runs;
-  one.began = one.from_time = clock_();
+  one.from_time = clock_();
   one.reported = false;
   one.from = one.reached = 0;
 }

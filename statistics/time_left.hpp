@@ -25,8 +25,8 @@ class TimeLeft {
 
   void expect(std::size_t part, double seconds);  // of one thread; 0: none, or unknown where all are 0
   void begin(std::size_t part);
-  // So much of the part is over, 0 to 1. The first call tells from where it goes on: at the start, or later where an
-  // interrupted part is taken up again.
+  // So much of the part is over, 0 to 1. The first call states where it begins: at 0, or later where an interrupted
+  // part continues.
   void reached(std::size_t part, double fraction);
   void end(std::size_t part);
   void drop(std::size_t part);  // it failed, or need not run: it says nothing of the other parts
@@ -41,7 +41,6 @@ class TimeLeft {
   struct Part {
     enum class State { waiting, runs, over, dropped } state = State::waiting;
     double expected = 0;
-    double began = 0;
     // The first report, and what was reached last: time and fraction.
     bool reported = false;
     double from_time = 0, from = 0, reached_time = 0, reached = 0;

@@ -18,7 +18,6 @@ constexpr double smallest_at_level = 5, largest_at_level = 10.4;  // px, radii s
 constexpr int census_window = 640;                                // px, of the busiest part searched at each level
 constexpr double mode_width = 0.1;                                // radii of one hypothesis, either way
 constexpr double faintest_census_support = 0.35;
-constexpr double asked_tolerance = 1.25;     // a radius that is given holds within this factor
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
@@ -36,8 +35,8 @@ struct RadiusRange {
 };
 RadiusRange radii_at(double scale, const CensusOptions& options) {
   if (!options.radius_px) return {smallest_at_level, largest_at_level};
-  return {std::max(smallest_at_level, *options.radius_px / asked_tolerance / scale),
-          std::min(largest_at_level, *options.radius_px * asked_tolerance / scale)};
+  return {std::max(smallest_at_level, *options.radius_px / given_radius_factor / scale),
+          std::min(largest_at_level, *options.radius_px * given_radius_factor / scale)};
 }
 
 // From twice the resolution down, until no circle fits in any more.

@@ -15,7 +15,8 @@
 
 namespace shakebed::ingest {
 
-constexpr double circle_cost_px = 8;  // px of rim at a radius of 8 px, for a circle's place and radius
+constexpr double given_radius_factor = 1.25;  // a radius that is given holds within this factor
+constexpr double circle_cost_px = 8;          // px of rim at a radius of 8 px, for a circle's place and radius
 
 struct CircleHypothesis {
   std::size_t channel = 0;  // of those given
@@ -33,7 +34,7 @@ struct CircleHypothesis {
 
 struct CensusOptions {
   Polarity polarity = Polarity::automatic;
-  std::optional<double> radius_px;  // then only within a quarter of it
+  std::optional<double> radius_px;  // then only within given_radius_factor of it
   double smallest_radius_px = 2.5;
 };
 

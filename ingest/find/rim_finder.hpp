@@ -56,8 +56,8 @@ struct LearnedRims {
   double edge_length_px = 0;   // of all edges, faint ones in part, px of the frame
 };
 
-// Learns from one frame, starting from a radius good to a tenth. Where beads are known to be there, poor
-// circles of chance, as the copies of beads of another size make, say nothing against circles that are seen well.
+// Learns from one frame, starting from a radius good to a tenth. Where beads are known to be there, poor circles of
+// chance, as the copies of beads of another size make, say nothing against circles that are seen well.
 LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known = Known::nothing);
 
 // Whether the outlines of the disks are round.

@@ -61,7 +61,7 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
         break;
       }
       below = {below.here + above.here, below.chance + above.chance, below.support_sum + above.support_sum,
-               below.classes + above.classes, above.joined_near};
+               below.classes + above.classes, below.joined_near || above.joined_near};
       pooled.pop_back();
     }
   }

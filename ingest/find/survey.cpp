@@ -165,9 +165,8 @@ void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
   }
 }
 
-bool within_a_quarter(double radius, double given) {
-  constexpr double tolerance = 1.25;
-  return radius < tolerance * given && given < tolerance * radius;
+bool is_the_given_one(double radius, double given) {
+  return radius < given_radius_factor * given && given < given_radius_factor * radius;
 }
 
 void enlarge(SurveyCandidate& candidate, int factor) {
@@ -215,7 +214,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
       judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
                   options.any_shape);
     enlarge(candidate, frames.reduction);
-    if (options.radius_px && !within_a_quarter(candidate.rims.radius_px, *options.radius_px))
+    if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
       candidate.why_not =
           formatted("the circles seen have a radius of %.1f px, not one within 25 %% of the %.1f px given",
                     candidate.rims.radius_px, *options.radius_px);

@@ -8,8 +8,8 @@
 
 namespace shakebed::ingest {
 
-// While it lives, all finding and measuring that this thread calls asks the question often: within 0.4 s on a picture of
-// 1,000 beads. What the question throws ends the call. measure_bed() asks it from its threads, too, several at once.
+// While it lives, all finding and measuring that this thread calls asks the question often: within 0.4 s on a picture
+// of 1,000 beads. What the question throws ends the call. measure_bed() asks it from its threads, too, several at once.
 // Questions can be nested: the innermost is asked.
 class StopQuestion {
  public:

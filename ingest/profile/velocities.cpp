@@ -225,9 +225,10 @@ class StepStatistics {
 
   void warn() {
     if (!result_.usable())
-      result_.warnings.emplace_back("Only " + std::to_string(static_cast<int>(100 * result_.linked_share)) +
-                                    " % of the disks could be followed from frame to frame: velocities are not reliable and do not enter "
-                                    "the answer. Use a higher frame rate.");
+      result_.warnings.emplace_back(
+          "Only " + std::to_string(static_cast<int>(100 * result_.linked_share)) +
+          " % of the disks could be followed from frame to frame: velocities are not reliable and do not enter "
+          "the answer. Use a higher frame rate.");
     if (result_.mean_step > 0.25)
       result_.warnings.emplace_back(
           "Disks move by " + std::to_string(result_.mean_step) +

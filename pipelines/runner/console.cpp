@@ -32,7 +32,7 @@ void Console::warning(std::string_view line) { write("warning: ", line); }
 void Console::error(std::string_view line) { write("error: ", line); }
 
 namespace {
-// What says so early that some of it is done was begun before.
+// Work that reports progress above 0 this early continues an earlier run.
 constexpr double taken_up_again = 1;  // [s]
 }  // namespace
 

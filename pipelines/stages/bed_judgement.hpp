@@ -14,8 +14,8 @@ namespace shakebed::pipelines {
 inline constexpr double allowed_contact_effect = 0.02;
 
 // Of a shaken bed, for observables.json: {"verdict", "why", "advice"}, the gravest reason first. Verdicts: "rows lock",
-// "at rest", "contact duration too long", "still changing", "beds differ", "one bed", "real contacts may matter", "holds".
-// `joined` is what observables.json says of all beds.
+// "at rest", "contact duration too long", "still changing", "beds differ", "one bed", "real contacts may matter",
+// "holds". `joined` is what observables.json says of all beds.
 Json judgement_of(const SceneOptions& bed, const Json& joined, std::size_t beds);
 
 // Whether a judgement says anything against the numbers.

@@ -77,7 +77,7 @@ struct BedOfInference {
                   std::vector<Problem>& problems) const;
   sim::MeasurementSchedule schedule(const SceneOptions& bed, double duration) const;
   // The numbers of observables(), view by view; not a number where a fit does not succeed, or where the bed chatters
-  // and is given up. `progress` is told the share of the run that is over. Throws Interrupted.
+  // and is given up. `progress` is called with the finished share of the run. Throws Interrupted.
   std::vector<double> run(const SceneOptions& bed, std::uint64_t seed, double duration, const RunContext& context,
                           const std::function<void(double)>& progress) const;
 };

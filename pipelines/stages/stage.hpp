@@ -133,8 +133,8 @@ class RunContext {
 
   // --- stages inside of a stage. May be called from several threads, with a folder each.
   // Runs a recipe in a folder, on one thread; what is up to date there is kept. Its stages, finished, in the order of
-  // the work. `progress`, if any, is told the share of the chain's time that is over. Throws ConfigError, StageError
-  // with the words of the stage that failed, Interrupted. A failed check is no failure.
+  // the work. `progress`, if any, is called with the share of the chain's time that has passed. Throws ConfigError,
+  // StageError with the words of the stage that failed, Interrupted. A failed check is no failure.
   using Progress = std::function<void(double)>;
   virtual std::vector<Input> run_chain(const JsonNode& recipe, const std::filesystem::path& folder,
                                        const Progress& progress) = 0;
