@@ -388,7 +388,8 @@ py::dict answer_of(const fit::Answer& answer) {
   number("spread", answer.spread);
   number("low", answer.interval.low);
   number("high", answer.interval.high);
-  number("confidence", answer.interval.confidence);
+  out["confidence"] = answer.ok() && answer.interval.confidence > 0 ? py::object(py::float_(answer.interval.confidence))
+                                                                    : py::object(py::none());
   number("solid_height", answer.solid_height.value);
   number("solid_height_std_error", answer.solid_height.std_error);
   out["thermometer"] = answer.thermometer;
@@ -418,13 +419,15 @@ void bind_fits(py::module_& m) {
                           const py::object& covariance, int covariance_samples, const std::string& kernel,
                           std::optional<double> column_number, std::optional<std::pair<double, double>> temperature_x,
                           std::optional<std::pair<double, double>> temperature_z,
-                          const std::vector<std::pair<std::string, std::string>>& objections) {
+                          const std::vector<std::pair<std::string, std::string>>& objections,
+                          std::optional<double> diameter, double origin_error) {
     fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
                            .kernel = kernel_named(kernel),
                            .column_number = column_number};
     if (temperature_x) input.temperature_x = fit::Estimate{temperature_x->first, temperature_x->second};
     if (temperature_z) input.temperature_z = fit::Estimate{temperature_z->first, temperature_z->second};
     for (const auto& [why, advice] : objections) input.objections.push_back({why, advice});
+    input.diameter = diameter, input.origin_error = origin_error;
     fit::Answer answer;
     {
       const py::gil_scoped_release release;
@@ -587,12 +590,22 @@ std::string odd_bead(double diameter) {
   return odd ? odd->what + ". " + odd->suggestion : "";
 }
 
+std::string impossible_bead(double diameter) {
+  const auto impossible = pipelines::impossible_bead(diameter);
+  return impossible ? impossible->what + ". " + impossible->suggestion : "";
+}
+
 double quantity(const std::string& text, const std::string& kind) {
   namespace dimension = pipelines::dimension;
   const pipelines::Dimension wanted = kind == "length"      ? dimension::length
                                       : kind == "frequency" ? dimension::frequency
                                                             : dimension::acceleration;
-  return pipelines::parse_quantity(text, wanted);  // std::invalid_argument becomes ValueError
+  // std::invalid_argument becomes ValueError
+  const pipelines::Quantity found = pipelines::parse_quantity(text, &wanted);
+  if (!found.has_unit)
+    throw std::invalid_argument("\"" + text + "\" has no unit: write \"" +
+                                pipelines::likely_quantity(text, found.value, wanted) + "\"");
+  return pipelines::parse_quantity(text, wanted);
 }
 
 }  // namespace
@@ -612,6 +625,7 @@ PYBIND11_MODULE(_core, m) {
   });
   m.def("check_recipe", &check_recipe);
   m.def("odd_bead", &odd_bead);
+  m.def("impossible_bead", &impossible_bead);
   m.def("quantity", &quantity);
   m.attr("version") = shakebed::pipelines::program_version();
 }

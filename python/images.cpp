@@ -263,6 +263,11 @@ PYBIND11_MODULE(_images, m) {
                              [](const ingest::BedFound& f) { return f.measurement.calibration.scale_m_per_px; })
       .def_property_readonly("radius", [](const ingest::BedFound& f) { return f.measurement.calibration.radius_px; })
       .def_property_readonly("floor", [](const ingest::BedFound& f) { return f.measurement.calibration.floor_px; })
+      .def_property_readonly("floor_std_error",
+                             [](const ingest::BedFound& f) { return f.measurement.calibration.floor_std_error_px; })
+      .def_property_readonly(
+          "floor_reference",
+          [](const ingest::BedFound& f) { return std::string(to_string(f.measurement.calibration.floor_reference)); })
       .def_property_readonly("frames", [](const ingest::BedFound& f) { return f.measurement.frames.size(); })
       .def_property_readonly("disks_a_frame", [](const ingest::BedFound& f) { return f.measurement.disk_count_mean; })
       .def_property_readonly("warnings", [](const ingest::BedFound& f) { return f.measurement.warnings; })

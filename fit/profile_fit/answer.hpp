@@ -29,6 +29,10 @@ struct AnswerInput {
   std::optional<Estimate> temperature_x{}, temperature_z{};  // kinetic, where velocities are known [m g D]
   // One standard error of T, relative, that the simulation's contact duration leaves; 0 where nothing is simulated.
   double contact_duration_effect = 0.0;
+  // One standard error of the floor's mean position, from which heights are measured [D].
+  double origin_error = 0.0;
+  // [m]; with it the reasons state T/(m g) in mm, else T in m g D.
+  std::optional<double> diameter{};
   double confidence = 0.95;
   // Doubts of the measurement about the profile, besides those that the profile itself shows (objections.hpp).
   std::vector<Objection> objections{};
@@ -67,7 +71,8 @@ struct Answer {
   double contact_duration_uncertainty = 0.0;  // of the simulation that gave the profile
   double std_error = 0.0;                     // all of these in quadrature
   double bias = 0.0;                          // what has been taken off, relative
-  // Of T; with no_single_temperature the range of all readings and kinetic T.
+  // Of T; with no_single_temperature the range of all readings and kinetic T, whose confidence is 0: it is no
+  // confidence interval.
   Interval interval;
   // Of the T that this thermometer reads, by the statistical error alone: where further beds lie, on average. The other
   // parts are the same for all of them.

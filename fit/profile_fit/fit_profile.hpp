@@ -202,6 +202,7 @@ struct FitResult {
   std::vector<std::string> warnings;  // plain sentences
 
   [[nodiscard]] bool ok() const { return status == FitStatus::ok; }
+  [[nodiscard]] bool has_solid() const { return solid_height.value > 0.0; }
   [[nodiscard]] std::string brief() const;  // one line
   [[nodiscard]] std::string full() const;   // a line a number, then the warnings
 };

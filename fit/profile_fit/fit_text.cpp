@@ -31,9 +31,12 @@ std::vector<std::string> FitOptions::validate() const {
 
 std::string FitResult::brief() const {
   if (!ok()) return std::string(to_string(status)) + ": " + message;
-  return model + ": T = " + estimate_text(temperature) + " m g D, solid height " + estimate_text(solid_height) +
-         " D, chi2/dof = " + number(chi2_per_dof, 3) + " (" + std::to_string(bins) + " heights" +
-         (misfit ? "; the model does not fit)" : ")");
+  const std::size_t said = warnings.size();
+  return model + ": T = " + estimate_text(temperature) + " m g D, " +
+         (has_solid() ? "solid height " + estimate_text(solid_height) + " D" : "no solid") +
+         ", chi2/dof = " + number(chi2_per_dof, 3) + " (" + std::to_string(bins) + " heights" +
+         (misfit ? "; the model does not fit" : "") +
+         (said == 0 ? "" : "; " + std::to_string(said) + (said == 1 ? " warning" : " warnings")) + ")";
 }
 
 std::string FitResult::full() const {
@@ -48,7 +51,7 @@ std::string FitResult::full() const {
              number(temperature_interval.low, 5) + " to " + number(temperature_interval.high, 5) + " m g D (" +
                  number(100 * temperature_interval.confidence, 3) + " %)");
   add_line(out, "shift", estimate_text(shift) + " D");
-  add_line(out, "solid height", estimate_text(solid_height) + " D");
+  add_line(out, "solid height", has_solid() ? estimate_text(solid_height) + " D" : "no solid");
   add_line(out, "plateau density", estimate_text(plateau_density) + " 1/D^2");
   add_line(out, "column number", estimate_text(column_number));
   if (critical_status == ValueStatus::ok) {

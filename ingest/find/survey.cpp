@@ -137,9 +137,9 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   const double wrong = candidate.expected_wrong * count;
   const double at_worst = (wrong + std::sqrt(wrong)) / std::max(1.0, count);  // a standard deviation more
   if (candidate.disks.empty())
-    candidate.why_not = "no circle is seen more often than chance makes up";
+    candidate.why_not = "no circle is seen more often than by chance";
   else if (at_worst > most_by_chance || (at_worst > few_wrong && candidate.explained_share < good_part))
-    candidate.why_not = formatted("of %.0f circles, chance makes up as many as %.0f %%", count, 100 * at_worst);
+    candidate.why_not = formatted("up to %.0f %% of the %.0f circles may have arisen by chance", 100 * at_worst, count);
   else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
     candidate.why_not =
         formatted("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
@@ -240,8 +240,8 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }
   if (!survey.found)
-    survey.why_not = survey.candidates.empty() ? "no circle is seen more often than chance makes up"
-                                               : survey.candidates.front().why_not;
+    survey.why_not =
+        survey.candidates.empty() ? "no circle is seen more often than by chance" : survey.candidates.front().why_not;
   return survey;
 }
 

@@ -62,12 +62,14 @@ class GeometryFinder {
   void set_floor() {
     bed_.floor_given = options_.floor_px.has_value();
     if (bed_.floor_given) {
+      bed_.floor_reference = FloorReference::given;
       bed_.floor_px = *options_.floor_px;
       bed_.floor_slope = options_.floor_slope.value_or(0.0);
       return;
     }
     const Line floor = find_floor(frames_, diameter_px_, film_.finder.width);
     bed_.floor_px = floor.offset;
+    bed_.floor_std_error_px = floor.middle_std_error;
     bed_.floor_slope = options_.floor_slope.value_or(floor.slope);
     if (!options_.floor_slope)
       bed_.floor_tilt_std_error_degrees = floor.slope_std_error * 180 / std::numbers::pi;

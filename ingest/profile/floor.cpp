@@ -49,6 +49,7 @@ Line robust_line(const std::vector<std::pair<double, double>>& points) {
     const double variance = std::max(spread * spread, square / (static_cast<double>(points.size()) - 2));
     line.slope_std_error = std::sqrt(variance * w / determinant);
     line.middle = {wx / w, wy / w};
+    line.middle_std_error = std::sqrt(variance / w);
   }
   return line;
 }
@@ -109,6 +110,17 @@ LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double di
   }
   std::erase_if(bottoms.y, [](double y) { return y < -1e8; });
   return bottoms;
+}
+
+double bottom_range(const std::vector<FrameFindings>& frames, double slope, double diameter_px, int width) {
+  std::vector<double> lowest;
+  for (const FrameFindings& frame : frames) {
+    std::vector<double> y = lowest_bottoms(frame, slope, diameter_px, width).y;
+    if (y.size() < 2) continue;
+    std::nth_element(y.begin(), y.end() - 2, y.end());
+    lowest.push_back(y[y.size() - 2]);
+  }
+  return quantile(lowest, 0.95) - quantile(lowest, 0.05);
 }
 
 std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms) {
@@ -191,12 +203,16 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
     if (!fit_floor_once(bottoms, tolerance, fit)) return motion;
   }
   std::vector<std::size_t> touching(parts, 0);
+  double squares = 0;
   for (const Bottom& bottom : bottoms) {
-    const bool touches = gap_above(fit, bottom) < 2 * tolerance;
+    const double gap = gap_above(fit, bottom);
+    const bool touches = gap < 2 * tolerance;
     touching[bottom.part] += touches;
     motion.touching += touches;
+    if (touches) squares += gap * gap;
   }
   motion.middle = fit[0];
+  motion.middle_std_error = std::sqrt(squares) / static_cast<double>(std::max<std::size_t>(1, motion.touching));
   motion.amplitude = std::hypot(fit[1], fit[2]);
   const double turns = std::atan2(fit[2], fit[1]) / (2 * std::numbers::pi);
   motion.phase = turns - std::floor(turns);

@@ -18,6 +18,7 @@ struct Line {
   double offset = 0, slope = 0;
   double slope_std_error = 0;
   std::pair<double, double> middle;  // of the points
+  double middle_std_error = 0;       // of its y
 };
 
 // Per column of the frame, the lowest bottom seen in nearly all frames: (x, y), px.
@@ -34,6 +35,10 @@ struct LowestBottoms {
 };
 LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double diameter_px, int width);
 
+// How far the lowest beads move up and down between frames, px: the bottom of all columns but one, 5 % to 95 % of the
+// frames. Where the floor rests and many beads lie near it, hardly at all.
+double bottom_range(const std::vector<FrameFindings>& frames, double slope, double diameter_px, int width);
+
 // Bottom of the bed in a frame: the lowest beads follow the floor, or at least its period.
 std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms);
 
@@ -41,7 +46,8 @@ std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms);
 struct FloorMotion {
   bool known = false;
   double middle = 0, amplitude = 0, phase = 0;
-  std::size_t touching = 0;  // beads
+  double middle_std_error = 0;  // by the scatter of the touching beads
+  std::size_t touching = 0;     // beads
 };
 
 // A bottom counts in full while it is below the floor or at most a tolerance above it. The tolerance shrinks, so that

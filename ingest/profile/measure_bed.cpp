@@ -33,6 +33,8 @@ constexpr std::size_t most_expected_frames = 100000;
 // What deserves a warning: rms of n D^2 between coverage and centres; relative scatter of the contrast and of the bead
 // number from frame to frame; degrees of the floor's tilt.
 constexpr double coverage_differs = 0.03, light_flickers = 0.02, number_varies = 0.01, floor_tilts = 0.5;
+// Lowest beads that move farther between frames may lie on a floor that moves [D]. At rest they scatter by a hundredth.
+constexpr double moving_bottom = 0.1;
 
 // Frames are examined as threads come by them, and taken up in their order; nobody runs far ahead of the slowest.
 class OrderedFrames {
@@ -186,6 +188,7 @@ class BedMeasurer {
       for (const std::string& warning : shaking_.warnings()) result_.warnings.push_back(warning);
       shaking_warned_ = shaking_.warnings().size();
     }
+    if (bed_.floor_reference == FloorReference::lowest_seen) doubt_floor();
     if (bed_.floor_amplitude_px > 0 && !options_.lowest)  // beads follow the floor below its mean position
       bins_.lowest = -std::ceil(bed_.floor_amplitude_px / diameter_px_ / bins_.width) * bins_.width;
     bed_.floor_tilt_degrees = std::atan(bed_.floor_slope) * 180 / std::numbers::pi;
@@ -198,6 +201,18 @@ class BedMeasurer {
                                  : bed_.walls_are_frame_sides ? sides.right - sides.left
                                                               : bed_.right_wall_px - bed_.left_wall_px;
     coverage_.emplace(film_.finder, bed_, diameter_px_, counted_width, refined_.radius_px);
+  }
+
+  // Heights are above the lowest bottoms of all frames. A floor that moves is there only once a period.
+  void doubt_floor() {
+    const double range = bottom_range(held_, bed_.floor_slope, diameter_px_, film_.finder.width);
+    if (range < moving_bottom * diameter_px_) return;
+    bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, 0.5 * range);
+    result_.warnings.push_back(formatted(
+        "The lowest beads move by %.2f D between the frames. If the floor moves, heights are above its lowest "
+        "position: up to %.2f D more than above its mean. Give the row of its mean position (\"floor\", --floor), or "
+        "a film with its frame rate (--frame-rate).",
+        range / diameter_px_, 0.5 * range / diameter_px_));
   }
 
   [[nodiscard]] std::size_t bins_up_to(double top) const {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ingest/find/find_disks.hpp"
@@ -83,6 +84,11 @@ struct MeasureOptions {
   [[nodiscard]] std::vector<std::string> validate() const;
 };
 
+// Where the floor is whose heights are stated: as given, the mean of a motion that a film shows, or the lowest position
+// of the beads' bottoms. That is the mean position only where the floor rests.
+enum class FloorReference { given, mean_of_motion, lowest_seen };
+std::string_view to_string(FloorReference reference);  // "given", "mean of its motion", "lowest seen"
+
 // Places are those of the true frame (see lens.hpp), which is the recorded one unless pixels or lens say otherwise.
 struct BedCalibration {
   Lens lens;
@@ -97,7 +103,9 @@ struct BedCalibration {
   double contrast_level = 0;  // grey levels
   double flicker = 0;         // scatter of the frames' contrast
   Polarity polarity = Polarity::automatic;
-  double floor_px = 0;                      // at x_px = 0; its mean position when it moves
+  double floor_px = 0;  // at x_px = 0; heights are above it
+  FloorReference floor_reference = FloorReference::lowest_seen;
+  double floor_std_error_px = 0;            // of its mean position; 0 when given
   double floor_slope = 0;                   // px down per px right
   double floor_tilt_degrees = 0;            // 0 unless beyond its error
   double floor_tilt_std_error_degrees = 0;  // 0 when given

@@ -9,6 +9,18 @@
 
 namespace shakebed::ingest {
 
+std::string_view to_string(FloorReference reference) {
+  switch (reference) {
+    case FloorReference::given:
+      return "given";
+    case FloorReference::mean_of_motion:
+      return "mean of its motion";
+    case FloorReference::lowest_seen:
+      return "lowest seen";
+  }
+  return "unknown";
+}
+
 std::string disks_csv_rows(const std::vector<MeasuredDisk>& disks) {
   std::string text;
   text.reserve(90 * disks.size());

@@ -54,10 +54,11 @@ void Shaking::find_floor_in_motion(BedCalibration& bed) {
   const FloorMotion motion = find_floor_motion(first_bottoms_, diameter_px_, *turns_per_frame_);
   if (!motion.known) {
     warnings_.emplace_back(
-        "The floor's motion could not be determined: beads touch it in too small a part of the shaker's period. "
-        "Heights are measured from its lowest position.");
+        "The floor's motion could not be determined: beads touch it in too small a part of the shaker's period.");
   } else if (motion.amplitude > resting * diameter_px_) {
     bed.floor_px = motion.middle;
+    bed.floor_std_error_px = motion.middle_std_error;
+    bed.floor_reference = FloorReference::mean_of_motion;
     bed.floor_amplitude_px = motion.amplitude;
     bed.floor_phase = motion.phase;
   }

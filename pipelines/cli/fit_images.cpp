@@ -10,6 +10,7 @@
 #include "pipelines/cli/run_plan.hpp"
 #include "pipelines/formats/quantity.hpp"
 #include "pipelines/stages/images_module.hpp"
+#include "pipelines/stages/scene_options.hpp"
 #include "statistics/kernel.hpp"
 
 namespace shakebed::pipelines {
@@ -137,6 +138,8 @@ void check_arguments(const ImageArguments& image) {
   if (!parse_quantity(image.diameter).has_unit)
     throw UsageError(fmt::format("--diameter: \"{}\" has no unit. Write \"{}\"", image.diameter,
                                  likely_quantity(image.diameter, diameter, dimension::length)));
+  if (const auto impossible = impossible_bead(diameter))
+    throw UsageError(fmt::format("--diameter: {}. {}", impossible->what, impossible->suggestion));
   for (const std::string& file : image.files) {
     if (file.find_first_of("*?[") == std::string::npos && !fs::exists(file))
       throw InputError(fmt::format("there is no file or folder \"{}\"", file));

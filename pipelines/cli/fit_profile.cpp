@@ -43,8 +43,9 @@ fit::FitOptions options_of(const ProfileArguments& given, const MeasuredProfile&
 }
 
 // Whether the profile has one temperature, whatever model and window were asked for.
-fit::Answer answer_of(const MeasuredProfile& measured, const fit::FitOptions& options) {
+fit::Answer answer_of(const MeasuredProfile& measured, const fit::FitOptions& options, std::optional<double> diameter) {
   fit::AnswerInput input;
+  input.diameter = diameter;
   input.profile = measured.profile, input.kernel = measured.kernel, input.column_number = options.column_number;
   return fit::find_answer(input);
 }
@@ -59,7 +60,7 @@ int fit_profile(const Call& call, const ProfileArguments& given) {
   const fit::FitResult result = fit::fit_profile(measured.profile, options);
   if (result.status == fit::FitStatus::bad_input) throw InputError(fmt::format("{}: {}", given.file, result.message));
   Json json = fit_json(result, diameter);
-  json["answer"] = answer_json(answer_of(measured, options), diameter);
+  json["answer"] = answer_json(answer_of(measured, options, diameter), diameter);
   for (const std::string& warning : measured.warnings) json["warnings"].push_back(warning);
   if (call.out) {
     std::filesystem::create_directories(*call.out);

@@ -39,7 +39,7 @@ CLI::App& Program::add(const CommandText& text, std::function<int(const Call&)> 
   command.footer(fmt::format("Examples:\n{}", text.examples));
   command.add_option("--out", call_.out, "folder for the results")->type_name("DIR");
   command.add_flag("--json", call_.json, "JSON result on stdout, messages on stderr");
-  command.add_flag("--quiet,-q", call_.quiet, "show warnings and errors only");
+  command.add_flag("--quiet,-q", call_.quiet, "show the result, warnings and errors only");
   command.add_flag("--verbose,-v", call_.verbose, "show all messages of the stages");
   command.callback([this, work = std::move(work)] { chosen_ = work; });
   return command;

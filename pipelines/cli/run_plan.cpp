@@ -102,9 +102,10 @@ Answer real_run(const Plan& plan, const RunOptions& options, Console& console) {
   const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
+  const bool ended = outcome.code == exit_ok || outcome.code == exit_check_failed;
   return {outcome.code,
-          terminal_text(plan, outcome) +
-              fmt::format("results: {}\nreport:  {}\n", outcome.out.string(), (outcome.out / "report.html").string()),
+          terminal_text(plan, outcome) + fmt::format("{} {}\nreport:  {}\n", ended ? "results:" : "results so far:",
+                                                     outcome.out.string(), (outcome.out / "report.html").string()),
           outcome_json(plan, outcome)};
 }
 

@@ -66,6 +66,23 @@ std::pair<Json, std::string> stage_status(const fs::path& out, const std::string
                                        damaged.empty() ? "" : fmt::format("  damaged: {}", fmt::join(damaged, ", ")))};
 }
 
+// The stages that have begun and not ended: their state is kept in .scratch.
+std::vector<std::string> begun_in(const fs::path& out) {
+  std::vector<std::string> begun;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out / ".scratch", error)) {
+    const std::string id = entry.path().filename().string();
+    if (!entry.is_directory(error) || read_record(out / id)) continue;
+    for (const fs::directory_entry& file : fs::recursive_directory_iterator(entry.path(), error)) {
+      if (!file.is_regular_file(error)) continue;
+      begun.push_back(id);
+      break;
+    }
+  }
+  std::sort(begun.begin(), begun.end());
+  return begun;
+}
+
 // How the last run ended, from what is to be printed with --json.
 std::string last_run(const Json& json) {
   if (json["running"].get<bool>()) return "running now";
@@ -101,12 +118,23 @@ int status(const Call& call, const fs::path& out) {
     json["stages"].push_back(std::move(row));
     text += line;
   }
+  json["begun"] = begun_in(out);
+  for (const Json& id : json["begun"])
+    text += fmt::format("  {:<16} begun, not finished: its state is kept\n", id.get<std::string>());
   const Json sweep = sweep_status(out);
-  if (json["stages"].empty() && sweep.is_null()) text += "  no finished stage\n";
+  if (json["stages"].empty() && json["begun"].empty() && sweep.is_null()) text += "  no finished stage\n";
   if (!sweep.is_null()) {
     json["sweep"] = sweep;
     text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
                         sweep["points"].get<std::uint64_t>(), sweep["failed"].get<std::uint64_t>());
+  }
+  if (const fs::path submitted = out / "slurm" / "submitted.json"; fs::is_regular_file(submitted, error)) {
+    json["submitted"] = read_json(submitted);
+    const std::string job = json["submitted"].value("job", ""), gather = json["submitted"].value("gather_job", "");
+    text +=
+        fmt::format("  last submitted to Slurm: {}{}job {} gathers (squeue --jobs {} shows whether they have ended)\n",
+                    job.empty() ? "" : "array job " + job, job.empty() ? "" : ", ", gather,
+                    job.empty() ? gather : job + "," + gather);
   }
   print(call.json ? dump(json) : text);
   return exit_ok;

@@ -52,8 +52,10 @@ int validate(const Call& call, const ValidateArguments& given) {
 
 void add_validate(Program& program) {
   const auto given = std::make_shared<ValidateArguments>();
-  CLI::App& command = program.add({"validate", "check a recipe, all mistakes at once", "  shakebed validate bed.json"},
-                                  [given](const Call& call) { return validate(call, *given); });
+  CLI::App& command =
+      program.add({"validate", "check a recipe: all mistakes at once, then those of the points of its sweep",
+                   "  shakebed validate bed.json"},
+                  [given](const Call& call) { return validate(call, *given); });
   command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
   add_preset(command, given->run);
   command

@@ -36,7 +36,7 @@ Json BedDescription::to_json() const {
   out["friction"] = friction ? Json(*friction) : Json();
   out["column_number"] = column_number();
   out["gamma"] = gamma();
-  out["height_origin"] = "mean position of the floor";
+  out["height_origin"] = height_origin;
   return out;
 }
 
@@ -63,6 +63,7 @@ BedDescription BedDescription::from_json(const Json& json, const std::string& fi
   bed.amplitude = known("amplitude"), bed.frequency = known("frequency");
   bed.bath_temperature = value("bath_temperature");
   bed.restitution = known("restitution"), bed.friction = known("friction");
+  bed.height_origin = json.value("height_origin", bed.height_origin);
   if (!(bed.diameter > 0) || !(bed.width > 0)) throw InputError(file + ": diameter and width must be above 0");
   return bed;
 }

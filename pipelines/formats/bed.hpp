@@ -29,6 +29,7 @@ struct BedDescription {
   double bath_temperature = 0;            // T of the reservoir [m g D], 0 without
   std::optional<double> restitution;      // disk on disk
   std::optional<double> friction;         // disk on disk
+  std::string height_origin = "the floor's mean position";  // heights are above it
 
   // N D/W: disks per diameter of width.
   double column_number() const { return count * diameter / width; }

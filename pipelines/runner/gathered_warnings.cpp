@@ -1,6 +1,7 @@
 #include "pipelines/runner/gathered_warnings.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -29,7 +30,7 @@ std::string pattern_of(const std::string& text) {
 
 }  // namespace
 
-void GatheredWarnings::add(const Json& warnings) {
+void GatheredWarnings::add(const std::string& point, const Json& warnings) {
   std::set<std::string> seen;
   for (const Json& warning : warnings) {
     if (!warning.is_string()) continue;
@@ -39,18 +40,23 @@ void GatheredWarnings::add(const Json& warnings) {
     const auto known =
         std::find_if(kinds_.begin(), kinds_.end(), [&](const Kind& kind) { return kind.pattern == pattern; });
     if (known == kinds_.end())
-      kinds_.push_back({pattern, text, 1});
+      kinds_.push_back({pattern, text, {point}});
     else
-      ++known->runs;
+      known->points.push_back(point);
   }
 }
 
 std::vector<std::string> GatheredWarnings::lines() const {
+  constexpr std::size_t most_named = 3;
   std::vector<std::string> lines;
-  for (const Kind& kind : kinds_)
-    lines.push_back(kind.runs == 1
-                        ? kind.first + " (1 point)"
-                        : fmt::format("{} ({} points; the numbers are those of the first)", kind.first, kind.runs));
+  for (const auto& [pattern, first, points] : kinds_) {
+    const std::size_t named = std::min(most_named, points.size());
+    const std::string names =
+        fmt::format("{}", fmt::join(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(named), ", "));
+    lines.push_back(points.size() == 1 ? fmt::format("{} (point {})", first, names)
+                                       : fmt::format("{} ({} points: {}{}; the numbers are those of the first)", first,
+                                                     points.size(), names, points.size() > named ? ", ..." : ""));
+  }
   return lines;
 }
 

@@ -11,14 +11,14 @@ namespace shakebed::pipelines {
 class GatheredWarnings {
  public:
   // The warnings of one run, an array of texts. Warnings that differ in their numbers alone are of one kind.
-  void add(const Json& warnings);
-  // The first of each kind in the order they came, "... (4 points)".
+  void add(const std::string& point, const Json& warnings);
+  // The first of each kind in the order they came, "... (4 points: 000001, 000002, 000004, ...)".
   std::vector<std::string> lines() const;
 
  private:
   struct Kind {
     std::string pattern, first;
-    std::size_t runs = 0;
+    std::vector<std::string> points{};
   };
   std::vector<Kind> kinds_;
 };

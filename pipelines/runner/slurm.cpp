@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/process.hpp"
@@ -90,7 +91,10 @@ std::string submit(const std::vector<std::string>& arguments) {
   std::string id = result.output.substr(0, result.output.find_first_of(";\n"));
   if (result.exit_code != 0 || id.empty() ||
       !std::all_of(id.begin(), id.end(), [](unsigned char c) { return std::isdigit(c); }))
-    throw StageError(fmt::format("sbatch refused (exit code {}): {}", result.exit_code, result.output));
+    throw StageError(fmt::format("sbatch refused (exit code {}): {}{}", result.exit_code, result.output,
+                                 std::getenv("SLURM_CONF") == nullptr
+                                     ? " If Slurm has a configuration of your own, set SLURM_CONF in this shell"
+                                     : ""));
   return id;
 }
 

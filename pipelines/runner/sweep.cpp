@@ -303,7 +303,7 @@ class SweepRun {
       row.push_back(good ? record->value("verdict", "") : "");
       if (!row.back().empty()) ++verdicts_[row.back()];
     }
-    if (good) warnings_.add((*record)["warnings"]);
+    if (good) warnings_.add(point.name, (*record)["warnings"]);
     return row;
   }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 
 #include "pipelines/runner/recipe_options.hpp"
@@ -122,10 +123,12 @@ class SweepReader {
     axis.places.assign(static_cast<std::size_t>(n), axis.places.front());
     for (std::int64_t i = 0; i < n; ++i) {
       const double u = n == 1 ? 0 : static_cast<double>(i) / static_cast<double>(n - 1);
-      const double value = i == 0             ? axis.low
+      const double exact = i == 0             ? axis.low
                            : i == n - 1       ? axis.high
                            : axis.logarithmic ? axis.low * std::pow(axis.high / axis.low, u)
                                               : axis.low + (axis.high - axis.low) * u;
+      // To 15 digits: 3.28 in place of 3.2799999999999994.
+      const double value = std::strtod(fmt::format("{:.15g}", exact).c_str(), nullptr);
       axis.values.push_back(axis.unit.empty() ? Json(value) : Json(number_text(value) + " " + axis.unit));
     }
     return true;

@@ -11,7 +11,7 @@ namespace {
 // The estimate at a pointer, its value and error multiplied by a factor.
 std::optional<fit::Estimate> estimate_at(const Json& json, const std::string& pointer, double factor) {
   const Json *value = find_pointer(json, pointer + "/value"), *error = find_pointer(json, pointer + "/std_error");
-  if (value == nullptr || !value->is_number() || !(value->get<double>() > 0)) return std::nullopt;
+  if (value == nullptr || !value->is_number() || !(value->get<double>() >= 0)) return std::nullopt;
   const double spread = error != nullptr && error->is_number() ? error->get<double>() : 0;
   return fit::Estimate{factor * value->get<double>(), factor * spread};
 }
@@ -40,6 +40,16 @@ double contact_duration_effect(const Input& input) {
   const Json result = input.result();
   const Json* effect = find_pointer(result, "/contact_duration_effect/value");
   return effect != nullptr && effect->is_number() ? effect->get<double>() : 0;
+}
+
+double origin_error(const Input& input) {
+  const Json result = input.result();
+  const auto number = [&](const char* pointer) {
+    const Json* found = find_pointer(result, pointer);
+    return found != nullptr && found->is_number() ? found->get<double>() : 0;
+  };
+  const double diameter = number("/diameter/value");
+  return diameter > 0 ? number("/floor/std_error") * number("/scale/value") / diameter : 0;
 }
 
 std::vector<fit::Objection> objections_of(const Input& input) {
@@ -73,7 +83,7 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   put_temperature(out, "temperature", answer.temperature, answer.std_error, diameter);
   out["interval"] = Json{{"low", quantity_json(answer.interval.low, "m g D")},
                          {"high", quantity_json(answer.interval.high, "m g D")},
-                         {"confidence", answer.interval.confidence}};
+                         {"confidence", answer.interval.confidence > 0 ? Json(answer.interval.confidence) : Json()}};
   out["statistical_error"] = quantity_json(answer.statistical_error, "m g D");
   out["misfit_error"] = quantity_json(answer.misfit_error, "m g D");
   out["next_bed_interval"] = Json{{"low", quantity_json(answer.next_bed_interval.low, "m g D")},
@@ -127,7 +137,11 @@ std::string answer_text(const Json& answer) {
     return found != nullptr && found->is_number() ? scale.factor * found->get<double>() : 0;
   };
   std::string text;
-  if (is_range(answer))
+  if (is_range(answer) && number("/interval/high/value") == 0)
+    text = scale.name + std::string(" = 0");
+  else if (is_range(answer) && number("/interval/low/value") == 0)
+    text = fmt::format("{} below {:.3g} {}", scale.name, number("/interval/high/value"), scale.unit);
+  else if (is_range(answer))
     text = fmt::format("{} between {:.3g} and {:.3g} {}", scale.name, number("/interval/low/value"),
                        number("/interval/high/value"), scale.unit);
   else

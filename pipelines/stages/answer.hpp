@@ -20,6 +20,8 @@ struct KineticTemperatures {
 KineticTemperatures kinetic_temperatures(const Input& input, std::optional<double> diameter);
 // Relative effect of the contact duration on T, where a simulation states one; else 0.
 double contact_duration_effect(const Input& input);
+// One standard error of the floor's mean position [D], where an input stage measured it in photographs; else 0.
+double origin_error(const Input& input);
 // What an input stage knows against its own profile: "objections" of its result.
 std::vector<fit::Objection> objections_of(const Input& input);
 

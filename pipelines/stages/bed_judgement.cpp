@@ -10,6 +10,8 @@
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/hard_disk_trust.hpp"
 
+#include "statistics/rest.hpp"
+
 namespace shakebed::pipelines {
 namespace {
 
@@ -67,10 +69,8 @@ class Judge {
 
   // Of a bed that lies still nothing else matters.
   bool at_rest() {
-    constexpr double hardly = 1e-6;  // m g D
-    const auto x = number_at(joined_, "/temperature_x/value"), z = number_at(joined_, "/temperature_z/value");
-    if (!x || !z || !(*x + *z < hardly)) return false;
-    object("at rest", "the disks hardly move: T_x and T_z are below 1e-6 m g D",
+    if (!lies_still(joined_)) return false;
+    object("at rest", fmt::format("the disks hardly move: T_x and T_z are below {:g} m g D", temperature_at_rest),
            "Shake the bed harder. At Gamma below 1 the floor never leaves it");
     return true;
   }

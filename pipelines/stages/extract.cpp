@@ -162,6 +162,8 @@ class Extract : public Stage {
     if (!gravity_) gravity_ = standard_gravity;
     fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: the diameter of a bead gives the scale",
                    "Write \"diameter\": \"2.99 mm\"");
+    if (const auto impossible = impossible_bead(diameter_.value_or(1e-3)))
+      fields.require(false, "diameter", impossible->what, impossible->suggestion);
     options_.diameter = diameter_.value_or(1), options_.gravity = *gravity_;
   }
 

@@ -18,9 +18,25 @@ namespace {
 // Of the picture of what the model leaves, for the page: marks of a pixel's width are still seen.
 constexpr int residual_width = 620, residual_quality = 50;
 
-ProfileTable table_of(const ingest::DensityProfile& profile, double width, std::string description) {
+// What heights are above.
+const char* origin_of_heights(const ingest::BedCalibration& bed) {
+  switch (bed.floor_reference) {
+    case ingest::FloorReference::given:
+      return "the given row of the floor";
+    case ingest::FloorReference::mean_of_motion:
+      return "the floor's mean position";
+    case ingest::FloorReference::lowest_seen:
+      return "the lowest position of the floor that the beads show";
+  }
+  return "the floor";
+}
+
+ProfileTable table_of(const ingest::DensityProfile& profile, const ingest::BedCalibration& bed,
+                      std::string description) {
+  const double width = bed.width;
   ProfileTable table;
   table.description = std::move(description);
+  table.origin = origin_of_heights(bed);
   table.kernel = profile.kernel;
   // Without the empty rows at both ends.
   std::size_t first = 0, last = profile.number_density.size();
@@ -70,7 +86,8 @@ void add_beads(const ExtractOptions& options, const ingest::Measurement& found, 
 
 void add_geometry(const ingest::Measurement& found, Json& result) {
   const ingest::BedCalibration& bed = found.calibration;
-  result["floor"] = quantity_json(bed.floor_px, "px");
+  result["floor"] = quantity_json(bed.floor_px, "px", bed.floor_std_error_px);
+  result["floor_reference"] = ingest::to_string(bed.floor_reference);
   result["floor_given"] = bed.floor_given;
   result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
   if (bed.shaking_frequency_hz > 0) {
@@ -155,6 +172,7 @@ BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement
   bed.diameter = options.diameter, bed.second_diameter = options.second_diameter;
   bed.gravity = options.gravity;
   bed.width = seen.width * options.diameter;
+  bed.height_origin = origin_of_heights(seen);
   if (seen.shaking_frequency_hz > 0) {
     bed.frequency = seen.shaking_frequency_hz;
     bed.amplitude = seen.floor_amplitude_px * seen.scale_m_per_px;
@@ -163,19 +181,19 @@ BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement
 }
 
 void write_profiles(RunContext& context, const ingest::Measurement& found, double column_number) {
-  const double width = found.calibration.width;
-  ProfileTable profile = table_of(found.profile, width, "density profile of the disks found, mean over the frames");
+  const ingest::BedCalibration& bed = found.calibration;
+  ProfileTable profile = table_of(found.profile, bed, "density profile of the disks found, mean over the frames");
   profile.column_number = column_number;
   write_profile_csv(context.output("profile.csv"), profile);
   if (found.second_profile)
     write_profile_csv(context.output("second_profile.csv"),
-                      table_of(*found.second_profile, width,
+                      table_of(*found.second_profile, bed,
                                "density profile of the beads of the second diameter; D is the first diameter"));
   if (found.coverage_profile)
     write_profile_csv(context.output("coverage_profile.csv"),
-                      table_of(*found.coverage_profile, width, "density profile from the covered area"));
+                      table_of(*found.coverage_profile, bed, "density profile from the covered area"));
   for (std::size_t i = 0; i < found.phases.size(); ++i) {
-    ProfileTable phase = table_of(found.phases[i].profile, width, "density profile at one phase of the shaking");
+    ProfileTable phase = table_of(found.phases[i].profile, bed, "density profile at one phase of the shaking");
     phase.phase = found.phases[i].phase;
     write_profile_csv(context.output(fmt::format("profile_phase_{:02d}.csv", i)), phase);
   }

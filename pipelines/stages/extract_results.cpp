@@ -5,6 +5,9 @@
 namespace shakebed::pipelines {
 namespace {
 
+// What heights are above, in the descriptions of tables.
+constexpr const char* floor_of_heights = "the floor (/floor_reference: which position of it)";
+
 void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/frames", "1", "number of frames read");
   list.number("/frames_used", "1", "number of frames in which disks were found");
@@ -44,7 +47,10 @@ void state_calibration(ResultList& list) {
   list.quantity("/contrast", "grey levels", "contrast of a bead");
   list.quantity("/flicker", "1", "relative change of the light from frame to frame");
   list.text("/polarity", "whether the beads are bright or dark");
-  list.quantity("/floor", "px", "row of the floor");
+  list.quantity("/floor", "px",
+                "row of the floor at the left edge of the frame; its error is that of the mean position");
+  list.text("/floor_reference",
+            "position of the floor that heights are above: given, mean of its motion (in a film), or lowest seen");
   list.truth("/floor_given", "whether the floor was given");
   list.quantity("/floor_tilt", "deg", "tilt of the floor");
   list.quantity("/left_wall", "px", "column of the left wall");
@@ -96,22 +102,23 @@ void state_density(ResultList& list, const ExtractOptions& options) {
 }
 
 void state_tables(ResultList& list, const ExtractOptions& options) {
-  list.table({"profile.csv", "density profile above the floor's mean position", profile_columns()});
-  list.table({"second_profile.csv", "density profile of the second species", profile_columns(),
+  list.table({"profile.csv", "density profile", profile_columns(floor_of_heights)});
+  list.table({"second_profile.csv", "density profile of the second species", profile_columns(floor_of_heights),
               given_if(options.second_diameter.has_value(), "\"second_diameter\" is given")});
-  list.table({"coverage_profile.csv", "density profile by covered area", profile_columns(),
+  list.table({"coverage_profile.csv", "density profile by covered area", profile_columns(floor_of_heights),
               given_when("the covered area could be measured")});
-  list.table({"profile_phase_*.csv", "density profile at a phase of the floor", profile_columns(),
+  list.table({"profile_phase_*.csv", "density profile at a phase of the floor", profile_columns(floor_of_heights),
               given_when("the phase of the frames is known")});
   list.table({"covariance.csv", "covariance of the densities of profile.csv", covariance_columns()});
   const std::vector<StatedColumn> place{{"frame", "1", "number of the frame, from 0"},
                                         {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
                                         {"y_px", "px", "centre, from the centre of the top-left pixel downwards"}};
   std::vector<StatedColumn> disks = place, details = place;
-  disks.insert(disks.end(), {{"radius_px", "px", "radius"},
-                             {"x", "D", "centre, from the left wall"},
-                             {"z", "D", "height of the centre above the floor's mean position"},
-                             {"quality", "1", "1 is a bead that looks like all the others, 0 is none"}});
+  disks.insert(disks.end(),
+               {{"radius_px", "px", "radius"},
+                {"x", "D", "centre, from the left wall"},
+                {"z", "D", "height of the centre above the floor (/floor_reference: which position of it)"},
+                {"quality", "1", "1 is a bead that looks like all the others, 0 is none"}});
   details.insert(details.end(),
                  {{"std_error_x_px", "px", "standard error of x_px"},
                   {"std_error_y_px", "px", "standard error of y_px"},

@@ -408,6 +408,7 @@ Json answer_of(const FitTask& task, const RunContext& context) {
   const fit::FitOptions& options = task.options;
   fit::AnswerInput input;
   input.profile = task.measured.profile, input.kernel = options.kernel;
+  input.diameter = task.diameter;
   if (options.base != fit::FitOptions{}.base) input.base = options.base;  // else that of a hexagonal bed
   input.column_number = options.column_number;
   for (const Input& upstream : context.inputs()) {
@@ -417,7 +418,7 @@ Json answer_of(const FitTask& task, const RunContext& context) {
   }
   // Of the profile's own stage alone: a profile of the user's is not what it measured.
   if (task.source != nullptr && task.path == task.source->directory / "profile.csv")
-    input.objections = objections_of(*task.source);
+    input.objections = objections_of(*task.source), input.origin_error = origin_error(*task.source);
   Json answer = answer_json(fit::find_answer(input), task.diameter);
   for (const Input& upstream : context.inputs()) add_judgement(upstream.result(), answer);
   return answer;

@@ -40,6 +40,10 @@ std::string temperature_text(const Json& answer, const std::string& pointer, con
 std::string number_html(const Json& answer, const AnswerScale& scale) {
   const auto low = in_scale(answer, "/interval/low/value", scale.factor),
              high = in_scale(answer, "/interval/high/value", scale.factor);
+  if (is_range(answer) && high && *high == 0) return prose(scale.name) + " = 0";
+  if (is_range(answer) && low && high && *low == 0)
+    return fmt::format("{} below <data value=\"{}\">{:.3g}</data> {}", prose(scale.name), number_text(*high), *high,
+                       scale.unit);
   if (is_range(answer) && low && high)
     return fmt::format("{} between <data value=\"{}\">{:.3g}</data> and <data value=\"{}\">{:.3g}</data> {}",
                        prose(scale.name), number_text(*low), *low, number_text(*high), *high, scale.unit);
@@ -169,7 +173,10 @@ std::string numbers_text(const FinishedStage& stage) {
   if (unit == nullptr || *unit != "m" || !add("temperature_over_mg", "T/(m g)", 1e3, " mm"))
     add("temperature", "T", 1, " m g D");
   add("reduced_temperature", "T/T_c", 1, "");
-  add("solid_height", "solid", 1, " D high");
+  if (const Json* solid = find_pointer(fit, "/solid_height/value"); solid != nullptr && *solid == 0)
+    numbers += numbers.empty() ? "" : ", no solid";
+  else
+    add("solid_height", "solid", 1, " D high");
   const Json* answer = find_pointer(fit, "/answer");
   std::string text;
   if (answer != nullptr)

@@ -122,7 +122,8 @@ class FitStatement {
     temperature("temperature_z", "kinetic temperature, vertical", kinetic);
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
     list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
-    list_.number("/answer/interval/confidence", "1", "confidence level of the interval", found);
+    list_.number("/answer/interval/confidence", "1",
+                 "confidence level of the interval; none where it is the range of all readings", found, true);
     list_.quantity("/answer/next_bed_interval/low", "m g D",
                    "lower end of the interval in which the mean T of further beds lies, by the same model and window",
                    found);

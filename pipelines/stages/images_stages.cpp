@@ -24,9 +24,11 @@ Previewed preview_images(const PreviewRequest& request) {
   write_preview(request.folder, *look, request.files, request.diameter);
   if (!look->survey.found) return {false, fmt::format("{}: no beads: {}", look->path, look->survey.why_not)};
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
-  return {true, fmt::format("{} {} beads of {:.2f} px radius in channel {}; expected share of wrong ones {:.1f} %",
-                            best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                            best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong)};
+  return {true, fmt::format(
+                    "a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in channel {}; "
+                    "expected share of wrong ones {:.1f} %. The run may find more",
+                    best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                    best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong)};
 }
 
 // ingest's own errors become ours.

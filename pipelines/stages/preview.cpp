@@ -36,7 +36,8 @@ std::string quoted(const std::string& text) {
 
 std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t number, const std::string& command) {
   return fmt::format(
-      "<h2>{}. {} beads of {:.2f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} %; the "
+      "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} "
+      "%; the "
       "beads' rims are {:.0f} % of the edges in the picture. {}</p>\n<pre>{}</pre>\n<p><img src=\"preview_{}.png\" "
       "alt=\"the beads found\"></p>\n",
       number, candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark", candidate.rims.radius_px,
@@ -81,8 +82,10 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
   command += fmt::format(" --diameter {}", quoted(diameter));
   std::string body;
   const ingest::Survey& survey = look.survey;
-  body += survey.found ? "<p>The first candidate is used unless options say otherwise.</p>\n"
-                       : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
+  body += survey.found
+              ? "<p>The first candidate is used unless options say otherwise. This is a first look, without the fit of "
+                "each bead: the run may find more of them, and states their radius with its error.</p>\n"
+              : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const ingest::CandidatePictures pictures(look.path);
   for (std::size_t k = 0; k < std::min(most_shown, survey.candidates.size()); ++k) {
     pictures.write(folder / fmt::format("preview_{}.png", k + 1), &survey.candidates[k]);

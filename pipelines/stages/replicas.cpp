@@ -10,6 +10,8 @@
 #include <string_view>
 #include <utility>
 
+#include "statistics/rest.hpp"
+
 namespace shakebed::pipelines {
 
 namespace {
@@ -137,7 +139,14 @@ Json joined_results(const std::vector<Json>& results) {
   return out;
 }
 
+bool lies_still(const Json& joined) {
+  const Json *x = find_pointer(joined, "/temperature_x/value"), *z = find_pointer(joined, "/temperature_z/value");
+  return x != nullptr && x->is_number() && *x < temperature_at_rest && z != nullptr && z->is_number() &&
+         *z < temperature_at_rest;
+}
+
 std::optional<NotableSpread> notable_spread(const Json& joined, std::size_t n) {
+  if (lies_still(joined)) return std::nullopt;
   for (const char* key : {"temperature_x", "temperature_z", "center_of_mass_rise"}) {
     const double spread = part_of(joined, key, "spread"), within = part_of(joined, key, "within");
     if (n >= 2 && differ(spread, within, n)) return NotableSpread{key, spoken(key), spread, within};
@@ -146,6 +155,7 @@ std::optional<NotableSpread> notable_spread(const Json& joined, std::size_t n) {
 }
 
 std::optional<NotableDrift> notable_drift_of(const Json& joined) {
+  if (lies_still(joined)) return std::nullopt;
   for (const auto& [drift, key] : drifting) {
     const double change = part_of(joined, drift, "value"), error = part_of(joined, drift, "std_error");
     if (error > 0 && std::abs(change) > notable_drift * error)

@@ -25,6 +25,8 @@ enum class ReplicaStarts {
 // state. It is scaled by Student's t for the few replicas: 1.96 of it hold the mean of further beds in 95 % of all
 // cases.
 Json joined_results(const std::vector<Json>& results);
+// Whether the bed, or all beds, hardly moved: what they differ by then says nothing.
+bool lies_still(const Json& joined);
 // The first of T_x, T_z and the rise by which n beds differ by more than each of them states.
 struct NotableSpread {
   const char *key, *what;  // "temperature_x", "T_x"

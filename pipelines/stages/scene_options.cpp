@@ -359,7 +359,8 @@ void SceneOptions::describe(Fields& fields) {
   if (!reduced_ && fields.mode() != Fields::Mode::encode) disks_.density = 2500;  // glass
   fields.object<DiskOptions>("disks", disks_, describe_disks, {.help = "the disks", .required = true});
   describe_gravity(fields);
-  fields.object<BoxOptions>("box", box_, describe_box, {.help = "the box", .required = true});
+  fields.object<BoxOptions>("box", box_, describe_box,
+                            {.help = "the box: its width, side walls and lid", .required = true});
   fields.object<FloorOptions>(
       "floor", floor_, [gravity = gravity_](Fields& f, FloorOptions& floor) { describe_floor(f, floor, gravity); },
       {.help = "the floor"});

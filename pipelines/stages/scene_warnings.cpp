@@ -15,6 +15,7 @@ namespace {
 constexpr double least_gamma = 1, most_gamma = 50;
 // Beads of experiments are 50 um to some cm.
 constexpr double largest_bead = 0.1, smallest_bead = 1e-6;  // [m]
+constexpr double largest_photographed = 1;                  // [m]
 // Narrower boxes hold little but the disks next to their walls.
 constexpr double least_width = 5;  // [D]
 // Cells of experiments are some cm to a metre wide; in a wider one, fewer disks than one a diameter of width are no
@@ -65,6 +66,10 @@ std::optional<Misfit> odd_bead(double diameter) {
       fmt::format("a bead of {}: beads of experiments are 50 um to some cm", handy_text(diameter, dimension::length)),
       diameter >= largest_bead ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", diameter)
                                : "Check its unit"};
+}
+
+std::optional<Misfit> impossible_bead(double diameter) {
+  return diameter >= largest_photographed ? odd_bead(diameter) : std::nullopt;
 }
 
 void warn_of_bead(Fields& fields, std::string_view pointer_below, double diameter) {

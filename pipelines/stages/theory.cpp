@@ -360,8 +360,10 @@ std::string fit_text(const Json& fit) {
     double value = quantity["value"].get<double>(), error = stated_error(quantity);
     std::string shown = unit == "1" ? "" : unit;
     if (unit == "m") value *= 1e3, error *= 1e3, shown = "mm";
-    out += fmt::format("{:<22} {:>12.6g}{} {}\n", label, value,
-                       quantity.value("fixed", false) ? "  (fixed)" : fmt::format(" +- {:.2g}", error), shown);
+    const std::string known = quantity.value("fixed", false) ? "  (fixed)"
+                              : error > 0                    ? fmt::format(" +- {:.2g}", error)
+                                                             : "";
+    out += fmt::format("{:<22} {:>12.6g}{} {}\n", label, value, known, shown);
   };
   if (!fit.value("describes_data", true)) {
     out += fmt::format("The model {} does not describe this profile: {}.\n", fit.value("model", ""),
@@ -369,7 +371,10 @@ std::string fit_text(const Json& fit) {
   }
   line("temperature", "T / (m g D)");
   line("temperature_over_mg", "T / (m g)");
-  line("solid_height", "solid height");
+  if (const Json* solid = find_pointer(fit, "/solid_height/value"); solid != nullptr && *solid == 0)
+    out += fmt::format("{:<22} {:>12}\n", "solid height", "no solid");
+  else
+    line("solid_height", "solid height");
   line("shift", "shift");
   line("plateau_density", "plateau density");
   line("critical_temperature", "T_c / (m g D)");

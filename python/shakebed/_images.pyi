@@ -27,6 +27,8 @@ class Bed:
     scale: float
     radius: float
     floor: float
+    floor_std_error: float
+    floor_reference: str
     frames: int
     disks_a_frame: float
     warnings: list[str]

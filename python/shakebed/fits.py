@@ -296,7 +296,8 @@ def find_answer(
     length = None if diameter is None else in_si(diameter, "length", "diameter")
     answer = _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
                                None if column_number is None else number(column_number, "column_number"),
-                               _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [])
+                               _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [],
+                               length, 0.0)
     return with_lengths(answer, length)
 
 

@@ -181,7 +181,8 @@ class MeasuredBed:
         profile = self.profile
         answer = _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
                                    profile.covariance_samples, profile.kernel, self.disks_a_frame / self.width, None, None,
-                                   self._bed.objections())
+                                   self._bed.objections(), self._diameter,
+                                   self.floor_std_error * self.scale / self._diameter)
         return with_lengths(answer, self._diameter)
 
     @property
@@ -208,8 +209,18 @@ class MeasuredBed:
 
     @property
     def floor(self) -> float:
-        """Row of the floor [px]."""
+        """Row of the floor [px], at the left edge of the frame."""
         return self._bed.floor
+
+    @property
+    def floor_std_error(self) -> float:
+        """Standard error of the floor's mean position [px]; 0 if the floor was given."""
+        return self._bed.floor_std_error
+
+    @property
+    def floor_reference(self) -> str:
+        """Position of the floor that heights are above: "given", "mean of its motion" or "lowest seen"."""
+        return self._bed.floor_reference
 
     @property
     def frames(self) -> int:
@@ -306,7 +317,10 @@ def measure_bed(
         An argument has the wrong type or shape.
     """
     wanted = _checked(options, _measure_options, "measure_bed")
-    wanted.update(diameter=in_si(diameter, "length", "diameter"), threads=threads)
+    length = in_si(diameter, "length", "diameter")
+    if length > 0 and (impossible := _core.impossible_bead(length)):
+        raise UsageError(f"diameter: {impossible}")
+    wanted.update(diameter=length, threads=threads)
     from . import _images
 
     call, close = reporter(progress, "finding disks")

@@ -164,6 +164,73 @@ TEST(Answer, IsARangeWhereProfileAndVelocitiesDisagree) {
   EXPECT_GT(answer.interval.high, 0.45);
 }
 
+// From the profile alone a cold bed looks like one at rest with an uneven surface: an upper limit, unless velocities
+// confirm it.
+TEST(Answer, OfAColdSurfaceIsAnUpperLimit) {
+  AnswerInput input = column(0.07);
+  const Answer alone = find_answer(input);
+  ASSERT_TRUE(alone.ok()) << alone.why;
+  EXPECT_EQ(alone.verdict, Verdict::no_single_temperature);
+  EXPECT_THAT(alone.why, testing::HasSubstr("T is below"));
+  EXPECT_EQ(alone.interval.low, 0.0);
+  EXPECT_GT(alone.interval.high, 0.07);
+  EXPECT_LT(alone.interval.high, 0.12);
+  EXPECT_EQ(alone.temperature, 0.5 * alone.interval.high);
+  input.temperature_x = Estimate{0.069, 0.002, false};
+  input.temperature_z = Estimate{0.071, 0.002, false};
+  const Answer confirmed = find_answer(input);
+  EXPECT_EQ(confirmed.verdict, Verdict::one_temperature) << confirmed.why;
+  EXPECT_NEAR(confirmed.temperature, 0.07, 3 * confirmed.std_error);
+  EXPECT_THAT(find_answer(column(0.3)).why, testing::HasSubstr("only velocities show whether T_x differs"));
+}
+
+TEST(Answer, OfABedAtRestIsNotReadOffItsProfile) {
+  AnswerInput input = column(0.12);
+  input.temperature_x = Estimate{2e-6, 1e-7, false};
+  input.temperature_z = Estimate{5e-6, 1e-7, false};
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
+  EXPECT_THAT(answer.why, testing::StartsWith("The bed is at rest: T_x = 2e-06 and T_z = 5e-06 m g D."));
+  EXPECT_EQ(answer.interval.low, 2e-6);
+  EXPECT_EQ(answer.interval.high, 5e-6);
+  input.temperature_x = input.temperature_z = Estimate{0.0, 0.0, false};
+  EXPECT_EQ(find_answer(input).interval.high, 0.0);
+  // A motion up and down alone.
+  input.temperature_z = Estimate{0.2, 0.001, false};
+  EXPECT_THAT(find_answer(input).why, testing::HasSubstr("T_x = 0 and T_z = 0.2 m g D."));
+}
+
+TEST(Answer, StatesTemperaturesAsLengthsWhereTheDiameterIsKnown) {
+  AnswerInput input = column(0.5);
+  input.temperature_x = Estimate{0.3, 0.01, false};
+  input.temperature_z = Estimate{0.6, 0.01, false};
+  input.diameter = 2e-3;
+  EXPECT_THAT(find_answer(input).why, testing::HasSubstr("T_x = 0.6 and T_z = 1.2 mm, a factor of 2 apart"));
+}
+
+// Heights that are all off by some length move the top of the solid by as much.
+TEST(Answer, CarriesTheErrorOfTheFloorIntoTheSolidsHeight) {
+  AnswerInput input = column(0.12);
+  const Answer exact = find_answer(input);
+  ASSERT_GT(exact.solid_height.value, 0.0);
+  input.origin_error = 0.4;
+  const Answer open = find_answer(input);
+  EXPECT_EQ(open.solid_height.value, exact.solid_height.value);
+  EXPECT_NEAR(open.solid_height.std_error, std::hypot(exact.solid_height.std_error, 0.4), 1e-12);
+  for (double& z : input.profile.height) z += 0.4;
+  EXPECT_NEAR(find_answer(input).solid_height.value - exact.solid_height.value, 0.4, 0.1);
+}
+
+// A range is no confidence interval, and holds all that is known of T.
+TEST(Answer, StatesNoConfidenceForARange) {
+  AnswerInput input = column(0.5);
+  EXPECT_EQ(find_answer(input).interval.confidence, 0.95);
+  input.temperature_x = Estimate{0.3, 0.01, false};
+  input.temperature_z = Estimate{0.6, 0.01, false};
+  EXPECT_EQ(find_answer(input).interval.confidence, 0.0);
+}
+
 // Two temperatures on top of one another: a dense bed at 0.4 under a tail that falls as at 1.2.
 TEST(Answer, IsARangeWhereTheDepthDecides) {
   AnswerInput input = column(0.4);

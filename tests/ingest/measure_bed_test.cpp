@@ -337,6 +337,47 @@ TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
   EXPECT_NEAR(resting.floor_px, 270, 0.1);
 }
 
+// Photographs tell nothing of the time: the floor is taken where it is lowest, and the error says how far its mean may
+// lie above.
+TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
+  const auto warned = [](const Measurement& measured) {
+    return std::any_of(measured.warnings.begin(), measured.warnings.end(), [](const std::string& warning) {
+      return warning.find("above its lowest position") != std::string::npos;
+    });
+  };
+  MeasureOptions options = options_of();
+  FrameSource source = FrameSource::from_frames(shaken_film(9, 0.3, 41, 1 / 13.7));
+  const Measurement moving = measure_bed(source, options);
+  EXPECT_EQ(moving.calibration.floor_reference, FloorReference::lowest_seen);
+  EXPECT_NEAR(moving.calibration.floor_px, 279, 1);
+  EXPECT_GT(moving.calibration.floor_std_error_px, 9 * 0.8)
+      << "half the way of the lowest beads, which is 9 px or more";
+  EXPECT_LT(moving.calibration.floor_std_error_px, 9 * 1.8);
+  EXPECT_TRUE(warned(moving));
+
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 20, 1 / 13.7));
+  const Measurement resting = measure_bed(still, options);
+  EXPECT_EQ(resting.calibration.floor_reference, FloorReference::lowest_seen);
+  EXPECT_GT(resting.calibration.floor_std_error_px, 0);
+  EXPECT_LT(resting.calibration.floor_std_error_px, 0.1);
+  EXPECT_NEAR(resting.calibration.floor_px, 270, 4 * resting.calibration.floor_std_error_px);
+  EXPECT_FALSE(warned(resting));
+
+  options.shaking_frequency_hz = 20, options.frame_rate_hz = 20 * 13.7;
+  source.rewind();
+  const Measurement film = measure_bed(source, options);
+  EXPECT_EQ(film.calibration.floor_reference, FloorReference::mean_of_motion);
+  EXPECT_LT(film.calibration.floor_std_error_px, 0.4);
+  EXPECT_FALSE(warned(film));
+
+  options.floor_px = 268;
+  source.rewind();
+  const Measurement given = measure_bed(source, options);
+  EXPECT_EQ(given.calibration.floor_reference, FloorReference::given);
+  EXPECT_EQ(given.calibration.floor_std_error_px, 0);
+  EXPECT_FALSE(warned(given));
+}
+
 TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
   const std::vector<GrayFrame> frames = shaken_film(9, 0.3, 100, 1 / 13.7);
   const auto warned = [](const Measurement& measured, const char* what) {

@@ -17,20 +17,20 @@ using testing::IsEmpty;
 TEST(GatheredWarnings, NameEachKindOnceWithItsPoints) {
   GatheredWarnings all;
   EXPECT_THAT(all.lines(), IsEmpty());
-  all.add(Json{"fit: chi2/dof = 40.7, p = 2.4e-22", "bed: T_x differs by -0.5 D"});
-  all.add(Json{"fit: chi2/dof = 1.2e+03, p = 0"});
-  all.add(Json{"fit: chi2/dof = 3, p = 1e-4", "fit: chi2/dof = 4, p = 1"});  // twice in one point: one point
-  all.add(Json{"another one"});
-  all.add(Json::array());
+  all.add("a", Json{"fit: chi2/dof = 40.7, p = 2.4e-22", "bed: T_x differs by -0.5 D"});
+  all.add("b", Json{"fit: chi2/dof = 1.2e+03, p = 0"});
+  all.add("c", Json{"fit: chi2/dof = 3, p = 1e-4", "fit: chi2/dof = 4, p = 1"});  // twice in one point: one point
+  all.add("d", Json{"another one"});
+  all.add("e", Json::array());
   EXPECT_THAT(all.lines(),
-              ElementsAre("fit: chi2/dof = 40.7, p = 2.4e-22 (3 points; the numbers are those of the first)",
-                          "bed: T_x differs by -0.5 D (1 point)", "another one (1 point)"));
+              ElementsAre("fit: chi2/dof = 40.7, p = 2.4e-22 (3 points: a, b, c; the numbers are those of the first)",
+                          "bed: T_x differs by -0.5 D (point a)", "another one (point d)"));
 }
 
 TEST(GatheredWarnings, KeepWordsApartThatDifferInMoreThanNumbers) {
   GatheredWarnings all;
-  all.add(Json{"bed 1: e = 0.9"});
-  all.add(Json{"bed 2: f = 0.9"});
+  all.add("a", Json{"bed 1: e = 0.9"});
+  all.add("b", Json{"bed 2: f = 0.9"});
   EXPECT_EQ(all.lines().size(), 2u);
 }
 
