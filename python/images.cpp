@@ -78,6 +78,7 @@ void take_measure_option(const std::string& key, py::handle value, ingest::Measu
   take("scale", out.scale_m_per_px);
   take("floor", out.floor_px);
   take("floor_slope", out.floor_slope);
+  take("floor_amplitude", out.floor_amplitude_m);
   take("left_wall", out.left_wall_px);
   take("right_wall", out.right_wall_px);
   take("pixel_aspect", out.pixel_aspect);

@@ -188,7 +188,7 @@ class BedMeasurer {
       for (const std::string& warning : shaking_.warnings()) result_.warnings.push_back(warning);
       shaking_warned_ = shaking_.warnings().size();
     }
-    if (bed_.floor_reference == FloorReference::lowest_seen) doubt_floor();
+    if (bed_.floor_reference == FloorReference::lowest_seen) raise_floor();
     if (bed_.floor_amplitude_px > 0 && !options_.lowest)  // beads follow the floor below its mean position
       bins_.lowest = -std::ceil(bed_.floor_amplitude_px / diameter_px_ / bins_.width) * bins_.width;
     bed_.floor_tilt_degrees = std::atan(bed_.floor_slope) * 180 / std::numbers::pi;
@@ -203,15 +203,25 @@ class BedMeasurer {
     coverage_.emplace(film_.finder, bed_, diameter_px_, counted_width, refined_.radius_px);
   }
 
-  // Heights are above the lowest bottoms of all frames. A floor that moves is there only once a period.
-  void doubt_floor() {
+  // The lowest bottoms of all frames show where the floor is lowest while it carries the bed. Its mean lies between
+  // there and an amplitude higher: beds that ride on it all the time show its lowest position, beds that fly over it
+  // hardly reach below the mean.
+  void raise_floor() {
+    if (options_.floor_amplitude_m) {
+      const double half = 0.5 * *options_.floor_amplitude_m / bed_.scale_m_per_px;
+      bed_.floor_px -= half;
+      bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, half);
+      bed_.floor_reference = FloorReference::mean_by_amplitude;
+      if (!options_.lowest) bins_.lowest = -std::ceil(half / diameter_px_ / bins_.width) * bins_.width;
+      return;
+    }
     const double range = bottom_range(held_, bed_.floor_slope, diameter_px_, film_.finder.width);
     if (range < moving_bottom * diameter_px_) return;
     bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, 0.5 * range);
     result_.warnings.push_back(formatted(
         "The lowest beads move by %.2f D between the frames. If the floor moves, heights are above its lowest "
-        "position: up to %.2f D more than above its mean. Give the row of its mean position (\"floor\", --floor), or "
-        "a film with its frame rate (--frame-rate).",
+        "position, and may be larger by up to %.2f D than those above its mean. Give its amplitude (--amplitude) or "
+        "the row of its mean position (--floor), or a film with its frame rate (--frame-rate).",
         range / diameter_px_, 0.5 * range / diameter_px_));
   }
 
@@ -423,6 +433,8 @@ std::vector<std::string> MeasureOptions::validate() const {
           "the kernel must have a shape and a finite width above 0: density is measured through a window");
   require(!left_wall_px || !right_wall_px || *left_wall_px < *right_wall_px,
           "the left wall must lie left of the right wall");
+  require(!floor_amplitude_m || positive(*floor_amplitude_m),
+          formatted("floor_amplitude_m is %g; it must be above 0", floor_amplitude_m.value_or(0)));
   require(!shaking_frequency_hz || frame_rate_hz, "phases need the frame rate beside the shaking frequency");
   require(geometry_frames > 0, "geometry_frames must be above 0");
   require(phase_bins > 0, "phase_bins must be above 0");

@@ -51,7 +51,10 @@ struct MeasureOptions {
   std::optional<double> scale_m_per_px{};  // else bead_diameter_m / (2 radius_px)
   std::optional<double> floor_px{};        // y_px of the floor's surface at the left edge of the frame
   std::optional<double> floor_slope{};     // px down per px right; 0 when floor_px is given without it
-  std::optional<double> left_wall_px{};    // x_px of the walls' inner faces
+  // Of the shaken floor [m]. Where no film shows its motion, its mean is taken to be half of this above the lowest
+  // position seen, with an error of the same size.
+  std::optional<double> floor_amplitude_m{};
+  std::optional<double> left_wall_px{};  // x_px of the walls' inner faces
   std::optional<double> right_wall_px{};
   // Beads of another size that are to be found too, filled like the first or in a shade of their own. They come with
   // the disks as species 2 and have a profile of their own; the first's is that of the first alone.
@@ -84,10 +87,11 @@ struct MeasureOptions {
   [[nodiscard]] std::vector<std::string> validate() const;
 };
 
-// Where the floor is whose heights are stated: as given, the mean of a motion that a film shows, or the lowest position
-// of the beads' bottoms. That is the mean position only where the floor rests.
-enum class FloorReference { given, mean_of_motion, lowest_seen };
-std::string_view to_string(FloorReference reference);  // "given", "mean of its motion", "lowest seen"
+// The position of the floor that heights are above: as given, or the mean of a motion that a film shows. Else the lowest
+// position of the beads' bottoms, raised by half of the amplitude if that is given. The lowest is the mean only where
+// the floor rests.
+enum class FloorReference { given, mean_of_motion, mean_by_amplitude, lowest_seen };
+std::string_view to_string(FloorReference reference);  // "given", "mean of its motion", "mean by its amplitude", ...
 
 // Places are those of the true frame (see lens.hpp), which is the recorded one unless pixels or lens say otherwise.
 struct BedCalibration {

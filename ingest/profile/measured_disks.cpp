@@ -15,6 +15,8 @@ std::string_view to_string(FloorReference reference) {
       return "given";
     case FloorReference::mean_of_motion:
       return "mean of its motion";
+    case FloorReference::mean_by_amplitude:
+      return "mean by its amplitude";
     case FloorReference::lowest_seen:
       return "lowest seen";
   }

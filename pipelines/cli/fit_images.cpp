@@ -78,6 +78,7 @@ Json extract_stage(const ImageArguments& image) {
     if (value) stage[key] = *value;
   };
   give("scale", image.scale), give("floor", image.floor);
+  give("floor_amplitude", image.amplitude);
   give("left_wall", image.left_wall), give("right_wall", image.right_wall);
   if (!image.roi.empty()) stage["roi"] = image.roi;
   give("polarity", image.polarity), give("channel", image.channel), give("radius", image.radius);
@@ -120,10 +121,7 @@ Json recipe_of(const ImageArguments& image) {
   recipe["name"] = "fit-images";
   recipe["stages"] = Json::array({extract_stage(image), fit});
   recipe["stages"].push_back(Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}});
-  if (image.frequency && image.amplitude)
-    recipe["stages"].push_back(map_stage(image));
-  else if (image.amplitude)
-    throw UsageError("--amplitude: Gamma also needs --frequency");
+  if (image.frequency && image.amplitude) recipe["stages"].push_back(map_stage(image));
   recipe["report"] = Json{{"title", "A bed in photographs"},
                           {"text",
                            "Disks were found in the frames given, the scale follows from the bead's diameter, the "
@@ -217,7 +215,8 @@ void add_bed_options(CLI::App& command, ImageArguments& image) {
   command.add_option("--frequency", image.frequency,
                      "frequency of the shaking: \"20 Hz\" (default: found in a film). With --amplitude, T is also "
                      "predicted from Gamma");
-  command.add_option("--amplitude", image.amplitude, "amplitude of the shaking: \"2.5 mm\"");
+  command.add_option("--amplitude", image.amplitude,
+                     "amplitude of the shaking: \"2.5 mm\". Places the floor's mean, and with --frequency gives Gamma");
   command.add_option(
       "--frame-rate", image.frame_rate,
       "frame rate of a film: \"500 Hz\". Velocities are then measured, and profiles by phase if the bed is shaken");

@@ -22,6 +22,11 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
                   {.help = "length of a pixel; left out, found from the diameter", .range = positive});
   fields.number("floor", o.floor,
                 {.help = "row of the floor's surface at the left edge, in pixels from the top; left out, found"});
+  fields.quantity(
+      "floor_amplitude", o.floor_amplitude, dimension::length,
+      {.help = "amplitude of the shaken floor. Where no film shows its motion, its mean is taken to be half of "
+               "this above the lowest position seen, with an error of the same size",
+       .range = positive});
   fields.number(
       "floor_slope", o.floor_slope,
       {.help = "slope of the floor, in pixels down per pixel to the right; left out, found", .range = from_to(-1, 1)});

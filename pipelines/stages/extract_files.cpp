@@ -24,6 +24,7 @@ const char* origin_of_heights(const ingest::BedCalibration& bed) {
     case ingest::FloorReference::given:
       return "the given row of the floor";
     case ingest::FloorReference::mean_of_motion:
+    case ingest::FloorReference::mean_by_amplitude:
       return "the floor's mean position";
     case ingest::FloorReference::lowest_seen:
       return "the lowest position of the floor that the beads show";

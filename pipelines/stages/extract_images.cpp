@@ -157,6 +157,7 @@ ingest::MeasureOptions asked_for(const ExtractOptions& options) {
   measure.bead_diameter_m = options.diameter;
   measure.scale_m_per_px = options.scale;
   measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
+  measure.floor_amplitude_m = options.floor_amplitude;
   measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
   measure.second_diameter_m = options.second_diameter;
   measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;

@@ -50,7 +50,9 @@ void state_calibration(ResultList& list) {
   list.quantity("/floor", "px",
                 "row of the floor at the left edge of the frame; its error is that of the mean position");
   list.text("/floor_reference",
-            "position of the floor that heights are above: given, mean of its motion (in a film), or lowest seen");
+            "position of the floor that heights are above: given; mean of its motion (in a film); mean by its "
+            "amplitude (given); "
+            "lowest seen");
   list.truth("/floor_given", "whether the floor was given");
   list.quantity("/floor_tilt", "deg", "tilt of the floor");
   list.quantity("/left_wall", "px", "column of the left wall");

@@ -45,6 +45,7 @@ struct ExtractOptions {
   std::optional<double> scale;                  // [m/px]
   std::optional<double> floor;                  // row of the floor's mean [px]
   std::optional<double> floor_slope;            // px down per px right
+  std::optional<double> floor_amplitude;        // of the shaken floor [m]
   std::optional<double> left_wall, right_wall;  // columns [px]
   std::vector<double> roi;                      // left, top, width, height [px]
   std::optional<double> second_diameter;        // of beads of another size, to be found too [m]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _find_options = frozenset({"polarity", "radius", "roi", "keep_half_hidden"})
-_measure_options = _find_options | {"scale", "floor", "floor_slope", "left_wall", "right_wall", "pixel_aspect",
+_measure_options = _find_options | {"scale", "floor", "floor_slope", "floor_amplitude", "left_wall", "right_wall", "pixel_aspect",
                                     "lens_radial", "spacing", "lowest", "highest", "frame_rate", "frequency", "kernel"}
 
 
@@ -219,7 +219,8 @@ class MeasuredBed:
 
     @property
     def floor_reference(self) -> str:
-        """Position of the floor that heights are above: "given", "mean of its motion" or "lowest seen"."""
+        """Position of the floor that heights are above: "given", "mean of its motion", "mean by its
+        amplitude" or "lowest seen"."""
         return self._bed.floor_reference
 
     @property
@@ -288,6 +289,9 @@ def measure_bed(
             Length of a pixel [m/px].
         floor, left_wall, right_wall : float
             Row of the floor and columns of the walls [px].
+        floor_amplitude : float
+            Amplitude of the shaken floor [m]. Where no film shows its motion, its mean is taken to be half of this
+            above the lowest position seen, with an error of the same size.
         floor_slope : float
             Slope of the floor, in pixels down per pixel to the right.
         pixel_aspect : float

@@ -363,6 +363,17 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_NEAR(resting.calibration.floor_px, 270, 4 * resting.calibration.floor_std_error_px);
   EXPECT_FALSE(warned(resting));
 
+  options.floor_amplitude_m = 9 * resting.calibration.scale_m_per_px;
+  source.rewind();
+  const Measurement raised = measure_bed(source, options);
+  EXPECT_EQ(raised.calibration.floor_reference, FloorReference::mean_by_amplitude);
+  EXPECT_NEAR(raised.calibration.floor_px, moving.calibration.floor_px - 4.5, 0.01);
+  EXPECT_NEAR(raised.calibration.floor_std_error_px, 4.5, 0.05);
+  EXPECT_NEAR(raised.calibration.floor_px, 270, 1.1 * raised.calibration.floor_std_error_px) << "a bed that rides";
+  EXPECT_LT(raised.profile.bins.lowest, 0);
+  EXPECT_FALSE(warned(raised));
+  options.floor_amplitude_m.reset();
+
   options.shaking_frequency_hz = 20, options.frame_rate_hz = 20 * 13.7;
   source.rewind();
   const Measurement film = measure_bed(source, options);
