@@ -51,7 +51,7 @@ std::string FitResult::full() const {
              number(temperature_interval.low, 5) + " to " + number(temperature_interval.high, 5) + " m g D (" +
                  number(100 * temperature_interval.confidence, 3) + " %)");
   add_line(out, "shift", estimate_text(shift) + " D");
-  add_line(out, "solid height", has_solid() ? estimate_text(solid_height) + " D" : "no solid");
+  add_line(out, "solid height", has_solid() ? estimate_text(solid_height) + " D" : "none");
   add_line(out, "plateau density", estimate_text(plateau_density) + " 1/D^2");
   add_line(out, "column number", estimate_text(column_number));
   if (critical_status == ValueStatus::ok) {

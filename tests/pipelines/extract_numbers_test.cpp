@@ -43,7 +43,8 @@ ingest::Measurement a_measurement() {
   bed.radius_px = 7.5, bed.radius_std_error_px = 0.06;
   bed.edge_width_px = 0.9, bed.noise_level = 3.5, bed.contrast_level = 120, bed.flicker = 0.07;
   bed.polarity = ingest::Polarity::bright_beads;
-  bed.floor_px = 400, bed.floor_tilt_degrees = 1.5, bed.floor_tilt_std_error_degrees = 0.11;
+  bed.floor_px = 400, bed.floor_std_error_px = 0.37, bed.floor_reference = ingest::FloorReference::given;
+  bed.floor_tilt_degrees = 1.5, bed.floor_tilt_std_error_degrees = 0.11;
   bed.shaking_frequency_hz = 21, bed.shaking_frequency_std_error_hz = 0.13, bed.frequency_false_alarm = 1e-5;
   bed.floor_amplitude_px = 12, bed.floor_phase = 0.3;
   bed.left_wall_px = 10, bed.right_wall_px = 310, bed.width = 20;
@@ -97,7 +98,7 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
                             {"/noise", 3.5, -1, "grey levels"},
                             {"/contrast", 120, -1, "grey levels"},
                             {"/flicker", 0.07, -1, "1"},
-                            {"/floor", 400, -1, "px"},
+                            {"/floor", 400, 0.37, "px"},
                             {"/floor_tilt", 1.5, 0.11, "deg"},
                             {"/frequency", 21, 0.13, "Hz"},
                             {"/floor_amplitude", 0.0024, -1, "m"},
@@ -136,6 +137,7 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
     EXPECT_DOUBLE_EQ(found->get<double>(), number) << pointer;
   }
   EXPECT_EQ(json["polarity"], "bright");
+  EXPECT_EQ(json["floor_reference"], "given");
   EXPECT_EQ(json["kernel"]["kind"], "top_hat");
   for (const auto& [name, truth] : {std::pair{"scale_given", false},
                                     {"floor_given", true},
