@@ -39,6 +39,7 @@ TABLES = {
         "eq6-shaken.csv": "shaken/table.csv",
         "eq6-claims.csv": "claims/claims.csv",
         "eq6-repeated.csv": "repeated/table.csv",
+        "eq6-weak.csv": "weak/table.csv",
         "eq6-control-claims.csv": "control-claims/claims.csv",
     },
     "quinn-hong-beyond": {
