@@ -106,7 +106,7 @@ def test_control_c_ends_the_search_in_one_picture():
     )
     process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
     assert process.stdout.readline() == b"ready\n"
-    time.sleep(0.4)
+    time.sleep(1)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()
@@ -146,7 +146,7 @@ def test_control_c_ends_a_measurement_on_several_threads():
     )
     process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
     assert process.stdout.readline() == b"ready\n"
-    time.sleep(0.4)
+    time.sleep(1)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()
