@@ -41,6 +41,8 @@ target_link_options(shakebed_options INTERFACE $<$<PLATFORM_ID:Linux>:-Wl,--as-n
 if(SHAKEBED_ARCH)
   target_compile_options(shakebed_options INTERFACE "-march=${SHAKEBED_ARCH}")
 endif()
+# g++ sweeps up its own memory again and again while it compiles. It is let have half a gigabyte first.
+target_compile_options(shakebed_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
 if(SHAKEBED_SANITIZE)
   target_compile_options(shakebed_options INTERFACE "-fsanitize=${SHAKEBED_SANITIZE}" -fno-omit-frame-pointer
                          -fno-sanitize-recover=all)
@@ -69,16 +71,22 @@ function(shakebed_test_headers name)
                             <sstream> <string> <vector>)
 endfunction()
 
-# shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [OPTIMIZED]
-#               [LONG patterns...] [STUDY patterns...])
+# shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [UNITY files]
+#               [OPTIMIZED] [BY_SUITE] [LONG patterns...] [LONG_COST seconds] [STUDY patterns...])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
-# compute long. LONG, STUDY: names of tests (* and ? as in --gtest_filter) that also get the label long or study.
+# compute long. BY_SUITE: the tests of a suite are one ctest case, for programs that take long to start (OpenCV's
+# libraries take a quarter of a second). LONG, STUDY: names of tests (* and ? as in --gtest_filter) that also get the
+# label long or study. UNITY: how many files are compiled at once, if not as many as elsewhere.
+# LONG_COST: what a long one takes; ctest starts the dearest first.
 function(shakebed_test name)
-  cmake_parse_arguments(ARG "OPTIMIZED" "TIMEOUT" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED;BY_SUITE" "TIMEOUT;UNITY;LONG_COST" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE ${ARG_UNITY})
+  endif()
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} shakebed_options GTest::gtest GTest::gmock GTest::gtest_main)
   if("shakebed_test_program" IN_LIST ARG_LIBRARIES)
     set(compile ${SHAKEBED_QUICKEST_COMPILE})
@@ -98,12 +106,16 @@ function(shakebed_test name)
   list(JOIN ARG_STUDY ":" study)
   set(slow ${ARG_LONG} ${ARG_STUDY})
   list(JOIN slow ":" slow)
-  shakebed_discover_tests(${name} quick "-${slow}" ${ARG_TIMEOUT} ${ARG_LABELS})
+  set(discover shakebed_discover_tests)
+  if(ARG_BY_SUITE)
+    set(discover shakebed_discover_suites)
+  endif()
+  cmake_language(CALL ${discover} ${name} quick "-${slow}" ${ARG_TIMEOUT} ${ARG_LABELS})
   if(ARG_LONG)
-    shakebed_discover_tests(${name} long "${long}" ${ARG_TIMEOUT} ${ARG_LABELS} long)
+    cmake_language(CALL ${discover} ${name} long "${long}" ${ARG_TIMEOUT} ${ARG_LABELS} long)
   endif()
   if(ARG_STUDY)
-    shakebed_discover_tests(${name} study "${study}" ${ARG_TIMEOUT} ${ARG_LABELS} study)
+    cmake_language(CALL ${discover} ${name} study "${study}" ${ARG_TIMEOUT} ${ARG_LABELS} study)
   endif()
 endfunction()
 
@@ -111,10 +123,28 @@ endfunction()
 # loses all but its first on the way to ctest: the labels are set by a script that ctest reads after it has discovered
 # the tests.
 function(shakebed_discover_tests name part filter timeout)
+  set(cost 0)
+  if(part STREQUAL "long" AND ARG_LONG_COST)
+    set(cost ${ARG_LONG_COST})
+  endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 TEST_FILTER "${filter}"
-                       TEST_LIST ${name}_${part}_tests PROPERTIES TIMEOUT ${timeout})
+                       TEST_LIST ${name}_${part}_tests PROPERTIES TIMEOUT ${timeout} COST ${cost})
   set(labels_file "${CMAKE_CURRENT_BINARY_DIR}/${name}_${part}_labels.cmake")
   file(WRITE "${labels_file}" "foreach(test IN LISTS ${name}_${part}_tests)\n"
        "  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARGN}\")\nendforeach()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${labels_file}")
+endfunction()
+
+# The same with one ctest case a suite: suites.cmake finds them when ctest starts.
+function(shakebed_discover_suites name part filter timeout)
+  set(file "${CMAKE_CURRENT_BINARY_DIR}/${name}_${part}_suites.cmake")
+  set(suffix "")
+  if(NOT part STREQUAL "quick")
+    set(suffix ".${part}")
+  endif()
+  file(GENERATE OUTPUT "${file}" CONTENT
+       "set(program \"$<TARGET_FILE:${name}>\")\nset(filter \"${filter}\")\nset(timeout ${timeout})\nset(labels \"${ARGN}\")
+set(suffix \"${suffix}\")
+include(\"${PROJECT_SOURCE_DIR}/cmake/suites.cmake\")\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${file}")
 endfunction()

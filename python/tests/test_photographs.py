@@ -59,7 +59,7 @@ def test_an_image_without_beads_is_said_to_have_none():
 def frames(tmp_path_factory):
     """A rendered bed, and what the command line measures of its pictures."""
     place = tmp_path_factory.mktemp("photographs")
-    bed = dict(SCENE, frames={"count": 12, "phases": 4})
+    bed = dict(SCENE, frames={"count": 6, "phases": 3})
     recipe = {"name": "photographs", "stages": [
         {"stage": "simulate", "id": "bed", **bed},
         {"stage": "render", "id": "film", "from": "bed", "scale": "0.2 mm/px", "seed": 1}]}
@@ -76,10 +76,17 @@ def frames(tmp_path_factory):
     return pictures, shakebed.load(place / "seen")["seen"]
 
 
-def test_the_answer_is_that_of_the_command_line(frames):
+@pytest.fixture(scope="module")
+def measured(frames):
+    """The same by the module, and the progress that it told."""
+    seen = []
+    return shakebed.measure_bed(frames[0], "3 mm", progress=seen.append), seen
+
+
+def test_the_answer_is_that_of_the_command_line(frames, measured):
     pictures, _ = frames
     printed = json.loads((pictures.parents[2] / "seen/fit/fit.json").read_text())["answer"]
-    answer = shakebed.measure_bed(pictures, "3 mm").answer()
+    answer = measured[0].answer()
     assert (answer["verdict"], answer["why"], answer["advice"]) == (printed["verdict"], printed["why"], printed["advice"])
     assert answer["temperature"] == printed.get("temperature", {}).get("value")
     assert answer["temperature_over_mg"] == printed.get("temperature_over_mg", {}).get("value")
@@ -105,10 +112,9 @@ def test_control_c_ends_the_search_in_one_picture():
     process.stdout.close()
 
 
-def test_a_measured_bed_is_that_of_the_command_line(frames):
+def test_a_measured_bed_is_that_of_the_command_line(frames, measured):
     pictures, wanted = frames
-    seen = []
-    bed = shakebed.measure_bed(pictures, "3 mm", progress=seen.append)
+    bed, seen = measured
     assert seen[-1] == 1
     profile, disks = wanted.table("profile"), wanted.table("disks")
     assert np.array_equal(bed.profile.height, profile["height"])

@@ -54,8 +54,6 @@ def test_a_users_mistake_is_found(tmp_path, cache):
         "fit = shakebed.fit_profile([0.0, 1.0], [1.0, 0.5])\n"
         "number: float = fit.temperature.value\n"
         "heights = shakebed.measure_bed('photographs', '3 mm').profile.height + 1\n")
-    done = mypy("--strict", tmp_path / "good.py", cache=cache)
-    assert done.returncode == 0, done.stdout
     (tmp_path / "bad.py").write_text("import shakebed\nnumber: str = shakebed.fit_profile([0.0], [1.0]).temperature.value\n")
-    done = mypy("--strict", tmp_path / "bad.py", cache=cache)
-    assert done.returncode == 1 and "bad.py:2" in done.stdout, done.stdout
+    done = mypy("--strict", tmp_path / "good.py", tmp_path / "bad.py", cache=cache)
+    assert done.returncode == 1 and "bad.py:2" in done.stdout and "good.py" not in done.stdout, done.stdout

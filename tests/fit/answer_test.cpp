@@ -516,7 +516,7 @@ TEST(Answer, DoesNotTakeRowsForTooDense) {
 }
 
 TEST(Answer, OfAnyProfileIsFiniteAndInOrder) {
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
     synthetic::Normal normal(17 * seed + 5);
     const auto uniform = [&] { return 0.5 * std::erfc(-normal() / std::sqrt(2.0)); };
     AnswerInput input;

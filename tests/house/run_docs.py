@@ -14,6 +14,7 @@ the long set; <!-- page needs: PROGRAM ... --> skips it where a program is missi
 
 usage: run_docs.py PROGRAM REPOSITORY quick|long [PAGE ...]    (exit 1: a page is wrong)
 """
+import functools
 import json
 import os
 import pathlib
@@ -86,6 +87,7 @@ def matches(expected, printed):
     return expected[furthest[0]] if furthest[0] < len(expected) else "(nothing more)"
 
 
+@functools.cache
 def python_with(modules):
     """The first Python that has the modules; a user's own may have none of Debian's."""
     for python in ("python3", "/usr/bin/python3"):

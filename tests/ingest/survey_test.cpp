@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <numbers>
 #include <random>
 #include <sstream>
@@ -166,7 +167,8 @@ TEST(Survey, AGivenRadiusIsObeyedOrContradicted) {
   }
 }
 
-TEST(Survey, RefusesPicturesWithoutBeads) {
+// The first picture, and of those that follow every `step`-th; noise of this many seeds.
+void expect_nothing_found(std::size_t step, unsigned noises) {
   const int width = 360, height = 300;
   std::mt19937 random(11);
   std::vector<Place> waves;
@@ -197,19 +199,22 @@ TEST(Survey, RefusesPicturesWithoutBeads) {
       {"bars of a histogram", [](double x, double y) {
          return y > 280 - 200 * std::exp(-std::pow(std::floor(x / 24) - 7, 2) / 8) ? 60.0 : 250.0;
        }}};
-  for (const auto& [name, paint] : pictures) {
+  for (std::size_t k = 0; k < pictures.size(); k += step) {
+    const auto& [name, paint] = pictures[k];
     const Survey survey = survey_of({{Channel::automatic, painted(width, height, paint)}});
     EXPECT_FALSE(survey.found) << name << ": " << survey.candidates.front().disks.size() << " disks";
     EXPECT_FALSE(survey.why_not.empty()) << name;
   }
   // Noise alone.
-  for (const unsigned seed : {1U, 2U, 3U}) {
+  for (unsigned seed = 1; seed <= noises; ++seed) {
     std::mt19937 more(seed);
     GrayFrame noise = painted(width, height, [](double, double) { return 120.0; });
     for (float& level : noise.pixels) level += static_cast<float>(more() % 61) - 30.0F;
     EXPECT_FALSE(survey_of({{Channel::automatic, noise}}).found) << seed;
   }
 }
+TEST(Survey, RefusesPicturesWithoutBeads) { expect_nothing_found(2, 1); }
+TEST(Survey, RefusesEveryPictureWithoutBeads) { expect_nothing_found(1, 3); }
 
 // FNV-1a: the same pictures everywhere.
 unsigned seed_of(const std::string& name, unsigned series) {
@@ -231,10 +236,13 @@ TEST(Survey, RefusesFiftyKindsOfPicturesWithoutBeads) {
   }
 }
 
-// Beads of every look are still seen: none is refused for its shape, and what is found are beads.
-TEST(Survey, FindsDrawnBeadsOfEveryLook) {
+// Beads of every look are still seen: none is refused for its shape, and what is found are beads. The first look, and
+// of those that follow every `step`-th.
+void expect_drawn_beads_found(std::size_t step) {
   constexpr unsigned series = 20;
-  for (const test::BeadLook& look : test::pictures_with_beads()) {
+  const std::vector<test::BeadLook>& looks = test::pictures_with_beads();
+  for (std::size_t k = 0; k < looks.size(); k += step) {
+    const test::BeadLook& look = looks[k];
     std::mt19937 random(seed_of(look.name, series));
     const test::DrawnBeads drawn = look.draw(random);
     std::vector<Place> truth;
@@ -249,6 +257,8 @@ TEST(Survey, FindsDrawnBeadsOfEveryLook) {
     EXPECT_EQ(found.found, found.hits) << look.name;
   }
 }
+TEST(Survey, FindsDrawnBeads) { expect_drawn_beads_found(3); }
+TEST(Survey, FindsDrawnBeadsOfEveryLook) { expect_drawn_beads_found(1); }
 
 // Where beads touch, blur moves the steepest edge inwards, by up to 8 % of these radii.
 TEST(Survey, RimsOfTouchingBeadsGiveTheRadiusOfTheirOpenSides) {
@@ -340,11 +350,10 @@ Measurement measured_as_found(const std::string& path) {
   return measure_bed(source, options);
 }
 
-TEST(Survey, FindsBeadsInPicturesEnlargedByRepeatingPixels) {
+void expect_enlarged_beads_found(unsigned pictures) {
   const test::ScratchFolder folder;
   std::mt19937 random(41);
   std::size_t beads = 0, hits = 0, found = 0;
-  constexpr int pictures = 8;
   for (unsigned k = 0; k < pictures; ++k) {
     const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
     const double radius = 2.6 + 3 * part(), factor = 2 + 2 * part();
@@ -370,6 +379,8 @@ TEST(Survey, FindsBeadsInPicturesEnlargedByRepeatingPixels) {
   EXPECT_GE(static_cast<double>(hits), 0.98 * static_cast<double>(beads));
   EXPECT_LE(static_cast<double>(found - hits), 0.02 * static_cast<double>(beads));
 }
+TEST(Survey, FindsBeadsInPicturesEnlargedByRepeatingPixels) { expect_enlarged_beads_found(2); }
+TEST(Survey, FindsBeadsInEightEnlargedPictures) { expect_enlarged_beads_found(8); }
 
 TEST(Survey, PicturesThatWereNotEnlargedStayAsTheyAre) {
   const test::ScratchFolder folder;
@@ -395,8 +406,8 @@ TEST(Survey, PicturesThatWereNotEnlargedStayAsTheyAre) {
 }
 
 // White beads in a black pan on a table as bright as they are: faces tile the table, which has no rims.
-TEST(Survey, SurroundingsAsBrightAsTheBeadsHoldNoBeads) {
-  for (const unsigned seed : {51U, 52U}) {
+void expect_beads_in_the_pan_alone(std::initializer_list<unsigned> seeds) {
+  for (const unsigned seed : seeds) {
     std::mt19937 random(seed);
     const double radius = 6 + static_cast<double>(random() % 300) / 100, pan = 200, middle = 240;
     std::vector<Place> truth;
@@ -425,10 +436,12 @@ TEST(Survey, SurroundingsAsBrightAsTheBeadsHoldNoBeads) {
     EXPECT_LE(static_cast<double>(found.found - found.hits), 0.02 * static_cast<double>(truth.size())) << seed;
   }
 }
+TEST(Survey, SurroundingsAsBrightAsTheBeadsHoldNoBeads) { expect_beads_in_the_pan_alone({51}); }
+TEST(Survey, BrightSurroundingsOfOtherBedsHoldNoBeads) { expect_beads_in_the_pan_alone({52}); }
 
 // Strangers' photographs with truth checked by hand; SHAKEBED_PHOTOGRAPHS names their folder (index.csv, a CSV a
 // picture).
-TEST(Survey, StrangersPhotographs) {
+TEST(StrangersPhotographs, AreSurveyed) {
   const char* folder = std::getenv("SHAKEBED_PHOTOGRAPHS");
   if (folder == nullptr) GTEST_SKIP() << "SHAKEBED_PHOTOGRAPHS names no folder of photographs: not tested";
   for (const char* name : {"mlund_N20-light_f000", "mlund_N20-light_f200", "mlund_N55-light_f000", "trackpy_bf_0025"}) {

@@ -8,6 +8,9 @@ prefix=$work/prefix
 
 fail() { echo "$*" >&2; exit 1; }
 
+# Not optimised, several files at once: what is built here runs for a moment. Symbols, flags and packages are the same.
+quick="-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=8"
+
 # Builds and runs the consumer with the further arguments of cmake.
 consumer() {
   folder=$work/consumer-$case
@@ -15,8 +18,9 @@ consumer() {
   mkdir -p "$folder"
   cp "$tree"/tests/install/consumer/* "$folder"
   begin=$(date +%s)
+  # shellcheck disable=SC2086
   "$cmake" -S "$folder" -B "$folder/build" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release \
-    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror" "$@"
+    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror" $quick "$@"
   "$cmake" --build "$folder/build" --target with_sim
   case $case in package | shared | clang) "$cmake" --build "$folder/build" ;; esac
   for program in "$folder"/build/with_*; do
@@ -32,8 +36,9 @@ built_alone() {
   name=$1
   shift
   rm -rf "$work/$name-prefix"
+  # shellcheck disable=SC2086
   "$cmake" -S "$tree" -B "$work/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSHAKEBED_PIPELINES=OFF -DSHAKEBED_TESTS=OFF \
-    -DSHAKEBED_BENCH=OFF "$@"
+    -DSHAKEBED_BENCH=OFF $quick "$@"
   "$cmake" --build "$work/$name"
   "$cmake" --install "$work/$name" --prefix "$work/$name-prefix" >/dev/null
 }

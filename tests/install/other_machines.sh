@@ -9,7 +9,8 @@ tree=$1 work=$2/tests/install/machines cmake=$3
 printed() {
   name=$1 runner=$2
   shift 2
-  "$cmake" -S "$tree/tests/install/machines" -B "$work/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release "-DSHAKEBED_TREE=$tree" \
+  "$cmake" -S "$tree/tests/install/machines" -B "$work/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=8 "-DSHAKEBED_TREE=$tree" \
     "$@" >"$work/$name.log" 2>&1 || { cat "$work/$name.log" >&2; return 1; }
   "$cmake" --build "$work/$name" --target machine_bytes >"$work/$name.log" 2>&1 || { cat "$work/$name.log" >&2; return 1; }
   # shellcheck disable=SC2086
@@ -17,7 +18,10 @@ printed() {
 }
 
 mkdir -p "$work"
-printed native ""
+# This machine's are those of the libraries of the build.
+c++ -std=c++20 -O2 -ffp-contract=off "-I$2/include" "$tree/tests/install/machines/machine_bytes.cpp" "$2/sim/libshakebed_sim.a" \
+  "$2/statistics/libshakebed_statistics.a" -o "$work/machine_bytes"
+"$work/machine_bytes" >"$work/native.txt"
 cat "$work/native.txt"
 if [ "$(uname -m)" = x86_64 ]; then
   printed baseline "" -DSHAKEBED_ARCH=

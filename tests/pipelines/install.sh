@@ -17,7 +17,7 @@ for recipe in $(find "$folder/prefix/share/shakebed/recipes" -name '*.json'); do
   shakebed validate "$recipe" --quiet || fail "$recipe"
 done
 shakebed reproduce --dry-run | grep -q '^bed: runs' || fail "no recipes inside"
-LD_DEBUG=files LD_DEBUG_OUTPUT="$folder/loaded" shakebed run bed.json --preset quick --out o --quiet >/dev/null 2>&1 || [ $? = 6 ] ||
+LD_DEBUG=files LD_DEBUG_OUTPUT="$folder/loaded" shakebed run bed.json --preset quick --set /stages/bed/frames/count=8 --out o --quiet >/dev/null 2>&1 || [ $? = 6 ] ||
   fail "the starter does not run"
 test -s o/extract/disks.csv || fail "no image was read"
 grep -ho 'calling init: .*libshakebed_images[^ ]*' "$folder"/loaded.* | grep -q "$folder/prefix" || fail "the images module is not the installed one"

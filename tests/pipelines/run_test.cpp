@@ -182,8 +182,10 @@ TEST_F(Pipeline, SameSeedGivesTheSameBytes) {
 TEST_F(Pipeline, TwoRunsOfTheStarterRecipeDifferInNothingButTheirCost) {
   ASSERT_EQ(run({"init", "starter.json"}).exit_code, 0);
   for (const char* out : {"a", "b"}) {
-    const ProgramResult result = run({"run", "starter.json", "--preset", "quick", "--out", out});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const ProgramResult result =
+        run({"run", "starter.json", "--preset", "quick", "--out", out, "--set", "/stages/bed/frames/count=8"});
+    // Whether numbers from eight frames are good (exit code 6) is not the question here.
+    ASSERT_TRUE(result.exit_code == 0 || result.exit_code == 6) << result.err;
     if (*out == 'a') std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // no date of the same second
   }
   const auto a = results_of(folder_ / "a"), b = results_of(folder_ / "b");

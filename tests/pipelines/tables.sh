@@ -31,7 +31,7 @@ cat >study.json <<'J'
     "tables": { "velocities": { "at": "/bath/velocities.csv", "key": "height" } } } ] }
 J
 "$shakebed" init starter.json >/dev/null
-"$shakebed" run starter.json --out starter --preset quick --quiet >/dev/null 2>&1 || [ $? = 6 ]
+"$shakebed" run starter.json --out starter --preset quick --set /stages/bed/frames/count=8 --quiet >/dev/null 2>&1 || [ $? = 6 ]
 "$shakebed" run study.json --out study --quiet >/dev/null 2>&1
 "$shakebed" run "$examples/sweep.json" --out rise --preset quick --quiet >/dev/null 2>&1
 cat >read.py <<'P'

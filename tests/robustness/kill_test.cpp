@@ -91,7 +91,8 @@ void kill_at_random_moments(int kills, std::uint32_t seed) {
 }
 
 TEST(Killed, SweepGoesOnWhereItStopped) { kill_at_random_moments(12, 1); }
-TEST(KilledLong, TwoHundredTimesAndEveryRerunEndsRight) { kill_at_random_moments(200, 2); }
+TEST(KilledLong, FiftyTimesAndEveryRerunEndsRight) { kill_at_random_moments(50, 2); }
+TEST(KilledStudy, TwoHundredTimesAndEveryRerunEndsRight) { kill_at_random_moments(200, 2); }
 
 // --- sweeps besides kills
 

@@ -24,9 +24,9 @@ std::string bed_recipe(int replicas) {
       "box": { "width": 14.3, "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": 0.8, "frequency": 0.35, "restitution": 0.9 },
       "bath": { "kind": "langevin", "temperature": 1, "rate": 0.2, "interval": 0.5 },
-      "schedule": [ { "temperature": 3, "ramp": 40, "hold": 200 }, { "temperature": 1, "ramp": 40, "hold": 200 } ],
+      "schedule": [ { "temperature": 3, "ramp": 40, "hold": 100 }, { "temperature": 1, "ramp": 40, "hold": 100 } ],
       "observe": ["order", "velocities", "displacement", "pressure", "phases"],
-      "settle": 50, "measure": 1200, "frames": { "count": 3000, "phases": 8 }, "checkpoint_seconds": 0.05,
+      "settle": 50, "measure": 600, "frames": { "count": 1500, "phases": 8 }, "checkpoint_seconds": 0.03,
       "replicas": )" +
          std::to_string(replicas) + " } ] }";
 }

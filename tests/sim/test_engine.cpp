@@ -178,7 +178,7 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[5].start = RandomStart{};
   scenes[6] = gentle_bed();
   scenes[7] = resting_bed(0.5);
-  for (const Scene& scene : scenes) expect_resumes(scene, 60, 150);
+  for (const Scene& scene : scenes) expect_resumes(scene, 60, 110);
   for (std::uint64_t seed = 0; seed < 10; ++seed)
     expect_resumes(random_stack(seed), 6, 18);  // some of the disks at rest
 }

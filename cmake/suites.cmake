@@ -1,0 +1,40 @@
+# Read by ctest: one case for each suite of the GoogleTest program `program` that has tests that pass `filter`, with the
+# `labels` and the `timeout` given. Its name is the suite's with `suffix`, of a single test that test's own. Suites with
+# many tests are started first. A suite is skipped when all of its tests are. Where only some are, its output names
+# them: an expression for them would hide failures of the others.
+if(NOT EXISTS "${program}")
+  get_filename_component(name "${program}" NAME)
+  add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)
+  return()
+endif()
+execute_process(COMMAND "${program}" --gtest_list_tests "--gtest_filter=${filter}" OUTPUT_VARIABLE listed
+                RESULT_VARIABLE status TIMEOUT 60)
+if(NOT status EQUAL 0)
+  message(FATAL_ERROR "${program} does not list its tests: ${status}")
+endif()
+string(REGEX REPLACE "[ \t]*#[^\n]*" "" listed "${listed}")  # types and values of parameters
+string(REGEX MATCHALL "[^\n]+" lines "${listed}")
+set(suites "")
+foreach(line IN LISTS lines)
+  if(line MATCHES "^([^ ]+)\\.$")
+    set(suite "${CMAKE_MATCH_1}")
+    list(APPEND suites "${suite}")
+    set(tests "")
+    set(count 0)
+  elseif(line MATCHES "^  ([^ ]+)$")
+    math(EXPR count "${count} + 1")
+    list(APPEND tests "${suite}.${CMAKE_MATCH_1}")
+    list(JOIN tests ":" "tests_of_${suite}")
+    set("count_of_${suite}" ${count})
+  endif()
+endforeach()
+foreach(suite IN LISTS suites)
+  set(test "${suite}${suffix}")
+  if("${count_of_${suite}}" EQUAL 1)
+    set(test "${tests_of_${suite}}")
+  endif()
+  add_test("${test}" "${program}" "--gtest_filter=${tests_of_${suite}}")
+  set_tests_properties("${test}" PROPERTIES LABELS "${labels}" TIMEOUT ${timeout} COST ${count_of_${suite}})
+  set_tests_properties("${test}" PROPERTIES SKIP_REGULAR_EXPRESSION
+                       "\\[  SKIPPED \\] ${count_of_${suite}} tests?, listed below")
+endforeach()
