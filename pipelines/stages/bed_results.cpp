@@ -59,6 +59,9 @@ class BedStatement {
                  given_if(bed_.shaken, "the floor shakes"));
     list_.quantity("/gamma", "1", "peak acceleration of the floor over g: Gamma = a (2 pi f)^2/g");
     list_.quantity("/column_number", "1", "column number N D/W: disks per diameter of width");
+    list_.quantity("/gravity_in_plane", "m/s^2",
+                   "acceleration g = gravity cos(tilt) in the plane of the bed, which is the g of all other numbers",
+                   given_if(bed_.tilted, "\"box\" names a \"tilt\", and the bed is not in reduced units"));
   }
 
   void fluid() {
@@ -110,6 +113,8 @@ class BedStatement {
         {"bath_work", "work of the bath"},
         {"imbalance", "energy that the balance does not explain; 0 apart from rounding"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);
+    list_.number(ledger + "dissipated_on_plates", energy_, "of the energy lost, that lost by friction with the plates",
+                 given_if(bed_.rubs, "\"box\" names \"plates\""));
     list_.number("/collisions", "1", "contacts of all kinds");
     list_.number("/disk_collisions", "1", "contacts between two disks");
     list_.number("/wall_collisions", "1", "contacts with sides and lid");

@@ -49,6 +49,8 @@ class Simulate : public Stage {
                              .shaken = bed_.period() > 0,
                              .frames = measure_.keeps_frames(),
                              .annealed = !annealing_.empty(),
+                             .tilted = bed_.tilt() && !bed_.description().reduced,
+                             .rubs = bed_.rubs(),
                              .replicas = replicas(),
                              .observe = ObserveOptions::from(observe_)});
   }

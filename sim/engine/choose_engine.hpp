@@ -14,9 +14,9 @@
 
 namespace shakebed::sim {
 
-// All of them: 4 spaces x 3 rules x 2 sizes.
+// All of them: 4 spaces x 3 rules x 2 sizes, and one for sloped sides, which does what any of these six would.
 struct EveryEngine {
-  static constexpr bool weightless = true, two_sizes = true;
+  static constexpr bool weightless = true, two_sizes = true, sloped = true;
 };
 
 // The cheapest rule that does what every surface of the scene asks for.
@@ -46,6 +46,11 @@ class ChooseEngine {
         floor_(std::visit([](const auto& kind) { return FloorMotion(kind); }, scene.box.floor)) {}
 
   std::unique_ptr<Simulation> operator()() const {
+    if (const auto* sides = std::get_if<HardSides>(&scene_.box.sides); sides != nullptr && sides->slope > 0) {
+      if constexpr (Offered::sloped)
+        return std::make_unique<Engine<SlopedBox, RoughRule, TwoSizes>>(scene_, floor_, disks_);
+      throw std::invalid_argument("/box/sides/slope: this program holds no engine for sloped sides");
+    }
     const bool periodic_sides = std::holds_alternative<PeriodicSides>(scene_.box.sides);
     if (std::holds_alternative<UniformGravity>(scene_.gravity))
       return periodic_sides ? with_rule<PeriodicSidesBox>() : with_rule<HardBox>();

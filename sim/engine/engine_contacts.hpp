@@ -150,9 +150,17 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   Motion motion = motion_at(disks_[i], now_);
   switch (disks_[i].partner) {
     case left_wall:
+      if constexpr (Space::sloped) {
+        hit_slope(i, motion, true);
+        break;
+      }
       bounce(i, motion, -1, 0, 0, side_surface_);
       break;
     case right_wall:
+      if constexpr (Space::sloped) {
+        hit_slope(i, motion, false);
+        break;
+      }
       bounce(i, motion, 1, 0, 0, side_surface_);
       break;
     case lid_above:
@@ -289,8 +297,20 @@ void Engine<Space, Rule, Sizes>::relieve() {
       });
       if constexpr (Space::has_walls) {
         const double radius = sizes_.radius(i);
-        if (hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
-        if (hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        if constexpr (Space::sloped) {
+          const FloorMotion::Motion floor = floor_.motion(now_);
+          for (const bool left : {true, false}) {
+            if (gap_to_slope(disk.x, disk.z, radius, left, floor.position) >= touching) continue;
+            const double nx = left ? -slope_cosine_ : slope_cosine_, nz = -slope_sine_;
+            const double approach = stop(disk.vx * nx + (disk.vz - floor.velocity) * nz);
+            disk.vx -= approach * nx;
+            disk.vz -= approach * nz;
+            floor_work_ -= sizes_.mass(i) * approach * nz * floor.velocity;
+          }
+        } else {
+          if (hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
+          if (hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        }
         if (lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
         if (disk.z - radius - floor_.position(now_) < touching) {
           const double approach = stop(floor_.velocity(now_) - disk.vz);

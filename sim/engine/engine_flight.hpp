@@ -18,6 +18,8 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) {
     hard_sides_ = Space::has_walls;
     side_surface_ = Contact(sides->surface);
+    slope_sine_ = std::sin(sides->slope);
+    slope_cosine_ = std::cos(sides->slope);
   } else {
     period_x_ = Period(width_);
   }
@@ -61,8 +63,14 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   event_rate_ = 8.0 * count_;
   initial_energy_ = kinetic_energy() + potential_energy();
   unusual_ = disk_surface_.varies();
-  plan_rest(scene.rests);
-  plan_press(scene.presses);
+  const auto* plates = std::get_if<RubbingPlates>(&scene.box.plates);
+  plan_rest(scene.rests && plates == nullptr);
+  plan_press(scene.presses && plates == nullptr);
+  if (plates != nullptr) {
+    plates_ = *plates;
+    rubs_.resize(count_);
+    begin_rub();
+  }
   begin_interval();
 }
 

@@ -154,8 +154,14 @@ template <class Space, class Rule, class Sizes>
   const auto consider = [&](double wait, std::int32_t wall) {
     if (now_ + wait < best.time) best = {now_ + wait, wall};
   };
-  if (near & near_left_wall) consider(time_to_wall(me.x - radius, -me.vx), left_wall);
-  if (near & near_right_wall) consider(time_to_wall(width_ - radius - me.x, me.vx), right_wall);
+  if constexpr (Space::sloped) {
+    const double horizon = std::min(best.time, exit) - now_;
+    if (near & near_left_wall) consider(time_to_slope(me, radius, true, horizon), left_wall);
+    if (near & near_right_wall) consider(time_to_slope(me, radius, false, horizon), right_wall);
+  } else {
+    if (near & near_left_wall) consider(time_to_wall(me.x - radius, -me.vx), left_wall);
+    if (near & near_right_wall) consider(time_to_wall(width_ - radius - me.x, me.vx), right_wall);
+  }
   if (near & near_lid) consider(time_to_lid(lid_height_ - radius - me.z, me.vz, gravity_), lid_above);
   if (near & near_floor) {
     const double horizon = std::min(best.time, exit) - now_;

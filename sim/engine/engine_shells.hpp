@@ -135,8 +135,14 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
   const auto note = [&near](bool it_is, unsigned bit) { near |= bit & -static_cast<unsigned>(it_is); };
   if constexpr (Space::has_walls) {
     const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
-    note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
-    note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
+    if constexpr (Space::sloped) {
+      const double x = disk.shell_x, z = disk.shell_z, highest = floor_.highest();
+      note(gap_to_slope(x, z, reach, true, highest) < 0, near_left_wall);
+      note(gap_to_slope(x, z, reach, false, highest) < 0, near_right_wall);
+    } else {
+      note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
+      note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
+    }
     bool meets_floor = disk.shell_z < floor_.highest() + reach;
     if constexpr (rests_apply) meets_floor = meets_floor && !is_at_rest(i);
     note(meets_floor, near_floor);

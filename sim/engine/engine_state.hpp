@@ -50,6 +50,11 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
     out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
     out.vx[label] = motion.vx();
     out.vz[label] = motion.vz();
+    if (!rubs_.empty()) [[unlikely]] {
+      const TwoLanes velocity = velocity_with_friction(i, motion);
+      out.vx[label] = velocity[0];
+      out.vz[label] = velocity[1];
+    }
     if constexpr (Rule::spins) out.spin[label] = spins_[i];
     if constexpr (rests_apply) {
       if (!is_at_rest(i)) continue;
@@ -95,8 +100,8 @@ double Engine<Space, Rule, Sizes>::potential_energy() const {
 
 template <class Space, class Rule, class Sizes>
 EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
-  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,
-                      dissipated_,     step_error_,      floor_work_,        bath_work_};
+  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,      dissipated_,
+                      step_error_,     floor_work_,      bath_work_,         rubbed_};
   if (!is_pressed_) return ledger;
   const double later = now_ - pressed_to_;
   const double work =

@@ -21,6 +21,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   for (double& time : last_contact_) time -= now_;
   for (double& time : withheld_at_) time -= now_;
   bath_at_ -= now_;
+  rub_at_ -= now_;
   rest_at_ -= now_;
   look_at_ -= now_;
   pressed_to_ -= now_;
@@ -68,6 +69,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
     permute(withheld_at_);
   }
   if constexpr (rests_apply) permute(rest_height_);
+  if (!rubs_.empty()) permute(rubs_);
   if constexpr (!Sizes::equal) {
     permute(sizes_.radii);
     permute(sizes_.masses);
@@ -161,6 +163,11 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   visit(self.dissipated_);
   visit(self.floor_work_);
   visit(self.bath_work_);
+  if (!self.rubs_.empty()) {
+    visit(self.rub_at_);
+    visit(self.rubbed_);
+    for (auto& rub : self.rubs_) visit(rub);
+  }
   if constexpr (!Sizes::equal) {
     for (std::uint32_t i = 0; i < self.count_; ++i) {
       visit(self.sizes_.radii[i]);

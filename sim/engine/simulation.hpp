@@ -31,10 +31,11 @@ struct EnergyLedger {
   double initial = 0;
   double kinetic = 0, potential = 0;  // now; kinetic includes spin
   double compressed = 0;              // now, in the springs of a bed that is pressed on the floor
-  double dissipated = 0;              // in contacts
+  double dissipated = 0;              // in contacts, and on the plates
   double step_error = 0;              // lost by the time steps of such a bed (negative: won)
-  double floor_work = 0;              // done by the floor's motion (and by a thermal floor)
+  double floor_work = 0;              // done by the floor's motion (and by a thermal floor, and by plates that move)
   double bath_work = 0;               // given by the reservoir
+  double dissipated_on_plates = 0;    // of what was dissipated, by friction with the plates
   double imbalance() const {
     return kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work - initial;
   }

@@ -36,6 +36,9 @@ struct Disks {
 // --- the box: x from 0 to width; the floor's mean position is z = 0
 struct HardSides {
   Surface surface;
+  // Angle from the vertical by which the sides lean outwards [rad]; the box is `width` wide at the floor. Sloped sides
+  // move with the floor, vertical ones stand still.
+  double slope = 0;
 };
 struct PeriodicSides {};
 using Sides = std::variant<HardSides, PeriodicSides>;
@@ -50,6 +53,17 @@ struct PeriodicTop {  // periodic upwards too: no floor at all
 };
 using Top = std::variant<OpenTop, Lid, PeriodicTop>;
 
+// The plates between which the disks are.
+struct SmoothPlates {};
+// A disk that moves against a plate is slowed down by `deceleration`, the friction coefficient times the acceleration
+// that presses it on the plate. One that rests on it stays there while nothing pulls more.
+struct RubbingPlates {
+  double deceleration = 0;
+  double interval = 0.01;    // at which the friction acts
+  bool follow_floor = true;  // the plates move with the floor; else they stand still
+};
+using Plates = std::variant<SmoothPlates, RubbingPlates>;
+
 using Floor = std::variant<StillFloor, SinusoidalFloor, TabulatedFloor>;
 
 struct Box {
@@ -57,6 +71,7 @@ struct Box {
   Sides sides{};
   Top top{};
   Floor floor{};
+  Plates plates{};
   Surface floor_surface{};
 };
 
