@@ -223,9 +223,9 @@ class Engine final : public Simulation {
 
   void act_bath();
 
-  // --- plates: engine_plates.hpp
-  // Of an interval: the flight's velocity at its end, by how much it is wrong at the beginning, and what is added at
-  // the end, if the disk meets nothing.
+  // --- plates: engine_plates.hpp.
+  // Of an interval in which the disk meets nothing: the flight's velocity at its end, by how much it is wrong at the
+  // beginning, and what is added to it at the end.
   struct Rub {
     double flown_x = 0, flown_z = 0, before_x = 0, before_z = 0, after_x = 0, after_z = 0;
   };

@@ -1,8 +1,9 @@
 // Side walls that slope outwards and move with the floor. Included by engine.hpp only.
 //
 // The left one is the line x = -(z - F) tan(slope), the right one its image; F is where the floor is. Their normals
-// towards the outside are (-cos, -sin) and (cos, -sin) of the slope. Along a normal a disk falls freely too, so that a
-// side is met as the floor is: by a point at (gap from the side of a floor at 0)/sin(slope), which falls with g.
+// towards the outside are (-cos, -sin) and (cos, -sin) of the slope. Along a normal a disk falls freely too. So a side
+// is met as the floor is, by a point that falls with g. Its height is the gap from the side of a floor at 0, over
+// sin(slope).
 #pragma once
 
 namespace shakebed::sim {
