@@ -175,9 +175,8 @@ void SceneOptions::warn_of_slope(Fields& fields) const {
   const double factor = 1 + 2 * height_at_rest() * std::tan(slope) / width;
   fields.warn(
       "sloped sides", "/box/sides/slope",
-      fmt::format("at the surface of the bed at rest the box is {:.3g} times as wide as at the floor, but "
-                  "densities and N D/W are per width W of the floor, and theories and fits know vertical sides "
-                  "only",
+      fmt::format("at the surface of the bed at rest the box is {:.3g} times as wide as at the floor. "
+                  "Densities and N D/W are per width W of the floor, and theories and fits know vertical sides only",
                   factor),
       "Divide a density at height z by 1 + 2 z tan(slope)/W to have it per area, and do not fit such a profile");
 }

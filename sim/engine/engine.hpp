@@ -224,8 +224,8 @@ class Engine final : public Simulation {
   void act_bath();
 
   // --- plates: engine_plates.hpp.
-  // Of an interval in which the disk meets nothing: the flight's velocity at its end, by how much it is wrong at the
-  // beginning, and what is added to it at the end.
+  // The flight's velocity at the end of an interval in which the disk meets nothing. Then by how much it is wrong at
+  // the beginning, and what is added to it at the end.
   struct Rub {
     double flown_x = 0, flown_z = 0, before_x = 0, before_z = 0, after_x = 0, after_z = 0;
   };
