@@ -54,6 +54,8 @@ class BedStatement {
                    "drift: center_of_mass in the second half of the measurement minus that in the first half", heavy_);
     list_.quantity("/center_of_mass_rise", "D", "rise of the centre of mass above ideal hexagonal packing", heavy_);
     list_.quantity("/ideal_center_of_mass", "D", "height of the centre of mass in ideal hexagonal packing", heavy_);
+    list_.quantity("/lid_height", "D", "mean height of a free lid above the floor's mean position",
+                   given_if(bed_.free_lid, "the lid is free"));
     list_.quantity("/bottom_row_density", "1/D^2", "number density of the lowest row", heavy_);
     list_.number("/center_of_mass_by_phase/#", "D", "height of the centre of mass at each phase of the floor",
                  given_if(bed_.shaken, "the floor shakes"));

@@ -15,7 +15,8 @@ struct BedOutput {
   bool material = false;          // is named
   bool shaken = false, frames = false, annealed = false;
   bool tilted = false;  // and not in reduced units
-  bool rubs = false;    // on plates
+  bool free_lid = false;
+  bool rubs = false;  // on plates
   std::uint32_t replicas = 1;
   ObserveOptions observe;
 };

@@ -220,22 +220,37 @@ void describe_box(Fields& f, BoxOptions& b) {
       {.help = "distance W between the side walls", .required = true, .range = positive, .example = "\"89.7 mm\""});
   describe_tilt_and_plates(f, b);
   describe_sides(f, b);
-  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
-            alternative<FixedLidOptions>("fixed", "a wall at rest",
-                                         [](Fields& g, FixedLidOptions& l) {
-                                           g.quantity("height", l.height, dimension::length,
-                                                      {.help = "height of the lid above the mean position of the floor",
-                                                       .required = true,
-                                                       .range = positive});
-                                           describe_surface(g, l.surface);
-                                         }),
-            alternative<PeriodicLidOptions>(
-                "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
-                [](Fields& g, PeriodicLidOptions& l) {
-                  g.quantity(
-                      "height", l.height, dimension::length,
-                      {.help = "period of the box in the vertical direction", .required = true, .range = positive});
-                }));
+  f.variant(
+      "lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
+      alternative<FixedLidOptions>("fixed", "a wall at rest",
+                                   [](Fields& g, FixedLidOptions& l) {
+                                     g.quantity("height", l.height, dimension::length,
+                                                {.help = "height of the lid above the mean position of the floor",
+                                                 .required = true,
+                                                 .range = positive});
+                                     describe_surface(g, l.surface);
+                                   }),
+      alternative<PeriodicLidOptions>(
+          "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
+          [](Fields& g, PeriodicLidOptions& l) {
+            g.quantity("height", l.height, dimension::length,
+                       {.help = "period of the box in the vertical direction", .required = true, .range = positive});
+          }),
+      alternative<FreeLidOptions>(
+          "free",
+          "a smooth lid with mass that slides up and down without friction: it lies on the bed and is thrown up",
+          [](Fields& g, FreeLidOptions& l) {
+            g.quantity(
+                "height", l.height, dimension::length,
+                {.help =
+                     "height of its lower face above the mean position of the floor, from which it falls at the start",
+                 .required = true,
+                 .range = positive});
+            g.quantity("mass", l.mass, dimension::mass,
+                       {.help = "mass of the lid", .required = true, .range = positive, .example = "\"2 g\""});
+            g.number("restitution", l.restitution,
+                     {.help = "normal coefficient of restitution e of a disk on the lid", .range = zero_to_one});
+          }));
 }
 
 void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravity) {
@@ -517,8 +532,9 @@ bool SceneOptions::dissipates() const {
   const auto loses = [](const auto& surface) { return surface.restitution < 1 || surface.friction > 0; };
   const auto* sides = std::get_if<HardSidesOptions>(&box_.sides);
   const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
+  const auto* free = std::get_if<FreeLidOptions>(&box_.lid);
   return loses(disks_.surface) || loses(floor_.surface) || (sides != nullptr && loses(sides->surface)) ||
-         (lid != nullptr && loses(lid->surface));
+         (lid != nullptr && loses(lid->surface)) || (free != nullptr && free->restitution < 1);
 }
 
 double SceneOptions::contact_duration() const {
@@ -593,6 +609,8 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   }
   if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid))
     scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface, speed)};
+  if (const auto* lid = std::get_if<FreeLidOptions>(&box_.lid))
+    scene.box.top = sim::Lid{lid->height / length, {.restitution = lid->restitution}, lid->mass / *description().mass};
   if (const auto* lid = std::get_if<PeriodicLidOptions>(&box_.lid))
     scene.box.top = sim::PeriodicTop{lid->height / length};
   if (box_.plates) scene.box.plates = rubbing_plates();

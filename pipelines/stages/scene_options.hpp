@@ -50,6 +50,10 @@ struct FixedLidOptions {
   double height = 0;
   SurfaceOptions surface;
 };
+struct FreeLidOptions {
+  double height = 0, mass = 0;
+  double restitution = 1;
+};
 struct PeriodicLidOptions {
   double height = 0;
 };
@@ -63,7 +67,7 @@ struct BoxOptions {
   double width = 0;
   std::optional<double> tilt;  // of the bed's plane, from the vertical [rad]
   std::variant<HardSidesOptions, PeriodicSidesOptions> sides;
-  std::variant<OpenLidOptions, FixedLidOptions, PeriodicLidOptions> lid;
+  std::variant<OpenLidOptions, FixedLidOptions, PeriodicLidOptions, FreeLidOptions> lid;
   std::optional<PlatesOptions> plates;
 };
 
@@ -152,6 +156,7 @@ class SceneOptions {
   std::optional<double> gravity() const;
   // Angle of the bed's plane from the vertical [rad]; nothing where none is named.
   std::optional<double> tilt() const { return box_.tilt; }
+  bool has_free_lid() const { return std::holds_alternative<FreeLidOptions>(box_.lid); }
   // Whether the sides slope outwards.
   bool slopes() const;
   // Whether disks rub on plates.

@@ -61,6 +61,8 @@ namespace shakebed::sim {
 // Bound on what rounding alone may do to a time or a distance, used in asserts [sqrt(D/g), D]. It is a thousand times
 // what hard cases show (1e-12 at speeds of 1000 sqrt(g D)).
 inline constexpr double asserted_rounding = 1e-9;
+// Length of the hop of a disk at rest on the floor without a contact clock [sqrt(D/g)].
+inline constexpr double rest_hop = 1e-4;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
 enum class Order { of_time, of_tiles, of_the_rest };
@@ -206,7 +208,27 @@ class Engine final : public Simulation {
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
   void hit_floor(std::uint32_t i, Motion& motion);
+  // --- a cell's sloped sides and free lid: engine_cell.hpp
+  struct FreeLid {
+    double mass = never;  // never: it stands still
+    double z = 0, vz = 0, own_time = 0;
+    double lowest = 0;         // where it is taken to be by those that could touch it
+    double leaves_at = never;  // when it may be lower
+    bool is_free() const { return mass < never; }
+  };
   void hit_slope(std::uint32_t i, Motion& motion, bool left);
+  template <class Stop>
+  void relieve_in_cell(std::uint32_t i, double touching, const Stop& stop);
+  void hit_free_lid(std::uint32_t i, Motion& motion);
+  void bring_lid_forward();
+  void draw_lid_bound();
+  void act_lid();
+  void predict_below_lid(std::uint32_t but);
+  double lid_height() const {
+    const double later = now_ - lid_.own_time;
+    return lid_.is_free() ? lid_.z + (lid_.vz - 0.5 * gravity_ * later) * later : lid_height_;
+  }
+  double lid_velocity() const { return lid_.is_free() ? lid_.vz - gravity_ * (now_ - lid_.own_time) : 0; }
   double time_to_slope(const Disk& disk, double radius, bool left, double horizon) const;
   // Free distance from a sloped side that belongs to a floor at that height.
   double gap_to_slope(double x, double z, double radius, bool left, double floor) const {
@@ -237,7 +259,7 @@ class Engine final : public Simulation {
   [[gnu::cold]] TwoLanes velocity_with_friction(std::uint32_t i, const Motion& motion) const;
 
   // --- rest: engine_rest.hpp
-  static constexpr bool rests_apply = Space::falls && Rule::dissipates && !Space::sloped;
+  static constexpr bool rests_apply = Space::falls && Rule::dissipates && !Space::is_cell;
   void plan_rest(bool wanted);
   void look_again();
   void act_rest();
@@ -324,6 +346,7 @@ class Engine final : public Simulation {
   [[no_unique_address]] Sizes sizes_;
   Bath bath_;
   double slope_sine_ = 0, slope_cosine_ = 1;
+  FreeLid lid_;
   RubbingPlates plates_;  // without deceleration: smooth
 
   // --- the state
@@ -407,6 +430,7 @@ class Engine final : public Simulation {
 
 // The member functions; none of these headers needs another one to come before it but for constants.
 #include "sim/engine/engine_baths.hpp"
+#include "sim/engine/engine_cell.hpp"
 #include "sim/engine/engine_checks.hpp"
 #include "sim/engine/engine_contacts.hpp"
 #include "sim/engine/engine_flight.hpp"
@@ -416,7 +440,6 @@ class Engine final : public Simulation {
 #include "sim/engine/engine_press.hpp"
 #include "sim/engine/engine_rest.hpp"
 #include "sim/engine/engine_shells.hpp"
-#include "sim/engine/engine_slopes.hpp"
 #include "sim/engine/engine_state.hpp"
 #include "sim/engine/engine_synchronise.hpp"
 #include "sim/engine/engine_tiles.hpp"

@@ -3,9 +3,6 @@
 
 namespace shakebed::sim {
 
-// Length of the hop of a disk at rest on the floor without a contact clock [sqrt(D/g)].
-inline constexpr double rest_hop = 1e-4;
-
 // The TC model: a contact is elastic if either partner was hit less than t_c
 // ago. Sets the clocks.
 template <class Space, class Rule, class Sizes>
@@ -150,20 +147,30 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   Motion motion = motion_at(disks_[i], now_);
   switch (disks_[i].partner) {
     case left_wall:
-      if constexpr (Space::sloped) {
-        hit_slope(i, motion, true);
-        break;
+      if constexpr (Space::is_cell) {
+        if (slope_sine_ > 0) {
+          hit_slope(i, motion, true);
+          break;
+        }
       }
       bounce(i, motion, -1, 0, 0, side_surface_);
       break;
     case right_wall:
-      if constexpr (Space::sloped) {
-        hit_slope(i, motion, false);
-        break;
+      if constexpr (Space::is_cell) {
+        if (slope_sine_ > 0) {
+          hit_slope(i, motion, false);
+          break;
+        }
       }
       bounce(i, motion, 1, 0, 0, side_surface_);
       break;
     case lid_above:
+      if constexpr (Space::is_cell) {
+        if (lid_.is_free()) {
+          hit_free_lid(i, motion);
+          break;
+        }
+      }
       bounce(i, motion, 0, 1, 0, lid_surface_);
       break;
     default:
@@ -171,7 +178,11 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
+  [[maybe_unused]] const bool lid_moved = disks_[i].partner == lid_above && lid_.is_free();
   fly_on(i, motion);
+  if constexpr (Space::is_cell) {
+    if (lid_moved) predict_below_lid(i);
+  }
 }
 
 template <class Space, class Rule, class Sizes>
@@ -297,21 +308,14 @@ void Engine<Space, Rule, Sizes>::relieve() {
       });
       if constexpr (Space::has_walls) {
         const double radius = sizes_.radius(i);
-        if constexpr (Space::sloped) {
-          const FloorMotion::Motion floor = floor_.motion(now_);
-          for (const bool left : {true, false}) {
-            if (gap_to_slope(disk.x, disk.z, radius, left, floor.position) >= touching) continue;
-            const double nx = left ? -slope_cosine_ : slope_cosine_, nz = -slope_sine_;
-            const double approach = stop(disk.vx * nx + (disk.vz - floor.velocity) * nz);
-            disk.vx -= approach * nx;
-            disk.vz -= approach * nz;
-            floor_work_ -= sizes_.mass(i) * approach * nz * floor.velocity;
-          }
-        } else {
-          if (hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
-          if (hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        bool slopes = false;
+        if constexpr (Space::is_cell) {
+          slopes = slope_sine_ > 0;
+          relieve_in_cell(i, touching, stop);
         }
-        if (lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
+        if (!slopes && hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
+        if (!slopes && hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        if (!lid_.is_free() && lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
         if (disk.z - radius - floor_.position(now_) < touching) {
           const double approach = stop(floor_.velocity(now_) - disk.vz);
           disk.vz += approach;

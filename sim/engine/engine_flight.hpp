@@ -25,6 +25,10 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   }
   if (const auto* lid = std::get_if<Lid>(&scene.box.top)) {
     lid_height_ = lid->height;
+    if (lid->is_free()) {
+      lid_.mass = lid->mass;
+      lid_.z = lid->height;
+    }
     lid_surface_ = Contact(lid->surface);
   }
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);

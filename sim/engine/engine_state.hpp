@@ -38,6 +38,8 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.time = time();
   out.floor_position = floor_.position(now_);
   out.floor_velocity = floor_.velocity(now_);
+  out.lid_height = lid_height();
+  out.lid_velocity = lid_velocity();
   out.x.resize(count_);
   out.z.resize(count_);
   out.vx.resize(count_);
@@ -88,6 +90,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
       sum += 0.5L * sizes_.mass(i) / inverse_inertia_ratio_ * surface_speed * surface_speed;
     }
   }
+  if (lid_.is_free()) sum += 0.5L * lid_.mass * lid_velocity() * lid_velocity();
   return static_cast<double>(sum);
 }
 
@@ -95,6 +98,7 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_now(i).z();
+  if (lid_.is_free()) sum += gravity_ * lid_.mass * lid_height();
   return static_cast<double>(sum);
 }
 

@@ -105,7 +105,13 @@ class Check {
               "sides slope outwards by 0.001 to 1.2 rad, or not at all (0), not by " + number(sides->slope) + " rad");
       require(!(sides->slope > 0) || falls(), "/box/sides/slope", "sloped sides need gravity");
     }
-    if (const auto* lid = std::get_if<Lid>(&b.top)) surface(lid->surface, "/box/lid");
+    if (const auto* lid = std::get_if<Lid>(&b.top)) {
+      surface(lid->surface, "/box/lid");
+      require(lid->mass > 0, "/box/lid/mass", "a lid that moves has a mass above 0, not " + number(lid->mass));
+      require(!lid->is_free() || falls(), "/box/lid/mass", "a lid that moves needs gravity");
+      require(!lid->is_free() || lid->surface.friction == 0, "/box/lid/friction",
+              "a lid that moves is smooth: friction is known with walls of infinite mass only");
+    }
     surface(b.floor_surface, "/floor");
   }
 

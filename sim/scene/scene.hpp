@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -44,9 +45,12 @@ struct PeriodicSides {};
 using Sides = std::variant<HardSides, PeriodicSides>;
 
 struct OpenTop {};
+// A wall at rest, or one of finite mass that falls and flies freely up and down, from rest at that height.
 struct Lid {
-  double height = 0;  // of its lower face above the floor's mean
+  double height = 0;  // of its lower face above the floor's mean; of a free lid at the start
   Surface surface;
+  double mass = std::numeric_limits<double>::infinity();
+  bool is_free() const { return mass < std::numeric_limits<double>::infinity(); }
 };
 struct PeriodicTop {  // periodic upwards too: no floor at all
   double height = 0;
