@@ -603,4 +603,23 @@ TEST(TiltedCell, StatesItsGravityAndWhatItLosesOnItsPlates) {
   EXPECT_NEAR(ledger("dissipated_on_plates") / (24 * a * speed * periods_of_time), 1, 0.5);
 }
 
+// The energy of an elastic bed stays. So the mean height of its lid follows from the heights and velocities of the
+// disks, and from the T/2 of kinetic energy that the lid has.
+TEST(TiltedCell, StatesTheHeightOfItsFreeLid) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5,
+    "units": "reduced", "disks": { "count": 24 }, "start_temperature": 3,
+    "box": { "width": 6.3, "sides": "periodic", "lid": { "kind": "free", "height": 12, "mass": 8 } },
+    "settle": 20, "measure": 1000 } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json json = Json::parse(read_text(folder / "o/bed/observables.json"));
+  const double t_x = value(json["temperature_x"]), t_z = value(json["temperature_z"]), t = (t_x + t_z) / 2;
+  const double energy = json["energy_ledger"]["initial"].get<double>();
+  const double lid = (energy - 24 * value(json["center_of_mass"]) - 24 * t - t / 2) / 8;
+  EXPECT_EQ(json["lid_height"]["unit"], "D");
+  EXPECT_GT(error(json["lid_height"]), 0);
+  EXPECT_NEAR(value(json["lid_height"]), lid, 0.05 * t);
+}
+
 }  // namespace

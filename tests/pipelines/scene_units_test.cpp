@@ -449,4 +449,17 @@ TEST(PlatesInSi, NeedSomethingThatPresses) {
   EXPECT_THAT(problems_of(flat + R"("plates": { "friction": 0.2 }, "tilt": 1 } })", true), testing::SizeIs(2));
 }
 
+// A disk of 4 mm and 2000 kg/m^3 has the mass 2000 pi 64e-9/4 kg of its description.
+TEST(FreeLidInSi, CountsInMassesOfADisk) {
+  const auto lid = std::get<sim::Lid>(options_of(R"({ "gravity": "10 m/s^2", )" + disks_in_si +
+                                                 R"(, "box": { "width": "48 mm", "lid": { "kind": "free",
+      "height": "40 mm", "mass": "2 g", "restitution": 0.7 } } })")
+                                          .scene(1)
+                                          .box.top);
+  EXPECT_DOUBLE_EQ(lid.height, 10);
+  EXPECT_NEAR(lid.mass, 2e-3 / (2000 * std::numbers::pi * 64e-9 / 4), 1e-9);
+  EXPECT_EQ(lid.surface.restitution, 0.7);
+  EXPECT_TRUE(lid.is_free());
+}
+
 }  // namespace
