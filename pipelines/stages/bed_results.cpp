@@ -109,9 +109,9 @@ class BedStatement {
         {"kinetic", "kinetic energy at the end"},
         {"potential", "potential energy at the end"},
         {"compressed", "energy of springs in a pressed bed at the end"},
-        {"dissipated", "energy lost in contacts"},
+        {"dissipated", "energy lost in contacts and by friction with plates"},
         {"step_error", "energy lost by the time steps of a pressed bed"},
-        {"floor_work", "work of the floor"},
+        {"floor_work", "work of the floor, and of plates and sides that move with it"},
         {"bath_work", "work of the bath"},
         {"imbalance", "energy that the balance does not explain; 0 apart from rounding"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);

@@ -178,7 +178,8 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
-  [[maybe_unused]] const bool lid_moved = disks_[i].partner == lid_above && lid_.is_free();
+  bool lid_moved = false;
+  if constexpr (Space::is_cell) lid_moved = disks_[i].partner == lid_above && lid_.is_free();
   fly_on(i, motion);
   if constexpr (Space::is_cell) {
     if (lid_moved) predict_below_lid(i);
