@@ -173,7 +173,8 @@ void describe_plates(Fields& g, PlatesOptions& p) {
              {.help = "interval h at which the friction acts. The velocity of a contact is wrong by up to friction "
                       "times pressing times h/2. Default: 0.01 sqrt(D/g), or a 50th of the floor's period if that "
                       "is shorter",
-              .range = positive});
+              .range = positive,
+              .example = "\"50 us\""});
 }
 
 void describe_tilt_and_plates(Fields& f, BoxOptions& b) {
@@ -249,7 +250,7 @@ void describe_box(Fields& f, BoxOptions& b) {
             g.quantity("mass", l.mass, dimension::mass,
                        {.help = "mass of the lid", .required = true, .range = positive, .example = "\"2 g\""});
             g.number("restitution", l.restitution,
-                     {.help = "normal coefficient of restitution e of a disk on the lid", .range = zero_to_one});
+                     {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
           }));
 }
 
