@@ -188,6 +188,7 @@ py::dict ledger(const sim::EnergyLedger& energy) {
   out["potential"] = energy.potential;
   out["compressed"] = energy.compressed;
   out["dissipated"] = energy.dissipated;
+  out["dissipated_on_plates"] = energy.dissipated_on_plates;
   out["step_error"] = energy.step_error;
   out["floor_work"] = energy.floor_work;
   out["bath_work"] = energy.bath_work;

@@ -27,6 +27,7 @@ Json BedDescription::to_json() const {
   out["second_diameter"] = quantity(second_diameter, "m", "D");
   out["mass"] = quantity(mass, "kg", "m");
   out["gravity"] = quantity(gravity, "m/s^2", "g");
+  if (tilt) out["tilt"] = quantity_json(*tilt, "rad");
   out["width"] = quantity(width, "m", "D");
   out["periodic"] = periodic;
   out["amplitude"] = quantity(amplitude, "m", "D");
@@ -57,7 +58,7 @@ BedDescription BedDescription::from_json(const Json& json, const std::string& fi
   bed.reduced = json.is_object() && json.value("units", "SI") == "reduced";
   bed.count = value("count");
   bed.diameter = value("diameter"), bed.second_diameter = known("second_diameter");
-  bed.mass = known("mass"), bed.gravity = known("gravity");
+  bed.mass = known("mass"), bed.gravity = known("gravity"), bed.tilt = known("tilt");
   bed.width = value("width");
   bed.periodic = json.value("periodic", false);
   bed.amplitude = known("amplitude"), bed.frequency = known("frequency");

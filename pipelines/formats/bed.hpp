@@ -21,7 +21,8 @@ struct BedDescription {
   double diameter = 1;                    // D, of the first species
   std::optional<double> second_diameter;  // of the second species, where there is one
   std::optional<double> mass;             // m
-  std::optional<double> gravity;          // g; 0 for a weightless scene
+  std::optional<double> gravity;          // g, of a tilted bed in its plane; 0 for a weightless scene
+  std::optional<double> tilt = {};        // of the bed's plane from the vertical [rad], where one is named
   double width = 0;                       // W, between the sides
   bool periodic = false;                  // sides
   std::optional<double> amplitude;        // a of the floor, 0 when it stands still

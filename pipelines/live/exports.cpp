@@ -10,7 +10,7 @@ namespace shakebed::sim {
 
 // The engines of the page: gravity, equal disks.
 struct EnginesOfThePage {
-  static constexpr bool weightless = false, two_sizes = false;
+  static constexpr bool weightless = false, two_sizes = false, cells = false;
 };
 std::unique_ptr<Simulation> simulate(const Scene& scene) { return simulate_with<EnginesOfThePage>(scene); }
 

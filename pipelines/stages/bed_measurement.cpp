@@ -147,11 +147,17 @@ sim::LayerGrid fine_layers(const HeightGrid& grid) {
   return {grid.lowest, thickness, static_cast<std::size_t>(std::ceil(height / thickness)) + 1};
 }
 
+bool has_free_lid(const sim::Scene& scene) {
+  const auto* lid = std::get_if<sim::Lid>(&scene.box.top);
+  return lid != nullptr && lid->is_free();
+}
+
 }  // namespace
 
 BedMeasurement::BedMeasurement(const sim::Scene& scene, const sim::DiskProperties& disks, const MeasurementPlan& plan)
     : width_(scene.box.width),
       disk_count_(static_cast<double>(disks.mass.size())),
+      free_lid_(has_free_lid(scene)),
       floor_frame_(!std::holds_alternative<sim::StillFloor>(scene.box.floor)),
       plan_(plan),
       bed_(scene, disks, plan.phases, plan.grid, plan.kernel),
@@ -183,6 +189,8 @@ void BedMeasurement::end_period(const sim::Simulation& simulation) {
   virial_rate_.add((counters.virial - virial_) / plan_.period);
   const double rate = static_cast<double>(counters.disk_collisions - collisions_) / plan_.period;
   collision_rate_.add(disk_count_ > 0 ? 2 * rate / disk_count_ : 0);
+  if (free_lid_) lid_height_.add(lid_heights_ / plan_.phases);
+  lid_heights_ = 0;
   virial_ = counters.virial;
   collisions_ = counters.disk_collisions;
   if (flights_) flights_->end_block(simulation.time());
@@ -190,6 +198,7 @@ void BedMeasurement::end_period(const sim::Simulation& simulation) {
 
 void BedMeasurement::look(const sim::Simulation& simulation, const sim::Snapshot& at, std::uint32_t phase, bool frame) {
   if (phase == 0 && bed_.periods() > 0) end_period(simulation);
+  if (free_lid_) lid_heights_ += at.lid_height;
   bed_.observe(at, phase);
   if (frame) frames_.observe(at, 0);
   for (const double z : at.z) above_ += z > plan_.grid.height(plan_.grid.points - 1);
@@ -227,6 +236,7 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
     out["ideal_center_of_mass"] = quantity_json(ideal, "D");
     plain("bottom_row_density", bed_.bottom_row_density(), "1/D^2");
   }
+  if (free_lid_) plain("lid_height", {lid_height_.mean(), lid_height_.std_error()}, "D");
   temperature("temperature_x", bed_.temperature_x());
   temperature("temperature_z", bed_.temperature_z());
   temperature("temperature_z_local", bed_.temperature_z_local());

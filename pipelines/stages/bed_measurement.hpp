@@ -64,7 +64,8 @@ class BedMeasurement {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(bed_, frames_, virial_rate_, collision_rate_, virial_, collisions_, above_, counters_, dissipated_);
+    archive(bed_, frames_, virial_rate_, collision_rate_, lid_height_, lid_heights_, virial_, collisions_, above_,
+            counters_, dissipated_);
     if (order_) archive(*order_);
     if (lab_) archive(*lab_);
     if (floor_) archive(*floor_);
@@ -79,10 +80,11 @@ class BedMeasurement {
   void write_profile(RunContext& context, const char* file, const sim::Profile& density,
                      const std::string& origin) const;
   double width_, disk_count_;
-  bool floor_frame_;
+  bool free_lid_, floor_frame_;
   MeasurementPlan plan_;
   sim::BedObserver bed_, frames_;
-  sim::BlockedMean virial_rate_, collision_rate_;
+  sim::BlockedMean virial_rate_, collision_rate_, lid_height_;
+  double lid_heights_ = 0;  // sum over the looks of this period
   double virial_ = 0;
   std::uint64_t collisions_ = 0;
   sim::Counters counters_;  // at the first look

@@ -54,11 +54,16 @@ class BedStatement {
                    "drift: center_of_mass in the second half of the measurement minus that in the first half", heavy_);
     list_.quantity("/center_of_mass_rise", "D", "rise of the centre of mass above ideal hexagonal packing", heavy_);
     list_.quantity("/ideal_center_of_mass", "D", "height of the centre of mass in ideal hexagonal packing", heavy_);
+    list_.quantity("/lid_height", "D", "mean height of a free lid above the floor's mean position",
+                   given_if(bed_.free_lid, "the lid is free"));
     list_.quantity("/bottom_row_density", "1/D^2", "number density of the lowest row", heavy_);
     list_.number("/center_of_mass_by_phase/#", "D", "height of the centre of mass at each phase of the floor",
                  given_if(bed_.shaken, "the floor shakes"));
     list_.quantity("/gamma", "1", "peak acceleration of the floor over g: Gamma = a (2 pi f)^2/g");
     list_.quantity("/column_number", "1", "column number N D/W: disks per diameter of width");
+    list_.quantity("/gravity_in_plane", "m/s^2",
+                   "acceleration g = gravity cos(tilt) in the plane of the bed, which is the g of all other numbers",
+                   given_if(bed_.tilted, "\"box\" names a \"tilt\", and the bed is not in reduced units"));
   }
 
   void fluid() {
@@ -104,12 +109,14 @@ class BedStatement {
         {"kinetic", "kinetic energy at the end"},
         {"potential", "potential energy at the end"},
         {"compressed", "energy of springs in a pressed bed at the end"},
-        {"dissipated", "energy lost in contacts"},
+        {"dissipated", "energy lost in contacts and by friction with plates"},
         {"step_error", "energy lost by the time steps of a pressed bed"},
-        {"floor_work", "work of the floor"},
+        {"floor_work", "work of the floor, and of plates and sides that move with it"},
         {"bath_work", "work of the bath"},
         {"imbalance", "energy that the balance does not explain; 0 apart from rounding"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);
+    list_.number(ledger + "dissipated_on_plates", energy_, "of the energy lost, that lost by friction with the plates",
+                 given_if(bed_.rubs, "\"box\" names \"plates\""));
     list_.number("/collisions", "1", "contacts of all kinds");
     list_.number("/disk_collisions", "1", "contacts between two disks");
     list_.number("/wall_collisions", "1", "contacts with sides and lid");

@@ -14,6 +14,9 @@ struct BedOutput {
   bool contact_duration = false;  // the TC model's
   bool material = false;          // is named
   bool shaken = false, frames = false, annealed = false;
+  bool tilted = false;  // and not in reduced units
+  bool free_lid = false;
+  bool rubs = false;  // on plates
   std::uint32_t replicas = 1;
   ObserveOptions observe;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
@@ -18,6 +19,8 @@ namespace {
 
 // Largest scene whose start is laid out and checked for overlap while a recipe is only being read.
 constexpr std::uint32_t checked_when_read = 50'000;
+// A bed nearer to the horizontal lies flat [rad]: 90 deg but for rounding.
+constexpr double largest_tilt = std::numbers::pi / 2 - 1e-9;
 constexpr Dimension cube_over_time{.length = 2, .time = -3};
 
 void describe_surface(Fields& fields, SurfaceOptions& surface) {
@@ -150,30 +153,105 @@ void describe_disks(Fields& f, DiskOptions& d) {
             "Leave it out, or leave out \"units\": \"reduced\"");
 }
 
+void describe_plates(Fields& g, PlatesOptions& p) {
+  g.number("friction", p.friction,
+           {.help = "Coulomb friction coefficient mu_p of a disk that slides on the plate; for a sphere that rolls, "
+                    "that of rolling. Static friction is as large",
+            .required = true,
+            .range = positive,
+            .example = "0.1"});
+  g.quantity("pressing", p.pressing, dimension::acceleration,
+             {.help = "acceleration that presses a disk on the plates: they slow it down by friction times it. "
+                      "Left out, the component of gravity across a tilted plane, gravity sin(tilt); in reduced "
+                      "units tan(tilt)",
+              .range = positive,
+              .example = "\"4.9 m/s^2\""});
+  g.choice("motion", p.motion, {{PlateMotion::floor, "floor"}, {PlateMotion::still, "still"}},
+           {.help = "motion of the plates. Floor: with the floor, as in a cell that is shaken as a whole. Still: "
+                    "none, as where only the floor is a piston"});
+  g.quantity("interval", p.interval, dimension::time,
+             {.help = "interval h at which the friction acts. The velocity of a contact is wrong by up to friction "
+                      "times pressing times h/2. Default: 0.01 sqrt(D/g), or a 50th of the floor's period if that "
+                      "is shorter",
+              .range = positive,
+              .example = "\"50 us\""});
+}
+
+void describe_tilt_and_plates(Fields& f, BoxOptions& b) {
+  f.quantity(
+      "tilt", b.tilt, dimension::angle,
+      {.help = "angle between the plane of the bed and the vertical: 0 for an upright cell. In the plane acts g = "
+               "gravity cos(tilt), and all numbers (Gamma, m g D, T/(m g), sqrt(D/g)) are with this g. In reduced "
+               "units g in the plane is 1 whatever the tilt",
+       .range = {.low = 0, .high = std::numbers::pi / 2},
+       .example = "\"30 deg\""});
+  f.require(!b.tilt || *b.tilt < largest_tilt, "tilt",
+            "a bed that lies flat has no gravity in its plane, so no unit of time and no Gamma",
+            "Give a tilt below 90 deg, or write the bed in reduced units with \"gravity\": 0");
+  f.object<PlatesOptions>(
+      "plates", b.plates, describe_plates,
+      {.help = "plate under a tilted bed, or plates before and behind it, on which the disks rub. Left out, they are "
+               "smooth. With friction beds neither rest nor press (disks/rests, disks/presses): these have no plates"});
+  f.require(!b.plates || b.plates->pressing || b.tilt.value_or(0) > 0, "plates",
+            "nothing presses the disks on the plates: the bed is upright",
+            "Give the plates \"pressing\", an acceleration, or the box a \"tilt\"");
+}
+
+void describe_sides(Fields& f, BoxOptions& b) {
+  f.variant("sides", b.sides, {.help = "side walls of the box"},
+            alternative<HardSidesOptions>(
+                "hard", "walls with their own restitution and friction",
+                [](Fields& g, HardSidesOptions& s) {
+                  describe_surface(g, s.surface);
+                  g.quantity(
+                      "slope", s.slope, dimension::angle,
+                      {.help = "angle from the vertical by which the sides lean outwards, above 0: the box is W wide "
+                               "at the floor and wider above. Left out, the sides are vertical. Sloped sides move with "
+                               "the floor; vertical ones stand still. Densities stay numbers per height and width W. "
+                               "Beds with sloped sides neither rest nor press (disks/rests, disks/presses)",
+                       .range = {.low = 1e-3, .high = 1.2},
+                       .example = "\"10 deg\""});
+                }),
+            alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
+}
+
 void describe_box(Fields& f, BoxOptions& b) {
   f.quantity(
       "width", b.width, dimension::length,
       {.help = "distance W between the side walls", .required = true, .range = positive, .example = "\"89.7 mm\""});
-  f.variant("sides", b.sides, {.help = "side walls of the box"},
-            alternative<HardSidesOptions>("hard", "walls with their own restitution and friction",
-                                          [](Fields& g, HardSidesOptions& s) { describe_surface(g, s.surface); }),
-            alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
-  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
-            alternative<FixedLidOptions>("fixed", "a wall at rest",
-                                         [](Fields& g, FixedLidOptions& l) {
-                                           g.quantity("height", l.height, dimension::length,
-                                                      {.help = "height of the lid above the mean position of the floor",
-                                                       .required = true,
-                                                       .range = positive});
-                                           describe_surface(g, l.surface);
-                                         }),
-            alternative<PeriodicLidOptions>(
-                "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
-                [](Fields& g, PeriodicLidOptions& l) {
-                  g.quantity(
-                      "height", l.height, dimension::length,
-                      {.help = "period of the box in the vertical direction", .required = true, .range = positive});
-                }));
+  describe_tilt_and_plates(f, b);
+  describe_sides(f, b);
+  f.variant(
+      "lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
+      alternative<FixedLidOptions>("fixed", "a wall at rest",
+                                   [](Fields& g, FixedLidOptions& l) {
+                                     g.quantity("height", l.height, dimension::length,
+                                                {.help = "height of the lid above the mean position of the floor",
+                                                 .required = true,
+                                                 .range = positive});
+                                     describe_surface(g, l.surface);
+                                   }),
+      alternative<PeriodicLidOptions>(
+          "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
+          [](Fields& g, PeriodicLidOptions& l) {
+            g.quantity("height", l.height, dimension::length,
+                       {.help = "period of the box in the vertical direction", .required = true, .range = positive});
+          }),
+      alternative<FreeLidOptions>(
+          "free",
+          "a smooth lid with mass that slides up and down without friction: it lies on the bed and is thrown up",
+          [](Fields& g, FreeLidOptions& l) {
+            g.quantity(
+                "height", l.height, dimension::length,
+                {.help =
+                     "height of its lower face above the mean position of the floor, from which it falls at the start",
+                 .required = true,
+                 .range = positive});
+            g.quantity("mass", l.mass, dimension::mass,
+                       {.help = "mass of the lid", .required = true, .range = positive, .example = "\"2 g\""});
+            g.number("restitution", l.restitution,
+                     {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
+          }));
 }
 
 void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravity) {
@@ -362,7 +440,7 @@ void SceneOptions::describe(Fields& fields) {
   fields.object<BoxOptions>("box", box_, describe_box,
                             {.help = "the box: its width, side walls and lid", .required = true});
   fields.object<FloorOptions>(
-      "floor", floor_, [gravity = gravity_](Fields& f, FloorOptions& floor) { describe_floor(f, floor, gravity); },
+      "floor", floor_, [gravity = gravity()](Fields& f, FloorOptions& floor) { describe_floor(f, floor, gravity); },
       {.help = "the floor"});
   describe_bath(fields, bath_);
   describe_start(fields, start_);
@@ -379,7 +457,8 @@ void SceneOptions::describe_gravity(Fields& fields) {
   if (fields.decoding() || fields.mode() == Fields::Mode::schema) gravity_ = reduced_ ? 1.0 : usual_gravity;
   if (!reduced_) {
     fields.quantity("gravity", gravity_, dimension::acceleration,
-                    {.help = "acceleration g; a weightless scene is written in reduced units",
+                    {.help = "acceleration of free fall; of it, a tilted bed feels g = gravity cos(tilt) (box/tilt). A "
+                             "weightless scene is written in reduced units",
                      .range = positive,
                      .example = "\"9.81 m/s^2\""});
     return;
@@ -397,6 +476,13 @@ void SceneOptions::check_scene(Fields& fields) const {
     fields.problem("/start/file",
                    "names " + std::to_string(file->file.paths.size()) + " files, but the start is one trajectory");
     return;
+  }
+  if (!gravity_) {
+    fields.require(!box_.tilt, "box/tilt", "a bed without gravity has no tilt",
+                   box_.plates ? "Give the plates \"pressing\" instead" : "Leave it out");
+    fields.require(!box_.plates || box_.plates->pressing, "box/plates",
+                   "without gravity it must be said what presses the disks on the plates", "Give \"pressing\"");
+    if (fields.problem_count() > 0) return;
   }
   const sim::Scene laid_out = scene(1);
   for (const sim::SceneProblem& problem : sim::check(laid_out)) fields.problem(problem.where, problem.what);
@@ -420,8 +506,19 @@ void SceneOptions::set_material(double restitution, double friction, double side
   }
 }
 
+bool SceneOptions::slopes() const {
+  const auto* sides = std::get_if<HardSidesOptions>(&box_.sides);
+  return sides != nullptr && sides->slope;
+}
+
+std::optional<double> SceneOptions::gravity() const {
+  // In reduced units it is the one in the plane that is 1. Upright beds must not see a product with cos(0).
+  if (!gravity_ || reduced_ || !box_.tilt || *box_.tilt == 0) return gravity_;
+  return *gravity_ * std::cos(*box_.tilt);
+}
+
 double SceneOptions::time_unit() const {
-  return gravity_ && !reduced_ ? ReducedScales::of(disks_.diameter, *gravity_).time : 1;
+  return gravity_ && !reduced_ ? ReducedScales::of(disks_.diameter, *gravity()).time : 1;
 }
 
 double SceneOptions::period() const {
@@ -436,8 +533,9 @@ bool SceneOptions::dissipates() const {
   const auto loses = [](const auto& surface) { return surface.restitution < 1 || surface.friction > 0; };
   const auto* sides = std::get_if<HardSidesOptions>(&box_.sides);
   const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
+  const auto* free = std::get_if<FreeLidOptions>(&box_.lid);
   return loses(disks_.surface) || loses(floor_.surface) || (sides != nullptr && loses(sides->surface)) ||
-         (lid != nullptr && loses(lid->surface));
+         (lid != nullptr && loses(lid->surface)) || (free != nullptr && free->restitution < 1);
 }
 
 double SceneOptions::contact_duration() const {
@@ -447,7 +545,7 @@ double SceneOptions::contact_duration() const {
 
 std::optional<double> SceneOptions::hertz_contact_time() const {
   if (disks_.material == Material::unnamed || !gravity_) return std::nullopt;
-  double speed = std::sqrt(*gravity_ * disks_.diameter);
+  double speed = std::sqrt(*gravity() * disks_.diameter);
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
     speed = 2 * std::numbers::pi * sine->frequency * sine->amplitude;
   else if (bath_temperature() > 0)
@@ -475,6 +573,17 @@ double SceneOptions::bath_temperature() const {
   return temperature / length_unit();
 }
 
+sim::RubbingPlates SceneOptions::rubbing_plates() const {
+  const PlatesOptions& p = *box_.plates;
+  const double tilt = box_.tilt.value_or(0), time = time_unit();
+  sim::RubbingPlates plates;
+  plates.deceleration = p.friction * (p.pressing ? *p.pressing * time * time / length_unit() : std::tan(tilt));
+  plates.follow_floor = p.motion == PlateMotion::floor;
+  if (period() > 0) plates.interval = std::min(plates.interval, period() / 50);
+  if (p.interval) plates.interval = *p.interval / time;
+  return plates;
+}
+
 sim::Scene SceneOptions::scene(std::uint64_t seed) const {
   const double length = length_unit(), time = time_unit(), speed = length / time;
   sim::Scene scene;
@@ -495,14 +604,17 @@ sim::Scene SceneOptions::scene(std::uint64_t seed) const {
 
   scene.box.width = box_.width / length;
   if (const auto* hard = std::get_if<HardSidesOptions>(&box_.sides)) {
-    scene.box.sides = sim::HardSides{to_sim(hard->surface, speed)};
+    scene.box.sides = sim::HardSides{to_sim(hard->surface, speed), hard->slope.value_or(0)};
   } else {
     scene.box.sides = sim::PeriodicSides{};
   }
   if (const auto* lid = std::get_if<FixedLidOptions>(&box_.lid))
     scene.box.top = sim::Lid{lid->height / length, to_sim(lid->surface, speed)};
+  if (const auto* lid = std::get_if<FreeLidOptions>(&box_.lid))
+    scene.box.top = sim::Lid{lid->height / length, {.restitution = lid->restitution}, lid->mass / *description().mass};
   if (const auto* lid = std::get_if<PeriodicLidOptions>(&box_.lid))
     scene.box.top = sim::PeriodicTop{lid->height / length};
+  if (box_.plates) scene.box.plates = rubbing_plates();
   scene.disks.contact_duration = contact_duration();
 
   if (const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion))
@@ -541,7 +653,8 @@ BedDescription SceneOptions::description() const {
   if (disks_.second) bed.second_diameter = disks_.second->diameter;
   const double cube = disks_.diameter * disks_.diameter * disks_.diameter;
   bed.mass = reduced_ ? 1 : disks_.density * std::numbers::pi * cube / (disks_.inertia == Inertia::sphere ? 6 : 4);
-  bed.gravity = gravity_.value_or(0);
+  bed.gravity = gravity().value_or(0);
+  bed.tilt = box_.tilt;
   bed.width = box_.width;
   bed.periodic = std::holds_alternative<PeriodicSidesOptions>(box_.sides);
   bed.amplitude = bed.frequency = 0;

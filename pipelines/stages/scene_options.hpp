@@ -42,6 +42,7 @@ struct DiskOptions {
 
 struct HardSidesOptions {
   SurfaceOptions surface;
+  std::optional<double> slope;  // outwards, from the vertical [rad]
 };
 struct PeriodicSidesOptions {};
 struct OpenLidOptions {};
@@ -49,13 +50,25 @@ struct FixedLidOptions {
   double height = 0;
   SurfaceOptions surface;
 };
+struct FreeLidOptions {
+  double height = 0, mass = 0;
+  double restitution = 1;
+};
 struct PeriodicLidOptions {
   double height = 0;
 };
+enum class PlateMotion { floor, still };
+struct PlatesOptions {
+  double friction = 0;
+  std::optional<double> pressing, interval;
+  PlateMotion motion = PlateMotion::floor;
+};
 struct BoxOptions {
   double width = 0;
+  std::optional<double> tilt;  // of the bed's plane, from the vertical [rad]
   std::variant<HardSidesOptions, PeriodicSidesOptions> sides;
-  std::variant<OpenLidOptions, FixedLidOptions, PeriodicLidOptions> lid;
+  std::variant<OpenLidOptions, FixedLidOptions, PeriodicLidOptions, FreeLidOptions> lid;
+  std::optional<PlatesOptions> plates;
 };
 
 struct StillFloorOptions {};
@@ -138,6 +151,16 @@ class SceneOptions {
   double length_unit() const { return disks_.diameter; }  // D
   double time_unit() const;                               // sqrt(D/g)
   bool weightless() const { return !gravity_; }
+  // Acceleration in the plane of the bed [m/s^2]: g cos(tilt), which all else calls g. In reduced units 1. Nothing
+  // without gravity.
+  std::optional<double> gravity() const;
+  // Angle of the bed's plane from the vertical [rad]; nothing where none is named.
+  std::optional<double> tilt() const { return box_.tilt; }
+  bool has_free_lid() const { return std::holds_alternative<FreeLidOptions>(box_.lid); }
+  // Whether the sides slope outwards.
+  bool slopes() const;
+  // Whether disks rub on plates.
+  bool rubs() const { return box_.plates.has_value(); }
   bool two_species() const;  // that can be known apart, by diameter or mass
   bool periodic_upwards() const { return std::holds_alternative<PeriodicLidOptions>(box_.lid); }
   // The floor's period in reduced units; 0 when it stands still.
@@ -169,14 +192,16 @@ class SceneOptions {
  private:
   void describe_gravity(Fields& fields);
   void check_scene(Fields& fields) const;
+  sim::RubbingPlates rubbing_plates() const;
   void warn_of_shaking(Fields& fields) const;
   void warn_of_size(Fields& fields) const;
   void warn_of_locking(Fields& fields) const;
+  void warn_of_slope(Fields& fields) const;
   double height_at_rest() const;  // [D]
   std::string length_text(double length) const;
 
   DiskOptions disks_;
-  std::optional<double> gravity_;
+  std::optional<double> gravity_;  // as written
   BoxOptions box_;
   FloorOptions floor_;
   BathOptions bath_;

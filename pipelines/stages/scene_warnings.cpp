@@ -105,7 +105,7 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
       "Gamma = {:.3g}: the floor's amplitude is {} at {}", value, length_text(sine->amplitude),
       reduced_ ? fmt::format("{:.6g}", sine->frequency) : handy_text(sine->frequency, dimension::frequency));
   const std::string four =
-      fmt::format("Gamma = 4 needs an amplitude of {}", length_text(4 * *gravity_ / (omega * omega)));
+      fmt::format("Gamma = 4 needs an amplitude of {}", length_text(4 * *gravity() / (omega * omega)));
   if (value < least_gamma)
     fields.warn("gamma below 1", sine->gamma ? "/floor/gamma" : "/floor/amplitude",
                 here + ". Below Gamma = 1 the floor never throws the bed, which stays at rest on it", four);
@@ -150,7 +150,8 @@ void SceneOptions::warn_of_size(Fields& fields) const {
 }
 
 std::optional<Misfit> SceneOptions::locking() const {
-  if (!gravity_ || disks_.second || !std::holds_alternative<HardSidesOptions>(box_.sides)) return std::nullopt;
+  if (!gravity_ || disks_.second || !std::holds_alternative<HardSidesOptions>(box_.sides) || slopes())
+    return std::nullopt;
   const double width = box_.width / length_unit();
   const std::optional<Commensurate> near = commensurate(width);
   if (width < least_width || !near) return std::nullopt;
@@ -167,7 +168,21 @@ void SceneOptions::warn_of_locking(Fields& fields) const {
   if (const auto odd = locking()) fields.warn("commensurate width", "/box/width", odd->what, odd->suggestion);
 }
 
+// What is measured counts per width W of the floor, and theories are of beds with one width.
+void SceneOptions::warn_of_slope(Fields& fields) const {
+  if (!slopes()) return;
+  const double slope = *std::get<HardSidesOptions>(box_.sides).slope, width = box_.width / length_unit();
+  const double factor = 1 + 2 * height_at_rest() * std::tan(slope) / width;
+  fields.warn(
+      "sloped sides", "/box/sides/slope",
+      fmt::format("at the surface of the bed at rest the box is {:.3g} times as wide as at the floor. "
+                  "Densities and N D/W are per width W of the floor, and theories and fits know vertical sides only",
+                  factor),
+      "Divide a density at height z by 1 + 2 z tan(slope)/W to have it per area, and do not fit such a profile");
+}
+
 void SceneOptions::warn(Fields& fields, double settle) const {
+  warn_of_slope(fields);
   warn_of_shaking(fields);
   warn_of_size(fields);
   warn_of_locking(fields);

@@ -49,6 +49,9 @@ class Simulate : public Stage {
                              .shaken = bed_.period() > 0,
                              .frames = measure_.keeps_frames(),
                              .annealed = !annealing_.empty(),
+                             .tilted = bed_.tilt() && !bed_.description().reduced,
+                             .free_lid = bed_.has_free_lid(),
+                             .rubs = bed_.rubs(),
                              .replicas = replicas(),
                              .observe = ObserveOptions::from(observe_)});
   }

@@ -233,6 +233,7 @@ Json BedRun::results(const SceneOptions& options) const {
   const sim::Counters counters = simulation_->counters();
   out["gamma"] = quantity_json(options.gamma(), "1");
   out["column_number"] = quantity_json(bed.column_number(), "1");
+  if (options.tilt() && !bed.reduced) out["gravity_in_plane"] = quantity_json(*options.gravity(), "m/s^2");
   if (const std::optional<double> time = options.hertz_contact_time())
     out["hertz_contact_time"] = quantity_json(*time, "s");
   out["energy_ledger"] = {{"unit", options.weightless() ? "T0" : "m g D"},
@@ -245,6 +246,7 @@ Json BedRun::results(const SceneOptions& options) const {
                           {"floor_work", energy.floor_work},
                           {"bath_work", energy.bath_work},
                           {"imbalance", energy.imbalance()}};
+  if (options.rubs()) out["energy_ledger"]["dissipated_on_plates"] = energy.dissipated_on_plates;
   out["collisions"] = counters.collisions();
   out["disk_collisions"] = counters.disk_collisions;
   out["wall_collisions"] = counters.wall_collisions;

@@ -293,6 +293,7 @@ class Bed:
         """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
+        dissipated_on_plates is the part of dissipated that friction with plates took.
         """
         return self._bed.energy()
 
@@ -494,6 +495,7 @@ class Simulation:
         """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
+        dissipated_on_plates is the part of dissipated that friction with plates took.
         """
         return self._stepper.energy()
 

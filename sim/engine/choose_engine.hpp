@@ -14,9 +14,10 @@
 
 namespace shakebed::sim {
 
-// All of them: 4 spaces x 3 rules x 2 sizes.
+// All of them: 4 spaces x 3 rules x 2 sizes, and one for cells with sloped sides or a free lid, with the most general
+// rule.
 struct EveryEngine {
-  static constexpr bool weightless = true, two_sizes = true;
+  static constexpr bool weightless = true, two_sizes = true, cells = true;
 };
 
 // The cheapest rule that does what every surface of the scene asks for.
@@ -46,6 +47,11 @@ class ChooseEngine {
         floor_(std::visit([](const auto& kind) { return FloorMotion(kind); }, scene.box.floor)) {}
 
   std::unique_ptr<Simulation> operator()() const {
+    if (is_cell()) {
+      if constexpr (Offered::cells)
+        return std::make_unique<Engine<CellBox, RoughRule, TwoSizes>>(scene_, floor_, disks_);
+      throw std::invalid_argument("/box: this program holds no engine for sloped sides and free lids");
+    }
     const bool periodic_sides = std::holds_alternative<PeriodicSides>(scene_.box.sides);
     if (std::holds_alternative<UniformGravity>(scene_.gravity))
       return periodic_sides ? with_rule<PeriodicSidesBox>() : with_rule<HardBox>();
@@ -57,6 +63,12 @@ class ChooseEngine {
   }
 
  private:
+  bool is_cell() const {
+    const auto* sides = std::get_if<HardSides>(&scene_.box.sides);
+    const auto* lid = std::get_if<Lid>(&scene_.box.top);
+    return (sides != nullptr && sides->slope > 0) || (lid != nullptr && lid->is_free());
+  }
+
   template <class Space>
   std::unique_ptr<Simulation> with_rule() const {
     const Needs needs = needs_of(scene_);

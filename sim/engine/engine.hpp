@@ -46,6 +46,7 @@
 #include "sim/engine/large_vector.hpp"
 #include "sim/engine/neighbour_lists.hpp"
 #include "sim/engine/overlap.hpp"
+#include "sim/engine/plate_slide.hpp"
 #include "sim/engine/policies.hpp"
 #include "sim/engine/pressed_bed.hpp"
 #include "sim/engine/random.hpp"
@@ -60,6 +61,8 @@ namespace shakebed::sim {
 // Bound on what rounding alone may do to a time or a distance, used in asserts [sqrt(D/g), D]. It is a thousand times
 // what hard cases show (1e-12 at speeds of 1000 sqrt(g D)).
 inline constexpr double asserted_rounding = 1e-9;
+// Length of the hop of a disk at rest on the floor without a contact clock [sqrt(D/g)].
+inline constexpr double rest_hop = 1e-4;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
 enum class Order { of_time, of_tiles, of_the_rest };
@@ -205,6 +208,32 @@ class Engine final : public Simulation {
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
   void hit_floor(std::uint32_t i, Motion& motion);
+  // --- a cell's sloped sides and free lid: engine_cell.hpp
+  struct FreeLid {
+    double mass = never;  // never: it stands still
+    double z = 0, vz = 0, own_time = 0;
+    double lowest = 0;         // where it is taken to be by those that could touch it
+    double leaves_at = never;  // when it may be lower
+    bool is_free() const { return mass < never; }
+  };
+  void hit_slope(std::uint32_t i, Motion& motion, bool left);
+  template <class Stop>
+  void relieve_in_cell(std::uint32_t i, double touching, const Stop& stop);
+  void hit_free_lid(std::uint32_t i, Motion& motion);
+  void bring_lid_forward();
+  void draw_lid_bound();
+  void act_lid();
+  void predict_below_lid(std::uint32_t but);
+  double lid_height() const {
+    const double later = now_ - lid_.own_time;
+    return lid_.is_free() ? lid_.z + (lid_.vz - 0.5 * gravity_ * later) * later : lid_height_;
+  }
+  double lid_velocity() const { return lid_.is_free() ? lid_.vz - gravity_ * (now_ - lid_.own_time) : 0; }
+  double time_to_slope(const Disk& disk, double radius, bool left, double horizon) const;
+  // Free distance from a sloped side that belongs to a floor at that height.
+  double gap_to_slope(double x, double z, double radius, bool left, double floor) const {
+    return slope_cosine_ * (left ? x : width_ - x) + slope_sine_ * (z - floor) - radius;
+  }
   void bounce(std::uint32_t i, Motion& motion, double nx, double nz, double wall_vz, const Contact& surface);
   bool too_soon(std::uint32_t i, std::uint32_t j);
   [[gnu::cold]] void withhold(std::uint32_t i, std::uint32_t j, double reduced_mass, double approach,
@@ -216,8 +245,21 @@ class Engine final : public Simulation {
 
   void act_bath();
 
+  // --- plates: engine_plates.hpp.
+  // The flight's velocity at the end of an interval in which the disk meets nothing. Then by how much it is wrong at
+  // the beginning, and what is added to it at the end.
+  struct Rub {
+    double flown_x = 0, flown_z = 0, before_x = 0, before_z = 0, after_x = 0, after_z = 0;
+  };
+  [[gnu::cold]] void act_plates();
+  [[gnu::cold]] void begin_rub();
+  FloorMotion::Motion plate_motion(double later) const;
+  void push_from_plate(std::uint32_t i, double vx, double vz, double plate_velocity);
+  bool slides_on(std::uint32_t i, const Motion& motion) const;
+  [[gnu::cold]] TwoLanes velocity_with_friction(std::uint32_t i, const Motion& motion) const;
+
   // --- rest: engine_rest.hpp
-  static constexpr bool rests_apply = Space::falls && Rule::dissipates;
+  static constexpr bool rests_apply = Space::falls && Rule::dissipates && !Space::is_cell;
   void plan_rest(bool wanted);
   void look_again();
   void act_rest();
@@ -303,6 +345,9 @@ class Engine final : public Simulation {
   double inverse_inertia_ratio_ = 2;  // 1/q
   [[no_unique_address]] Sizes sizes_;
   Bath bath_;
+  double slope_sine_ = 0, slope_cosine_ = 1;
+  FreeLid lid_;
+  RubbingPlates plates_;  // without deceleration: smooth
 
   // --- the state
   LargeVector<Disk> disks_;            // and a sentinel after the last
@@ -321,6 +366,8 @@ class Engine final : public Simulation {
   double event_rate_ = 1;
   std::uint64_t events_at_synchronisation_ = 0;
   double bath_at_ = never;  // next action of the reservoir
+  double rub_at_ = never;   // next action of the plates
+  std::vector<Rub> rubs_;   // empty for smooth plates
   double checked_at_ = -1;  // for rows that lock, see locked()
   // Events until that check, and until advance_towards() returns; in process_until() those beyond the next pause, which
   // is after events_to_pause_ - 1 more.
@@ -329,7 +376,7 @@ class Engine final : public Simulation {
   Random random_;
   Counters counters_;
   Watcher* watcher_ = nullptr;
-  double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0;
+  double initial_energy_ = 0, dissipated_ = 0, floor_work_ = 0, bath_work_ = 0, rubbed_ = 0;
 
   // --- tiles; none: everything is done in the order of time
   std::vector<Tile> tiles_;
@@ -383,10 +430,12 @@ class Engine final : public Simulation {
 
 // The member functions; none of these headers needs another one to come before it but for constants.
 #include "sim/engine/engine_baths.hpp"
+#include "sim/engine/engine_cell.hpp"
 #include "sim/engine/engine_checks.hpp"
 #include "sim/engine/engine_contacts.hpp"
 #include "sim/engine/engine_flight.hpp"
 #include "sim/engine/engine_loop.hpp"
+#include "sim/engine/engine_plates.hpp"
 #include "sim/engine/engine_prediction.hpp"
 #include "sim/engine/engine_press.hpp"
 #include "sim/engine/engine_rest.hpp"

@@ -3,9 +3,6 @@
 
 namespace shakebed::sim {
 
-// Length of the hop of a disk at rest on the floor without a contact clock [sqrt(D/g)].
-inline constexpr double rest_hop = 1e-4;
-
 // The TC model: a contact is elastic if either partner was hit less than t_c
 // ago. Sets the clocks.
 template <class Space, class Rule, class Sizes>
@@ -150,12 +147,30 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
   Motion motion = motion_at(disks_[i], now_);
   switch (disks_[i].partner) {
     case left_wall:
+      if constexpr (Space::is_cell) {
+        if (slope_sine_ > 0) {
+          hit_slope(i, motion, true);
+          break;
+        }
+      }
       bounce(i, motion, -1, 0, 0, side_surface_);
       break;
     case right_wall:
+      if constexpr (Space::is_cell) {
+        if (slope_sine_ > 0) {
+          hit_slope(i, motion, false);
+          break;
+        }
+      }
       bounce(i, motion, 1, 0, 0, side_surface_);
       break;
     case lid_above:
+      if constexpr (Space::is_cell) {
+        if (lid_.is_free()) {
+          hit_free_lid(i, motion);
+          break;
+        }
+      }
       bounce(i, motion, 0, 1, 0, lid_surface_);
       break;
     default:
@@ -163,7 +178,12 @@ void Engine<Space, Rule, Sizes>::hit_wall(std::uint32_t i) {
       break;
   }
   (disks_[i].partner == floor_below ? counters_.floor_collisions : counters_.wall_collisions) += 1;
+  bool lid_moved = false;
+  if constexpr (Space::is_cell) lid_moved = disks_[i].partner == lid_above && lid_.is_free();
   fly_on(i, motion);
+  if constexpr (Space::is_cell) {
+    if (lid_moved) predict_below_lid(i);
+  }
 }
 
 template <class Space, class Rule, class Sizes>
@@ -289,9 +309,14 @@ void Engine<Space, Rule, Sizes>::relieve() {
       });
       if constexpr (Space::has_walls) {
         const double radius = sizes_.radius(i);
-        if (hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
-        if (hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
-        if (lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
+        bool slopes = false;
+        if constexpr (Space::is_cell) {
+          slopes = slope_sine_ > 0;
+          relieve_in_cell(i, touching, stop);
+        }
+        if (!slopes && hard_sides_ && disk.x - radius < touching) disk.vx += stop(-disk.vx);
+        if (!slopes && hard_sides_ && width_ - radius - disk.x < touching) disk.vx -= stop(disk.vx);
+        if (!lid_.is_free() && lid_height_ - radius - disk.z < touching) disk.vz -= stop(disk.vz);
         if (disk.z - radius - floor_.position(now_) < touching) {
           const double approach = stop(floor_.velocity(now_) - disk.vz);
           disk.vz += approach;

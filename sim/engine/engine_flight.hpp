@@ -18,11 +18,17 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) {
     hard_sides_ = Space::has_walls;
     side_surface_ = Contact(sides->surface);
+    slope_sine_ = std::sin(sides->slope);
+    slope_cosine_ = std::cos(sides->slope);
   } else {
     period_x_ = Period(width_);
   }
   if (const auto* lid = std::get_if<Lid>(&scene.box.top)) {
     lid_height_ = lid->height;
+    if (lid->is_free()) {
+      lid_.mass = lid->mass;
+      lid_.z = lid->height;
+    }
     lid_surface_ = Contact(lid->surface);
   }
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);
@@ -61,8 +67,14 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   event_rate_ = 8.0 * count_;
   initial_energy_ = kinetic_energy() + potential_energy();
   unusual_ = disk_surface_.varies();
-  plan_rest(scene.rests);
-  plan_press(scene.presses);
+  const auto* plates = std::get_if<RubbingPlates>(&scene.box.plates);
+  plan_rest(scene.rests && plates == nullptr);
+  plan_press(scene.presses && plates == nullptr);
+  if (plates != nullptr) {
+    plates_ = *plates;
+    rubs_.resize(count_);
+    begin_rub();
+  }
   begin_interval();
 }
 

@@ -180,7 +180,7 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
     if (std::abs(goal - synchronise_at_) <= 8 * std::numeric_limits<double>::epsilon() * std::abs(time))
       goal = synchronise_at_;
     if (!(goal > now_)) return true;
-    const double until = std::min({goal, synchronise_at_, bath_at_, rest_at_});
+    const double until = std::min({goal, synchronise_at_, bath_at_, rest_at_, rub_at_, lid_.leaves_at});
     bool arrived = true;
     if (is_pressed_) {
       if constexpr (press_applies) arrived = press_until(until);
@@ -201,6 +201,10 @@ bool Engine<Space, Rule, Sizes>::advance_towards(double time, std::uint64_t most
       if (now_ == rest_at_) act_rest();
     }
     if (now_ == bath_at_) act_bath();
+    if (now_ == rub_at_) act_plates();
+    if constexpr (Space::is_cell) {
+      if (now_ == lid_.leaves_at) act_lid();
+    }
     if (now_ == synchronise_at_) {
       const bool is_goal = goal == synchronise_at_;  // before the next one is set
       synchronise();

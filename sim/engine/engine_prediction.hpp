@@ -154,9 +154,21 @@ template <class Space, class Rule, class Sizes>
   const auto consider = [&](double wait, std::int32_t wall) {
     if (now_ + wait < best.time) best = {now_ + wait, wall};
   };
-  if (near & near_left_wall) consider(time_to_wall(me.x - radius, -me.vx), left_wall);
-  if (near & near_right_wall) consider(time_to_wall(width_ - radius - me.x, me.vx), right_wall);
-  if (near & near_lid) consider(time_to_lid(lid_height_ - radius - me.z, me.vz, gravity_), lid_above);
+  bool slopes = false, lid_is_free = false;
+  if constexpr (Space::is_cell) {
+    slopes = slope_sine_ > 0;
+    lid_is_free = lid_.is_free();
+    const double horizon = std::min(best.time, exit) - now_;
+    if (slopes && (near & near_left_wall) != 0) consider(time_to_slope(me, radius, true, horizon), left_wall);
+    if (slopes && (near & near_right_wall) != 0) consider(time_to_slope(me, radius, false, horizon), right_wall);
+    // Both fall with g: they approach at a constant speed.
+    if (lid_is_free && (near & near_lid) != 0)
+      consider(time_to_wall(lid_height() - radius - me.z, me.vz - lid_velocity()), lid_above);
+  }
+  if (!slopes && (near & near_left_wall) != 0) consider(time_to_wall(me.x - radius, -me.vx), left_wall);
+  if (!slopes && (near & near_right_wall) != 0) consider(time_to_wall(width_ - radius - me.x, me.vx), right_wall);
+  if (!lid_is_free && (near & near_lid) != 0)
+    consider(time_to_lid(lid_height_ - radius - me.z, me.vz, gravity_), lid_above);
   if (near & near_floor) {
     const double horizon = std::min(best.time, exit) - now_;
     consider(floor_.time_to_contact(me.z - radius, me.vz, gravity_, now_, horizon), floor_below);

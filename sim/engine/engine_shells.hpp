@@ -135,12 +135,21 @@ void Engine<Space, Rule, Sizes>::mark_near_bounds(std::uint32_t i) {
   const auto note = [&near](bool it_is, unsigned bit) { near |= bit & -static_cast<unsigned>(it_is); };
   if constexpr (Space::has_walls) {
     const double reach = sizes_.radius(i) + disk.skin * skin_unit + shell_slack;
-    note(hard_sides_ & (disk.shell_x < reach), near_left_wall);
-    note(hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
+    bool slopes = false;
+    if constexpr (Space::is_cell) {
+      slopes = slope_sine_ > 0;
+      const double x = disk.shell_x, z = disk.shell_z, highest = floor_.highest();
+      note(slopes && gap_to_slope(x, z, reach, true, highest) < 0, near_left_wall);
+      note(slopes && gap_to_slope(x, z, reach, false, highest) < 0, near_right_wall);
+    }
+    note(!slopes & hard_sides_ & (disk.shell_x < reach), near_left_wall);
+    note(!slopes & hard_sides_ & (disk.shell_x > width_ - reach), near_right_wall);
     bool meets_floor = disk.shell_z < floor_.highest() + reach;
     if constexpr (rests_apply) meets_floor = meets_floor && !is_at_rest(i);
     note(meets_floor, near_floor);
-    note(disk.shell_z > lid_height_ - reach, near_lid);
+    double lid = lid_height_;
+    if constexpr (Space::is_cell) lid = lid_.is_free() ? lid_.lowest : lid;
+    note(disk.shell_z > lid - reach, near_lid);
   }
   const double reach = largest_contact_ + disk.skin * skin_unit + largest_skin_ + shell_slack_;
   const auto at_edge = [reach](double centre, const Period& period) {

@@ -38,6 +38,8 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
   out.time = time();
   out.floor_position = floor_.position(now_);
   out.floor_velocity = floor_.velocity(now_);
+  out.lid_height = lid_height();
+  out.lid_velocity = lid_velocity();
   out.x.resize(count_);
   out.z.resize(count_);
   out.vx.resize(count_);
@@ -50,6 +52,11 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
     out.z[label] = Space::wraps_z ? period_z_.wrapped(motion.z()) : motion.z();
     out.vx[label] = motion.vx();
     out.vz[label] = motion.vz();
+    if (!rubs_.empty()) [[unlikely]] {
+      const TwoLanes velocity = velocity_with_friction(i, motion);
+      out.vx[label] = velocity[0];
+      out.vz[label] = velocity[1];
+    }
     if constexpr (Rule::spins) out.spin[label] = spins_[i];
     if constexpr (rests_apply) {
       if (!is_at_rest(i)) continue;
@@ -83,6 +90,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
       sum += 0.5L * sizes_.mass(i) / inverse_inertia_ratio_ * surface_speed * surface_speed;
     }
   }
+  if (lid_.is_free()) sum += 0.5L * lid_.mass * lid_velocity() * lid_velocity();
   return static_cast<double>(sum);
 }
 
@@ -90,13 +98,14 @@ template <class Space, class Rule, class Sizes>
 double Engine<Space, Rule, Sizes>::potential_energy() const {
   long double sum = 0;
   for (std::uint32_t i = 0; i < count_; ++i) sum += gravity_ * sizes_.mass(i) * motion_now(i).z();
+  if (lid_.is_free()) sum += gravity_ * lid_.mass * lid_height();
   return static_cast<double>(sum);
 }
 
 template <class Space, class Rule, class Sizes>
 EnergyLedger Engine<Space, Rule, Sizes>::energy() const {
-  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,
-                      dissipated_,     step_error_,      floor_work_,        bath_work_};
+  EnergyLedger ledger{initial_energy_, kinetic_energy(), potential_energy(), 0,      dissipated_,
+                      step_error_,     floor_work_,      bath_work_,         rubbed_};
   if (!is_pressed_) return ledger;
   const double later = now_ - pressed_to_;
   const double work =

@@ -21,6 +21,11 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   for (double& time : last_contact_) time -= now_;
   for (double& time : withheld_at_) time -= now_;
   bath_at_ -= now_;
+  rub_at_ -= now_;
+  if constexpr (Space::is_cell) {
+    bring_lid_forward();
+    lid_.own_time = 0;
+  }
   rest_at_ -= now_;
   look_at_ -= now_;
   pressed_to_ -= now_;
@@ -68,6 +73,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
     permute(withheld_at_);
   }
   if constexpr (rests_apply) permute(rest_height_);
+  if (!rubs_.empty()) permute(rubs_);
   if constexpr (!Sizes::equal) {
     permute(sizes_.radii);
     permute(sizes_.masses);
@@ -124,6 +130,7 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   const double extent = std::max(width_, std::max(height, top));
   shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
   lists_.reset(disks_.data(), count_);
+  if constexpr (Space::is_cell) draw_lid_bound();
   choose_tiles();
   file_shells(height);
   std::visit(
@@ -161,6 +168,15 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
   visit(self.dissipated_);
   visit(self.floor_work_);
   visit(self.bath_work_);
+  if (self.lid_.is_free()) {
+    visit(self.lid_.z);
+    visit(self.lid_.vz);
+  }
+  if (!self.rubs_.empty()) {
+    visit(self.rub_at_);
+    visit(self.rubbed_);
+    for (auto& rub : self.rubs_) visit(rub);
+  }
   if constexpr (!Sizes::equal) {
     for (std::uint32_t i = 0; i < self.count_; ++i) {
       visit(self.sizes_.radii[i]);
@@ -231,6 +247,7 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   random_.set_state(random_state);
   unusual_ = disk_surface_.varies() || resting_ > 0;
   for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;
+  lid_.own_time = 0;
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
   const bool was_pressed = std::exchange(is_pressed_, false);

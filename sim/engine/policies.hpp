@@ -11,21 +11,27 @@
 
 namespace shakebed::sim {
 
+// `is_cell`: what real cells have; see engine_cell.hpp.
 // Weightless and periodic in both directions: no walls at all.
 struct PeriodicSpace {
-  static constexpr bool falls = false, has_walls = false, wraps_x = true, wraps_z = true;
+  static constexpr bool falls = false, has_walls = false, wraps_x = true, wraps_z = true, is_cell = false;
 };
 // Weightless with a floor and a lid; the sides are hard or periodic.
 struct WeightlessBox {
-  static constexpr bool falls = false, has_walls = true, wraps_x = true, wraps_z = false;
+  static constexpr bool falls = false, has_walls = true, wraps_x = true, wraps_z = false, is_cell = false;
 };
 // Gravity, a floor, open above or with a lid, hard sides.
 struct HardBox {
-  static constexpr bool falls = true, has_walls = true, wraps_x = false, wraps_z = false;
+  static constexpr bool falls = true, has_walls = true, wraps_x = false, wraps_z = false, is_cell = false;
 };
 // The same with periodic sides.
 struct PeriodicSidesBox {
-  static constexpr bool falls = true, has_walls = true, wraps_x = true, wraps_z = false;
+  static constexpr bool falls = true, has_walls = true, wraps_x = true, wraps_z = false, is_cell = false;
+};
+
+// Gravity, a floor, sides that are periodic, hard or sloped, open above or with a lid that stands still or is free.
+struct CellBox {
+  static constexpr bool falls = true, has_walls = true, wraps_x = true, wraps_z = false, is_cell = true;
 };
 
 // Periods of a space; where a direction does not wrap, the period counts as 0

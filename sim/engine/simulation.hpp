@@ -17,7 +17,9 @@ namespace shakebed::sim {
 struct Snapshot {
   double time = 0;  // since the start
   double floor_position = 0, floor_velocity = 0;
-  std::vector<double> x, z, vx, vz, spin;  // spin empty for smooth disks
+  double lid_height = std::numeric_limits<double>::infinity();  // of its lower face; infinite for an open box
+  double lid_velocity = 0;                                      // of a free lid
+  std::vector<double> x, z, vx, vz, spin;                       // spin empty for smooth disks
 };
 
 // What never changes; index = disk.
@@ -31,10 +33,11 @@ struct EnergyLedger {
   double initial = 0;
   double kinetic = 0, potential = 0;  // now; kinetic includes spin
   double compressed = 0;              // now, in the springs of a bed that is pressed on the floor
-  double dissipated = 0;              // in contacts
+  double dissipated = 0;              // in contacts, and on the plates
   double step_error = 0;              // lost by the time steps of such a bed (negative: won)
-  double floor_work = 0;              // done by the floor's motion (and by a thermal floor)
+  double floor_work = 0;              // done by the floor's motion (and by a thermal floor, and by plates that move)
   double bath_work = 0;               // given by the reservoir
+  double dissipated_on_plates = 0;    // of what was dissipated, by friction with the plates
   double imbalance() const {
     return kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work - initial;
   }

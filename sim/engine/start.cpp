@@ -26,12 +26,14 @@ struct Room {
   double width, height;  // height infinite for an open box
   bool periodic_x, periodic_z;
   double diameter;  // of the largest disk
-  double floor;     // highest position of the floor at time 0
+  double floor;     // position of the floor at time 0
+  double slope;     // of the sides outwards [rad]
   std::uint32_t count;
 };
 
 Room room_of(const Scene& scene) {
-  Room room{scene.box.width, INFINITY, false, false, 0, 0, scene.count()};
+  Room room{scene.box.width, INFINITY, false, false, 0, 0, 0, scene.count()};
+  if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) room.slope = sides->slope;
   room.periodic_x = std::holds_alternative<PeriodicSides>(scene.box.sides);
   if (const auto* lid = std::get_if<Lid>(&scene.box.top)) room.height = lid->height;
   if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) {
@@ -171,9 +173,11 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
     if (p.species >= scene.disks.species.size())
       throw std::runtime_error("disk " + std::to_string(i) + " of the start is of a species that is not described");
     const double r = scene.disks.species[p.species].diameter / 2;
-    const bool outside =
-        (!room.periodic_x && (p.x < r - 1e-12 * room.width || p.x > room.width - r + 1e-12 * room.width)) ||
-        (!room.periodic_z && (p.z < room.floor + r - 1e-12 || p.z > room.height - r + 1e-12));
+    const double spread = room.slope > 0 ? (p.z - room.floor) * std::tan(room.slope) : 0;
+    const double from_wall = r / std::cos(room.slope) - spread;
+    const bool outside = (!room.periodic_x && (p.x < from_wall - 1e-12 * room.width ||
+                                               p.x > room.width - from_wall + 1e-12 * room.width)) ||
+                         (!room.periodic_z && (p.z < room.floor + r - 1e-12 || p.z > room.height - r + 1e-12));
     if (outside || !std::isfinite(p.x) || !std::isfinite(p.z) || !std::isfinite(p.vx) || !std::isfinite(p.vz)) {
       std::ostringstream out;
       out << "disk " << i << " of the start, at (" << p.x << ", " << p.z << ") D, is not inside the box";

@@ -25,6 +25,7 @@ class Check {
     disks();
     box();
     floor();
+    plates();
     bath();
     if (problems_.empty()) room();
     return problems_;
@@ -96,8 +97,21 @@ class Check {
             "a box that is periodic upwards has no gravity: a disk would fall for ever");
     require(falls() || !std::holds_alternative<OpenTop>(b.top), "/box/lid",
             "without gravity an open box loses its disks: give it a lid, or make it periodic");
-    if (const auto* sides = std::get_if<HardSides>(&b.sides)) surface(sides->surface, "/box/sides");
-    if (const auto* lid = std::get_if<Lid>(&b.top)) surface(lid->surface, "/box/lid");
+    if (const auto* sides = std::get_if<HardSides>(&b.sides)) {
+      surface(sides->surface, "/box/sides");
+      constexpr double least_slope = 1e-3,
+                       most_slope = 1.2;  // 0.06 and 69 deg: beyond, a wall is another or hardly leans
+      require(sides->slope == 0 || (sides->slope >= least_slope && sides->slope <= most_slope), "/box/sides/slope",
+              "sides slope outwards by 0.001 to 1.2 rad, or not at all (0), not by " + number(sides->slope) + " rad");
+      require(!(sides->slope > 0) || falls(), "/box/sides/slope", "sloped sides need gravity");
+    }
+    if (const auto* lid = std::get_if<Lid>(&b.top)) {
+      surface(lid->surface, "/box/lid");
+      require(lid->mass > 0, "/box/lid/mass", "a lid that moves has a mass above 0, not " + number(lid->mass));
+      require(!lid->is_free() || falls(), "/box/lid/mass", "a lid that moves needs gravity");
+      require(!lid->is_free() || lid->surface.friction == 0, "/box/lid/friction",
+              "a lid that moves is smooth: friction is known with walls of infinite mass only");
+    }
     surface(b.floor_surface, "/floor");
   }
 
@@ -133,6 +147,23 @@ class Check {
     require(height() > amplitude + largest, "/box/lid",
             "the lid at " + number(height()) + " D leaves no room for a disk above the floor, which rises to " +
                 number(amplitude) + " D");
+  }
+
+  void plates() {
+    const auto* plates = std::get_if<RubbingPlates>(&scene_.box.plates);
+    if (plates == nullptr) return;
+    require(plates->deceleration > 0 && std::isfinite(plates->deceleration), "/box/plates",
+            "the friction with the plates slows a disk down by more than 0, not by " + number(plates->deceleration));
+    require(plates->interval > 0 && std::isfinite(plates->interval), "/box/plates/interval",
+            "the interval at which friction with the plates acts is positive, not " + number(plates->interval));
+    if (const auto* sine = std::get_if<SinusoidalFloor>(&scene_.box.floor)) interval_of(*plates, 1 / sine->frequency);
+    if (const auto* table = std::get_if<TabulatedFloor>(&scene_.box.floor)) interval_of(*plates, table->period);
+  }
+  void interval_of(const RubbingPlates& plates, double period) {
+    constexpr double least_a_period = 20;
+    require(plates.interval * least_a_period <= period, "/box/plates/interval",
+            "friction with the plates acts every " + number(plates.interval) + " sqrt(D/g), which is more than a " +
+                number(least_a_period) + "th of the floor's period of " + number(period) + " sqrt(D/g)");
   }
 
   void bath() {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -36,19 +37,36 @@ struct Disks {
 // --- the box: x from 0 to width; the floor's mean position is z = 0
 struct HardSides {
   Surface surface;
+  // Angle from the vertical by which the sides lean outwards [rad]; the box is `width` wide at the floor. Sloped sides
+  // move with the floor, vertical ones stand still.
+  double slope = 0;
 };
 struct PeriodicSides {};
 using Sides = std::variant<HardSides, PeriodicSides>;
 
 struct OpenTop {};
+// A wall at rest, or one of finite mass that falls and flies freely up and down, from rest at that height.
 struct Lid {
-  double height = 0;  // of its lower face above the floor's mean
+  double height = 0;  // of its lower face above the floor's mean; of a free lid at the start
   Surface surface;
+  double mass = std::numeric_limits<double>::infinity();
+  bool is_free() const { return mass < std::numeric_limits<double>::infinity(); }
 };
 struct PeriodicTop {  // periodic upwards too: no floor at all
   double height = 0;
 };
 using Top = std::variant<OpenTop, Lid, PeriodicTop>;
+
+// The plates between which the disks are.
+struct SmoothPlates {};
+// A disk that moves against a plate is slowed down by `deceleration`, the friction coefficient times the acceleration
+// that presses it on the plate. One that rests on it stays there while nothing pulls more.
+struct RubbingPlates {
+  double deceleration = 0;
+  double interval = 0.01;    // at which the friction acts
+  bool follow_floor = true;  // the plates move with the floor; else they stand still
+};
+using Plates = std::variant<SmoothPlates, RubbingPlates>;
 
 using Floor = std::variant<StillFloor, SinusoidalFloor, TabulatedFloor>;
 
@@ -57,6 +75,7 @@ struct Box {
   Sides sides{};
   Top top{};
   Floor floor{};
+  Plates plates{};
   Surface floor_surface{};
 };
 

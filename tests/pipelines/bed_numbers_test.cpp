@@ -573,4 +573,53 @@ TEST(Replicas, AreTheMeanOfTheirBeds) {
   EXPECT_NEAR(variance(NumberTable(folder / "all/bed/covariance.csv")) / std::max(own, seen), 1, 1e-6);
 }
 
+// A bed between plates, tilted by 60 degrees: g in the plane is 5 m/s^2, and what presses on the plate tan(60 deg) of
+// it.
+TEST(TiltedCell, StatesItsGravityAndWhatItLosesOnItsPlates) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5,
+    "replicas": 1, "disks": { "count": 24, "diameter": "4 mm", "restitution": 0.8 }, "gravity": "10 m/s^2",
+    "box": { "width": "25.2 mm", "tilt": "60 deg", "plates": { "friction": 0.1 } },
+    "floor": { "motion": "sinusoidal", "amplitude": "1 mm", "frequency": "20 Hz", "restitution": 0.8 },
+    "settle": "0 s", "measure": "0.6 s" } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json json = Json::parse(read_text(folder / "o/bed/observables.json"));
+  EXPECT_NEAR(value(json["gravity_in_plane"]), 5, 1e-12);
+  EXPECT_EQ(json["gravity_in_plane"]["unit"], "m/s^2");
+  EXPECT_NEAR(value(json["gamma"]), 0.001 * std::pow(2 * std::numbers::pi * 20, 2) / 5, 1e-12);
+  EXPECT_DOUBLE_EQ(value(json["temperature_x_over_mg"]), 0.004 * value(json["temperature_x"]));
+  const Json bed = Json::parse(read_text(folder / "o/bed/bed.json"));
+  EXPECT_NEAR(bed["gravity"]["value"].get<double>(), 5, 1e-12);
+  EXPECT_NEAR(bed["tilt"]["value"].get<double>(), std::numbers::pi / 3, 1e-12);
+  const auto ledger = [&](const char* name) { return json["energy_ledger"][name].get<double>(); };
+  EXPECT_GT(ledger("dissipated_on_plates"), 0);
+  EXPECT_LT(ledger("dissipated_on_plates"), ledger("dissipated"));
+  EXPECT_LT(std::abs(ledger("imbalance")), 1e-8 * ledger("dissipated"));
+  // Of 24 disks that all slide all the time at their mean speed, sqrt(pi T/2) for a Maxwellian, friction takes so much.
+  const double periods_of_time = 12 * 0.05 / std::sqrt(0.004 / 5), a = 0.1 * std::sqrt(3.0);
+  const double speed =
+      std::sqrt(std::numbers::pi / 2 * (value(json["temperature_x"]) + value(json["temperature_z"])) / 2);
+  EXPECT_NEAR(ledger("dissipated_on_plates") / (24 * a * speed * periods_of_time), 1, 0.5);
+}
+
+// The energy of an elastic bed stays. So the mean height of its lid follows from the heights and velocities of the
+// disks, and from the T/2 of kinetic energy that the lid has.
+TEST(TiltedCell, StatesTheHeightOfItsFreeLid) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5,
+    "units": "reduced", "disks": { "count": 24 }, "start_temperature": 3,
+    "box": { "width": 6.3, "sides": "periodic", "lid": { "kind": "free", "height": 12, "mass": 8 } },
+    "settle": 20, "measure": 1000 } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json json = Json::parse(read_text(folder / "o/bed/observables.json"));
+  const double t_x = value(json["temperature_x"]), t_z = value(json["temperature_z"]), t = (t_x + t_z) / 2;
+  const double energy = json["energy_ledger"]["initial"].get<double>();
+  const double lid = (energy - 24 * value(json["center_of_mass"]) - 24 * t - t / 2) / 8;
+  EXPECT_EQ(json["lid_height"]["unit"], "D");
+  EXPECT_GT(error(json["lid_height"]), 0);
+  EXPECT_NEAR(value(json["lid_height"]), lid, 0.05 * t);
+}
+
 }  // namespace

@@ -49,6 +49,9 @@ const Refused refused_recipes[] = {
     {"fit-with-another-diameter", 12, "/stages/3/diameter", "is 0.0031 m here, but 0.003 m in stage \"bed\""},
     {"map-with-another-frequency", 13, "/stages/4/frequency", "is 21 Hz here, but 20 Hz in stage \"bed\""},
     {"kernel-with-a-hyphen", 11, "/stages/2/kernel/kind", "Did you mean \"top_hat\"?"},
+    {"plates-of-an-upright-cell", 6, "/stages/0/box/plates", "nothing presses the disks on the plates"},
+    {"cell-that-lies-flat", 6, "/stages/0/box/tilt", "or write the bed in reduced units"},
+    {"map-with-the-gravity-of-free-fall", 13, "/stages/4/gravity", "is 9.81 m/s^2 here, but 4.905"},
     {"gamma-without-frequency", 7, "/stages/0/floor/frequency", "\"frequency\" is missing"},
 };
 
@@ -135,6 +138,8 @@ const Odd odd[] = {
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},
     {"alternate-rows-lock", "/stages/0/box/width: the box is 30.5 diameters wide", "alternate rows can lock"},
+    {"sloped-sides", "/stages/0/box/sides/slope: at the surface of the bed at rest the box is 1.66 times as wide",
+     "do not fit such a profile"},
     {"high-bed", "/stages/0/disks/count: 12000 disks in a box 30.5 diameters wide make a bed 347 diameters high",
      "Take fewer disks"},
 };

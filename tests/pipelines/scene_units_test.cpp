@@ -1,5 +1,7 @@
 // A bed written in SI units against the same bed in units of D, m and g done by hand: D = 4 mm and g = 10 m/s^2, so the
 // unit of time is 20 ms and that of speed 0.2 m/s.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +11,7 @@
 
 #include "pipelines/formats/json.hpp"
 #include "pipelines/stages/scene_options.hpp"
+#include "sim/engine/simulation.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -18,6 +21,20 @@ using namespace shakebed::pipelines;
 using tests::ScratchFolder;
 using tests::write_text;
 
+std::vector<std::string> problems_of(const std::string& text, bool reduced = false) {
+  std::vector<Problem> problems;
+  const auto node = parse_json(text, "bed.json", problems);
+  Fields::Source source{.file = "bed.json"};
+  source.problems = &problems;
+  SceneOptions options;
+  Fields fields = Fields::decode(*node, "", source);
+  fields.set_reduced(reduced);
+  options.describe(fields);
+  fields.finish();
+  std::vector<std::string> words;
+  for (const Problem& problem : problems) words.push_back(problem.pointer + ": " + problem.what);
+  return words;
+}
 SceneOptions options_of(const std::string& text, bool reduced = false) {
   std::vector<Problem> problems;
   const auto node = parse_json(text, "bed.json", problems);
@@ -307,6 +324,142 @@ TEST(Material, GoesToDisksFloorAndSides) {
   EXPECT_EQ(scene.box.floor_surface.friction, 0.2);
   EXPECT_EQ(std::get<sim::HardSides>(scene.box.sides).surface.restitution, 0.7);
   EXPECT_EQ(std::get<sim::HardSides>(scene.box.sides).surface.friction, 0.1);
+}
+
+// A tilted bed on smooth plates is an upright one in the gravity of its plane: in every number, and in every byte of
+// its run.
+TEST(TiltedBed, IsAnUprightOneInTheGravityOfItsPlane) {
+  const std::string rest = disks_in_si + R"(, "floor": { "motion": "sinusoidal", "frequency": "20 Hz", "gamma": 3,
+    "restitution": 0.8 }, "bath": { "kind": "langevin", "temperature": "8 mm", "rate": "2 Hz", "interval": "10 ms" },
+    "start_temperature": "2 mm" })";
+  const auto tilted = [&](const std::string& tilt) {
+    return options_of(R"({ "gravity": "9.81 m/s^2", "box": { "width": "48 mm", "sides": "periodic", "tilt": )" + tilt +
+                      " }, " + rest);
+  };
+  for (const double degrees : {0.0, 7.0, 30.0, 85.0}) {
+    const double in_plane = degrees == 0 ? 9.81 : 9.81 * std::cos(degrees * (std::numbers::pi / 180));
+    const SceneOptions one = tilted(fmt::format("\"{} deg\"", degrees));
+    const SceneOptions other = options_of(
+        fmt::format(R"({{ "gravity": {}, "box": {{ "width": "48 mm", "sides": "periodic" }}, )", in_plane) + rest);
+    EXPECT_EQ(one.gravity(), in_plane);
+    EXPECT_EQ(one.time_unit(), other.time_unit());
+    EXPECT_EQ(one.gamma(), other.gamma());
+    EXPECT_EQ(one.bath_temperature(), other.bath_temperature());
+    EXPECT_EQ(one.period(), other.period());
+    EXPECT_EQ(one.description().gravity, other.description().gravity);
+    EXPECT_EQ(one.description().amplitude, other.description().amplitude);
+    EXPECT_EQ(one.description().tilt, degrees * (std::numbers::pi / 180));
+    EXPECT_FALSE(other.description().tilt);
+    const auto a = sim::simulate(one.scene(3)), b = sim::simulate(other.scene(3));
+    a->advance_to(20);
+    b->advance_to(20);
+    sim::Snapshot here, there;
+    a->snapshot(here);
+    b->snapshot(there);
+    EXPECT_EQ(here.x, there.x);
+    EXPECT_EQ(here.z, there.z);
+    EXPECT_EQ(here.vx, there.vx);
+    EXPECT_EQ(here.vz, there.vz);
+    EXPECT_EQ(a->energy().dissipated, b->energy().dissipated);
+  }
+}
+
+// Gamma, T/(m g) and the unit of time are with the acceleration in the plane: half of it at 60 degrees.
+TEST(TiltedBed, CountsInTheGravityOfItsPlane) {
+  const auto at = [](const std::string& tilt) {
+    return options_of(R"({ "gravity": "10 m/s^2", )" + disks_in_si +
+                      R"(, "box": { "width": "48 mm", "sides": "periodic")" + tilt +
+                      R"( }, "floor": { "motion": "sinusoidal", "frequency": "20 Hz", "amplitude": "1 mm" } })");
+  };
+  const SceneOptions upright = at(""), tilted = at(R"(, "tilt": "60 deg")");
+  EXPECT_NEAR(tilted.gamma(), 2 * upright.gamma(), 1e-12);
+  EXPECT_NEAR(tilted.time_unit(), std::sqrt(2.0) * upright.time_unit(), 1e-12);
+  EXPECT_NEAR(*tilted.gravity(), 5, 1e-12);
+  EXPECT_EQ(BedDescription::from_json(tilted.description().to_json(), "bed.json").tilt, tilted.tilt());
+}
+
+// In reduced units the gravity in the plane is the unit already.
+TEST(TiltedBed, IsTheSameInReducedUnits) {
+  const std::string disks = R"({ "disks": { "count": 12 }, "box": { "width": 12)";
+  EXPECT_EQ(options_of(disks + R"(, "tilt": 1 } })", true).gravity(), 1);
+  EXPECT_EQ(options_of(disks + R"(, "tilt": 1 } })", true).time_unit(), 1);
+}
+
+TEST(TiltedBed, DoesNotLieFlat) {
+  const auto problems = [](const std::string& tilt) {
+    return problems_of(R"({ "disks": { "count": 12, "diameter": "4 mm" }, "box": { "width": "48 mm", "tilt": )" + tilt +
+                       " } }");
+  };
+  EXPECT_TRUE(problems("\"89 deg\"").empty());
+  EXPECT_THAT(problems("\"90 deg\""), testing::ElementsAre(testing::HasSubstr("lies flat")));
+  EXPECT_THAT(problems("\"91 deg\""), testing::SizeIs(1));
+  EXPECT_THAT(problems("\"-1 deg\""), testing::SizeIs(1));
+  EXPECT_THAT(problems("\"3 mm\""), testing::SizeIs(1));
+}
+
+// D = 4 mm. At 30 degrees g is 10 cos(30 deg) in the plane and 10 sin(30 deg) = 5 m/s^2 across it.
+TEST(PlatesInSi, AreInReducedUnits) {
+  const auto plates = [](const std::string& in_box, const std::string& more = "") {
+    return std::get<sim::RubbingPlates>(options_of(R"({ "gravity": "10 m/s^2", )" + disks_in_si +
+                                                   R"(, "box": { "width": "48 mm", )" + in_box + " }" + more + " }")
+                                            .scene(1)
+                                            .box.plates);
+  };
+  const double in_plane = 10 * std::cos(std::numbers::pi / 6), time = std::sqrt(0.004 / in_plane);
+  const sim::RubbingPlates tilted = plates(R"("tilt": "30 deg", "plates": { "friction": 0.2 })");
+  EXPECT_NEAR(tilted.deceleration, 0.2 * 5 / in_plane, 1e-15);
+  EXPECT_EQ(tilted.interval, 0.01);
+  EXPECT_TRUE(tilted.follow_floor);
+  const sim::RubbingPlates pressed = plates(
+      R"("tilt": "30 deg", "plates": { "friction": 0.2, "pressing": "3 m/s^2", "interval": "50 us", "motion": "still" })");
+  EXPECT_NEAR(pressed.deceleration, 0.2 * 3 / in_plane, 1e-15);
+  EXPECT_NEAR(pressed.interval, 50e-6 / time, 1e-15);
+  EXPECT_FALSE(pressed.follow_floor);
+  const sim::RubbingPlates fast = plates(R"("plates": { "friction": 1, "pressing": "3 m/s^2" })",
+                                         R"(, "floor": { "motion": "sinusoidal", "frequency": "500 Hz", "gamma": 3 })");
+  EXPECT_NEAR(fast.interval, 2e-3 / 0.02 / 50, 1e-12) << "a 50th of the period";
+  EXPECT_NEAR(fast.deceleration, 0.3, 1e-15);
+  EXPECT_TRUE(std::holds_alternative<sim::SmoothPlates>(scene_of().box.plates));
+}
+
+TEST(PlatesInReducedUnits, ArePressedByTheTangentOfTheTilt) {
+  const auto deceleration = [](const std::string& text) {
+    return std::get<sim::RubbingPlates>(options_of(text, true).scene(1).box.plates).deceleration;
+  };
+  const std::string disks = R"({ "disks": { "count": 12 }, )";
+  EXPECT_NEAR(deceleration(disks + R"("box": { "width": 12, "tilt": 1, "plates": { "friction": 0.5 } } })"),
+              0.5 * std::tan(1), 1e-15);
+  // On a horizontal plate: weightless in its plane.
+  EXPECT_EQ(deceleration(disks + R"("gravity": 0, "box": { "width": 12, "sides": "periodic", "lid": { "kind": "fixed",
+    "height": 12 }, "plates": { "friction": 0.5, "pressing": 3 } } })"),
+            1.5);
+}
+
+TEST(PlatesInSi, NeedSomethingThatPresses) {
+  const auto problems = [](const std::string& in_box) {
+    return problems_of(R"({ "disks": { "count": 12, "diameter": "4 mm" }, "box": { "width": "48 mm", )" + in_box +
+                       " } }");
+  };
+  EXPECT_THAT(problems(R"("plates": { "friction": 0.2 })"),
+              testing::ElementsAre(testing::HasSubstr("/box/plates: nothing presses")));
+  EXPECT_TRUE(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2 })").empty());
+  EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "pressing": "3 m/s^2" })"), testing::SizeIs(1));
+  const std::string flat = R"({ "gravity": 0, "disks": { "count": 12 }, "box": { "width": 12, "sides": "periodic",
+    "lid": { "kind": "fixed", "height": 12 }, )";
+  EXPECT_THAT(problems_of(flat + R"("plates": { "friction": 0.2 }, "tilt": 1 } })", true), testing::SizeIs(2));
+}
+
+// A disk of 4 mm and 2000 kg/m^3 has the mass 2000 pi 64e-9/4 kg of its description.
+TEST(FreeLidInSi, CountsInMassesOfADisk) {
+  const auto lid = std::get<sim::Lid>(options_of(R"({ "gravity": "10 m/s^2", )" + disks_in_si +
+                                                 R"(, "box": { "width": "48 mm", "lid": { "kind": "free",
+      "height": "40 mm", "mass": "2 g", "restitution": 0.7 } } })")
+                                          .scene(1)
+                                          .box.top);
+  EXPECT_DOUBLE_EQ(lid.height, 10);
+  EXPECT_NEAR(lid.mass, 2e-3 / (2000 * std::numbers::pi * 64e-9 / 4), 1e-9);
+  EXPECT_EQ(lid.surface.restitution, 0.7);
+  EXPECT_TRUE(lid.is_free());
 }
 
 }  // namespace
