@@ -100,10 +100,14 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   const double near = same_bead * rims.model.radius_px;
   const Nearby by_face(faces.disks.size(), near,
                        [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
+  const double face_radius = faces.disks.empty() ? 0 : faces.disks.front().radius_px;
+  const Nearby on_a_face(faces.disks.size(), std::max(near, 0.8 * face_radius),
+                         [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
   double sure = 0, missed = 0;
   for (const RimDisk& rim : rims.disks) {
     const bool has_no_face = !by_face.any_near(rim.circle.x, rim.circle.y);
-    if (has_no_face) agreement.missed_beads += rim.probability;
+    // A circle over a bead that was found is no other bead.
+    if (has_no_face && !on_a_face.any_near(rim.circle.x, rim.circle.y)) agreement.missed_beads += rim.probability;
     if (rim.probability < surely_a_bead) continue;
     ++sure;
     missed += has_no_face;
@@ -156,9 +160,9 @@ class FacesAndRims {
         faces.calibration.rims = rims_.model;
         faces.calibration.expected_missed =
             share_missed(frame, rims_.model, agreement.all, agreement.missed_beads, asked_.roi);
+        faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
         // Rims of a packed bed that blur has closed say nothing against its faces.
-        const bool doubtful = agreement.rimless > 0 && !packing_of(frame, found, faces.calibration).convinces();
-        faces.calibration.rims_to_be_checked = doubtful || left_out_;
+        if (agreement.rimless > 0 && !left_out_) use_packing(faces, found, agreement.all);
         return faces;
       }
       if (round == most_left_out_rounds || agreement.rimless <= most_rimless) return std::nullopt;
@@ -168,6 +172,16 @@ class FacesAndRims {
   }
 
  private:
+  void use_packing(CalibrationResult& faces, const FindResult& found, const std::vector<Circle>& all) const {
+    tell_radius(faces);
+    FinderCalibration& calibration = faces.calibration;
+    const GrayFrame& frame = *frames_.back();
+    if (!packing_of(frame, found, calibration).convinces()) return;
+    calibration.rims = rims_of(calibration);
+    calibration.rims_to_be_checked = false;
+    calibration.expected_missed = share_missed(frame, *calibration.rims, all, 0, asked_.roi);
+  }
+
   void leave_out(const Agreement& agreement) {
     const GrayFrame& frame = *frames_.back();
     std::vector<std::uint8_t> pixels = left_out_ ? *left_out_ : std::vector<std::uint8_t>(frame.pixels.size(), 0);

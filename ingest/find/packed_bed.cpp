@@ -20,7 +20,7 @@ constexpr double beside = 1.2;                                 // radii: the voi
 constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;
 constexpr double model_contrast = 0.015;  // contrast units: what the model leaves without noise
 constexpr std::size_t fewest_disks = 20;
-constexpr double least_touching = 0.5, most_overlapping = 0.02, most_unexplained = 0.01, most_misfit = 1.25;
+constexpr double least_touching = 0.5, most_overlapping = 0.02, most_unexplained = 0.003, most_misfit = 1.2;
 constexpr double least_filled = 0.2;
 // px: smaller disks are specks; rims of larger ones are seen well.
 constexpr double smallest_px = 3, largest_px = 14;
@@ -75,21 +75,23 @@ Packing packing_of(const GrayFrame& frame, const FindResult& found, const Finder
   packing.touching = contacts.touching;
   packing.overlapping = contacts.overlapping;
   const double noise = std::hypot(faces.noise_level, model_contrast * contrast);
-  packing.misfit = faces.residual_level / noise;
   const double plainly = std::max(plainly_sigmas * noise, plainly_contrast * contrast);
   const GrayFrame left = residual_frame(frame, found, faces), in_view = seen_part(frame, faces);
   const Nearby near(found.disks.size(), beside * radius,
                     [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });
-  double looked = 0, off = 0, seen = 0;
+  double looked = 0, off = 0, seen = 0, squares = 0;
   for (int row = 0; row < left.height; ++row)
     for (int column = 0; column < left.width; ++column) {
       if (unseen(in_view.at(column, row))) continue;
       ++seen;
       if (!near.any_near(column, row)) continue;
       ++looked;
-      off += std::abs(static_cast<double>(left.at(column, row))) > plainly;
+      const double gap = static_cast<double>(left.at(column, row));
+      off += std::abs(gap) > plainly;
+      squares += gap * gap;
     }
   packing.unexplained = off / std::max(1.0, looked);
+  packing.misfit = std::sqrt(squares / std::max(1.0, looked)) / noise;
   packing.filled = static_cast<double>(found.disks.size()) * std::numbers::pi * radius * radius / std::max(1.0, seen);
   return packing;
 }

@@ -21,7 +21,7 @@ struct Packing {
   double touching = 0;     // share of the whole disks that have two neighbours or more one diameter away
   double overlapping = 0;  // share of the disks with a neighbour much nearer than that
   double unexplained = 0;  // share of the pixels on and beside the disks where the model is plainly off
-  double misfit = 0;       // size of the residuals over that of the noise alone
+  double misfit = 0;       // rms of these pixels' residuals over that of the noise alone
   double filled = 0;       // share of the frame
   [[nodiscard]] bool convinces() const;
 };

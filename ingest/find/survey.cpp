@@ -231,7 +231,7 @@ bool leaves_room(const SurveyCandidate& candidate) {
 
 // Radii at which the circles of the census would touch, those of the best hypotheses first; last, none.
 std::vector<PackedStart> starts_from(const CircleCensus& census, const SurveyOptions& options, int reduction) {
-  constexpr std::size_t most_starts = 3;
+  constexpr std::size_t most_starts = 2;
   constexpr double another = 1.08;
   if (options.radius_px) return {{options.polarity, *options.radius_px / reduction}};
   std::vector<PackedStart> starts;
