@@ -38,6 +38,9 @@ constexpr double widest_rim = 1.1, spots_explained = 0.5;
 constexpr double much_smaller = 0.7;  // radii
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
+// px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
+// not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
+constexpr double coarse_px = 10, wide_enough_px = 24;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
 
@@ -273,6 +276,17 @@ void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const s
   survey.found = true;
 }
 
+// Why no beads are found and, where what is seen is small, what helps.
+std::string why_none(const Survey& survey) {
+  if (survey.candidates.empty()) return "no circle is seen more often than by chance";
+  const SurveyCandidate& best = survey.candidates.front();
+  if (!best.not_round || best.rims.radius_px > coarse_px) return best.why_not;
+  return best.why_not + formatted(
+                            ". At a radius of %.1f px, blur alone makes outlines of touching beads look so: if "
+                            "these are beads, photograph them at least %.0f px wide",
+                            best.rims.radius_px, wide_enough_px);
+}
+
 }  // namespace
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
@@ -313,8 +327,10 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;
-      candidate.why_not =
-          formatted("circles of %.1f px are seen, too small to distinguish from specks", candidate.rims.radius_px);
+      candidate.why_not = formatted(
+          "circles of %.1f px radius are seen, too small to distinguish from specks (at least %.0f px are needed): "
+          "photograph the beads with more pixels, or give their radius",
+          candidate.rims.radius_px, speck_px);
     }
     survey.candidates.push_back(std::move(candidate));
   }
@@ -335,9 +351,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     if (settled.channel != survey.candidates.front().channel)
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }
-  if (!survey.found)
-    survey.why_not =
-        survey.candidates.empty() ? "no circle is seen more often than by chance" : survey.candidates.front().why_not;
+  if (!survey.found) survey.why_not = why_none(survey);
   return survey;
 }
 
