@@ -12,6 +12,7 @@
 
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
+#include "ingest/find/packed_bed.hpp"
 
 namespace shakebed::ingest {
 
@@ -99,10 +100,14 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   const double near = same_bead * rims.model.radius_px;
   const Nearby by_face(faces.disks.size(), near,
                        [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
+  const double face_radius = faces.disks.empty() ? 0 : faces.disks.front().radius_px;
+  const Nearby on_a_face(faces.disks.size(), std::max(near, 0.8 * face_radius),
+                         [&](std::size_t i) { return std::pair(faces.disks[i].x_px, faces.disks[i].y_px); });
   double sure = 0, missed = 0;
   for (const RimDisk& rim : rims.disks) {
     const bool has_no_face = !by_face.any_near(rim.circle.x, rim.circle.y);
-    if (has_no_face) agreement.missed_beads += rim.probability;
+    // A circle over a bead that was found is no other bead.
+    if (has_no_face && !on_a_face.any_near(rim.circle.x, rim.circle.y)) agreement.missed_beads += rim.probability;
     if (rim.probability < surely_a_bead) continue;
     ++sure;
     missed += has_no_face;
@@ -149,12 +154,15 @@ class FacesAndRims {
       const double ratio = faces.found ? faces.calibration.radius_px / rims_.model.radius_px : 0;
       if (!(ratio > least_ratio && ratio < most_ratio)) return std::nullopt;
       const GrayFrame& frame = *frames_.back();
-      const Agreement agreement = compare(frame, rims_, find_disks(frame, faces.calibration, asked_));
+      const FindResult found = find_disks(frame, faces.calibration, asked_);
+      const Agreement agreement = compare(frame, rims_, found);
       if (agreement.good()) {
         faces.calibration.rims = rims_.model;
         faces.calibration.expected_missed =
             share_missed(frame, rims_.model, agreement.all, agreement.missed_beads, asked_.roi);
         faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
+        // Rims of a packed bed that blur has closed say nothing against its faces.
+        if (agreement.rimless > 0 && !left_out_) use_packing(faces, found, agreement.all);
         return faces;
       }
       if (round == most_left_out_rounds || agreement.rimless <= most_rimless) return std::nullopt;
@@ -164,6 +172,16 @@ class FacesAndRims {
   }
 
  private:
+  void use_packing(CalibrationResult& faces, const FindResult& found, const std::vector<Circle>& all) const {
+    tell_radius(faces);
+    FinderCalibration& calibration = faces.calibration;
+    const GrayFrame& frame = *frames_.back();
+    if (!packing_of(frame, found, calibration).convinces()) return;
+    calibration.rims = rims_of(calibration);
+    calibration.rims_to_be_checked = false;
+    calibration.expected_missed = share_missed(frame, *calibration.rims, all, 0, asked_.roi);
+  }
+
   void leave_out(const Agreement& agreement) {
     const GrayFrame& frame = *frames_.back();
     std::vector<std::uint8_t> pixels = left_out_ ? *left_out_ : std::vector<std::uint8_t>(frame.pixels.size(), 0);
@@ -188,6 +206,30 @@ class FacesAndRims {
   const LearnedRims& rims_;
   std::shared_ptr<const std::vector<std::uint8_t>> left_out_;
 };
+
+// Beads that lie close and whose rims mislead, by their faces. The radius is the one that is given or was seen, or, of
+// circles that are too small, half the distance between their centres.
+std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                                              const LearnedRims& rims) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : rims.disks) circles.push_back(disk.circle);
+  std::vector<double> starts = {options.radius_px.value_or(options.seen->radius_px)};
+  if (const auto touching = touching_radius(circles); touching && !options.radius_px) starts.push_back(*touching);
+  for (const double start : starts) {
+    FindOptions find = options;
+    find.polarity = options.seen->polarity;
+    find.radius_px = start;
+    PackedBed bed = learn_packed_bed(frames, find);
+    if (!bed.faces.found) continue;
+    std::vector<Circle> found;
+    for (const FoundDisk& disk : bed.disks) found.push_back(place_of(disk));
+    FinderCalibration& calibration = bed.faces.calibration;
+    calibration.rims = rims_of(calibration);
+    calibration.expected_missed = share_missed(*frames.back(), *calibration.rims, found, 0, options.roi);
+    return std::move(bed.faces);
+  }
+  return std::nullopt;
+}
 
 // What rims cannot show: that more beads are there.
 void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCalibration& calibration) {
@@ -298,6 +340,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
+  if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
   return calibration_by_rims(frame, rims, options);
 }
 

@@ -10,6 +10,8 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/circle_census.hpp"
 #include "ingest/find/drawing_signs.hpp"
+#include "ingest/find/edge_map.hpp"
+#include "ingest/find/packed_bed.hpp"
 #include "ingest/find/settle_channel.hpp"
 #include "statistics/text.hpp"
 
@@ -36,6 +38,9 @@ constexpr double widest_rim = 1.1, spots_explained = 0.5;
 constexpr double much_smaller = 0.7;  // radii
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
+// px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
+// not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
+constexpr double coarse_px = 10, wide_enough_px = 24;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
 
@@ -182,6 +187,106 @@ void enlarge(SurveyCandidate& candidate, int factor) {
   }
 }
 
+// Share of the edges that are gone once the beads are taken out, and their length.
+void explain_edges(SurveyCandidate& candidate, const GrayFrame& frame, const PackedBed& bed) {
+  FindResult found;
+  found.disks = bed.disks;
+  const EdgeMap edges = find_edges(frame);
+  const EdgeMap left = find_edges(residual_frame(frame, found, bed.faces.calibration), edges.threshold);
+  const auto all = static_cast<double>(edges.ridge.size()), rest = static_cast<double>(left.ridge.size());
+  candidate.explained_share = std::max(0.0, 1 - rest / std::max(1.0, all));
+  const double cost = circle_cost_px * candidate.rims.radius_px / cost_radius_px;
+  candidate.gain_px = std::max(0.0, all - rest - cost * static_cast<double>(bed.disks.size()));
+}
+
+SurveyCandidate candidate_of(const PackedBed& bed, const GrayFrame& frame) {
+  SurveyCandidate candidate;
+  candidate.rims = rims_of(bed.faces.calibration);
+  for (const FoundDisk& disk : bed.disks) {
+    RimDisk rim;
+    rim.circle.x = disk.x_px;
+    rim.circle.y = disk.y_px;
+    rim.circle.radius = candidate.rims.radius_px;
+    rim.circle.support = 1;
+    rim.circle.contrast = candidate.rims.contrast;
+    rim.probability = disk.quality;
+    rim.variance_px2 = 0.5 * (disk.variance_x + disk.variance_y);
+    candidate.disks.push_back(rim);
+  }
+  candidate.expected_wrong = expected_wrong_share(candidate.disks);
+  explain_edges(candidate, frame, bed);
+  return candidate;
+}
+
+std::vector<Circle> circles_of(const std::vector<RimDisk>& disks) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : disks) circles.push_back(disk.circle);
+  return circles;
+}
+
+// Circles that are beads leave no room between nearest neighbours where beads touch. Circles through what blur leaves
+// of rims in a packed bed do.
+bool leaves_room(const SurveyCandidate& candidate) {
+  constexpr double room = 1.03;
+  const auto touching = touching_radius(circles_of(candidate.disks));
+  return touching && *touching > room * candidate.rims.open_radius_px;
+}
+
+// Radii at which the circles of the census would touch, those of the best hypotheses first; last, none.
+std::vector<PackedStart> starts_from(const CircleCensus& census, const SurveyOptions& options, int reduction) {
+  constexpr std::size_t most_starts = 2;
+  constexpr double another = 1.08;
+  if (options.radius_px) return {{options.polarity, *options.radius_px / reduction}};
+  std::vector<PackedStart> starts;
+  for (const CircleHypothesis& hypothesis : census.hypotheses) {
+    const auto radius = touching_radius(hypothesis.seen);
+    if (!radius || starts.size() >= most_starts) continue;
+    if (std::none_of(starts.begin(), starts.end(), [&](const PackedStart& one) {
+          return one.polarity == hypothesis.polarity &&
+                 std::max(*radius / *one.radius_px, *one.radius_px / *radius) < another;
+        }))
+      starts.push_back({hypothesis.polarity, radius});
+  }
+  starts.push_back({options.polarity, std::nullopt});
+  return starts;
+}
+
+struct SurveyedPicture {
+  const GrayFrame& frame;
+  Channel channel = Channel::automatic;
+  int reduction = 1;
+  const DrawingSigns& signs;
+};
+
+// Beads that lie close, by their faces, come first where they explain more than circles do.
+void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const std::vector<PackedStart>& starts,
+                         const SurveyOptions& options) {
+  const std::optional<PackedBed> bed = look_for_packed_bed(picture.frame, starts);
+  if (!bed) return;
+  SurveyCandidate candidate = candidate_of(*bed, picture.frame);
+  candidate.channel = picture.channel;
+  if (const char* why = why_drawn(picture.signs, candidate.explained_share)) candidate.why_drawn = why;
+  enlarge(candidate, picture.reduction);
+  candidate.gain_px *= picture.reduction;
+  const bool given = !options.radius_px || is_the_given_one(candidate.rims.radius_px, *options.radius_px);
+  candidate.credible = given && (candidate.why_drawn.empty() || options.any_shape);
+  if (!candidate.credible) return;
+  if (survey.found && survey.candidates.front().gain_px > candidate.gain_px) return;
+  survey.candidates.insert(survey.candidates.begin(), std::move(candidate));
+  survey.found = true;
+}
+
+// Why no beads are found and, where what is seen is small, what helps.
+std::string why_none(const Survey& survey) {
+  if (survey.candidates.empty()) return "no circle is seen more often than by chance";
+  const SurveyCandidate& best = survey.candidates.front();
+  if (!best.not_round || best.rims.radius_px > coarse_px) return best.why_not;
+  return best.why_not + formatted(
+                            ". At a radius of %.1f px, blur alone makes outlines of touching beads look so: if "
+                            "these are beads, photograph them at least %.0f px wide",
+                            best.rims.radius_px, wide_enough_px);
+}
+
 }  // namespace
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
@@ -222,8 +327,10 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;
-      candidate.why_not =
-          formatted("circles of %.1f px are seen, too small to distinguish from specks", candidate.rims.radius_px);
+      candidate.why_not = formatted(
+          "circles of %.1f px radius are seen, too small to distinguish from specks (at least %.0f px are needed): "
+          "photograph the beads with more pixels, or give their radius",
+          candidate.rims.radius_px, speck_px);
     }
     survey.candidates.push_back(std::move(candidate));
   }
@@ -234,14 +341,17 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
                      return a.gain_px > b.gain_px;
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
+  if (!survey.found || leaves_room(survey.candidates.front())) {
+    const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
+    SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
+    consider_packed_bed(survey, picture, starts_from(census, options, frames.reduction), options);
+  }
   if (survey.found) {
     SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), options);
     if (settled.channel != survey.candidates.front().channel)
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }
-  if (!survey.found)
-    survey.why_not =
-        survey.candidates.empty() ? "no circle is seen more often than by chance" : survey.candidates.front().why_not;
+  if (!survey.found) survey.why_not = why_none(survey);
   return survey;
 }
 

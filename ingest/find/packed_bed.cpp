@@ -1,0 +1,175 @@
+#include "ingest/find/packed_bed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "ingest/calibrate/picture_parts.hpp"
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/nearby.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+constexpr double nearest_touch = 0.96, farthest_touch = 1.05;  // diameters between centres
+constexpr double overlap = 0.9;                                // diameters
+constexpr double beside = 1.2;                                 // radii: the voids between disks lie within
+// A pixel is plainly not explained beyond so many times the noise and this share of the contrast.
+constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;
+constexpr double model_contrast = 0.015;  // contrast units: what the model leaves without noise
+constexpr std::size_t fewest_disks = 20;
+constexpr double least_touching = 0.5, most_overlapping = 0.02, most_unexplained = 0.003, most_misfit = 1.2;
+constexpr double least_filled = 0.2;
+// px: smaller disks are specks; rims of larger ones are seen well.
+constexpr double smallest_px = 3, largest_px = 14;
+constexpr int part_px = 400;
+
+struct Contacts {
+  double touching = 0, overlapping = 0;
+};
+Contacts contacts_of(const std::vector<FoundDisk>& disks, double diameter) {
+  const Nearby near(disks.size(), farthest_touch * diameter,
+                    [&](std::size_t i) { return std::pair(disks[i].x_px, disks[i].y_px); });
+  double whole = 0;
+  Contacts contacts;
+  for (std::size_t k = 0; k < disks.size(); ++k) {
+    int touched = 0;
+    bool overlaps = false;
+    near.any_near(disks[k].x_px, disks[k].y_px, [&](std::size_t i) {
+      if (i == k) return false;
+      const double away = std::hypot(disks[i].x_px - disks[k].x_px, disks[i].y_px - disks[k].y_px) / diameter;
+      touched += away >= nearest_touch && away <= farthest_touch;
+      overlaps = overlaps || away < overlap;
+      return false;
+    });
+    contacts.overlapping += overlaps;
+    if (disks[k].cut) continue;
+    ++whole;
+    contacts.touching += touched >= 2;
+  }
+  contacts.touching /= std::max(1.0, whole);
+  contacts.overlapping /= std::max(1.0, static_cast<double>(disks.size()));
+  return contacts;
+}
+
+bool is_small(const PackedBed& bed) {
+  const double radius = bed.faces.calibration.radius_px;
+  return bed.faces.found && radius >= smallest_px && radius <= largest_px;
+}
+
+}  // namespace
+
+bool Packing::convinces() const {
+  return disks >= fewest_disks && touching >= least_touching && overlapping <= most_overlapping &&
+         unexplained <= most_unexplained && misfit <= most_misfit && filled >= least_filled;
+}
+
+Packing packing_of(const GrayFrame& frame, const FindResult& found, const FinderCalibration& faces) {
+  Packing packing;
+  packing.disks = found.disks.size();
+  if (found.disks.empty()) return packing;
+  const double radius = faces.radius_px, contrast = std::abs(faces.contrast_level);
+  const Contacts contacts = contacts_of(found.disks, 2 * radius);
+  packing.touching = contacts.touching;
+  packing.overlapping = contacts.overlapping;
+  const double noise = std::hypot(faces.noise_level, model_contrast * contrast);
+  const double plainly = std::max(plainly_sigmas * noise, plainly_contrast * contrast);
+  const GrayFrame left = residual_frame(frame, found, faces), in_view = seen_part(frame, faces);
+  const Nearby near(found.disks.size(), beside * radius,
+                    [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });
+  double looked = 0, off = 0, seen = 0, squares = 0;
+  for (int row = 0; row < left.height; ++row)
+    for (int column = 0; column < left.width; ++column) {
+      if (unseen(in_view.at(column, row))) continue;
+      ++seen;
+      if (!near.any_near(column, row)) continue;
+      ++looked;
+      const double gap = static_cast<double>(left.at(column, row));
+      off += std::abs(gap) > plainly;
+      squares += gap * gap;
+    }
+  packing.unexplained = off / std::max(1.0, looked);
+  packing.misfit = std::sqrt(squares / std::max(1.0, looked)) / noise;
+  packing.filled = static_cast<double>(found.disks.size()) * std::numbers::pi * radius * radius / std::max(1.0, seen);
+  return packing;
+}
+
+PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
+  PackedBed bed;
+  bed.faces = learn_finder(frames, options);
+  if (!bed.faces.found) return bed;
+  tell_radius(bed.faces);
+  FindResult found = find_disks(*frames.back(), bed.faces.calibration, options);
+  bed.packing = packing_of(*frames.back(), found, bed.faces.calibration);
+  bed.disks = std::move(found.disks);
+  if (!bed.packing.convinces()) {
+    bed.faces.found = false;
+    bed.faces.why_not = "disks that touch do not describe the frame";
+  }
+  return bed;
+}
+
+RimModel rims_of(const FinderCalibration& faces) {
+  constexpr std::size_t support_steps = 20;
+  RimModel rims;
+  rims.polarity = faces.polarity;
+  rims.radius_px = rims.open_radius_px = faces.radius_px;
+  rims.radius_std_error_px = faces.radius_std_error_px;
+  rims.contrast = std::abs(faces.contrast_level);
+  rims.probability.assign(support_steps + 1, 1.0);
+  return rims;
+}
+
+std::optional<double> touching_radius(const std::vector<Circle>& circles) {
+  constexpr std::size_t fewest = 8;
+  constexpr double peak = 0.05, least_in_peak = 0.4, farthest = 4;  // relative width; share of the circles; radii
+  if (circles.size() < fewest) return std::nullopt;
+  double largest = 1;
+  for (const Circle& circle : circles) largest = std::max(largest, circle.radius);
+  const Nearby near(circles.size(), farthest * largest,
+                    [&](std::size_t i) { return std::pair(circles[i].x, circles[i].y); });
+  std::vector<double> nearest;
+  for (std::size_t k = 0; k < circles.size(); ++k) {
+    double least = farthest * largest;
+    near.any_near(circles[k].x, circles[k].y, [&](std::size_t i) {
+      if (i != k) least = std::min(least, std::hypot(circles[i].x - circles[k].x, circles[i].y - circles[k].y));
+      return false;
+    });
+    if (least < farthest * largest) nearest.push_back(least);
+  }
+  std::sort(nearest.begin(), nearest.end());
+  std::size_t most = 0;
+  double middle = 0;
+  for (std::size_t first = 0, end = 0; first < nearest.size(); ++first) {
+    while (end < nearest.size() && nearest[end] < (1 + peak) * nearest[first]) ++end;
+    if (end - first <= most) continue;
+    most = end - first;
+    middle = nearest[first + most / 2];
+  }
+  if (static_cast<double>(most) < least_in_peak * static_cast<double>(circles.size())) return std::nullopt;
+  return 0.5 * middle;
+}
+
+std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::vector<PackedStart>& starts) {
+  std::optional<GrayFrame> part;
+  if (std::max(frame.width, frame.height) > part_px)
+    part = cut_out(frame, busiest_part(frame, part_px, {.block = 16, .reach = 2, .stride = 2}));
+  for (const PackedStart& start : starts) {
+    if (start.radius_px && (*start.radius_px < smallest_px || *start.radius_px > largest_px)) continue;
+    FindOptions find;
+    find.polarity = start.polarity;
+    find.radius_px = start.radius_px;
+    PackedBed bed = learn_packed_bed({part ? &*part : &frame}, find);
+    if (!is_small(bed)) continue;
+    if (!part) return bed;
+    find.polarity = bed.faces.calibration.polarity;
+    find.radius_px = bed.faces.calibration.rim_radius_px;
+    bed = learn_packed_bed({&frame}, find);
+    if (is_small(bed)) return bed;
+  }
+  return std::nullopt;
+}
+
+}  // namespace shakebed::ingest
