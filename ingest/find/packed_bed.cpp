@@ -14,7 +14,7 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr double nearest_touch = 0.96, farthest_touch = 1.05;  // diameters between centres
-constexpr double overlap = 0.9;                                // diameters
+constexpr double overlap_below = 0.9;                                // diameters
 constexpr double beside = 1.2;                                 // radii: the voids between disks lie within
 // A pixel is plainly not explained beyond so many times the noise and this share of the contrast.
 constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;
@@ -26,14 +26,14 @@ constexpr double least_filled = 0.2;
 constexpr double smallest_px = 3, largest_px = 14;
 constexpr int part_px = 400;
 
-struct Contacts {
+struct Neighbours {
   double touching = 0, overlapping = 0;
 };
-Contacts contacts_of(const std::vector<FoundDisk>& disks, double diameter) {
+Neighbours neighbours_of(const std::vector<FoundDisk>& disks, double diameter) {
   const Nearby near(disks.size(), farthest_touch * diameter,
                     [&](std::size_t i) { return std::pair(disks[i].x_px, disks[i].y_px); });
   double whole = 0;
-  Contacts contacts;
+  Neighbours contacts;
   for (std::size_t k = 0; k < disks.size(); ++k) {
     int touched = 0;
     bool overlaps = false;
@@ -41,7 +41,7 @@ Contacts contacts_of(const std::vector<FoundDisk>& disks, double diameter) {
       if (i == k) return false;
       const double away = std::hypot(disks[i].x_px - disks[k].x_px, disks[i].y_px - disks[k].y_px) / diameter;
       touched += away >= nearest_touch && away <= farthest_touch;
-      overlaps = overlaps || away < overlap;
+      overlaps = overlaps || away < overlap_below;
       return false;
     });
     contacts.overlapping += overlaps;
@@ -71,7 +71,7 @@ Packing packing_of(const GrayFrame& frame, const FindResult& found, const Finder
   packing.disks = found.disks.size();
   if (found.disks.empty()) return packing;
   const double radius = faces.radius_px, contrast = std::abs(faces.contrast_level);
-  const Contacts contacts = contacts_of(found.disks, 2 * radius);
+  const Neighbours contacts = neighbours_of(found.disks, 2 * radius);
   packing.touching = contacts.touching;
   packing.overlapping = contacts.overlapping;
   const double noise = std::hypot(faces.noise_level, model_contrast * contrast);
