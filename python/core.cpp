@@ -385,6 +385,7 @@ py::dict answer_of(const fit::Answer& answer) {
   number("std_error", answer.std_error);
   number("statistical_error", answer.statistical_error);
   number("bias_uncertainty", answer.bias_uncertainty);
+  number("wall_uncertainty", answer.wall_uncertainty);
   number("contact_duration_uncertainty", answer.contact_duration_uncertainty);
   number("spread", answer.spread);
   number("low", answer.interval.low);
@@ -421,7 +422,7 @@ void bind_fits(py::module_& m) {
                           std::optional<double> column_number, std::optional<std::pair<double, double>> temperature_x,
                           std::optional<std::pair<double, double>> temperature_z,
                           const std::vector<std::pair<std::string, std::string>>& objections,
-                          std::optional<double> diameter, double origin_error) {
+                          std::optional<double> diameter, double origin_error, bool shaken, double width) {
     fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
                            .kernel = kernel_named(kernel),
                            .column_number = column_number};
@@ -429,6 +430,7 @@ void bind_fits(py::module_& m) {
     if (temperature_z) input.temperature_z = fit::Estimate{temperature_z->first, temperature_z->second};
     for (const auto& [why, advice] : objections) input.objections.push_back({why, advice});
     input.diameter = diameter, input.origin_error = origin_error;
+    input.shaken = shaken, input.width_between_walls = width;
     fit::Answer answer;
     {
       const py::gil_scoped_release release;
@@ -484,6 +486,7 @@ void bind_beds(py::module_& m) {
       .def("trajectory", &trajectory)
       .def("times", [](const Bed& bed) { return array_of(bed.times); })
       .def("phases", [](const Bed& bed) { return array_of(bed.phases); })
+      .def_property_readonly("hard_sides", [](const Bed& bed) { return !bed.input.bed.description().periodic; })
       .def("floor", [](const Bed& bed) { return array_of(bed.floor); })
       .def("floor_velocities", [](const Bed& bed) { return array_of(bed.floor_velocities); })
       .def("brief", [](const Bed& bed) { return bed.measured.brief(); })
@@ -524,8 +527,9 @@ py::tuple read_trajectory(const std::string& path, bool y_is_up) {
       if (frame.size() != bed.measured.disks.mass.size())
         throw pipelines::InputError(fmt::format("{}: frame {} holds {} disks, the first one {}", path, bed.times.size(),
                                                 frame.size(), bed.measured.disks.mass.size()));
-      sim::Snapshot at{frame.time, frame.floor_position, frame.floor_velocity, frame.x, frame.z, frame.vx, frame.vz,
-                       frame.spin};
+      sim::Snapshot at;
+      at.time = frame.time, at.floor_position = frame.floor_position, at.floor_velocity = frame.floor_velocity;
+      at.x = frame.x, at.z = frame.z, at.vx = frame.vx, at.vz = frame.vz, at.spin = frame.spin;
       put_frame(bed, at, frame.phase);
     }
   }

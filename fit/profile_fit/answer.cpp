@@ -46,6 +46,10 @@ constexpr double widest_factor = 2.0, widest_interval = 3.0;
 // On 18 simulated beds at rest (240 and 500 disks, e 0.6 and 0.9, from rows and random fills) the whole column gave
 // 0.04 to 0.10 [m g D].
 constexpr double coldest_shown = 0.1;
+// Centres keep half a diameter away from a hard wall, but the density is per whole width. A column of that density is
+// that of a warmer bed: on 13 beds in a bath, 16 to 33 D wide, T was 0.4 to 1.3 D/W too high. One standard error of T,
+// relative, times W/D.
+constexpr double wall_effect = 0.7;
 // Steps in which the known bias and the temperature at which it is looked up settle.
 constexpr int bias_steps = 4;
 // The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
@@ -76,6 +80,7 @@ class AnswerFinder {
     combine();
     judge_interval();
     judge_surface();
+    judge_shaking();
     find_next_bed_interval();
     find_solid_height();
     return answer_;
@@ -129,7 +134,7 @@ class AnswerFinder {
         reading.admissible = thermometer.votes && reading.std_error <= admissible_uncertainty * reading.temperature;
       } else if (answer_.why.empty()) {
         answer_.status = fit.status;
-        answer_.why = fit.message;
+        answer_.why = fit.message + (fit.message.ends_with('.') ? "" : ".");
       }
       answer_.readings.push_back(std::move(reading));
       votes_.push_back(&thermometer);
@@ -271,7 +276,7 @@ class AnswerFinder {
                       ? "Only one model and window can be trusted for this profile, and this model fits."
                       : "All " + std::to_string(compared_ + 1) +
                             " fits (models and windows) agree within 20 % or their errors, and the model fits.";
-    if (!x && !z)
+    if (!x && !z && !input_.shaken)
       answer_.why += " This is the T of the profile: only velocities show whether T_x differs, as in shaken beds.";
     answer_.advice = std::hypot(answer_.bias_uncertainty, answer_.misfit_error) > answer_.statistical_error
                          ? "Most of the uncertainty comes from the model: a longer measurement does not reduce it."
@@ -287,6 +292,16 @@ class AnswerFinder {
   [[nodiscard]] bool is_at_rest() const {
     const std::optional<Estimate>&x = input_.temperature_x, &z = input_.temperature_z;
     return x && z && x->value < temperature_at_rest && z->value < temperature_at_rest;
+  }
+
+  // A profile alone does not show what shaking always does.
+  void judge_shaking() {
+    if (!answer_.ok() || !input_.shaken || input_.temperature_x || input_.temperature_z) return;
+    if (answer_.verdict == Verdict::one_temperature) {
+      answer_.verdict = Verdict::no_single_temperature;
+      answer_.advice = "Quote this range as that of the profile. Measure velocities: a film with its frame rate.";
+    }
+    answer_.why += " The bed is shaken: T_x and T_z may lie outside this range.";
   }
 
   // The greatest density from `low` to `high` [D] over the usual one, at most 1.
@@ -311,8 +326,9 @@ class AnswerFinder {
     Answer& a = answer_;
     a.spread = a.temperature * (a.verdict == Verdict::one_temperature ? spread_beyond_ : spread_of_all_);
     a.contact_duration_uncertainty = a.temperature * input_.contact_duration_effect;
+    if (input_.width_between_walls > 0.0) a.wall_uncertainty = a.temperature * wall_effect / input_.width_between_walls;
     a.std_error = std::hypot(std::hypot(a.statistical_error, a.misfit_error, a.contact_duration_uncertainty),
-                             a.bias_uncertainty, a.spread);
+                             std::hypot(a.bias_uncertainty, a.spread), a.wall_uncertainty);
     a.interval.confidence = input_.confidence;
     a.interval.status = FitStatus::ok;
     if (a.verdict == Verdict::no_single_temperature) {

@@ -29,6 +29,10 @@ struct AnswerInput {
   std::optional<Estimate> temperature_x{}, temperature_z{};  // kinetic, where velocities are known [m g D]
   // One standard error of T, relative, that the simulation's contact duration leaves; 0 where nothing is simulated.
   double contact_duration_effect = 0.0;
+  // Whether the floor moves: T_x and T_z then differ, which only velocities show.
+  bool shaken = false;
+  // Width of the bed between hard walls [D]; 0: without walls, or with walls out of view.
+  double width_between_walls = 0.0;
   // One standard error of the floor's mean position, from which heights are measured [D].
   double origin_error = 0.0;
   // [m]; with it the reasons state T/(m g) in mm, else T in m g D.
@@ -69,6 +73,7 @@ struct Answer {
   double bias_uncertainty = 0.0;              // of the thermometer's known bias, which has been taken off
   double spread = 0.0;                        // of the admissible thermometers beyond what these two explain
   double contact_duration_uncertainty = 0.0;  // of the simulation that gave the profile
+  double wall_uncertainty = 0.0;              // of hard side walls, near which the bed is thinner
   double std_error = 0.0;                     // all of these in quadrature
   double bias = 0.0;                          // what has been taken off, relative
   // Of T; with no_single_temperature the range of all readings and kinetic T, whose confidence is 0: it is no

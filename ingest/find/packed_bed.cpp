@@ -14,7 +14,7 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr double nearest_touch = 0.96, farthest_touch = 1.05;  // diameters between centres
-constexpr double overlap_below = 0.9;                                // diameters
+constexpr double overlap_below = 0.9;                          // diameters
 constexpr double beside = 1.2;                                 // radii: the voids between disks lie within
 // A pixel is plainly not explained beyond so many times the noise and this share of the contrast.
 constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "ingest/frames/stop_question.hpp"
@@ -33,6 +34,8 @@ constexpr std::size_t most_expected_frames = 100000;
 // What deserves a warning: rms of n D^2 between coverage and centres; relative scatter of the contrast and of the bead
 // number from frame to frame; degrees of the floor's tilt.
 constexpr double coverage_differs = 0.03, light_flickers = 0.02, number_varies = 0.01, floor_tilts = 0.5;
+// Frames that show how far the lowest beads move.
+constexpr std::size_t fewest_for_range = 5;
 // Lowest beads that move farther between frames may lie on a floor that moves [D]. At rest they scatter by a hundredth.
 constexpr double moving_bottom = 0.1;
 
@@ -176,6 +179,7 @@ class BedMeasurer {
       ends_ = ends_of_bed(held_, refined_.radius_px);
     result_.bed_region = region_between(ends_, film_.finder.width, film_.finder.height);
     for (FrameFindings& frame : held_) leave_out_beside(frame);
+    check_floor();
     for (std::string& warning : find_geometry(film_, held_, refined_, bed_))
       result_.warnings.push_back(std::move(warning));
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
@@ -203,11 +207,27 @@ class BedMeasurer {
     coverage_.emplace(film_.finder, bed_, diameter_px_, counted_width, refined_.radius_px);
   }
 
+  // A floor far outside the picture is that of another.
+  void check_floor() const {
+    constexpr double farthest = 2;  // heights of the picture
+    const double height = film_.finder.height, row = options_.floor_px.value_or(0);
+    if (row >= -height && row <= farthest * height) return;
+    throw std::invalid_argument(formatted("the floor given is at row %.6g, but the picture has %.0f rows",
+                                          row * film_.finder.recorded_px, height * film_.finder.recorded_px));
+  }
+
   // The lowest bottoms of all frames show where the floor is lowest while it carries the bed. Its mean lies between
   // there and an amplitude higher: beds that ride on it all the time show its lowest position, beds that fly over it
   // hardly reach below the mean.
   void raise_floor() {
-    if (options_.floor_amplitude_m) {
+    const double range = bottom_range(held_, bed_.floor_slope, diameter_px_, film_.finder.width);
+    if (options_.floor_amplitude_m && held_.size() >= fewest_for_range &&
+        *options_.floor_amplitude_m > bed_.scale_m_per_px * std::max(range, moving_bottom * diameter_px_)) {
+      result_.warnings.push_back(formatted(
+          "The amplitude given is %.2f D, but the lowest beads move by %.2f D only: it is not used here. Check it, "
+          "and the diameter.",
+          *options_.floor_amplitude_m / bed_.scale_m_per_px / diameter_px_, range / diameter_px_));
+    } else if (options_.floor_amplitude_m) {
       const double half = 0.5 * *options_.floor_amplitude_m / bed_.scale_m_per_px;
       bed_.floor_px -= half;
       bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, half);
@@ -215,7 +235,6 @@ class BedMeasurer {
       if (!options_.lowest) bins_.lowest = -std::ceil(half / diameter_px_ / bins_.width) * bins_.width;
       return;
     }
-    const double range = bottom_range(held_, bed_.floor_slope, diameter_px_, film_.finder.width);
     if (range < moving_bottom * diameter_px_) return;
     bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, 0.5 * range);
     result_.warnings.push_back(formatted(
@@ -252,6 +271,8 @@ class BedMeasurer {
     };
     for (const FoundDisk& disk : frame.disks) add(disk, 1);
     for (const FoundDisk& disk : frame.second) add(disk, 2);
+    if (status == FrameStatus::good || status == FrameStatus::nothing_found)
+      counts_in_width_.push_back(static_cast<double>(heights.size()));
     result_.disk_total += disks.size();
     for (const MeasuredDisk& disk : disks) wrong_ += 1 - disk.probability;
     result_.expected_wrong = result_.disk_total > 0 ? wrong_ / static_cast<double>(result_.disk_total) : 0;
@@ -349,12 +370,16 @@ class BedMeasurer {
            100 * bed_.flicker);
   }
 
+  static std::pair<double, double> mean_and_scatter(const std::vector<double>& counts) {
+    double mean = 0, scatter = 0;
+    for (const double count : counts) mean += count / static_cast<double>(counts.size());
+    for (const double count : counts) scatter += (count - mean) * (count - mean);
+    return {mean, counts.size() > 1 ? std::sqrt(scatter / static_cast<double>(counts.size() - 1)) : 0};
+  }
+
   void count_disks() {
-    double& mean = result_.disk_count_mean;
-    double& scatter = result_.disk_count_std;
-    for (const double count : counts_) mean += count / static_cast<double>(counts_.size());
-    for (const double count : counts_) scatter += (count - mean) * (count - mean);
-    scatter = counts_.size() > 1 ? std::sqrt(scatter / static_cast<double>(counts_.size() - 1)) : 0;
+    std::tie(result_.disk_count_mean, result_.disk_count_std) = mean_and_scatter(counts_);
+    std::tie(result_.count_in_width_mean, result_.count_in_width_std) = mean_and_scatter(counts_in_width_);
   }
 
   // What else deserves a word.
@@ -410,7 +435,7 @@ class BedMeasurer {
   FrameRows densities_, second_densities_;
   std::optional<Coverage> coverage_;
   std::vector<std::size_t> frame_of_;
-  std::vector<double> counts_;
+  std::vector<double> counts_, counts_in_width_;
   double highest_ = 0;  // D
   std::size_t good_ = 0, cut_below_ = 0, cut_above_ = 0;
   double wrong_ = 0;  // disks that are none, by their probabilities

@@ -87,9 +87,9 @@ struct MeasureOptions {
   [[nodiscard]] std::vector<std::string> validate() const;
 };
 
-// The position of the floor that heights are above: as given, or the mean of a motion that a film shows. Else the lowest
-// position of the beads' bottoms, raised by half of the amplitude if that is given. The lowest is the mean only where
-// the floor rests.
+// The position of the floor that heights are above: as given, or the mean of a motion that a film shows. Else the
+// lowest position of the beads' bottoms, raised by half of the amplitude if that is given. The lowest is the mean only
+// where the floor rests.
 enum class FloorReference { given, mean_of_motion, mean_by_amplitude, lowest_seen };
 std::string_view to_string(FloorReference reference);  // "given", "mean of its motion", "mean by its amplitude", ...
 
@@ -161,6 +161,8 @@ struct Measurement {
   std::vector<PhaseProfile> phases;
   double disk_count_mean = 0;
   double disk_count_std = 0;          // scatter of the bead number from frame to frame
+  double count_in_width_mean = 0;     // of the disks whose centres lie between the walls ...
+  double count_in_width_std = 0;      // ... and its scatter
   bool floor_out_of_view = false;     // the lower border cuts beads, and no floor was given
   bool surface_out_of_view = false;   // the upper border cuts beads
   Contacts contacts;                  // in the frames that geometry is found from
@@ -180,6 +182,8 @@ struct Objection {
   std::string why, advice;
 };
 std::vector<Objection> objections_to(const Measurement& found);
+// Whether the floor is known to move, or the lowest beads move so much that it must: the bed is shaken.
+bool is_shaken(const Measurement& found);
 
 // Rows of that table, to be written while frames come in: heads and lines end with a newline.
 inline constexpr const char* disks_csv_head = "frame,x_px,y_px,radius_px,x,z,quality\n";

@@ -14,6 +14,10 @@ constexpr std::size_t least_disks = 30;
 constexpr double most_doubtful = 0.1;
 // Heights are measured across the floor; farther tilted, gravity is another direction than theirs [degrees].
 constexpr double most_tilted = 10;
+// An error of the floor that only lowest beads in motion cause, half of their way [D].
+constexpr double unquiet_floor = 0.25;
+// Difference of the densities by centres and by covered area, rms [1/D^2]: a fifth of the bed is not what is found.
+constexpr double most_area_off = 0.2;
 
 }  // namespace
 
@@ -38,10 +42,22 @@ std::vector<Objection> objections_to(const Measurement& found) {
     object(formatted("About %.0f %% of the disks found may be wrong, and %.0f %% of the beads may be missed.",
                      100 * wrong, 100 * missed),
            "Look at the circles in the film, and give --radius, --polarity, --channel or --roi.");
+  if (found.coverage_profile && found.coverage_disagreement > most_area_off)
+    object(formatted("The density of the disks found differs from that of the covered area by %.2f per D^2: beads are "
+                     "missed, or the diameter is not theirs.",
+                     found.coverage_disagreement),
+           "Look at the circles in the film; give --radius, or take photographs with less noise.");
   if (tilt > most_tilted)
     object(formatted("The floor found is tilted by %.0f degrees.", tilt),
            "Level the camera, or give the floor (\"floor\", --floor) if another line was taken for it.");
   return out;
+}
+
+bool is_shaken(const Measurement& found) {
+  const BedCalibration& bed = found.calibration;
+  const double diameter_px = 2 * bed.radius_px;
+  return bed.floor_amplitude_px > 0 || bed.floor_reference == FloorReference::mean_by_amplitude ||
+         bed.floor_std_error_px > unquiet_floor * diameter_px;
 }
 
 }  // namespace shakebed::ingest

@@ -79,6 +79,15 @@ double correlation_of_steps(double x) {
   const double e = std::exp(-x);
   return (1 - e) * (1 - e) / (2 * (x - 1 + e));
 }
+// The correction takes collisions for many and weak. Of a simulated bed filmed at 500 and 2,000 Hz, whose temperatures
+// are known, it missed 0.4 of what it corrects.
+constexpr double correction_missed = 0.4;
+constexpr double large_correction = 1.15;
+
+double with_correction(double std_error, const KineticTemperature& t) {
+  return std::hypot(std_error, correction_missed * (1 - 1 / t.finite_time_factor) * t.over_mg_m);
+}
+
 double finite_time_factor(double correlation) {
   double low = 1e-4, high = 50;
   for (int round = 0; round < 100; ++round) {
@@ -219,7 +228,7 @@ class StepStatistics {
       t.finite_time_factor = 1;
     t.localisation_bias_m = total_noise / total_count * to_temperature;
     t.over_mg_m = mean_square * t.finite_time_factor * to_temperature;
-    t.std_error_m = statistics::mean_of(series).std_error * t.finite_time_factor * to_temperature;
+    t.std_error_m = with_correction(statistics::mean_of(series).std_error * t.finite_time_factor * to_temperature, t);
     return t;
   }
 
@@ -233,10 +242,11 @@ class StepStatistics {
       result_.warnings.emplace_back(
           "Disks move by " + std::to_string(result_.mean_step) +
           " D between frames on average: fast disks are lost and T is too low. Use a higher frame rate.");
-    if (result_.horizontal.finite_time_factor > 1.5 || result_.vertical.finite_time_factor > 1.5)
+    const double factor = std::max(result_.horizontal.finite_time_factor, result_.vertical.finite_time_factor);
+    if (factor > large_correction)
       result_.warnings.emplace_back(
-          "Velocities change much between frames: T depends strongly on the finite-time correction. Use a higher frame "
-          "rate.");
+          "Velocities change between frames: T is corrected by a factor of " + std::to_string(factor) +
+          ", and its error allows for 0.4 of this correction. Use a higher frame rate.");
   }
 
   const std::vector<MeasuredDisk>& disks_;
@@ -304,7 +314,7 @@ VelocityMeasurement VelocityMeter::result() {
     }
     const statistics::Mean found = statistics::mean_of(series);
     mean.over_mg_m = found.value;
-    mean.std_error_m = found.std_error;
+    mean.std_error_m = with_correction(found.std_error, mean);
     return mean;
   };
   all.horizontal = mean_of(&VelocityMeasurement::horizontal);

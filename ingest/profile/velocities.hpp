@@ -24,7 +24,7 @@ struct Link {
 
 struct KineticTemperature {
   double over_mg_m = 0;            // T/(m g), m: <(v - flow)^2>/g of one component
-  double std_error_m = 0;          // by windows of frames
+  double std_error_m = 0;          // by windows of frames, and 0.4 of the finite-time correction
   double localisation_bias_m = 0;  // what was taken off: 2 sigma^2/(g dt^2)
   double finite_time_factor = 1;   // what it was multiplied by: 1 + the loss of speed over dt by collisions
 };

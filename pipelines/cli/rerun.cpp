@@ -60,7 +60,9 @@ int rerun(const Call& call, const RerunArguments& given) {
   const Json manifest = read_json(before / "manifest.json");
   if (!manifest.contains("document") || !manifest.contains("stages"))
     throw InputError((before / "manifest.json").string() + ": is not a manifest written by shakebed");
-  const fs::path directory = manifest["recipe"].value("directory", std::string("."));
+  const Json* recipe_directory = find_pointer(manifest, "/recipe/directory");
+  const fs::path directory =
+      recipe_directory != nullptr && recipe_directory->is_string() ? recipe_directory->get<std::string>() : ".";
   const Plan plan =
       make_plan(to_node(manifest["document"]), (before / "manifest.json").string() + " (document)", directory);
   RunOptions options;
@@ -78,10 +80,13 @@ int rerun(const Call& call, const RerunArguments& given) {
   if (!outcome.error.empty()) console.error(outcome.error);
   if (outcome.code != exit_ok && outcome.code != exit_check_failed) return outcome.code;
   const auto [files, different] = compare(manifest, options.out);
+  for (const std::string& problem : verify_output(before).problems)
+    console.warning(fmt::format("{}: {}", before.string(), problem));
   for (const std::string& name : different)
     if (!call.json) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
   print(call.json           ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
-        : different.empty() ? fmt::format("identical: all {} files of {} have the same bytes\n", files, before.string())
+        : different.empty() ? fmt::format("identical: all {} files of the stages have the bytes that {} states\n",
+                                          files, (before / "manifest.json").string())
                             : fmt::format("{} of {} files differ\n", different.size(), files));
   return different.empty() ? exit_ok : exit_check_failed;
 }

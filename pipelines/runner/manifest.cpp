@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <ctime>
+#include <optional>
 
 #include "pipelines/formats/files.hpp"
+#include "pipelines/runner/cache.hpp"
 #include "pipelines/version.hpp"
 
 namespace shakebed::pipelines {
@@ -33,20 +36,6 @@ std::string host_name() {
 namespace {
 Json file_entry(const std::string& name, std::uint64_t bytes, const std::string& sha) {
   return Json{{"file", name}, {"bytes", bytes}, {"sha256", sha}};
-}
-
-Json recipe_json(const Plan& plan, const RunOptions& options) {
-  Json recipe;
-  recipe["file"] = plan.file;
-  std::error_code error;
-  if (fs::is_regular_file(plan.file, error)) {
-    recipe["sha256"] = sha256_of_file(plan.file);
-    recipe["directory"] = fs::absolute(plan.directory, error).string();
-  }
-  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
-  recipe["settings"] = Json::object();
-  for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
-  return recipe;
 }
 
 // The files of the stages before it, then those of the user's own.
@@ -85,6 +74,20 @@ Json stage_json(const PlannedStage& planned, const StageOutcome& stage) {
 }
 }  // namespace
 
+Json recipe_json(const Plan& plan, const RunOptions& options) {
+  Json recipe;
+  recipe["file"] = plan.file;
+  std::error_code error;
+  if (fs::is_regular_file(plan.file, error)) {
+    recipe["sha256"] = sha256_of_file(plan.file);
+    recipe["directory"] = fs::absolute(plan.directory, error).string();
+  }
+  if (!plan.preset.empty()) recipe["preset"] = plan.preset;
+  recipe["settings"] = Json::object();
+  for (const Setting& setting : options.settings) recipe["settings"][setting.pointer] = setting.value.to_json();
+  return recipe;
+}
+
 Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome& outcome, const std::string& started) {
   Json out;
   out["pipeline"] = plan.name;
@@ -114,6 +117,28 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
       out["outputs"].push_back(file_entry(name, fs::file_size(path), sha256_of_file(path)));
   }
   return out;
+}
+
+// Of the points of a sweep: what their stages have recorded.
+void verify_points(const fs::path& out, VerifyResult& result) {
+  std::vector<fs::path> stages;
+  std::error_code error;
+  for (const fs::directory_entry& point : fs::directory_iterator(out / "points", error))
+    for (const fs::directory_entry& stage : fs::directory_iterator(point.path(), error))
+      if (stage.is_directory(error)) stages.push_back(stage.path());
+  std::sort(stages.begin(), stages.end());
+  for (const fs::path& stage : stages) {
+    const std::optional<StageRecord> record = read_record(stage);
+    if (!record) continue;
+    for (const Fingerprint& file : record->outputs) {
+      const fs::path path = stage / file.file;
+      ++result.files;
+      if (!fs::is_regular_file(path, error))
+        result.problems.push_back(fs::relative(path, out, error).string() + ": missing");
+      else if (!file.sha256.empty() && sha256_of_file(path) != file.sha256)
+        result.problems.push_back(fs::relative(path, out, error).string() + ": changed since the run");
+    }
+  }
 }
 
 VerifyResult verify_output(const fs::path& out) {
@@ -146,6 +171,7 @@ VerifyResult verify_output(const fs::path& out) {
   } catch (const nlohmann::json::exception&) {
     throw InputError((out / "manifest.json").string() + ": is not a manifest written by shakebed");
   }
+  verify_points(out, result);
   return result;
 }
 

@@ -14,6 +14,8 @@ std::string compiler_text();
 std::string utc_now();  // 2026-11-21T02:27:48Z
 std::string host_name();
 
+// The recipe of a run: file, fingerprint, directory, preset, changes.
+Json recipe_json(const Plan& plan, const RunOptions& options);
 Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome& outcome, const std::string& started);
 
 // Recomputes the SHA-256 of everything a manifest lists.

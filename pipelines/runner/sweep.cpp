@@ -386,6 +386,7 @@ class SweepRun {
     out["wall_seconds"] = seconds;
     out["exit_code"] = static_cast<int>(code);
     if (!plan_.preset.empty()) out["preset"] = plan_.preset;
+    out["recipe"] = recipe_json(plan_, options_);
     out["document"] = plan_.document.to_json();
     out["stages"] = Json::array();
     out["outputs"] = Json::array({Json{{"file", "sweep.csv"}, {"bytes", csv_.size()}, {"sha256", sha256(csv_)}}});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/bed_judgement.hpp"
 
@@ -52,6 +53,21 @@ double origin_error(const Input& input) {
   return diameter > 0 ? number("/floor/std_error") * number("/scale/value") / diameter : 0;
 }
 
+double width_between_walls(const Input& input) {
+  if (!input.has("bed.json")) return 0;
+  const BedDescription bed = BedDescription::read(input.file("bed.json"));
+  const Json result = input.result();
+  const Json* open = find_pointer(result, "/walls_are_frame_sides");
+  return bed.periodic || (open != nullptr && *open == true) ? 0 : bed.width / bed.diameter;
+}
+
+bool is_shaken(const Input& input) {
+  const Json result = input.result();
+  const Json* shaken = find_pointer(result, "/shaken");
+  if (shaken != nullptr && *shaken == true) return true;
+  return input.has("bed.json") && BedDescription::read(input.file("bed.json")).amplitude.value_or(0) > 0;
+}
+
 std::vector<fit::Objection> objections_of(const Input& input) {
   std::vector<fit::Objection> found;
   const Json result = input.result();
@@ -92,6 +108,7 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   out["bias_uncertainty"] = quantity_json(answer.bias_uncertainty, "m g D");
   out["spread"] = quantity_json(answer.spread, "m g D");
   out["contact_duration_uncertainty"] = quantity_json(answer.contact_duration_uncertainty, "m g D");
+  out["wall_uncertainty"] = quantity_json(answer.wall_uncertainty, "m g D");
   out["bias"] = answer.bias;
   out["thermometer"] = answer.thermometer;
   out["model"] = answer.model;

@@ -88,6 +88,7 @@ void add_beads(const ExtractOptions& options, const ingest::Measurement& found, 
 void add_geometry(const ingest::Measurement& found, Json& result) {
   const ingest::BedCalibration& bed = found.calibration;
   result["floor"] = quantity_json(bed.floor_px, "px", bed.floor_std_error_px);
+  result["shaken"] = ingest::is_shaken(found);
   result["floor_reference"] = ingest::to_string(bed.floor_reference);
   result["floor_given"] = bed.floor_given;
   result["floor_tilt"] = quantity_json(bed.floor_tilt_degrees, "deg", bed.floor_tilt_std_error_degrees);
@@ -109,7 +110,7 @@ void add_density(const ExtractOptions& options, const ingest::Measurement& found
   const double width = found.calibration.width;
   const double samples = std::max<double>(1, static_cast<double>(found.profile.samples));
   result["column_number"] =
-      quantity_json(found.disk_count_mean / width, "1", found.disk_count_std / width / std::sqrt(samples));
+      quantity_json(found.count_in_width_mean / width, "1", found.count_in_width_std / width / std::sqrt(samples));
   result["kernel"] = Json{{"kind", to_string(options.kernel.kind)}, {"width", options.kernel.width}};
   result["profile"] = profile_numbers(found.profile);
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
@@ -169,7 +170,7 @@ Table frames_table(Table table, const std::vector<ingest::FrameReport>& frames) 
 BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement& found) {
   const ingest::BedCalibration& seen = found.calibration;
   BedDescription bed;
-  bed.count = found.disk_count_mean;
+  bed.count = found.count_in_width_mean;
   bed.diameter = options.diameter, bed.second_diameter = options.second_diameter;
   bed.gravity = options.gravity;
   bed.width = seen.width * options.diameter;

@@ -132,6 +132,7 @@ class FitStatement {
     list_.quantity("/answer/statistical_error", "m g D", "statistical error of T, by the measured errors alone", found);
     list_.quantity("/answer/misfit_error", "m g D", "systematic error of T from the misfit of the model", found);
     list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
+    list_.quantity("/answer/wall_uncertainty", "m g D", "part of the standard error from hard side walls", found);
     list_.quantity("/answer/contact_duration_uncertainty", "m g D",
                    "uncertainty of T from the contact duration t_c of the simulation", found);
     list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);

@@ -29,6 +29,9 @@ class Bed:
     floor: float
     floor_std_error: float
     floor_reference: str
+    shaken: bool
+    walls_seen: bool
+    column_number: float
     frames: int
     disks_a_frame: float
     warnings: list[str]

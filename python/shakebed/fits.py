@@ -265,6 +265,7 @@ def find_answer(
     temperature_x: Union[None, Quantity, tuple[float, float], Number] = None,
     temperature_z: Union[None, Quantity, tuple[float, float], Number] = None,
     diameter: Union[None, str, Number] = None,
+    width_between_walls: Optional[float] = None,
 ) -> dict[str, Any]:
     """One temperature from all thermometers, with its whole uncertainty and a verdict (see docs/thermometer.md).
 
@@ -278,6 +279,8 @@ def find_answer(
         Kinetic temperatures [m g D], if velocities are known: a value, or a value with its standard error.
     diameter : str or float, optional
         Diameter D of a disk ("2.99 mm", or a number in m). With it T/(m g) is given as a length.
+    width_between_walls : float, optional
+        Width of a bed between hard side walls [D]. Near them the bed is thinner, which adds to the error of T.
 
     Returns
     -------
@@ -297,7 +300,8 @@ def find_answer(
     answer = _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
                                None if column_number is None else number(column_number, "column_number"),
                                _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [],
-                               length, 0.0)
+                               length, 0.0, False, 0.0 if width_between_walls is None else number(width_between_walls,
+                                                                                                 "width_between_walls"))
     return with_lengths(answer, length)
 
 

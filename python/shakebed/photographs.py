@@ -180,9 +180,10 @@ class MeasuredBed:
         """
         profile = self.profile
         answer = _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
-                                   profile.covariance_samples, profile.kernel, self.disks_a_frame / self.width, None, None,
+                                   profile.covariance_samples, profile.kernel, self._bed.column_number, None, None,
                                    self._bed.objections(), self._diameter,
-                                   self.floor_std_error * self.scale / self._diameter)
+                                   self.floor_std_error * self.scale / self._diameter, self._bed.shaken,
+                                   self.width if self._bed.walls_seen else 0.0)
         return with_lengths(answer, self._diameter)
 
     @property

@@ -281,7 +281,8 @@ class Bed:
 
         seen, in_metres = self.observables, self.length_unit != 1
         return find_answer(self.profile, column_number=self.column_number, temperature_x=seen.get("temperature_x"),
-                           temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None)
+                           temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None,
+                           width_between_walls=self.width if self._bed.hard_sides else None)
 
     def trajectory(self) -> Trajectory:
         """The frames that the scene keeps (option "frames"), not copied."""

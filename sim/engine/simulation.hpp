@@ -17,9 +17,9 @@ namespace shakebed::sim {
 struct Snapshot {
   double time = 0;  // since the start
   double floor_position = 0, floor_velocity = 0;
+  std::vector<double> x, z, vx, vz, spin;                       // spin empty for smooth disks
   double lid_height = std::numeric_limits<double>::infinity();  // of its lower face; infinite for an open box
   double lid_velocity = 0;                                      // of a free lid
-  std::vector<double> x, z, vx, vz, spin;                       // spin empty for smooth disks
 };
 
 // What never changes; index = disk.

@@ -75,8 +75,8 @@ struct Box {
   Sides sides{};
   Top top{};
   Floor floor{};
-  Plates plates{};
   Surface floor_surface{};
+  Plates plates{};
 };
 
 // --- reservoirs

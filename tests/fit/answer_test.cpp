@@ -222,6 +222,30 @@ TEST(Answer, CarriesTheErrorOfTheFloorIntoTheSolidsHeight) {
   EXPECT_NEAR(find_answer(input).solid_height.value - exact.solid_height.value, 0.4, 0.1);
 }
 
+// Hard walls make a narrow bed look warmer.
+TEST(Answer, AllowsForHardWalls) {
+  AnswerInput input = column(1.0);
+  const Answer open = find_answer(input);
+  input.width_between_walls = 20.0;
+  const Answer walled = find_answer(input);
+  EXPECT_EQ(walled.temperature, open.temperature);
+  EXPECT_NEAR(walled.wall_uncertainty, walled.temperature * 0.7 / 20.0, 1e-15);
+  EXPECT_NEAR(walled.std_error, std::hypot(open.std_error, walled.wall_uncertainty), 1e-15);
+  EXPECT_GT(walled.interval.high, open.interval.high);
+}
+
+// What shaking does to T_x and T_z is not in the profile.
+TEST(Answer, OfAShakenBedWithoutVelocitiesIsARange) {
+  AnswerInput input = column(1.0);
+  input.shaken = true;
+  const Answer shaken = find_answer(input);
+  EXPECT_EQ(shaken.verdict, Verdict::no_single_temperature);
+  EXPECT_THAT(shaken.why, testing::HasSubstr("T_x and T_z may lie outside this range."));
+  EXPECT_EQ(shaken.interval.low, find_answer(column(1.0)).interval.low);
+  input.temperature_x = input.temperature_z = Estimate{1.0, 0.01, false};
+  EXPECT_EQ(find_answer(input).verdict, Verdict::one_temperature);
+}
+
 // A range is no confidence interval, and holds all that is known of T.
 TEST(Answer, StatesNoConfidenceForARange) {
   AnswerInput input = column(0.5);

@@ -362,6 +362,8 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_LT(resting.calibration.floor_std_error_px, 0.1);
   EXPECT_NEAR(resting.calibration.floor_px, 270, 4 * resting.calibration.floor_std_error_px);
   EXPECT_FALSE(warned(resting));
+  EXPECT_FALSE(is_shaken(resting));
+  EXPECT_TRUE(is_shaken(moving));
 
   options.floor_amplitude_m = 9 * resting.calibration.scale_m_per_px;
   source.rewind();
@@ -372,6 +374,14 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_NEAR(raised.calibration.floor_px, 270, 1.1 * raised.calibration.floor_std_error_px) << "a bed that rides";
   EXPECT_LT(raised.profile.bins.lowest, 0);
   EXPECT_FALSE(warned(raised));
+  EXPECT_TRUE(is_shaken(raised));
+  options.floor_amplitude_m = 10 * *options.floor_amplitude_m;  // more than the lowest beads move
+  source.rewind();
+  const Measurement contradicted = measure_bed(source, options);
+  EXPECT_EQ(contradicted.calibration.floor_reference, FloorReference::lowest_seen);
+  EXPECT_TRUE(std::any_of(contradicted.warnings.begin(), contradicted.warnings.end(), [](const std::string& warning) {
+    return warning.find("The amplitude given is") != std::string::npos;
+  }));
   options.floor_amplitude_m.reset();
 
   options.shaking_frequency_hz = 20, options.frame_rate_hz = 20 * 13.7;
@@ -387,6 +397,24 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_EQ(given.calibration.floor_reference, FloorReference::given);
   EXPECT_EQ(given.calibration.floor_std_error_px, 0);
   EXPECT_FALSE(warned(given));
+  options.floor_px = 900;
+  source.rewind();
+  EXPECT_THROW(measure_bed(source, options), std::invalid_argument);
+}
+
+// Beads that the sides of the frame cut are not counted in the column number of the part that is seen.
+TEST(MeasureBed, CountsForTheColumnNumberWhatLiesWithinTheWidth) {
+  MeasureOptions options = options_of();
+  FrameSource source = FrameSource::from_frames(shaken_film(0, 0, 6, 1));
+  const Measurement whole = measure_bed(source, options);
+  EXPECT_EQ(whole.count_in_width_mean, whole.disk_count_mean);
+  options.find.roi = PixelRectangle{60, 0, 200, 300};
+  source.rewind();
+  const Measurement part = measure_bed(source, options);
+  ASSERT_TRUE(part.calibration.walls_are_frame_sides);
+  EXPECT_LT(part.count_in_width_mean, part.disk_count_mean);
+  const double all = whole.count_in_width_mean / whole.calibration.width;
+  EXPECT_NEAR(part.count_in_width_mean / part.calibration.width, all, 0.06 * all);
 }
 
 TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {

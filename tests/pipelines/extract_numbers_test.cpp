@@ -54,7 +54,8 @@ ingest::Measurement a_measurement() {
   found.coverage_profile = a_profile(1.2);
   found.phases = {{0.0625, a_profile(1.0)}, {0.5625, a_profile(0.95)}};
   found.coverage_disagreement = 0.015;
-  found.disk_count_mean = 50, found.disk_count_std = 2;
+  found.disk_count_mean = 53, found.disk_count_std = 3;
+  found.count_in_width_mean = 50, found.count_in_width_std = 2;
   found.finder.rims.emplace(), found.finder.expected_missed = 0.03, found.expected_wrong = 0.017;
   found.second_finder.emplace();
   found.second_finder->radius_px = 5.5, found.second_finder->radius_std_error_px = 0.08;
@@ -138,6 +139,7 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
   }
   EXPECT_EQ(json["polarity"], "bright");
   EXPECT_EQ(json["floor_reference"], "given");
+  EXPECT_EQ(json["shaken"], true);
   EXPECT_EQ(json["kernel"]["kind"], "top_hat");
   for (const auto& [name, truth] : {std::pair{"scale_given", false},
                                     {"floor_given", true},

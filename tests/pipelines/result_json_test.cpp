@@ -211,7 +211,7 @@ fit::Answer an_answer() {
   answer.thermometer = "whole column", answer.model = "fermi";
   answer.temperature = 0.25, answer.std_error = 0.025;
   answer.statistical_error = 0.011, answer.bias_uncertainty = 0.012, answer.spread = 0.013;
-  answer.contact_duration_uncertainty = 0.014, answer.misfit_error = 0.016;
+  answer.contact_duration_uncertainty = 0.014, answer.wall_uncertainty = 0.019, answer.misfit_error = 0.016;
   answer.next_bed_interval = {fit::FitStatus::ok, 0.23, 0.27, 0.85};
   answer.bias = 0.07;
   answer.interval = {fit::FitStatus::ok, 0.21, 0.31, 0.9};
@@ -238,6 +238,7 @@ TEST(AnswerJson, HoldsEveryNumberWithItsErrorAndUnit) {
                            {"/interval/high", 0.31, -1, "m g D"},
                            {"/statistical_error", 0.011, -1, "m g D"},
                            {"/contact_duration_uncertainty", 0.014, -1, "m g D"},
+                           {"/wall_uncertainty", 0.019, -1, "m g D"},
                            {"/bias_uncertainty", 0.012, -1, "m g D"},
                            {"/misfit_error", 0.016, -1, "m g D"},
                            {"/next_bed_interval/low", 0.23, -1, "m g D"},

@@ -402,6 +402,34 @@ TEST_F(Pipeline, RerunGivesTheSameFiles) {
   EXPECT_GE(json["files"].get<int>(), 10);
 }
 
+TEST_F(Pipeline, SweepsAreVerifiedToTheirPointsAndRunAgain) {
+  write_text(folder_ / "s.json", R"({ "name": "s", "stages": [
+    { "stage": "simulate", "id": "bed", "replicas": 1, "units": "reduced", "disks": { "count": 20, "restitution": 0.9 },
+      "box": { "width": 5.3 }, "floor": { "motion": "sinusoidal", "amplitude": 0.5, "frequency": 0.5 },
+      "settle": 5, "measure": 10 } ],
+    "sweep": { "over": { "/stages/bed/seed": [1, 2] }, "collect": ["/bed/temperature_x"] } })");
+  ASSERT_EQ(run({"run", "s.json", "--out", "o", "--quiet"}).exit_code, 0);
+  EXPECT_EQ(run({"verify", "o"}).exit_code, 0);
+  const ProgramResult again = run({"rerun", "o", "--out", "again", "--quiet"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("identical"));
+  std::string profile = read_text(folder_ / "o/points/000001/bed/profile.csv");
+  profile.back() = ' ';
+  write_text(folder_ / "o/points/000001/bed/profile.csv", profile);
+  const ProgramResult damaged = run({"verify", "o"});
+  EXPECT_EQ(damaged.exit_code, 6);
+  EXPECT_THAT(damaged.err, HasSubstr("points/000001/bed/profile.csv: changed since the run"));
+}
+
+TEST_F(Pipeline, RerunSaysWhatWasChangedInTheFolderItself) {
+  ASSERT_EQ(run_recipe().exit_code, 0);
+  std::string profile = read_text(folder_ / "o/bed/profile.csv");
+  profile.back() = ' ';
+  write_text(folder_ / "o/bed/profile.csv", profile);
+  const ProgramResult result = run({"rerun", "o", "--out", "again"});
+  EXPECT_THAT(result.err, HasSubstr("o: bed/profile.csv: changed since the run"));
+}
+
 TEST_F(Pipeline, JsonAndQuietSpeakAsAsked) {
   const ProgramResult result = run_recipe({"--json", "--quiet"});
   EXPECT_EQ(result.exit_code, 0);

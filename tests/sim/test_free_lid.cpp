@@ -8,16 +8,11 @@
 
 #include "sim/engine/simulation.hpp"
 #include "sim/scene/scene.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace {
 
 using namespace shakebed::sim;
-
-Snapshot snapshot_of(const Simulation& simulation) {
-  Snapshot at;
-  simulation.snapshot(at);
-  return at;
-}
 
 Scene one_disk(double height, double mass, double restitution, double z, double vz) {
   Scene scene;

@@ -9,6 +9,7 @@
 #include "sim/engine/plate_slide.hpp"
 #include "sim/engine/simulation.hpp"
 #include "sim/scene/scene.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace {
 
@@ -98,12 +99,6 @@ Scene one_disk(double vx, double vz, const RubbingPlates& plates, bool falls = t
   scene.start = PlacedStart{{{200, 200, vx, vz, 0, 0}}};
   return scene;
 }
-Snapshot snapshot_of(const Simulation& simulation) {
-  Snapshot at;
-  simulation.snapshot(at);
-  return at;
-}
-
 // On a horizontal plate: after v^2/(2 mu g), at the time v/(mu g), whatever the interval.
 TEST(Plates, LetASlidingDiskStopWhereItsEnergyIsGone) {
   for (const double interval : {0.003, 0.01, 0.7}) {

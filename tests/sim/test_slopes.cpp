@@ -9,6 +9,7 @@
 
 #include "sim/engine/simulation.hpp"
 #include "sim/scene/scene.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace {
 
@@ -149,12 +150,6 @@ Scene bed(double slope, bool rough = false) {
   scene.box.floor = SinusoidalFloor{3 / std::pow(2 * std::numbers::pi * 0.35, 2), 0.35};
   return scene;
 }
-Snapshot snapshot_of(const Simulation& simulation) {
-  Snapshot at;
-  simulation.snapshot(at);
-  return at;
-}
-
 // Nothing leaves the box, nothing overlaps, and the ledger closes with the work of the sides in that of the floor.
 TEST(SlopedSides, HoldAShakenBed) {
   for (const double slope : {0.05, 0.3, 0.9}) {
