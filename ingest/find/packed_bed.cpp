@@ -20,6 +20,8 @@ constexpr double beside = 1.2;                                 // radii: the voi
 constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;
 constexpr double model_contrast = 0.015;  // contrast units: what the model leaves without noise
 constexpr std::size_t fewest_disks = 20;
+// Drawn beds of 3.4 to 12 px: touching 0.63 (shaken) to 1, unexplained up to 0.0001. Other shapes on a lattice:
+// touching up to 0.05, or unexplained from 0.009.
 constexpr double least_touching = 0.5, most_overlapping = 0.02, most_unexplained = 0.003, most_misfit = 1.2;
 constexpr double least_filled = 0.2;
 // px: smaller disks are specks; rims of larger ones are seen well.

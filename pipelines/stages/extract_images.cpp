@@ -110,9 +110,8 @@ void judge_missed(const ExtractOptions& options, RunContext& context, double mis
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
     throw StageError(fmt::format(
         "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
-        "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. To measure the disks found "
-        "all "
-        "the same, give --shape any",
+        "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. Beads that touch and are "
+        "narrower than 24 px need more pixels. To measure the disks found all the same, give --shape any",
         100 * missed));
   context.warning(fmt::format(
       "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
