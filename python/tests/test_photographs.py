@@ -177,8 +177,8 @@ def test_memory_does_not_grow_with_images():
             found.std_error, found.full()
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB
 
-    before = loop(50)
-    assert loop(200) - before < 2048  # a leak of one image in floating point a call would be 4.3 MiB
+    before = loop(30)
+    assert loop(100) - before < 1536  # a leak of one image in floating point a call would be 2.2 MiB
 
 
 def test_twelve_lines_go_from_photographs_to_a_plot(frames, tmp_path):

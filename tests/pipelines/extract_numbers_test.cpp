@@ -89,7 +89,7 @@ struct Stated {
 
 TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
   const Json json = bed_numbers(some_options(), a_measurement());
-  for (const Stated& one : {Stated{"/disks_per_frame", 50, -1, "1"},
+  for (const Stated& one : {Stated{"/disks_per_frame", 53, -1, "1"},
                             {"/diameter", 0.003, -1, "m"},
                             {"/scale", 2e-4, 1e-5, "m/px"},
                             {"/pixel_aspect", 1.02, 0.002, "1"},
@@ -121,7 +121,7 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
   }
   for (const auto& [pointer, number] : {std::pair{"/frames", 5.0},
                                         {"/frames_used", 4},
-                                        {"/disks_per_frame_scatter", 2},
+                                        {"/disks_per_frame_scatter", 3},
                                         {"/bead_number", 51},
                                         {"/expected_wrong", 0.017},
                                         {"/expected_missed", 0.03},
