@@ -13,6 +13,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   const bool was_pressed = is_pressed_;
   if constexpr (press_applies) {
     if (was_pressed) write_down_pressed();
+    chatters_ = was_pressed || pressed_in_interval_;
+    pressed_in_interval_ = false;
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     bring_forward(i);
@@ -110,6 +112,8 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   asked_at_ = now_;
   contacts_when_asked_ = counters_.collisions();
   floor_contacts_when_asked_ = counters_.floor_collisions;
+  counted_since_ = now_;
+  contacts_when_counted_ = counters_.collisions();
   events_to_ask_ = presses_ ? events_between_presses * count_ : seldom;
   if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
@@ -205,6 +209,13 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
     visit(self.press_contact_time_);
     visit(self.released_at_);
     visit(self.step_error_);
+  }
+  if constexpr (press_applies && Rule::spins) {
+    visit(self.chatters_);
+    std::uint64_t stretches = self.stretches_.size();
+    visit(stretches);
+    if constexpr (!std::is_const_v<Self>) self.stretches_.resize(std::min<std::uint64_t>(stretches, 16 * self.count_));
+    for (auto& stretch : self.stretches_) visit(stretch);
   }
 }
 
