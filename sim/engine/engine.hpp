@@ -294,9 +294,7 @@ class Engine final : public Simulation {
   bool chatters();
   void keep_stretches();
   std::vector<PressedBed::Stretch> stretches_by_place() const;
-  double spin_now(std::uint32_t i) const {
-    return is_pressed_ ? pressed_.spin_at(i, now_ - pressed_to_) : spins_[i];
-  }
+  double spin_now(std::uint32_t i) const { return is_pressed_ ? pressed_.spin_at(i, now_ - pressed_to_) : spins_[i]; }
   Motion motion_now(std::uint32_t i) const {
     if (!is_pressed_) return motion_at(disks_[i], now_);
     const PressedBed::State state = pressed_.at(i, now_ - pressed_to_);

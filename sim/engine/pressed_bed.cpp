@@ -303,9 +303,7 @@ void PressedBed::place_stretches(std::vector<Stretch>& stretches) {
   const auto key = [](std::uint32_t a, std::uint32_t b) {
     return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
   };
-  const auto less = [&key](const Stretch& a, const Stretch& b) {
-    return key(a.disk, a.other) < key(b.disk, b.other);
-  };
+  const auto less = [&key](const Stretch& a, const Stretch& b) { return key(a.disk, a.other) < key(b.disk, b.other); };
   std::sort(stretches.begin(), stretches.end(), less);
   stretch_.assign(first_.size(), 0);
   active_.resize(first_.size());
@@ -527,11 +525,11 @@ void PressedBed::add_forces(const FloorMotion::Motion& floor) {
     box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
   }
   loss_rate_ = pair_.damping * pair_squares_;
-  loss_rate_ += add_wall_forces(near_left_, left, TwoLanes{1, 0}, 0, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_right_, right, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_lid_, lid, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
+  loss_rate_ += add_wall_forces(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
   const WallContacts on_floor =
-      add_wall_forces(near_floor_, Wall::floor, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
+      add_wall_forces(near_floor_, at_floor, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
   loss_rate_ += on_floor.lost;
   floor_force_ = on_floor.force;
   floor_at_ = floor;

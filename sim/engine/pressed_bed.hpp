@@ -32,7 +32,7 @@ class PressedBed {
   struct Surfaces {
     Surface disks, sides, floor, lid;
   };
-  enum Wall : std::uint32_t { left, right, floor, lid, walls };
+  enum Wall : std::uint32_t { at_left, at_right, at_floor, at_lid, walls };
   // Stretch of the tangential spring of two disks, or of a disk and a wall: then `other` is count + wall.
   struct Stretch {
     std::uint32_t disk, other;
@@ -116,10 +116,10 @@ class PressedBed {
         visit(i, &spring == &floor_, on_disk);
       }
     };
-    all(near_left_, left, TwoLanes{1, 0}, 0, 0, side_);
-    all(near_right_, right, TwoLanes{-1, 0}, -box_.width, 0, side_);
-    all(near_lid_, lid, TwoLanes{0, -1}, -box_.lid, 0, lid_);
-    all(near_floor_, floor, TwoLanes{0, 1}, floor_at_.position, floor_at_.velocity, floor_);
+    all(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_);
+    all(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_);
+    all(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_);
+    all(near_floor_, at_floor, TwoLanes{0, 1}, floor_at_.position, floor_at_.velocity, floor_);
   }
   // Moves apart what overlaps, half of it each, until all do by no more than `most` or for so many sweeps.
   void separate(double floor, double most, int sweeps);
@@ -186,7 +186,7 @@ class PressedBed {
   std::vector<std::uint32_t> active_;           // pairs, as they are listed
   double slip_time_ = 0;                        // the step whose forces are added
   double rubbed_ = 0;                           // lost by tangential forces in this step
-  std::vector<double> listed_;  // {x, z} when the neighbours were listed, z above the floor
+  std::vector<double> listed_;                  // {x, z} when the neighbours were listed, z above the floor
   // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
   std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
   std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;

@@ -38,7 +38,8 @@ double energy_of(const PressedBed& bed, std::uint32_t count, double inverse_iner
   return sum;
 }
 
-// Two disks that meet obliquely leave as the rule of hard rough disks says: where the contact sticks and where it slides.
+// Two disks that meet obliquely leave as the rule of hard rough disks says: where the contact sticks and where it
+// slides.
 TEST(PressedRoughBed, DoesInAContactWhatTheRuleOfRoughDisksDoes) {
   constexpr double contact_time = 0.005, speed = 0.05;
   for (const double b : {0.9, 0.7, 0.3, 0.0}) {
