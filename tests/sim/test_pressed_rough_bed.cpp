@@ -179,14 +179,14 @@ TEST(PressedRoughBed, OnlyLosesEnergyOnAFloorThatStands) {
   }
 }
 
-// Ten rows of 2 mm disks at 30 Hz.
-Scene rough_scene(double gamma, double width = 12.3, double restitution = 0.9) {
+// Ten rows of 2 mm disks at 30 Hz. With such a contact duration 2,000 contacts a disk and period are the limit.
+Scene rough_scene(double gamma, double width = 12.3, double restitution = 0.9, double contact_duration = 3e-4) {
   Scene scene;
   scene.gravity = UniformGravity{};
   scene.disks.species = {{120, 1, 1}};
   scene.disks.contact = scene.box.floor_surface = {restitution, 0.4, 0};
   scene.disks.inertia_ratio = 0.4;
-  scene.disks.contact_duration = 1e-4;
+  scene.disks.contact_duration = contact_duration;
   scene.box.width = width;
   scene.box.sides = HardSides{{restitution, 0, 0}};
   if (gamma > 0) scene.box.floor = SinusoidalFloor{gamma / std::pow(2 * std::numbers::pi * 0.428, 2), 0.428};
@@ -255,7 +255,7 @@ TEST(PressedRoughBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
       SCOPED_TRACE(testing::Message() << gamma << " " << width);
       const auto bed = simulate(rough_scene(gamma, width, 0.6));
       double deepest = 0;
-      for (int k = 1; k <= 500; ++k) {
+      for (int k = 1; k <= 400; ++k) {
         bed->advance_to(0.062 * k);
         const EnergyLedger ledger = bed->energy();
         ASSERT_NEAR(ledger.imbalance(), 0, 1e-10 * (ledger.dissipated + ledger.initial));
@@ -273,8 +273,8 @@ TEST(PressedRoughBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
 
 TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
   int pressed = 0;
-  for (const double gamma : {0.8, 0.95, 1.3}) {
-    for (const double saved_at : {10.0, 20.0, 30.0}) {
+  for (const double gamma : {0.8, 1.3}) {
+    for (const double saved_at : {15.0, 30.0}) {
       const Scene scene = rough_scene(gamma, 12.3, 0.6);
       const auto a = simulate(scene);
       while (a->time() < saved_at) a->advance_to(a->next_synchronisation());
@@ -282,12 +282,12 @@ TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
       b->restore(a->checkpoint());
       pressed += a->energy().compressed > 0;
       EXPECT_EQ(a->energy().compressed, b->energy().compressed);
-      a->advance_to(saved_at + 40);
-      b->advance_to(saved_at + 40);
+      a->advance_to(saved_at + 15);
+      b->advance_to(saved_at + 15);
       expect_same_bytes(*a, *b);
     }
   }
-  EXPECT_GE(pressed, 3);
+  EXPECT_GE(pressed, 2);
 }
 
 TEST(PressedRoughBed, DoesNotCareWhoLooksNorWhen) {
@@ -329,7 +329,7 @@ TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
 // Shaken beds that make fewer contacts a period than the limit are not touched, not even by rounding.
 TEST(PressedRoughBed, LeavesShakenBedsAlone) {
   for (const double gamma : {2.0, 3.0, 6.0}) {
-    Scene scene = rough_scene(gamma), hard = scene;
+    Scene scene = rough_scene(gamma, 12.3, 0.9, 1e-4), hard = scene;
     hard.presses = false;
     const auto a = simulate(scene), b = simulate(hard);
     a->advance_to(30 * period);
