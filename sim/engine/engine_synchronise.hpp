@@ -253,7 +253,12 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
     throw std::invalid_argument(
         "the checkpoint is of another scene: it holds "
         "more than this one needs");
-  if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
+  const auto missing = [this](std::uint32_t label) { return label >= count_; };
+  const auto hangs_on_nothing = [&](const PressedBed::Stretch& one) {
+    return missing(one.disk) || one.other >= count_ + PressedBed::walls;
+  };
+  if (std::any_of(labels_.begin(), labels_.end(), missing) ||
+      std::any_of(stretches_.begin(), stretches_.end(), hangs_on_nothing))
     throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
   random_.set_state(random_state);
   unusual_ = disk_surface_.varies() || resting_ > 0;
