@@ -55,15 +55,23 @@ class Judge {
       append(out["advice"], one.advice);
     }
     if (as_real_contacts()) append(out["why"], trust_.why);
+    say_pressed(out);
     return out;
   }
 
  private:
+  // Its time steps leave an error in the ledger, which hard disks do not have.
+  void say_pressed(Json& out) const {
+    if (number_at(joined_, "/energy_ledger/step_error").value_or(0) == 0) return;
+    append(out["why"], "the disks were soft while the bed was pressed on the floor");
+  }
+
   [[nodiscard]] Json without_objection() const {
     Json out{{"verdict", verdict_holds}, {"why", ""}, {"advice", "Quote the numbers with their errors."}};
     append(out["why"], beds_ > 1 ? fmt::format("{} beds agree, and none of them changed while it was measured", beds_)
                                  : "the bed did not change while it was measured");
     if (as_real_contacts()) append(out["why"], trust_.why);
+    say_pressed(out);
     return out;
   }
 

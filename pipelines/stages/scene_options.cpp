@@ -137,7 +137,8 @@ void describe_disks(Fields& f, DiskOptions& d) {
       "presses", d.presses,
       {.help = "whether the disks of a bed are soft while it is pressed on the floor: linear springs and dashpots, "
                "contacts of 0.007 sqrt(D/g) at most. Hard disks cost up to a thousand times as much there. It applies "
-               "to equal smooth disks with constant restitutions of at least 0.3, without a bath"});
+               "to equal disks with constant restitutions of at least 0.3, without a bath. Disks with friction are "
+               "soft only where they make more than 0.6 sqrt(D/g) / contact_duration contacts each in a period"});
   f.object<SecondSpeciesOptions>(
       "second", d.second,
       [](Fields& g, SecondSpeciesOptions& s) {

@@ -279,7 +279,7 @@ class Engine final : public Simulation {
   double energy_of(std::uint32_t i, TwoLanes velocity) const;
 
   // --- press: engine_press.hpp
-  static constexpr bool press_applies = rests_apply && !Rule::spins && Sizes::equal;
+  static constexpr bool press_applies = rests_apply && Sizes::equal;
   void plan_press(bool wanted);
   void ask_press();
   std::optional<double> approach_of_neighbours() const;
@@ -291,6 +291,10 @@ class Engine final : public Simulation {
   bool press_until(double until);
   FloorMotion::Motion press_on(const FloorMotion::Motion& before, double next);
   void tell_pressed(double step) const;
+  bool chatters();
+  void keep_stretches();
+  std::vector<PressedBed::Stretch> stretches_by_place() const;
+  double spin_now(std::uint32_t i) const { return is_pressed_ ? pressed_.spin_at(i, now_ - pressed_to_) : spins_[i]; }
   Motion motion_now(std::uint32_t i) const {
     if (!is_pressed_) return motion_at(disks_[i], now_);
     const PressedBed::State state = pressed_.at(i, now_ - pressed_to_);
@@ -408,6 +412,11 @@ class Engine final : public Simulation {
   double step_error_ = 0;           // of the ledger, before that
   double asked_at_ = 0;
   std::uint64_t contacts_when_asked_ = 0, floor_contacts_when_asked_ = 0, events_to_ask_ = 1;
+  // Rough disks: contacts are counted since then; and the tangential springs, by labels, from one interval to the next.
+  double counted_since_ = 0;
+  std::uint64_t contacts_when_counted_ = 0;
+  bool chatters_ = false, pressed_in_interval_ = false;
+  std::vector<PressedBed::Stretch> stretches_;
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;

@@ -57,7 +57,7 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
       out.vx[label] = velocity[0];
       out.vz[label] = velocity[1];
     }
-    if constexpr (Rule::spins) out.spin[label] = spins_[i];
+    if constexpr (Rule::spins) out.spin[label] = spin_now(i);
     if constexpr (rests_apply) {
       if (!is_at_rest(i)) continue;
       out.vz[label] = out.floor_velocity;  // the mean over its hop
@@ -86,7 +86,7 @@ double Engine<Space, Rule, Sizes>::kinetic_energy() const {
     const long double vx = motion.vx(), vz = motion.vz();
     sum += 0.5L * sizes_.mass(i) * (vx * vx + vz * vz);
     if constexpr (Rule::spins) {
-      const long double surface_speed = sizes_.radius(i) * spins_[i];
+      const long double surface_speed = sizes_.radius(i) * spin_now(i);
       sum += 0.5L * sizes_.mass(i) / inverse_inertia_ratio_ * surface_speed * surface_speed;
     }
   }

@@ -13,6 +13,8 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   const bool was_pressed = is_pressed_;
   if constexpr (press_applies) {
     if (was_pressed) write_down_pressed();
+    chatters_ = was_pressed || pressed_in_interval_;
+    pressed_in_interval_ = false;
   }
   for (std::uint32_t i = 0; i < count_; ++i) {
     bring_forward(i);
@@ -110,6 +112,8 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   asked_at_ = now_;
   contacts_when_asked_ = counters_.collisions();
   floor_contacts_when_asked_ = counters_.floor_collisions;
+  counted_since_ = now_;
+  contacts_when_counted_ = counters_.collisions();
   events_to_ask_ = presses_ ? events_between_presses * count_ : seldom;
   if constexpr (!Sizes::equal) largest_contact_ = 2 * *std::max_element(sizes_.radii.begin(), sizes_.radii.end() - 1);
   double top = 0;
@@ -206,6 +210,13 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
     visit(self.released_at_);
     visit(self.step_error_);
   }
+  if constexpr (press_applies && Rule::spins) {
+    visit(self.chatters_);
+    std::uint64_t stretches = self.stretches_.size();
+    visit(stretches);
+    if constexpr (!std::is_const_v<Self>) self.stretches_.resize(std::min<std::uint64_t>(stretches, 16 * self.count_));
+    for (auto& stretch : self.stretches_) visit(stretch);
+  }
 }
 
 template <class Space, class Rule, class Sizes>
@@ -242,7 +253,12 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
     throw std::invalid_argument(
         "the checkpoint is of another scene: it holds "
         "more than this one needs");
-  if (std::any_of(labels_.begin(), labels_.end(), [this](std::uint32_t label) { return label >= count_; }))
+  const auto missing = [this](std::uint32_t label) { return label >= count_; };
+  const auto hangs_on_nothing = [&](const PressedBed::Stretch& one) {
+    return missing(one.disk) || one.other >= count_ + PressedBed::walls;
+  };
+  if (std::any_of(labels_.begin(), labels_.end(), missing) ||
+      std::any_of(stretches_.begin(), stretches_.end(), hangs_on_nothing))
     throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
   random_.set_state(random_state);
   unusual_ = disk_surface_.varies() || resting_ > 0;

@@ -23,9 +23,9 @@ constexpr double overdone = 1.6;
 
 // Part of its energy that a contact loses whose contact time is 1 and whose velocity would fall by exp(-damping), mean
 // over the moments within a step at which it may begin.
-double share_lost(double damping) {
+double share_lost(double damping, double steps) {
   constexpr int moments = 64;
-  constexpr double dt = 1 / PressedBed::steps_a_contact;
+  const double dt = 1 / steps;
   const double stiffness = std::numbers::pi * std::numbers::pi + damping * damping;
   double sum = 0;
   for (int moment = 0; moment < moments; ++moment) {
@@ -71,22 +71,49 @@ std::uint32_t place_of(std::uint32_t i) { return i * static_cast<std::uint32_t>(
 
 }  // namespace
 
-PressedBed::Spring PressedBed::spring_of(const Surface& surface) {
+PressedBed::Spring PressedBed::spring_of(const Surface& surface) const {
   const double e = surface.restitution;
   double low = 0, high = 1 - 2 * std::log(e);
   for (int halving = 0; e < 1 && halving < 50; ++halving) {
     const double middle = 0.5 * (low + high);
-    (share_lost(middle) < 1 - e * e ? low : high) = middle;
+    (share_lost(middle, steps()) < 1 - e * e ? low : high) = middle;
   }
-  return {std::numbers::pi * std::numbers::pi + low * low, 2 * low};
+  return {std::numbers::pi * std::numbers::pi + low * low, 2 * low, grip_of(surface)};
 }
 
-void PressedBed::set_up(const Box& box, const Surfaces& surfaces) {
+// Of a contact time of 1: what slips with speed 1 when a contact begins, and sticks, slips with minus the tangential
+// restitution b0 when it ends. The mass that slips is 1/(1 + 1/q). Where it can be, the spring swings as long as the
+// normal one does: its stiffness is 1/(1 + 1/q) of that, 2/7 for spheres. Then the dashpot gives b0. With less than
+// exp(-least) of it the spring is softer; below -0.3 it cannot be reached.
+PressedBed::Grip PressedBed::grip_of(const Surface& surface) const {
+  if (!rough_ || !(surface.friction > 0)) return {};
+  constexpr double least = 0.5, least_of_all = 0.02, slowest = 0.1;
+  const double b = surface.tangential_restitution, mass = 1 / (1 + inverse_inertia_ratio_);
+  double damping = b > std::exp(-least) ? std::max(least_of_all, -std::log(b)) : least, rate = std::numbers::pi;
+  if (damping == least) {
+    double low = slowest, high = std::numbers::pi;
+    for (int halving = 0; halving < 50; ++halving) {
+      const double middle = 0.5 * (low + high);
+      const double end = std::exp(-damping) * (std::cos(middle) - damping / middle * std::sin(middle));
+      (end > -b ? low : high) = middle;
+    }
+    rate = low;
+  }
+  return {mass * (rate * rate + damping * damping), mass * 2 * damping, surface.friction};
+}
+
+void PressedBed::set_up(const Box& box, const Surfaces& surfaces, double inverse_inertia_ratio) {
   box_ = box;
+  rough_ = inverse_inertia_ratio > 0;
+  inverse_inertia_ratio_ = inverse_inertia_ratio;
   const Spring pair = spring_of(surfaces.disks);
-  const Spring half{0.5 * pair.stiffness, 0.5 * pair.damping};  // of their reduced mass
+  const Spring half{0.5 * pair.stiffness,
+                    0.5 * pair.damping,  // of their reduced mass
+                    {0.5 * pair.grip.stiffness, 0.5 * pair.grip.damping, pair.grip.friction}};
   const auto spring_on = [&](const Surface& wall) {
-    return wall.restitution == surfaces.disks.restitution ? pair : spring_of(wall);
+    Spring spring = wall.restitution == surfaces.disks.restitution ? pair : spring_of(wall);
+    spring.grip = grip_of(wall);
+    return spring;
   };
   of_unit_time_ =
       std::array<Spring, 4>{half, spring_on(surfaces.sides), spring_on(surfaces.floor), spring_on(surfaces.lid)};
@@ -94,7 +121,10 @@ void PressedBed::set_up(const Box& box, const Surfaces& surfaces) {
 
 void PressedBed::soften(double contact_time) {
   const auto soft = [contact_time](const Spring& spring) {
-    return Spring{spring.stiffness / (contact_time * contact_time), spring.damping / contact_time};
+    const double square = contact_time * contact_time;
+    return Spring{spring.stiffness / square,
+                  spring.damping / contact_time,
+                  {spring.grip.stiffness / square, spring.grip.damping / contact_time, spring.grip.friction}};
   };
   pair_ = soft(of_unit_time_[0]);
   side_ = soft(of_unit_time_[1]);
@@ -102,7 +132,8 @@ void PressedBed::soften(double contact_time) {
   lid_ = soft(of_unit_time_[3]);
 }
 
-void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time) {
+void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time,
+                       const std::vector<double>& spins, const std::vector<Stretch>& stretches) {
   disks_ = std::move(disks);
   count_ = static_cast<std::uint32_t>(disks_.size());
   halfway_.resize(2 * std::size_t{count_});
@@ -114,8 +145,23 @@ void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floo
   floor_work_ = damped_ = usual_approach_ = 0;
   fastest_ = mean_square_speed_ = never;
   soften(contact_time);
+  if (rough_) {
+    rim_.assign(count_, 0);
+    for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = radius * spins[i];
+    rim_halfway_ = rim_;
+    rim_force_.assign(count_, 0);
+    wall_stretch_.assign(std::size_t{walls} * count_, 0);
+    stretch_.clear();
+    first_.clear();
+    second_.clear();
+  }
   list_pairs(floor.position);
+  if (rough_) {
+    kept_ = stretches;
+    place_stretches(kept_);
+  }
   add_forces(floor);
+  damped_ = rubbed_;  // of springs that were stretched farther than friction allows
 }
 
 auto PressedBed::at(std::uint32_t i, double later) const -> State {
@@ -141,6 +187,7 @@ void PressedBed::list_pairs(double floor) {
   const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(box_.width / reach)));
   std::vector<std::vector<std::uint32_t>> column(columns);
   listed_.resize(2 * std::size_t{count_});
+  if (rough_) keep_stretches();
   first_.clear();
   second_.clear();
   for (std::uint32_t i = 0; i < count_; ++i) {
@@ -172,6 +219,7 @@ void PressedBed::list_pairs(double floor) {
     }
   }
   interleave();
+  if (rough_) place_stretches(kept_);
   list_walls(floor);
   until_check_ = steps_a_check;
 }
@@ -239,6 +287,131 @@ void PressedBed::choose_active(double dt) {
   usual_approach_ = std::sqrt(sum_of(approaches) / static_cast<double>(std::max<std::size_t>(pairs, 1)));
 }
 
+// ------------------------------------------------------------------------------------------------
+// tangential springs
+
+// Stretched springs of pairs, before these are listed anew.
+void PressedBed::keep_stretches() {
+  kept_.clear();
+  for (std::size_t p = 0; p < stretch_.size(); ++p) {
+    if (stretch_[p] != 0) kept_.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
+  }
+}
+
+// Where the pairs now stand. Those of walls stay with their disks.
+void PressedBed::place_stretches(std::vector<Stretch>& stretches) {
+  const auto key = [](std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+  };
+  const auto less = [&key](const Stretch& a, const Stretch& b) { return key(a.disk, a.other) < key(b.disk, b.other); };
+  std::sort(stretches.begin(), stretches.end(), less);
+  stretch_.assign(first_.size(), 0);
+  active_.resize(first_.size());
+  for (std::size_t p = 0; p < first_.size(); ++p) {
+    active_[p] = static_cast<std::uint32_t>(p);
+    const Stretch wanted{disk_at(first_[p]), disk_at(second_[p]), 0};
+    const auto found = std::lower_bound(stretches.begin(), stretches.end(), wanted, less);
+    if (found != stretches.end() && !less(wanted, *found)) stretch_[p] = found->stretch;
+  }
+  for (const Stretch& one : stretches) {
+    if (one.other >= count_) wall_stretch_[walls * one.disk + one.other - count_] = one.stretch;
+  }
+}
+
+auto PressedBed::stretches() const -> std::vector<Stretch> {
+  std::vector<Stretch> all;
+  for (std::size_t p = 0; p < stretch_.size(); ++p) {
+    if (stretch_[p] != 0) all.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
+  }
+  for (std::uint32_t i = 0; i < wall_stretch_.size(); ++i) {
+    if (wall_stretch_[i] != 0) all.push_back({i / walls, count_ + i % walls, wall_stretch_[i]});
+  }
+  return all;
+}
+
+double PressedBed::stretched() const {
+  double sum = 0;
+  for (const double stretch : stretch_) sum += 0.5 * pair_.grip.stiffness * stretch * stretch;
+  const std::array<const Spring*, walls> springs{&side_, &side_, &floor_, &lid_};
+  for (std::size_t i = 0; i < wall_stretch_.size(); ++i)
+    sum += 0.5 * springs[i % walls]->grip.stiffness * wall_stretch_[i] * wall_stretch_[i];
+  return sum;
+}
+
+void PressedBed::let_go() {
+  damped_ += stretched();
+  std::fill(stretch_.begin(), stretch_.end(), 0.0);
+  std::fill(wall_stretch_.begin(), wall_stretch_.end(), 0.0);
+}
+
+// The force against the slip. slip: its speed now; slipped: half a step before. Neither the spring alone nor with its
+// dashpot pulls more than friction allows.
+[[gnu::always_inline]] inline auto PressedBed::pull(double& stretch, const Grip& grip, double slip, double slipped,
+                                                    double normal_force) const -> Pulled {
+  const double most = grip.most(normal_force), before = stretch, way = slipped * slip_time_;
+  stretch = std::clamp(before + way, -most / grip.stiffness, most / grip.stiffness);
+  const double force = grip.force(stretch, slip, normal_force);
+  return {force, -force * way - 0.5 * grip.stiffness * (stretch * stretch - before * before)};
+}
+
+// As choose_active(). A pair whose spring is stretched is asked, so that it is let go.
+void PressedBed::choose_active_of_rough(double dt) {
+  const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
+  active_.clear();
+  double approaches = 0;
+  for (std::size_t p = 0; p < first_.size(); ++p) {
+    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+    if (i >= count_) continue;
+    const TwoLanes d = gap_of(i, k), flow = d * (velocity_of(k) - velocity_of(i));
+    const double squared = d[0] * d[0] + d[1] * d[1], closing = flow[0] + flow[1];
+    approaches += closing * closing;
+    if (stretch_[p] != 0 || squared - 2 * margin < 1 || squared + 2 * ahead * closing < 1)
+      active_.push_back(static_cast<std::uint32_t>(p));
+  }
+  usual_approach_ = std::sqrt(approaches / static_cast<double>(std::max<std::size_t>(first_.size(), 1)));
+}
+
+template <bool periodic>
+void PressedBed::add_rough_pair_forces() {
+  double squares = 0, count = 0;
+  const TwoLanes swap = {-1, 1};
+  for (const std::uint32_t p : active_) {
+    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+    TwoLanes d = pair_at(&disks_[k].x) - pair_at(&disks_[i].x);
+    if constexpr (periodic) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
+    const double squared = d[0] * d[0] + d[1] * d[1];
+    double& stretch = stretch_[p];
+    if (!(squared < 4 * radius * radius)) {
+      if (stretch != 0) rubbed_ += 0.5 * pair_.grip.stiffness * stretch * stretch;
+      stretch = 0;
+      continue;
+    }
+    const double distance = std::sqrt(squared);
+    const TwoLanes normal = d / both(distance), tangent = swap * __builtin_shufflevector(normal, normal, 1, 0);
+    const TwoLanes flow = velocity_of(k) - velocity_of(i), normal_flow = flow * normal, side_flow = flow * tangent;
+    const TwoLanes past = (pair_at(&halfway_[2 * k]) - pair_at(&halfway_[2 * i])) * tangent;
+    const double v = normal_flow[0] + normal_flow[1];
+    const double force = pair_.stiffness * (2 * radius - distance) - pair_.damping * v;
+    squares += v * v;
+    count += 1;
+    TwoLanes on_second = both(force) * normal;
+    if (pair_.grip.friction > 0) {
+      const Pulled side = pull(stretch, pair_.grip, rim_[i] + rim_[k] - (side_flow[0] + side_flow[1]),
+                               rim_halfway_[i] + rim_halfway_[k] - (past[0] + past[1]), force);
+      on_second -= both(side.force) * tangent;
+      rim_force_[i] += inverse_inertia_ratio_ * side.force;
+      rim_force_[k] += inverse_inertia_ratio_ * side.force;
+      rubbed_ += side.lost;
+    }
+    put_pair(&force_[4 * i], pair_at(&force_[4 * i]) - on_second);
+    put_pair(&force_[4 * k], pair_at(&force_[4 * k]) + on_second);
+  }
+  touching_ = count;
+  pair_squares_ = squares;
+}
+
+// ------------------------------------------------------------------------------------------------
+
 void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
   until_check_ = steps_a_check;
   double farthest = 0, fastest = 0, squares = 0;
@@ -246,7 +419,8 @@ void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
     const TwoLanes moved = pair_at(&disks_[i].x) - TwoLanes{0, floor.position} - pair_at(&listed_[2 * i]);
     const TwoLanes speed = pair_at(&disks_[i].vx) - TwoLanes{0, floor.velocity};
     farthest = std::max(farthest, moved[0] * moved[0] + moved[1] * moved[1]);
-    const double square = speed[0] * speed[0] + speed[1] * speed[1];
+    double square = speed[0] * speed[0] + speed[1] * speed[1];
+    if (rough_) square += rim_[i] * rim_[i];
     fastest = std::max(fastest, square);
     squares += square;
   }
@@ -254,6 +428,8 @@ void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
   mean_square_speed_ = squares / count_;
   if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
     list_pairs(floor.position);
+  } else if (rough_) {
+    choose_active_of_rough(dt);
   } else {
     choose_active(dt);
   }
@@ -313,26 +489,47 @@ auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, doub
 }
 
 // inward: from the wall into the box; place and speed of the wall that way.
-auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
-                                 const Spring& spring) -> WallContacts {
+auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wall, TwoLanes inward, double place,
+                                 double speed, const Spring& spring) -> WallContacts {
   WallContacts contacts;
   for (const std::uint32_t i : near) {
     const WallContacts one = wall_force(i, inward, place, speed, spring, velocity_of(i));
     put_pair(&force_[4 * i], fused(both(one.force), inward, pair_at(&force_[4 * i])));
     contacts.force += one.force;
     contacts.lost += one.lost;
+    if (!rough_ || !(spring.grip.friction > 0)) continue;
+    double& stretch = wall_stretch_[walls * i + wall];
+    if (one.force == 0) {
+      if (stretch != 0) rubbed_ += 0.5 * spring.grip.stiffness * stretch * stretch;
+      stretch = 0;
+      continue;
+    }
+    const TwoLanes tangent = {inward[1], -inward[0]};
+    const TwoLanes now = velocity_of(i) * tangent, past = pair_at(&halfway_[2 * i]) * tangent;
+    const Pulled side =
+        pull(stretch, spring.grip, now[0] + now[1] + rim_[i], past[0] + past[1] + rim_halfway_[i], one.force);
+    put_pair(&force_[4 * i], fused(both(side.force), tangent, pair_at(&force_[4 * i])));
+    rim_force_[i] += inverse_inertia_ratio_ * side.force;
+    rubbed_ += side.lost;
   }
   return contacts;
 }
 
 void PressedBed::add_forces(const FloorMotion::Motion& floor) {
   std::fill(force_.begin(), force_.end(), 0.0);
-  box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
+  rubbed_ = 0;
+  if (rough_) {
+    std::fill(rim_force_.begin(), rim_force_.end(), 0.0);
+    box_.period > 0 ? add_rough_pair_forces<true>() : add_rough_pair_forces<false>();
+  } else {
+    box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
+  }
   loss_rate_ = pair_.damping * pair_squares_;
-  loss_rate_ += add_wall_forces(near_left_, TwoLanes{1, 0}, 0, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_right_, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_lid_, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
-  const WallContacts on_floor = add_wall_forces(near_floor_, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
+  loss_rate_ += add_wall_forces(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
+  loss_rate_ += add_wall_forces(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
+  const WallContacts on_floor =
+      add_wall_forces(near_floor_, at_floor, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
   loss_rate_ += on_floor.lost;
   floor_force_ = on_floor.force;
   floor_at_ = floor;
@@ -348,12 +545,20 @@ void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Moti
     put_pair(disk, fused(whole, v, pair_at(disk)));
     put_pair(disk + 2, fused(half, a, v));
   }
+  if (rough_) {
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      rim_halfway_[i] += 0.5 * (last_step_ + dt) * rim_force_[i];
+      rim_[i] = rim_halfway_[i] + 0.5 * dt * rim_force_[i];
+    }
+  }
   last_step_ = dt;
   if (--until_check_ == 0) check(after, dt);
   const double force_before = floor_force_, loss_before = loss_rate_;
+  slip_time_ = dt;
   add_forces(after);
+  slip_time_ = 0;
   floor_work_ += 0.5 * (force_before + floor_force_) * (after.position - before.position);
-  damped_ += 0.5 * (loss_before + loss_rate_) * dt;
+  damped_ += 0.5 * (loss_before + loss_rate_) * dt + rubbed_;
 }
 
 void PressedBed::lie(const FloorMotion::Motion& floor) {
@@ -364,6 +569,7 @@ void PressedBed::lie(const FloorMotion::Motion& floor) {
     put_pair(&disks_[i].vx, velocity);
     put_pair(&force_[4 * i], TwoLanes{0, 1 + floor.acceleration});
   }
+  for (auto* values : {&rim_, &rim_halfway_, &rim_force_}) std::fill(values->begin(), values->end(), 0.0);
   floor_force_ = count_ * (1 + floor.acceleration);
   loss_rate_ = 0;
 }
@@ -379,6 +585,7 @@ void PressedBed::carry(const FloorMotion::Motion& before, const FloorMotion::Mot
 void PressedBed::wake(const FloorMotion::Motion& floor) {
   list_pairs(floor.position);
   add_forces(floor);
+  damped_ += rubbed_;
 }
 
 double PressedBed::approach() const { return std::sqrt(pair_squares_ / std::max(touching_, 1.0)); }
@@ -398,6 +605,7 @@ double PressedBed::compressed() const {
   for (const std::uint32_t i : near_right_) add(disks_[i].x + radius - box_.width, side_);
   for (const std::uint32_t i : near_lid_) add(disks_[i].z + radius - box_.lid, lid_);
   for (const std::uint32_t i : near_floor_) add(floor_at_.position + radius - disks_[i].z, floor_);
+  if (rough_) sum += stretched();
   return sum;
 }
 

@@ -1,10 +1,14 @@
 // A bed under load as soft disks: a linear spring and a dashpot in every contact, small steps of time. What hard disks
-// do by ever more and ever smaller contacts, a bed that lies on the floor does here in contacts that last. Equal smooth
-// disks; the engine decides when (engine_press.hpp).
+// do by ever more and ever smaller contacts, a bed that lies on the floor does here in contacts that last. Equal disks,
+// smooth or rough; the engine decides when (engine_press.hpp).
+//
+// Rough disks have a tangential spring and dashpot in every contact, too, which give way to Coulomb friction
+// [CundallStrack1979]. The spring is stretched by the slip while the contact lasts.
 //
 // A value owns its disks; one thread at a time may use one. Reduced units.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -28,15 +32,25 @@ class PressedBed {
   struct Surfaces {
     Surface disks, sides, floor, lid;
   };
+  enum Wall : std::uint32_t { at_left, at_right, at_floor, at_lid, walls };
+  // Stretch of the tangential spring of two disks, or of a disk and a wall: then `other` is count + wall.
+  struct Stretch {
+    std::uint32_t disk, other;
+    double stretch;
+  };
   struct alignas(32) State {
     double x, z, vx, vz;
   };
-  // Steps a contact time. The mean loss is right with any; with 4 a packed bed was unstable.
-  static constexpr double steps_a_contact = 6;
+  // Steps a contact time. The mean loss is right with any; with 4 a packed bed was unstable. Spins against one another
+  // swing faster than disks do: by 1.2 for spheres.
+  static constexpr double steps_a_contact = 6, steps_of_rough = 8;
   static constexpr std::uint32_t steps_a_check = 8;  // of who may touch whom, and of the contact time
 
-  void set_up(const Box& box, const Surfaces& surfaces);
-  void begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time);
+  // inverse_inertia_ratio: 1/q of disks that spin, 0 of smooth ones.
+  void set_up(const Box& box, const Surfaces& surfaces, double inverse_inertia_ratio = 0);
+  void begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time,
+             const std::vector<double>& spins = {}, const std::vector<Stretch>& stretches = {});
+  double steps() const { return rough_ ? steps_of_rough : steps_a_contact; }
   // One step of dt, from a floor that moves so to one that moves so.
   void step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt);
   // Springs and dashpots as of another contact time, from now on.
@@ -54,6 +68,11 @@ class PressedBed {
 
   // After the last step, and `later` than that.
   State at(std::uint32_t i, double later) const;
+  double spin_at(std::uint32_t i, double later) const {
+    return (rim_halfway_[i] + (0.5 * last_step_ + later) * rim_force_[i]) / 0.5;
+  }
+  std::vector<Stretch> stretches() const;
+  void let_go();  // of all tangential springs; their energy counts as damped
   double floor_force() const { return floor_force_; }
   double floor_work() const { return floor_work_; }  // since begin()
   double damped() const { return damped_; }          // in dashpots, since begin()
@@ -71,39 +90,72 @@ class PressedBed {
       if (i >= count_ || !(distance < 1)) continue;
       const TwoLanes normal = d / both(distance), flow = (velocity_of(k) - velocity_of(i)) * normal;
       const double force = pair_.stiffness * (1 - distance) - pair_.damping * (flow[0] + flow[1]);
-      visit(pair_at(&disks_[i].x), d, both(force) * normal);
+      TwoLanes on_second = both(force) * normal;
+      if (rough_) {
+        const TwoLanes tangent = {-normal[1], normal[0]};
+        const TwoLanes slip = (velocity_of(i) - velocity_of(k)) * tangent;
+        on_second -= both(pair_.grip.force(stretch_[p], slip[0] + slip[1] + rim_[i] + rim_[k], force)) * tangent;
+      }
+      visit(pair_at(&disks_[i].x), d, on_second);
     }
   }
   // Calls visit(disk, whether it is on the floor, force on it) for each disk in contact with a wall.
   template <class Visit>
   void each_wall_contact(Visit visit) const {
-    const auto all = [&](const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
+    const auto all = [&](const std::vector<std::uint32_t>& near, Wall wall, TwoLanes inward, double place, double speed,
                          const Spring& spring) {
       for (const std::uint32_t i : near) {
         const double force = wall_force(i, inward, place, speed, spring, velocity_of(i)).force;
-        if (force != 0) visit(i, &spring == &floor_, both(force) * inward);
+        if (force == 0) continue;
+        TwoLanes on_disk = both(force) * inward;
+        if (rough_) {
+          const TwoLanes tangent = {inward[1], -inward[0]}, slip = velocity_of(i) * tangent;
+          const double stretch = wall_stretch_[walls * i + wall];
+          on_disk += both(spring.grip.force(stretch, slip[0] + slip[1] + rim_[i], force)) * tangent;
+        }
+        visit(i, &spring == &floor_, on_disk);
       }
     };
-    all(near_left_, TwoLanes{1, 0}, 0, 0, side_);
-    all(near_right_, TwoLanes{-1, 0}, -box_.width, 0, side_);
-    all(near_lid_, TwoLanes{0, -1}, -box_.lid, 0, lid_);
-    all(near_floor_, TwoLanes{0, 1}, floor_at_.position, floor_at_.velocity, floor_);
+    all(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_);
+    all(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_);
+    all(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_);
+    all(near_floor_, at_floor, TwoLanes{0, 1}, floor_at_.position, floor_at_.velocity, floor_);
   }
   // Moves apart what overlaps, half of it each, until all do by no more than `most` or for so many sweeps.
   void separate(double floor, double most, int sweeps);
 
  private:
+  struct Grip {
+    double stiffness = 0, damping = 0, friction = 0;
+    double most(double normal_force) const { return friction * std::max(normal_force, 0.0); }
+    // Against the slip, of a spring that is stretched no farther than friction allows.
+    double force(double stretch, double slip, double normal_force) const {
+      return std::clamp(-stiffness * stretch - damping * slip, -most(normal_force), most(normal_force));
+    }
+  };
   struct Spring {
     double stiffness = 0, damping = 0;  // of mass 1
+    Grip grip{};
   };
   struct WallContacts {
     double force = 0, lost = 0;
   };
-  static Spring spring_of(const Surface& surface);
+  struct Pulled {
+    double force, lost;
+  };
+  Spring spring_of(const Surface& surface) const;
+  Grip grip_of(const Surface& surface) const;
+  Pulled pull(double& stretch, const Grip& grip, double slip, double slipped, double normal_force) const;
+  double stretched() const;
   void list_pairs(double floor);
   void list_walls(double floor);
   void interleave();
   void choose_active(double dt);
+  void choose_active_of_rough(double dt);
+  void keep_stretches();
+  void place_stretches(std::vector<Stretch>& stretches);
+  template <bool periodic>
+  void add_rough_pair_forces();
   void check(const FloorMotion::Motion& floor, double dt);
   void add_forces(const FloorMotion::Motion& floor);
   template <bool periodic>
@@ -112,8 +164,8 @@ class PressedBed {
   TwoLanes velocity_of(std::uint32_t i) const { return pair_at(&disks_[i].vx); }
   WallContacts wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
                           TwoLanes velocity) const;
-  WallContacts add_wall_forces(const std::vector<std::uint32_t>& near, TwoLanes inward, double place, double speed,
-                               const Spring& spring);
+  WallContacts add_wall_forces(const std::vector<std::uint32_t>& near, Wall wall, TwoLanes inward, double place,
+                               double speed, const Spring& spring);
   TwoLanes gap_of(std::uint32_t i, std::uint32_t k) const;
 
   Box box_;
@@ -124,7 +176,17 @@ class PressedBed {
   std::vector<double> halfway_;  // velocities half a step before, {vx, vz}
   std::vector<double> force_;    // {x, z} at the places of disks_; weight apart
   double last_step_ = 0;
-  std::vector<double> listed_;  // {x, z} when the neighbours were listed, z above the floor
+  // --- of rough disks
+  bool rough_ = false;
+  double inverse_inertia_ratio_ = 0;
+  // R times the spin, foreseen and half a step before, and how it is accelerated.
+  std::vector<double> rim_, rim_halfway_, rim_force_;
+  std::vector<double> stretch_, wall_stretch_;  // of pairs, as they are listed; {left, right, floor, lid} of each disk
+  std::vector<Stretch> kept_;                   // while neighbours are listed anew
+  std::vector<std::uint32_t> active_;           // pairs, as they are listed
+  double slip_time_ = 0;                        // the step whose forces are added
+  double rubbed_ = 0;                           // lost by tangential forces in this step
+  std::vector<double> listed_;                  // {x, z} when the neighbours were listed, z above the floor
   // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
   std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
   std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;

@@ -127,7 +127,7 @@ struct Scene {
   Start start{};
   // A dissipative bed with contact clocks that has come to rest on the floor lies there (engine_rest.hpp).
   bool rests = true;
-  // One of equal smooth disks that is pressed on the floor goes on as one of soft disks (engine_press.hpp).
+  // One of equal disks that is pressed on the floor goes on as one of soft disks (engine_press.hpp).
   bool presses = true;
   double start_temperature = 1;  // of the Maxwellian velocities at the start (placed disks keep their own)
   std::uint64_t seed = 1;

@@ -1,0 +1,342 @@
+// Beds of rough disks that are pressed on the floor: the tangential springs by themselves, and the engine that decides
+// when.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "sim/engine/collision.hpp"
+#include "sim/engine/pressed_bed.hpp"
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/flights.hpp"
+#include "sim/measure/observables.hpp"
+
+namespace shakebed::sim {
+namespace {
+
+constexpr FloorMotion::Motion still{0, 0, 0};
+constexpr double of_a_sphere = 2.5, of_a_disk = 2;  // 1/q
+
+PressedBed rough_disks(const Surface& surface, double inverse_inertia_ratio, double width = 10) {
+  PressedBed bed;
+  bed.set_up({width, 0, never}, {surface, Surface{surface.restitution, 0, 0}, surface, surface}, inverse_inertia_ratio);
+  return bed;
+}
+
+double energy_of(const PressedBed& bed, std::uint32_t count, double inverse_inertia_ratio) {
+  double sum = bed.compressed();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const PressedBed::State at = bed.at(i, 0);
+    const double rim = 0.5 * bed.spin_at(i, 0);
+    sum += at.z + 0.5 * (at.vx * at.vx + at.vz * at.vz + rim * rim / inverse_inertia_ratio);
+  }
+  return sum;
+}
+
+// Two disks that meet obliquely leave as the rule of hard rough disks says: where the contact sticks and where it
+// slides.
+TEST(PressedRoughBed, DoesInAContactWhatTheRuleOfRoughDisksDoes) {
+  constexpr double contact_time = 0.005, speed = 0.05;
+  for (const double b : {0.9, 0.7, 0.3, 0.0}) {
+    for (const double side : {0.2, 0.5, 4.0}) {
+      SCOPED_TRACE(testing::Message() << b << " " << side);
+      const Surface surface{0.9, 0.3, b};
+      constexpr int moments = 40;
+      double slip = 0;
+      for (int moment = 0; moment < moments; ++moment) {
+        PressedBed bed = rough_disks(surface, of_a_sphere);
+        const double step = contact_time / bed.steps(), gap = 2 * speed * step * (2 + moment / double(moments));
+        bed.begin({{4, 20, speed, side * speed}, {5 + gap, 20, -speed, -side * speed}}, still, contact_time);
+        for (int k = 0; k < 20; ++k) bed.step(still, still, step);
+        const double rims = 0.5 * (bed.spin_at(0, 0) + bed.spin_at(1, 0));
+        slip += (bed.at(0, 0).vz - bed.at(1, 0).vz + rims) / (2 * speed) / moments;
+      }
+      const RoughImpulse hard = walton_impulse(1, 0, 2, 2 * side, 0.5, surface, of_a_sphere);
+      const double expected = side + (1 + of_a_sphere) * hard.tangential;
+      EXPECT_NEAR(slip, expected, 0.05 * std::max(side, 1.0));
+    }
+  }
+}
+
+TEST(PressedRoughBed, ConservesMomentumAndAngularMomentumInContacts) {
+  const Surface surface{0.8, 0.4, 0.3};
+  PressedBed bed = rough_disks(surface, of_a_disk, 100);
+  std::vector<PressedBed::State> disks;
+  std::vector<double> spins;
+  for (int i = 0; i < 30; ++i) {
+    disks.push_back({20 + i % 6 * 0.999, 50 + i / 6 * 0.999, 0.1 * std::sin(3.0 * i), 0.1 * std::cos(5.0 * i)});
+    spins.push_back(std::sin(7.0 * i));
+  }
+  bed.begin(disks, still, 0.005, spins);
+  const auto momenta = [&bed](double fallen) {
+    std::array<double, 3> sum{};
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      const PressedBed::State at = bed.at(i, 0);
+      const double vz = at.vz + fallen, z = at.z + 0.5 * fallen * fallen;
+      sum[0] += at.vx;
+      sum[1] += vz;
+      sum[2] += at.x * vz - z * at.vx + 0.25 / of_a_disk * bed.spin_at(i, 0);
+    }
+    return sum;
+  };
+  const auto before = momenta(0);
+  constexpr double step = 6e-4;
+  for (int k = 0; k < 500; ++k) bed.step(still, still, step);
+  const auto after = momenta(500 * step);
+  EXPECT_GT(bed.damped(), 0.01);
+  EXPECT_NEAR(after[0], before[0], 1e-12);
+  EXPECT_NEAR(after[1], before[1], 1e-11);
+  EXPECT_NEAR(after[2], before[2], 2e-2 * std::abs(before[2]));  // overlaps shorten the levers
+}
+
+// Friction slows it down by mu g and spins it up until it rolls: then it keeps 1/(1 + q) of its speed.
+TEST(PressedRoughBed, SlidesAndThenRollsOnTheFloor) {
+  for (const double inverse : {of_a_sphere, of_a_disk}) {
+    constexpr double friction = 0.2, speed = 1, step = 8e-4;
+    const Surface surface{0.9, friction, 0};
+    PressedBed bed = rough_disks(surface, inverse, 40);
+    bed.begin({{5, 0.5, speed, 0}}, still, 0.007);
+    auto go_to = [&, time = 0.0](double until) mutable {
+      for (; time < until; time += step) bed.step(still, still, step);
+      return time;
+    };
+    const double rolls = speed / (friction * (1 + inverse));
+    double time = go_to(0.5 * rolls);
+    EXPECT_NEAR(bed.at(0, 0).vx, speed - friction * time, 2e-3);
+    EXPECT_NEAR(0.5 * bed.spin_at(0, 0), -inverse * friction * time, 4e-3);
+    time = go_to(3 * rolls);
+    const double rolling = speed / (1 + 1 / inverse);
+    EXPECT_NEAR(bed.at(0, 0).vx, rolling, 2e-3);
+    EXPECT_NEAR(0.5 * bed.spin_at(0, 0), -rolling, 2e-3);
+    EXPECT_NEAR(bed.at(0, 0).x, 5 + rolls * (speed + rolling) / 2 + rolling * (time - rolls), 4e-3);
+    EXPECT_NEAR(bed.damped(), 0.5 * (speed * speed - speed * rolling), 4e-3);
+  }
+}
+
+// One disk on two that do not touch: it stays where friction is more than tan(15 degrees) = 0.268.
+std::vector<PressedBed::State> three_disks() {
+  constexpr double apart = 1.0005;
+  return {{4.5, 0.5, 0, 0}, {4.5 + apart, 0.5, 0, 0}, {4.5 + apart / 2, 0.5 + std::sqrt(1 - apart * apart / 4), 0, 0}};
+}
+
+TEST(PressedRoughBed, StandsOnTwoDisksByFrictionAlone) {
+  constexpr double step = 8e-4;
+  for (const double b : {0.8, 0.0}) {
+    PressedBed bed = rough_disks({0.7, 0.29, b}, of_a_disk);
+    bed.begin(three_disks(), still, 0.007);
+    for (int k = 0; k < 20'000; ++k) bed.step(still, still, step);
+    const PressedBed::State early = bed.at(0, 0);
+    EXPECT_NEAR(early.x, 4.5, 1e-3);
+    for (int k = 0; k < 200'000; ++k) bed.step(still, still, step);
+    EXPECT_NEAR(bed.at(0, 0).x, early.x, 1e-9);  // no creep
+    EXPECT_NEAR(bed.at(0, 0).z, early.z, 1e-9);
+    EXPECT_NEAR(bed.spin_at(0, 0), 0, 1e-9);
+    EXPECT_NEAR(bed.floor_force(), 3, 1e-9);
+    // The bottom disks are held by friction: it is tan(15 degrees) of the normal force, in both of their contacts.
+    bed.each_contact([&](TwoLanes, TwoLanes to, TwoLanes force) {
+      const double normal = force[0] * to[0] + force[1] * to[1], side = -force[0] * to[1] + force[1] * to[0];
+      EXPECT_NEAR(std::abs(side / normal), 2 - std::numbers::sqrt3, 2e-3);
+    });
+    bed.each_wall_contact([&](std::uint32_t, bool is_floor, TwoLanes force) {
+      EXPECT_TRUE(is_floor);
+      EXPECT_NEAR(std::abs(force[0]), 0.5 * (2 - std::numbers::sqrt3), 2e-3);
+    });
+  }
+  PressedBed bed = rough_disks({0.7, 0.25, 0}, of_a_disk);
+  bed.begin(three_disks(), still, 0.007);
+  for (int k = 0; k < 20'000; ++k) bed.step(still, still, step);
+  EXPECT_LT(bed.at(0, 0).x, 4.4);
+}
+
+// Not by its springs either: what it has lost is no less than what the dashpots and friction took.
+TEST(PressedRoughBed, OnlyLosesEnergyOnAFloorThatStands) {
+  const Surface surface{0.9, 0.4, 0.2};
+  constexpr std::uint32_t count = 40;
+  std::vector<PressedBed::State> disks;
+  std::vector<double> spins;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    disks.push_back({1 + i % 8 * 1.01 + i / 8 % 2 * 0.5, 0.55 + i / 8 * 0.92, 0.1 * std::sin(i), 0});
+    spins.push_back(0.3 * std::cos(i));
+  }
+  for (const double step : {6e-4, 1.5e-4}) {
+    PressedBed bed = rough_disks(surface, of_a_sphere);
+    bed.begin(disks, still, 0.005, spins);
+    const double first = energy_of(bed, count, of_a_sphere);
+    double least = first;
+    for (int k = 0; k * step < 2; ++k) {
+      bed.step(still, still, step);
+      const double energy = energy_of(bed, count, of_a_sphere);
+      EXPECT_LT(energy, least + 2e-4 * first);
+      least = std::min(least, energy);
+    }
+    EXPECT_GT(bed.damped(), 0.5);
+    EXPECT_NEAR(first - energy_of(bed, count, of_a_sphere), bed.damped(), (step > 5e-4 ? 0.1 : 0.05) * bed.damped());
+  }
+}
+
+// Ten rows of 2 mm disks at 30 Hz. With such a contact duration 2,000 contacts a disk and period are the limit.
+Scene rough_scene(double gamma, double width = 12.3, double restitution = 0.9, double contact_duration = 3e-4) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{120, 1, 1}};
+  scene.disks.contact = scene.box.floor_surface = {restitution, 0.4, 0};
+  scene.disks.inertia_ratio = 0.4;
+  scene.disks.contact_duration = contact_duration;
+  scene.box.width = width;
+  scene.box.sides = HardSides{{restitution, 0, 0}};
+  if (gamma > 0) scene.box.floor = SinusoidalFloor{gamma / std::pow(2 * std::numbers::pi * 0.428, 2), 0.428};
+  scene.start = RandomStart{};
+  scene.start_temperature = 0.01;
+  return scene;
+}
+constexpr double period = 1 / 0.428;
+
+void expect_same_bytes(const Simulation& a, const Simulation& b) {
+  Snapshot of_a, of_b;
+  a.snapshot(of_a);
+  b.snapshot(of_b);
+  EXPECT_EQ(of_a.x, of_b.x);
+  EXPECT_EQ(of_a.z, of_b.z);
+  EXPECT_EQ(of_a.vx, of_b.vx);
+  EXPECT_EQ(of_a.vz, of_b.vz);
+  EXPECT_EQ(of_a.spin, of_b.spin);
+  EXPECT_EQ(a.energy().dissipated, b.energy().dissipated);
+  EXPECT_EQ(a.energy().floor_work, b.energy().floor_work);
+  EXPECT_EQ(a.counters().events(), b.counters().events());
+}
+
+// Hard disks would make contacts there without end: 4 % of such a settling took 25 s.
+TEST(PressedRoughBed, ComesToRestOnAFloorThatNeverFallsAway) {
+  for (const double gamma : {0.0, 0.3, 0.7}) {
+    SCOPED_TRACE(gamma);
+    const auto bed = simulate(rough_scene(gamma));
+    bed->advance_to(30 * period);
+    const std::uint64_t events = bed->counters().events();
+    Snapshot first, later;
+    bed->snapshot(first);
+    bed->advance_to(60 * period);
+    bed->snapshot(later);
+    EXPECT_EQ(bed->counters().events(), events);
+    for (std::size_t i = 0; i < first.z.size(); ++i) {
+      ASSERT_NEAR(later.x[i], first.x[i], 1e-4);
+      ASSERT_NEAR(later.z[i] - later.floor_position, first.z[i] - first.floor_position, 1e-4);
+    }
+    EXPECT_NEAR(bed->energy().imbalance(), 0, 1e-10 * bed->energy().dissipated);
+  }
+}
+
+// Nothing drives it: from the fall to rest its energy only falls.
+TEST(PressedRoughBed, OfTheEngineNeverGainsEnergyUnshaken) {
+  const auto bed = simulate(rough_scene(0));
+  bool pressed = false;
+  double least = bed->energy().initial;
+  for (int k = 1; k <= 800; ++k) {
+    bed->advance_to(0.05 * k);
+    const EnergyLedger ledger = bed->energy();
+    const double mechanical = ledger.kinetic + ledger.potential + ledger.compressed;
+    ASSERT_LT(mechanical, least + 1e-4 * ledger.initial);
+    ASSERT_NEAR(ledger.imbalance(), 0, 1e-10 * ledger.initial);
+    least = std::min(least, mechanical);
+    pressed = pressed || ledger.compressed > 0;
+  }
+  EXPECT_TRUE(pressed);
+}
+
+// The second width is that of twelve disks: rows lock.
+TEST(PressedRoughBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
+  bool was_pressed = false;
+  for (const double width : {12.3, 12.0}) {
+    for (const double gamma : {0.9, 1.3}) {
+      SCOPED_TRACE(testing::Message() << gamma << " " << width);
+      const auto bed = simulate(rough_scene(gamma, width, 0.6));
+      double deepest = 0;
+      for (int k = 1; k <= 400; ++k) {
+        bed->advance_to(0.062 * k);
+        const EnergyLedger ledger = bed->energy();
+        ASSERT_NEAR(ledger.imbalance(), 0, 1e-10 * (ledger.dissipated + ledger.initial));
+        deepest = std::max(deepest, bed->largest_overlap());
+        was_pressed = was_pressed || ledger.compressed > 0;
+        EXPECT_EQ(precision_lost(*bed), "");
+      }
+      const EnergyLedger ledger = bed->energy();
+      EXPECT_LT(deepest, soft_overlap / 2);
+      EXPECT_LT(std::abs(ledger.step_error), 0.15 * ledger.dissipated);
+    }
+  }
+  EXPECT_TRUE(was_pressed);
+}
+
+TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
+  int pressed = 0;
+  for (const double gamma : {0.8, 1.3}) {
+    for (const double saved_at : {15.0, 30.0}) {
+      const Scene scene = rough_scene(gamma, 12.3, 0.6);
+      const auto a = simulate(scene);
+      while (a->time() < saved_at) a->advance_to(a->next_synchronisation());
+      const auto b = simulate(scene);
+      b->restore(a->checkpoint());
+      pressed += a->energy().compressed > 0;
+      EXPECT_EQ(a->energy().compressed, b->energy().compressed);
+      a->advance_to(saved_at + 15);
+      b->advance_to(saved_at + 15);
+      expect_same_bytes(*a, *b);
+    }
+  }
+  EXPECT_GE(pressed, 2);
+}
+
+TEST(PressedRoughBed, DoesNotCareWhoLooksNorWhen) {
+  for (const double gamma : {0.95, 1.3}) {
+    const Scene scene = rough_scene(gamma, 12.3, 0.6);
+    const auto alone = simulate(scene), looked_at = simulate(scene), watched = simulate(scene);
+    FlightObserver observer(scene, watched->properties(), LayerGrid{-1, 0.5, 60});
+    watched->watch(&observer);
+    observer.begin(0);
+    alone->advance_to(19.7);
+    watched->advance_to(19.7);
+    Snapshot at;
+    for (int k = 1; k <= 5'000; ++k) {
+      looked_at->advance_to(k == 5'000 ? 19.7 : 3.94e-3 * k);
+      looked_at->snapshot(at);
+    }
+    expect_same_bytes(*alone, *looked_at);
+    expect_same_bytes(*alone, *watched);
+  }
+}
+
+TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
+  for (const double gamma : {0.8, 1.3}) {
+    const Scene scene = rough_scene(gamma, 12.3, 0.6);
+    const auto bed = simulate(scene);
+    bed->advance_to(20 * period);
+    FlightObserver observer(scene, bed->properties(), LayerGrid{-1, 0.5, 60});
+    bed->watch(&observer);
+    observer.begin(bed->time());
+    for (int k = 1; k <= 20; ++k) {
+      bed->advance_to((20 + k) * period);
+      observer.end_block(bed->time());
+    }
+    const double weight = 120 / 12.3;
+    EXPECT_NEAR(observer.floor_pressure().value, weight, 0.01 * weight) << gamma;
+  }
+}
+
+// Shaken beds that make fewer contacts a period than the limit are not touched, not even by rounding.
+TEST(PressedRoughBed, LeavesShakenBedsAlone) {
+  for (const double gamma : {2.0, 3.0, 6.0}) {
+    Scene scene = rough_scene(gamma, 12.3, 0.9, 1e-4), hard = scene;
+    hard.presses = false;
+    const auto a = simulate(scene), b = simulate(hard);
+    a->advance_to(30 * period);
+    b->advance_to(30 * period);
+    expect_same_bytes(*a, *b);
+  }
+}
+
+}  // namespace
+}  // namespace shakebed::sim
