@@ -29,8 +29,8 @@ inline constexpr double least_contact_time = 3e-4, least_contact_time_at_start =
 // lock have thousands of them. With 0.2 on the floor the bed is 5 % hotter, as hard disks are while they land.
 inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
 // Rough disks are left to events until they have made so many contacts each in a period, over the contact duration of
-// the scene [sqrt(D/g)]. A period counts as no longer than 4 sqrt(D/g). Beds at Gamma of 2 or more make 0.001 to 0.17,
-// and 0.33 in one period in which a row locked: see tests/bench/README.md. A bed that has reached the limit is pressed
+// the scene [sqrt(D/g)]. A period counts as no longer than 4 sqrt(D/g). Beds at Gamma of 2 or more make up to 0.26, and
+// 0.33 in one period in which a row locked: see tests/bench/README.md. A bed that has reached the limit is pressed
 // earlier in later periods, until one goes by without.
 inline constexpr double chattering = 0.6, chattering_on = 0.04;
 inline constexpr double softening = 1.05;       // of the contact time at most, between two checks
