@@ -267,6 +267,7 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   base_ = static_cast<double>(intervals_done_) * interval_;
   now_ = 0;
   const bool was_pressed = std::exchange(is_pressed_, false);
+  pressed_in_interval_ = false;
   begin_interval();
   if constexpr (press_applies) {
     if (was_pressed) go_on_pressed();
