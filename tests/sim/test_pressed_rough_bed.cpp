@@ -19,7 +19,7 @@
 namespace shakebed::sim {
 namespace {
 
-constexpr FloorMotion::Motion still{0, 0, 0};
+constexpr FloorMotion::Motion resting_floor{0, 0, 0};
 constexpr double of_a_sphere = 2.5, of_a_disk = 2;  // 1/q
 
 PressedBed rough_disks(const Surface& surface, double inverse_inertia_ratio, double width = 10) {
@@ -51,8 +51,8 @@ TEST(PressedRoughBed, DoesInAContactWhatTheRuleOfRoughDisksDoes) {
       for (int moment = 0; moment < moments; ++moment) {
         PressedBed bed = rough_disks(surface, of_a_sphere);
         const double step = contact_time / bed.steps(), gap = 2 * speed * step * (2 + moment / double(moments));
-        bed.begin({{4, 20, speed, side * speed}, {5 + gap, 20, -speed, -side * speed}}, still, contact_time);
-        for (int k = 0; k < 20; ++k) bed.step(still, still, step);
+        bed.begin({{4, 20, speed, side * speed}, {5 + gap, 20, -speed, -side * speed}}, resting_floor, contact_time);
+        for (int k = 0; k < 20; ++k) bed.step(resting_floor, resting_floor, step);
         const double rims = 0.5 * (bed.spin_at(0, 0) + bed.spin_at(1, 0));
         slip += (bed.at(0, 0).vz - bed.at(1, 0).vz + rims) / (2 * speed) / moments;
       }
@@ -72,7 +72,7 @@ TEST(PressedRoughBed, ConservesMomentumAndAngularMomentumInContacts) {
     disks.push_back({20 + i % 6 * 0.999, 50 + i / 6 * 0.999, 0.1 * std::sin(3.0 * i), 0.1 * std::cos(5.0 * i)});
     spins.push_back(std::sin(7.0 * i));
   }
-  bed.begin(disks, still, 0.005, spins);
+  bed.begin(disks, resting_floor, 0.005, spins);
   const auto momenta = [&bed](double fallen) {
     std::array<double, 3> sum{};
     for (std::uint32_t i = 0; i < 30; ++i) {
@@ -86,7 +86,7 @@ TEST(PressedRoughBed, ConservesMomentumAndAngularMomentumInContacts) {
   };
   const auto before = momenta(0);
   constexpr double step = 6e-4;
-  for (int k = 0; k < 500; ++k) bed.step(still, still, step);
+  for (int k = 0; k < 500; ++k) bed.step(resting_floor, resting_floor, step);
   const auto after = momenta(500 * step);
   EXPECT_GT(bed.damped(), 0.01);
   EXPECT_NEAR(after[0], before[0], 1e-12);
@@ -100,9 +100,9 @@ TEST(PressedRoughBed, SlidesAndThenRollsOnTheFloor) {
     constexpr double friction = 0.2, speed = 1, step = 8e-4;
     const Surface surface{0.9, friction, 0};
     PressedBed bed = rough_disks(surface, inverse, 40);
-    bed.begin({{5, 0.5, speed, 0}}, still, 0.007);
+    bed.begin({{5, 0.5, speed, 0}}, resting_floor, 0.007);
     auto go_to = [&, time = 0.0](double until) mutable {
-      for (; time < until; time += step) bed.step(still, still, step);
+      for (; time < until; time += step) bed.step(resting_floor, resting_floor, step);
       return time;
     };
     const double rolls = speed / (friction * (1 + inverse));
@@ -128,11 +128,11 @@ TEST(PressedRoughBed, StandsOnTwoDisksByFrictionAlone) {
   constexpr double step = 8e-4;
   for (const double b : {0.8, 0.0}) {
     PressedBed bed = rough_disks({0.7, 0.29, b}, of_a_disk);
-    bed.begin(three_disks(), still, 0.007);
-    for (int k = 0; k < 20'000; ++k) bed.step(still, still, step);
+    bed.begin(three_disks(), resting_floor, 0.007);
+    for (int k = 0; k < 20'000; ++k) bed.step(resting_floor, resting_floor, step);
     const PressedBed::State early = bed.at(0, 0);
     EXPECT_NEAR(early.x, 4.5, 1e-3);
-    for (int k = 0; k < 200'000; ++k) bed.step(still, still, step);
+    for (int k = 0; k < 200'000; ++k) bed.step(resting_floor, resting_floor, step);
     EXPECT_NEAR(bed.at(0, 0).x, early.x, 1e-9);  // no creep
     EXPECT_NEAR(bed.at(0, 0).z, early.z, 1e-9);
     EXPECT_NEAR(bed.spin_at(0, 0), 0, 1e-9);
@@ -148,8 +148,8 @@ TEST(PressedRoughBed, StandsOnTwoDisksByFrictionAlone) {
     });
   }
   PressedBed bed = rough_disks({0.7, 0.25, 0}, of_a_disk);
-  bed.begin(three_disks(), still, 0.007);
-  for (int k = 0; k < 20'000; ++k) bed.step(still, still, step);
+  bed.begin(three_disks(), resting_floor, 0.007);
+  for (int k = 0; k < 20'000; ++k) bed.step(resting_floor, resting_floor, step);
   EXPECT_LT(bed.at(0, 0).x, 4.4);
 }
 
@@ -165,11 +165,11 @@ TEST(PressedRoughBed, OnlyLosesEnergyOnAFloorThatStands) {
   }
   for (const double step : {6e-4, 1.5e-4}) {
     PressedBed bed = rough_disks(surface, of_a_sphere);
-    bed.begin(disks, still, 0.005, spins);
+    bed.begin(disks, resting_floor, 0.005, spins);
     const double first = energy_of(bed, count, of_a_sphere);
     double least = first;
     for (int k = 0; k * step < 2; ++k) {
-      bed.step(still, still, step);
+      bed.step(resting_floor, resting_floor, step);
       const double energy = energy_of(bed, count, of_a_sphere);
       EXPECT_LT(energy, least + 2e-4 * first);
       least = std::min(least, energy);
@@ -194,9 +194,9 @@ Scene rough_scene(double gamma, double width = 12.3, double restitution = 0.9, d
   scene.start_temperature = 0.01;
   return scene;
 }
-constexpr double period = 1 / 0.428;
+constexpr double rough_period = 1 / 0.428;
 
-void expect_same_bytes(const Simulation& a, const Simulation& b) {
+void expect_same_rough_state(const Simulation& a, const Simulation& b) {
   Snapshot of_a, of_b;
   a.snapshot(of_a);
   b.snapshot(of_b);
@@ -215,11 +215,11 @@ TEST(PressedRoughBed, ComesToRestOnAFloorThatNeverFallsAway) {
   for (const double gamma : {0.0, 0.3, 0.7}) {
     SCOPED_TRACE(gamma);
     const auto bed = simulate(rough_scene(gamma));
-    bed->advance_to(30 * period);
+    bed->advance_to(30 * rough_period);
     const std::uint64_t events = bed->counters().events();
     Snapshot first, later;
     bed->snapshot(first);
-    bed->advance_to(60 * period);
+    bed->advance_to(60 * rough_period);
     bed->snapshot(later);
     EXPECT_EQ(bed->counters().events(), events);
     for (std::size_t i = 0; i < first.z.size(); ++i) {
@@ -284,7 +284,7 @@ TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
       EXPECT_EQ(a->energy().compressed, b->energy().compressed);
       a->advance_to(saved_at + 15);
       b->advance_to(saved_at + 15);
-      expect_same_bytes(*a, *b);
+      expect_same_rough_state(*a, *b);
     }
   }
   EXPECT_GE(pressed, 2);
@@ -304,8 +304,8 @@ TEST(PressedRoughBed, DoesNotCareWhoLooksNorWhen) {
       looked_at->advance_to(k == 5'000 ? 19.7 : 3.94e-3 * k);
       looked_at->snapshot(at);
     }
-    expect_same_bytes(*alone, *looked_at);
-    expect_same_bytes(*alone, *watched);
+    expect_same_rough_state(*alone, *looked_at);
+    expect_same_rough_state(*alone, *watched);
   }
 }
 
@@ -313,12 +313,12 @@ TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
   for (const double gamma : {0.8, 1.3}) {
     const Scene scene = rough_scene(gamma, 12.3, 0.6);
     const auto bed = simulate(scene);
-    bed->advance_to(20 * period);
+    bed->advance_to(20 * rough_period);
     FlightObserver observer(scene, bed->properties(), LayerGrid{-1, 0.5, 60});
     bed->watch(&observer);
     observer.begin(bed->time());
     for (int k = 1; k <= 20; ++k) {
-      bed->advance_to((20 + k) * period);
+      bed->advance_to((20 + k) * rough_period);
       observer.end_block(bed->time());
     }
     const double weight = 120 / 12.3;
@@ -332,9 +332,9 @@ TEST(PressedRoughBed, LeavesShakenBedsAlone) {
     Scene scene = rough_scene(gamma, 12.3, 0.9, 1e-4), hard = scene;
     hard.presses = false;
     const auto a = simulate(scene), b = simulate(hard);
-    a->advance_to(30 * period);
-    b->advance_to(30 * period);
-    expect_same_bytes(*a, *b);
+    a->advance_to(30 * rough_period);
+    b->advance_to(30 * rough_period);
+    expect_same_rough_state(*a, *b);
   }
 }
 
