@@ -64,14 +64,12 @@ TEST(FirstLine, OfABedThatLiesStillSaysSo) {
   EXPECT_THAT(bed.first_line, HasSubstr("At rest: The disks hardly move"));
 }
 
-// Smooth or rough; a bed that was never pressed does not.
+// A bed that was never pressed does not.
 TEST(FirstLine, OfABedThatWasPressedSaysThatItsDisksWereSoft) {
   const std::string soft = "The disks were soft while the bed was pressed on the floor.";
-  for (const double friction : {0.0, 0.3}) {
-    const Judged bed = judged({.friction = friction, .gamma = 0.7, .contact_duration = "10 us"});
-    EXPECT_THAT(bed.first_line, HasSubstr(soft)) << friction;
-    EXPECT_NE(bed.observed["energy_ledger"]["step_error"], 0);
-  }
+  const Judged bed = judged({.friction = 0, .gamma = 0.7, .contact_duration = "10 us"});
+  EXPECT_THAT(bed.first_line, HasSubstr(soft));
+  EXPECT_NE(bed.observed["energy_ledger"]["step_error"], 0);
   EXPECT_THAT(judged({.friction = 0.3}).first_line, Not(HasSubstr(soft)));
 }
 
