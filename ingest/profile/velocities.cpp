@@ -244,9 +244,9 @@ class StepStatistics {
           " D between frames on average: fast disks are lost and T is too low. Use a higher frame rate.");
     const double factor = std::max(result_.horizontal.finite_time_factor, result_.vertical.finite_time_factor);
     if (factor > large_correction)
-      result_.warnings.emplace_back(
-          "Velocities change between frames: T is corrected by a factor of " + std::to_string(factor) +
-          ", and its error allows for 0.4 of this correction. Use a higher frame rate.");
+      result_.warnings.emplace_back("Velocities change between frames: T is corrected by a factor of " +
+                                    std::to_string(factor) +
+                                    ", and its error allows for 0.4 of this correction. Use a higher frame rate.");
   }
 
   const std::vector<MeasuredDisk>& disks_;

@@ -77,7 +77,10 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
   const Given timed = given_if(options.frame_rate.has_value(), "\"frame_rate\" is given");
   for (const char* axis : {"temperature_x_over_mg", "temperature_z_over_mg"}) {
     const std::string pointer = std::string("/velocities/") + axis;
-    list.quantity(pointer, "m", "kinetic temperature as T/(m g), the mean motion of each height in each frame taken off (as temperature_*_local of a simulation)", timed, true);
+    list.quantity(pointer, "m",
+                  "kinetic temperature as T/(m g), the mean motion of each height in each frame taken off (as "
+                  "temperature_*_local of a simulation)",
+                  timed, true);
     list.number(pointer + "/localisation_bias", "m", "part of the temperature that comes from errors of the centres",
                 timed, true);
     list.number(pointer + "/finite_time_factor", "1", "correction for the time between frames", timed, true);

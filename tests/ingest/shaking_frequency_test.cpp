@@ -87,7 +87,7 @@ TEST(ShakingFrequency, TheFirstToneIsToldFromItsOvertones) {
   EXPECT_NEAR(found.cycles_per_frame, 1 / 12.7, 2e-4);
 }
 
-// What wanders has a slope within a line's neighbourhood, and is told from a line all the same.
+// A slow drift has a slope near a line of the spectrum. It is not taken for a line all the same.
 void expect_no_frequency(std::uint64_t series, std::size_t alarms_allowed) {
   for (const double share : {0.0, 0.6, 0.95, 0.995}) {
     std::size_t alarms = 0;

@@ -16,6 +16,7 @@
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/flights.hpp"
 #include "sim/measure/observables.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace shakebed::sim {
 namespace {
@@ -43,19 +44,6 @@ Scene pressed_scene(double gamma, double width = 12.3) {
   return scene;
 }
 constexpr double period = 1 / 0.428;
-
-void expect_same_bytes(const Simulation& a, const Simulation& b) {
-  Snapshot of_a, of_b;
-  a.snapshot(of_a);
-  b.snapshot(of_b);
-  EXPECT_EQ(of_a.x, of_b.x);
-  EXPECT_EQ(of_a.z, of_b.z);
-  EXPECT_EQ(of_a.vx, of_b.vx);
-  EXPECT_EQ(of_a.vz, of_b.vz);
-  EXPECT_EQ(a.energy().dissipated, b.energy().dissipated);
-  EXPECT_EQ(a.energy().floor_work, b.energy().floor_work);
-  EXPECT_EQ(a.counters().events(), b.counters().events());
-}
 
 TEST(PressedBed, LosesInAContactWhatTheRestitutionSays) {
   for (const double e : {0.3, 0.5, 0.9, 0.95, 1.0}) {

@@ -15,6 +15,7 @@
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/flights.hpp"
 #include "sim/measure/observables.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace shakebed::sim {
 namespace {
@@ -196,20 +197,6 @@ Scene rough_scene(double gamma, double width = 12.3, double restitution = 0.9, d
 }
 constexpr double rough_period = 1 / 0.428;
 
-void expect_same_rough_state(const Simulation& a, const Simulation& b) {
-  Snapshot of_a, of_b;
-  a.snapshot(of_a);
-  b.snapshot(of_b);
-  EXPECT_EQ(of_a.x, of_b.x);
-  EXPECT_EQ(of_a.z, of_b.z);
-  EXPECT_EQ(of_a.vx, of_b.vx);
-  EXPECT_EQ(of_a.vz, of_b.vz);
-  EXPECT_EQ(of_a.spin, of_b.spin);
-  EXPECT_EQ(a.energy().dissipated, b.energy().dissipated);
-  EXPECT_EQ(a.energy().floor_work, b.energy().floor_work);
-  EXPECT_EQ(a.counters().events(), b.counters().events());
-}
-
 // Hard disks would make contacts there without end: 4 % of such a settling took 25 s.
 TEST(PressedRoughBed, ComesToRestOnAFloorThatNeverFallsAway) {
   for (const double gamma : {0.0, 0.3, 0.7}) {
@@ -284,7 +271,7 @@ TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
       EXPECT_EQ(a->energy().compressed, b->energy().compressed);
       a->advance_to(saved_at + 15);
       b->advance_to(saved_at + 15);
-      expect_same_rough_state(*a, *b);
+      expect_same_bytes(*a, *b);
     }
   }
   EXPECT_GE(pressed, 2);
@@ -304,8 +291,8 @@ TEST(PressedRoughBed, DoesNotCareWhoLooksNorWhen) {
       looked_at->advance_to(k == 5'000 ? 19.7 : 3.94e-3 * k);
       looked_at->snapshot(at);
     }
-    expect_same_rough_state(*alone, *looked_at);
-    expect_same_rough_state(*alone, *watched);
+    expect_same_bytes(*alone, *looked_at);
+    expect_same_bytes(*alone, *watched);
   }
 }
 
@@ -334,7 +321,7 @@ TEST(PressedRoughBed, LeavesShakenBedsAlone) {
     const auto a = simulate(scene), b = simulate(hard);
     a->advance_to(30 * rough_period);
     b->advance_to(30 * rough_period);
-    expect_same_rough_state(*a, *b);
+    expect_same_bytes(*a, *b);
   }
 }
 
