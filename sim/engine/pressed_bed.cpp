@@ -13,8 +13,8 @@ namespace {
 
 using State = PressedBed::State;
 
-constexpr double radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
-constexpr double far_off = -100;             // where the sentinels are: they touch nothing
+constexpr double disk_radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
+constexpr double far_off = -100;                  // where the sentinels are: they touch nothing
 // A pair is asked until the next check if it would touch within so many times that many steps at the speed it has, or
 // at that which is usual.
 constexpr double foresight = 6;
@@ -147,7 +147,7 @@ void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floo
   soften(contact_time);
   if (rough_) {
     rim_.assign(count_, 0);
-    for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = radius * spins[i];
+    for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = disk_radius * spins[i];
     rim_halfway_ = rim_;
     rim_force_.assign(count_, 0);
     wall_stretch_.assign(std::size_t{walls} * count_, 0);
@@ -183,7 +183,7 @@ TwoLanes PressedBed::gap_of(std::uint32_t i, std::uint32_t k) const {
 
 // All pairs within the skin, by columns of disks in the order of height.
 void PressedBed::list_pairs(double floor) {
-  const double reach = 2 * radius + skin;
+  const double reach = 2 * disk_radius + skin;
   const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(box_.width / reach)));
   std::vector<std::vector<std::uint32_t>> column(columns);
   listed_.resize(2 * std::size_t{count_});
@@ -245,7 +245,7 @@ void PressedBed::interleave() {
 }
 
 void PressedBed::list_walls(double floor) {
-  const double near = radius + skin / 2;
+  const double near = disk_radius + skin / 2;
   for (auto* list : {&near_left_, &near_right_, &near_floor_, &near_lid_}) list->clear();
   for (std::uint32_t i = 0; i < count_; ++i) {
     const State& disk = disks_[i];
@@ -260,7 +260,7 @@ void PressedBed::list_walls(double floor) {
 void PressedBed::choose_active(double dt) {
   const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
   const std::size_t pairs = first_.size();
-  const Lanes contact = all_lanes(4 * radius * radius);
+  const Lanes contact = all_lanes(4 * disk_radius * disk_radius);
   active_first_.resize(pairs + 4);
   active_second_.resize(pairs + 4);
   std::size_t active = 0;
@@ -381,7 +381,7 @@ void PressedBed::add_rough_pair_forces() {
     if constexpr (periodic) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
     const double squared = d[0] * d[0] + d[1] * d[1];
     double& stretch = stretch_[p];
-    if (!(squared < 4 * radius * radius)) {
+    if (!(squared < 4 * disk_radius * disk_radius)) {
       if (stretch != 0) rubbed_ += 0.5 * pair_.grip.stiffness * stretch * stretch;
       stretch = 0;
       continue;
@@ -391,7 +391,7 @@ void PressedBed::add_rough_pair_forces() {
     const TwoLanes flow = velocity_of(k) - velocity_of(i), normal_flow = flow * normal, side_flow = flow * tangent;
     const TwoLanes past = (pair_at(&halfway_[2 * k]) - pair_at(&halfway_[2 * i])) * tangent;
     const double v = normal_flow[0] + normal_flow[1];
-    const double force = pair_.stiffness * (2 * radius - distance) - pair_.damping * v;
+    const double force = pair_.stiffness * (2 * disk_radius - distance) - pair_.damping * v;
     squares += v * v;
     count += 1;
     TwoLanes on_second = both(force) * normal;
@@ -482,7 +482,7 @@ void PressedBed::add_pair_forces() {
 auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
                             TwoLanes velocity) const -> WallContacts {
   const TwoLanes along = inward * pair_at(&disks_[i].x), flow = inward * velocity;
-  const double gap = along[0] + along[1] - place - radius;
+  const double gap = along[0] + along[1] - place - disk_radius;
   if (!(gap < 0)) return {};
   const double v = flow[0] + flow[1] - speed;
   return {-spring.stiffness * gap - spring.damping * v, spring.damping * v * v};
@@ -599,12 +599,12 @@ double PressedBed::compressed() const {
     const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
     if (i >= count_) continue;
     const TwoLanes d = gap_of(i, k);
-    add(2 * radius - std::sqrt(d[0] * d[0] + d[1] * d[1]), pair_);
+    add(2 * disk_radius - std::sqrt(d[0] * d[0] + d[1] * d[1]), pair_);
   }
-  for (const std::uint32_t i : near_left_) add(radius - disks_[i].x, side_);
-  for (const std::uint32_t i : near_right_) add(disks_[i].x + radius - box_.width, side_);
-  for (const std::uint32_t i : near_lid_) add(disks_[i].z + radius - box_.lid, lid_);
-  for (const std::uint32_t i : near_floor_) add(floor_at_.position + radius - disks_[i].z, floor_);
+  for (const std::uint32_t i : near_left_) add(disk_radius - disks_[i].x, side_);
+  for (const std::uint32_t i : near_right_) add(disks_[i].x + disk_radius - box_.width, side_);
+  for (const std::uint32_t i : near_lid_) add(disks_[i].z + disk_radius - box_.lid, lid_);
+  for (const std::uint32_t i : near_floor_) add(floor_at_.position + disk_radius - disks_[i].z, floor_);
   if (rough_) sum += stretched();
   return sum;
 }
@@ -616,18 +616,18 @@ void PressedBed::separate(double floor, double most, int sweeps) {
       worst = std::max(worst, overlap);
       return std::max(overlap, 0.0);
     };
-    for (const std::uint32_t i : near_floor_) disks_[i].z += excess(floor + radius - disks_[i].z);
-    for (const std::uint32_t i : near_lid_) disks_[i].z -= excess(disks_[i].z + radius - box_.lid);
-    for (const std::uint32_t i : near_left_) disks_[i].x += excess(radius - disks_[i].x);
-    for (const std::uint32_t i : near_right_) disks_[i].x -= excess(disks_[i].x + radius - box_.width);
+    for (const std::uint32_t i : near_floor_) disks_[i].z += excess(floor + disk_radius - disks_[i].z);
+    for (const std::uint32_t i : near_lid_) disks_[i].z -= excess(disks_[i].z + disk_radius - box_.lid);
+    for (const std::uint32_t i : near_left_) disks_[i].x += excess(disk_radius - disks_[i].x);
+    for (const std::uint32_t i : near_right_) disks_[i].x -= excess(disks_[i].x + disk_radius - box_.width);
     for (std::size_t p = 0; p < first_.size(); ++p) {
       const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
       if (i >= count_) continue;
       const TwoLanes d = gap_of(i, k);
       const double squared = d[0] * d[0] + d[1] * d[1];
-      if (squared >= 4 * radius * radius) continue;
+      if (squared >= 4 * disk_radius * disk_radius) continue;
       const double distance = std::sqrt(squared);
-      const TwoLanes move = both(0.5 * overdone * excess(2 * radius - distance) / distance) * d;
+      const TwoLanes move = both(0.5 * overdone * excess(2 * disk_radius - distance) / distance) * d;
       put_pair(&disks_[i].x, pair_at(&disks_[i].x) - move);
       put_pair(&disks_[k].x, pair_at(&disks_[k].x) + move);
     }
