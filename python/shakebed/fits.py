@@ -280,7 +280,8 @@ def find_answer(
     diameter : str or float, optional
         Diameter D of a disk ("2.99 mm", or a number in m). With it T/(m g) is given as a length.
     width_between_walls : float, optional
-        Width of a bed between hard side walls [D]. Near them the bed is thinner, which adds to the error of T.
+        Width of a bed between hard side walls [D]. Near them the bed is thinner. The answer corrects for this, and
+        states what is left as part of the error.
 
     Returns
     -------
