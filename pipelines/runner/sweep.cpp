@@ -14,6 +14,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/runner/gathered_warnings.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "pipelines/runner/moved_points.hpp"
 #include "pipelines/runner/pages.hpp"
 #include "pipelines/runner/shared_stages.hpp"
 #include "pipelines/runner/sweep_progress.hpp"
@@ -107,11 +108,28 @@ class SweepRun {
       shared_.count(keys);
       if (point.index % shard_.of == shard_.number - 1) mine_.push_back({&point, std::move(keys), {}, false, 0});
     }
+    const std::map<std::string, std::string> elsewhere = computed_elsewhere();
     for (Mine& one : mine_) {
-      one.earlier = code_of_point(points_dir_ / one.point->name, one.keys.point);
+      const auto found = elsewhere.find(one.point->name);
+      one.earlier =
+          code_of_point(points_dir_ / (found == elsewhere.end() ? one.point->name : found->second), one.keys.point);
       one.done = !options_.force && is_done(one.earlier);
       kept_ += one.done;
     }
+  }
+
+  // Points that were computed under another number. They are moved to their own place, but by a dry run. Shards work at
+  // the same time and move nothing.
+  std::map<std::string, std::string> computed_elsewhere() {
+    if (shard_.of > 1 || options_.force) return {};
+    NamedKeys names;
+    for (const Mine& one : mine_) names.emplace_back(one.point->name, one.keys.point);
+    std::map<std::string, std::string> places = earlier_places(names, points_dir_);
+    if (arguments_.dry_run || places.empty()) return places;
+    if (move_to_own_places(places, points_dir_))
+      console_.message(fmt::format(
+          "{} points have another number in this sweep than before; their folders were renamed", places.size()));
+    return {};
   }
 
   int say_what_would_run() {

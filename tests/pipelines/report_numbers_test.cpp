@@ -137,4 +137,32 @@ TEST(SweepTable, DoesNotSeeTheOrderOfItsPointsNorTheirShards) {
   EXPECT_EQ(run("shards", "[0.7, 0.9, 1.2]", {"2/2", "1/2"}), plain);
 }
 
+// Points are known by their values: one more or one fewer in the list renames folders and runs only what is new.
+TEST(SweepTable, KeepsWhatIsComputedWhenTheListOfValuesChanges) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::string& values, const std::string& out, const std::string& more) {
+    write_text(folder / "r.json", R"({ "name": "t", "sweep": { "over": { "/stages/map/gamma": )" + values +
+                                      R"( }, "collect": ["/map/gamma", "/map/critical_temperature"] },
+      "stages": [ { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", out, more}, folder.path());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return ran.out + ran.err;
+  };
+  const auto point = [&](const std::string& name) { return folder / ("o/points/" + name); };
+  run("[3, 5, 6]", "o", "--quiet");
+  for (const std::string name : {"000000", "000001", "000002"}) write_text(point(name) / "of", name);
+  const std::string next = "[2, 3, 4, 6]";  // 3 and 6 move, 5 is left out
+  EXPECT_THAT(run(next, "o", "--dry-run"), HasSubstr("2 of 4 points to run"));
+  EXPECT_EQ(read_text(point("000000") / "of"), "000000") << "a dry run moves nothing";
+  EXPECT_THAT(run(next, "o", "--jobs=1"), HasSubstr("4 points, 2 up to date, 2 to run"));
+  EXPECT_EQ(read_text(point("000001") / "of"), "000000");
+  EXPECT_EQ(read_text(point("000003") / "of"), "000002");
+  run(next, "fresh", "--quiet");
+  EXPECT_EQ(read_text(folder / "o/sweep.csv"), read_text(folder / "fresh/sweep.csv"));
+  // Turned round: two pairs of folders change places.
+  EXPECT_THAT(run("[6, 4, 3, 2]", "o", "--jobs=1"), HasSubstr("4 points, 4 up to date, 0 to run"));
+  EXPECT_EQ(read_text(point("000000") / "of"), "000002");
+  EXPECT_EQ(read_text(point("000002") / "of"), "000000");
+}
+
 }  // namespace
