@@ -108,6 +108,9 @@ std::string map_colour(double share) {
                      light > 0.18 ? "#000" : "#fff");
 }
 
+// Ends of the range of an answer, which its temperature is drawn with.
+constexpr std::string_view low_end = "/interval/low", high_end = "/interval/high";
+
 // The figures of a sweep: every gathered number against the first axis that has numbers, one series for each
 // combination of the other axes.
 class SweepFigures {
@@ -125,7 +128,9 @@ class SweepFigures {
 
   // A number over two parameters, replicas averaged; "" where it is not a grid of two.
   std::string map_html(std::size_t k) const {
-    if (random_ || axes_.size() != 2 || !place(sweep_.points.front(), 0) || !place(sweep_.points.front(), 1)) return "";
+    if (is_end_of_range(k) || random_ || axes_.size() != 2 || !place(sweep_.points.front(), 0) ||
+        !place(sweep_.points.front(), 1))
+      return "";
     struct Cell {
       double sum = 0;
       int count = 0;
@@ -141,7 +146,7 @@ class SweepFigures {
       columns.insert(*x);
       Cell& cell = rows[*y][*x];
       if (value) cell.sum += *value, ++cell.count;
-      cell.hollow = cell.hollow || hollow(i);
+      cell.hollow = cell.hollow || hollow(i, k);
     }
     if (columns.size() < 2 || rows.size() < 2 || columns.size() > most_columns_of_map) return "";
     double low = INFINITY, high = -INFINITY;
@@ -178,6 +183,7 @@ class SweepFigures {
     std::vector<fs::path> figures;
     if (along_ == axes_.size()) return figures;
     for (std::size_t k = 0; k < sweep_.collected.size(); ++k) {
+      if (is_end_of_range(k)) continue;
       const Picture picture = picture_of(k);
       if (picture.series.empty()) continue;
       const std::string name = fmt::format("sweep-{}", k + 1);
@@ -225,14 +231,55 @@ class SweepFigures {
     return label.empty() ? "points" : label;
   }
 
-  // Points without one temperature are hollow.
-  bool hollow(std::size_t point) const {
+  // The collected number that belongs to the same answer as number k, by how its pointer ends; nothing when there is
+  // none.
+  std::optional<std::size_t> of_same_answer(std::size_t k, std::string_view end) const {
+    const std::string& pointer = sweep_.collected[k];
+    for (const PlannedStage& stage : plan_.stages) {
+      const std::string answer = fmt::format("/{}{}", stage.id, stage.row->answer);
+      if (stage.row->answer.empty() || !pointer.starts_with(answer + "/")) continue;
+      const auto found = std::find(sweep_.collected.begin(), sweep_.collected.end(), answer + std::string(end));
+      if (found != sweep_.collected.end()) return static_cast<std::size_t>(found - sweep_.collected.begin());
+    }
+    return std::nullopt;
+  }
+
+  // Drawn with the temperature, not by themselves.
+  bool is_end_of_range(std::size_t k) const {
+    return of_same_answer(k, low_end) == k || of_same_answer(k, high_end) == k;
+  }
+
+  bool is_temperature_of_answer(std::size_t k) const {
+    return std::any_of(plan_.stages.begin(), plan_.stages.end(), [&](const PlannedStage& stage) {
+      const std::string temperature = fmt::format("/{}{}/temperature", stage.id, stage.row->answer);
+      return !stage.row->answer.empty() &&
+             (sweep_.collected[k] == temperature || sweep_.collected[k] == temperature + "_over_mg");
+    });
+  }
+
+  // The temperature of a point that has no single one.
+  bool hollow(std::size_t point, std::size_t k) const {
     const std::string& verdict = sweep_.table[point + 1].back();
-    return sweep_.table.front().back() == verdict_column && !verdict.empty() && !is_one_temperature(verdict);
+    return sweep_.table.front().back() == verdict_column && !verdict.empty() && !is_one_temperature(verdict) &&
+           is_temperature_of_answer(k);
+  }
+
+  std::optional<double> cell_of(std::size_t point, std::size_t k, bool error) const {
+    return number_of(sweep_.table[point + 1][3 + axes_.size() + 2 * k + (error ? 1 : 0)]);
+  }
+
+  // The standard error; of the middle of a range, half the range.
+  std::optional<double> error_of(std::size_t point, std::size_t k) const {
+    if (const auto stated = cell_of(point, k, true)) return stated;
+    const auto low = of_same_answer(k, low_end), high = of_same_answer(k, high_end);
+    if (!hollow(point, k) || !low || !high || sweep_.collected[k].ends_with("_over_mg")) return std::nullopt;
+    const auto from = cell_of(point, *low, false), to = cell_of(point, *high, false);
+    return from && to ? std::optional((*to - *from) / 2) : std::nullopt;
   }
 
   // Of the point: two series a label, filled and hollow. None beyond most_series labels.
-  Series* series_of(Picture& picture, std::map<std::string, std::size_t>& groups, std::size_t point) const {
+  Series* series_of(Picture& picture, std::map<std::string, std::size_t>& groups, std::size_t point,
+                    std::size_t k) const {
     const std::string label = label_of(sweep_.points[point]);
     const auto [group, fresh] = groups.emplace(label, groups.size());
     if (group->second >= most_series) return nullptr;
@@ -241,23 +288,20 @@ class SweepFigures {
       picture.series.push_back({label, Series::Style::points, color, {}, {}, {}});
       picture.series.push_back({label + ", not one temperature", Series::Style::points, color, {}, {}, {}, true});
     }
-    return &picture.series[2 * group->second + (hollow(point) ? 1 : 0)];
+    return &picture.series[2 * group->second + (hollow(point, k) ? 1 : 0)];
   }
 
   Picture picture_of(std::size_t k) {
     const NumberWords number = words_of_number(plan_, sweep_.collected[k]);
     Picture picture{.x_label = axis_label(along_), .y_label = with_unit(number.name, number.unit)};
-    const std::size_t column = 3 + axes_.size() + 2 * k;
     std::map<std::string, std::size_t> groups;
     for (std::size_t i = 0; i < sweep_.points.size(); ++i) {
-      const std::vector<std::string>& row = sweep_.table[i + 1];
-      const std::optional<double> x = place(sweep_.points[i], along_), y = number_of(row[column]);
+      const std::optional<double> x = place(sweep_.points[i], along_), y = cell_of(i, k, false);
       if (!x || !y) continue;
-      Series* series = series_of(picture, groups, i);
+      Series* series = series_of(picture, groups, i, k);
       if (series == nullptr) continue;
       series->x.push_back(*x), series->y.push_back(number.factor * *y);
-      if (const std::optional<double> error = number_of(row[column + 1]))
-        series->error.push_back(number.factor * *error);
+      if (const std::optional<double> error = error_of(i, k)) series->error.push_back(number.factor * *error);
     }
     for (Series& series : picture.series) {
       if (series.error.size() != series.x.size()) series.error.clear();
@@ -286,7 +330,9 @@ class SweepPage {
     std::size_t k = 0;
     for (const fs::path& figure : figures_(sweep_.out / "figures"))
       out += figure_html(figure, ++number,
-                         ++k == 1 ? "Each number against the first parameter; error bars: one standard error." : "");
+                         ++k == 1 ? "Each number against the first parameter; error bars: one standard error, or the "
+                                    "whole range where there is no single temperature."
+                                  : "");
     out += warnings() + maps() + points();
     for (const std::string& paragraph : plan_.report.text) out += fmt::format("<p>{}</p>\n", prose(paragraph));
     if (plan_.report.text.empty() && !plan_.description.empty())
@@ -305,7 +351,7 @@ class SweepPage {
     if (!sweep_.verdicts.empty()) {
       out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep_.verdicts)));
       if (sweep_.verdicts.size() > 1 || !is_one_temperature(sweep_.verdicts.begin()->first))
-        out += " Points without one temperature are drawn hollow (○ in maps).";
+        out += " The temperature of a point that has not one temperature is drawn hollow (○ in maps).";
       out += "</p>\n";
     }
     return out + "</section>\n";

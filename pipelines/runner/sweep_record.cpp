@@ -20,7 +20,9 @@ std::vector<std::string> collected(const Plan& plan) {
   std::vector<std::string> pointers;
   for (const PlannedStage& stage : plan.stages) {
     for (const std::string_view key : stage.row->headline) pointers.push_back(fmt::format("/{}/{}", stage.id, key));
-    if (!stage.row->answer.empty()) pointers.push_back(fmt::format("/{}{}/temperature", stage.id, stage.row->answer));
+    if (stage.row->answer.empty()) continue;
+    for (const char* part : {"temperature", "interval/low", "interval/high"})
+      pointers.push_back(fmt::format("/{}{}/{}", stage.id, stage.row->answer, part));
   }
   return pointers;
 }

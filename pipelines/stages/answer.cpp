@@ -17,11 +17,15 @@ std::optional<fit::Estimate> estimate_at(const Json& json, const std::string& po
   return fit::Estimate{factor * value->get<double>(), factor * spread};
 }
 
-// T in m g D and as T/(m g).
-void put_temperature(Json& out, const std::string& name, double value, double std_error,
+// T in m g D and as T/(m g). The middle of a range has no standard error: null.
+void put_temperature(Json& out, const std::string& name, double value, std::optional<double> std_error,
                      std::optional<double> diameter) {
-  out[name] = quantity_json(value, "m g D", std_error);
-  if (diameter) out[name + "_over_mg"] = quantity_json(value * *diameter, "m", std_error * *diameter);
+  const auto put = [&](const std::string& key, const char* unit, double factor) {
+    out[key] = quantity_json(value * factor, unit, std_error.value_or(0) * factor);
+    if (!std_error) out[key]["std_error"] = nullptr;
+  };
+  put(name, "m g D", 1);
+  if (diameter) put(name + "_over_mg", "m", *diameter);
 }
 
 }  // namespace
@@ -96,7 +100,9 @@ Json answer_json(const fit::Answer& answer, std::optional<double> diameter) {
   out["advice"] = answer.advice;
   out["status"] = fit::to_string(answer.status);
   if (!answer.ok()) return out;
-  put_temperature(out, "temperature", answer.temperature, answer.std_error, diameter);
+  const bool range = answer.verdict == fit::Verdict::no_single_temperature;
+  put_temperature(out, "temperature", answer.temperature, range ? std::nullopt : std::optional(answer.std_error),
+                  diameter);
   out["interval"] = Json{{"low", quantity_json(answer.interval.low, "m g D")},
                          {"high", quantity_json(answer.interval.high, "m g D")},
                          {"confidence", answer.interval.confidence > 0 ? Json(answer.interval.confidence) : Json()}};

@@ -117,7 +117,10 @@ class FitStatement {
                      both(given, given_when("the diameter is known")));
     };
     const Given kinetic = both(found, given_when("a kinetic temperature is known"));
-    temperature("temperature", "temperature with its whole uncertainty", found);
+    temperature("temperature",
+                "temperature with its whole uncertainty; without one temperature, the middle of the range, and no "
+                "standard error",
+                found);
     temperature("temperature_x", "kinetic temperature, horizontal", kinetic);
     temperature("temperature_z", "kinetic temperature, vertical", kinetic);
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);

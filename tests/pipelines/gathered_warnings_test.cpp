@@ -60,8 +60,13 @@ TEST(Sweeps, SayTheVerdictOfEveryPoint) {
     const std::string line = table.substr(row + 1, end - row - 1);
     const auto verdict = answer["verdict"].get<std::string>();
     EXPECT_TRUE(line.ends_with("," + verdict)) << line;
+    // A range has its two ends and no standard error.
+    const bool range = verdict == "no single temperature";
+    EXPECT_EQ(answer["temperature"]["std_error"].is_null(), range);
     EXPECT_THAT(line, testing::HasSubstr("," + answer["temperature"]["value"].dump() + "," +
-                                         answer["temperature"]["std_error"].dump() + ","));
+                                         (range ? "" : answer["temperature"]["std_error"].dump()) + "," +
+                                         answer["interval"]["low"]["value"].dump() + ",," +
+                                         answer["interval"]["high"]["value"].dump() + ",,"));
     EXPECT_THAT(read_text(folder / "o/report.html"), testing::HasSubstr(verdict));
     EXPECT_THAT(ran.out, testing::HasSubstr(verdict));
   }
