@@ -165,6 +165,7 @@ py::dict observables(const Bed& bed) {
   }
   out["temperature_x"] = measured(m.temperature_x);
   out["temperature_z"] = measured(m.temperature_z);
+  out["temperature_z_local"] = measured(m.temperature_z_local);
   out["spin_temperature"] = measured(m.spin_temperature);
   if (bed.input.bed.periodic_upwards()) out["compressibility_factor"] = measured(m.compressibility_factor);
   return out;
@@ -383,6 +384,7 @@ py::dict answer_of(const fit::Answer& answer) {
   out["advice"] = answer.advice;
   number("temperature", answer.temperature);
   number("std_error", answer.std_error);
+  if (answer.verdict == fit::Verdict::no_single_temperature) out["std_error"] = py::none();  // the middle of a range
   number("statistical_error", answer.statistical_error);
   number("bias_uncertainty", answer.bias_uncertainty);
   number("wall_uncertainty", answer.wall_uncertainty);
@@ -538,15 +540,17 @@ py::tuple read_trajectory(const std::string& path, bool y_is_up) {
                         array_of(held->floor_velocities));
 }
 
-// Heights of centres, frames x disks, to a density with its errors and covariance.
-py::dict density_profile(const Doubles& z, double width, const std::string& kernel_text, const HeightGrid& grid) {
+// Heights of centres, frame after frame, to a density with its errors and covariance. `ends`: of each frame, the place
+// behind its last height.
+py::dict density_profile(const Doubles& z, const std::vector<std::size_t>& ends, double width,
+                         const std::string& kernel_text, const HeightGrid& grid) {
   const Kernel kernel = kernel_named(kernel_text);
-  const auto frames = static_cast<std::size_t>(z.shape(0)), disks = static_cast<std::size_t>(z.shape(1));
+  const std::size_t frames = ends.size();
   fit::ProfileFrames densities;
   for (std::size_t i = 0; i < grid.points; ++i) densities.height.push_back(grid.height(i));
   densities.number_density.resize(frames * grid.points);
-  for (std::size_t k = 0; k < frames; ++k)
-    add_density(grid, kernel, width, {z.data() + k * disks, disks}, 0,
+  for (std::size_t k = 0, begin = 0; k < frames; begin = ends[k++])
+    add_density(grid, kernel, width, {z.data() + begin, ends[k] - begin}, 0,
                 std::span(densities.number_density).subspan(k * grid.points, grid.points));
   const fit::FrameAverage average = fit::average_frames(densities);
   if (average.status != fit::FitStatus::ok) throw Mistake(average.message);
@@ -624,9 +628,9 @@ PYBIND11_MODULE(_core, m) {
   bind_beds(m);
   bind_fits(m);
   m.def("read_trajectory", &read_trajectory);
-  m.def("density_profile", [](const Doubles& z, double width, const std::string& kernel, double lowest, double spacing,
-                              std::size_t points) {
-    return density_profile(z, width, kernel, {.lowest = lowest, .spacing = spacing, .points = points});
+  m.def("density_profile", [](const Doubles& z, const std::vector<std::size_t>& ends, double width,
+                              const std::string& kernel, double lowest, double spacing, std::size_t points) {
+    return density_profile(z, ends, width, kernel, {.lowest = lowest, .spacing = spacing, .points = points});
   });
   m.def("check_recipe", &check_recipe);
   m.def("odd_bead", &odd_bead);

@@ -33,7 +33,7 @@ print("fastest disk: %.2f sqrt(g D)" % np.hypot(*np.moveaxis(trajectory.velociti
 
 # %%
 answer = bed.answer()
-print(answer["verdict"], "T = %.2f +- %.2f m g D" % (answer["temperature"], answer["std_error"]))
+print(answer["verdict"], ": T from %.2f to %.2f m g D" % (answer["low"], answer["high"]))
 print(answer["why"])
 
 # %% [markdown]

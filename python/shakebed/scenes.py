@@ -133,8 +133,9 @@ def density_profile(
 
     Parameters
     ----------
-    heights : array_like, shape (frames, disks)
-        Heights of the centres above the floor [D]; frames in the order of time.
+    heights : array_like, shape (frames, disks), or a sequence of one-dimensional arrays, one a frame
+        Heights of the centres above the floor [D]; frames in the order of time. Frames of a sequence may have
+        different numbers of disks.
     width : float
         Width of the bed [D].
     kernel : str
@@ -152,9 +153,7 @@ def density_profile(
     UsageError
         A shape or a value is invalid.
     """
-    z = np.ascontiguousarray(np.asarray(heights, float))
-    if z.ndim != 2 or z.size == 0:
-        raise UsageError(f"heights has shape {z.shape}; it must be (frames, disks)")
+    z, ends = _joined_frames(heights)
     if not np.isfinite(z).all():
         raise UsageError("heights holds numbers that are not finite")
     for name, value in (("width", width), ("spacing", spacing)):
@@ -167,7 +166,18 @@ def density_profile(
     points = int(np.floor((high - low) / spacing)) + 1
     if points > _most_heights:
         raise UsageError(f"spacing {spacing} makes {points} heights; take at most {_most_heights}")
-    return profile_from(_core.density_profile(z, float(width), kernel, low, float(spacing), points))
+    return profile_from(_core.density_profile(z, ends, float(width), kernel, low, float(spacing), points))
+
+
+def _joined_frames(heights: Any) -> tuple[Array, Any]:
+    """Heights of all frames, one after another, and of each frame the place behind its last."""
+    frames = [np.asarray(frame, float) for frame in heights]
+    wrong = [frame.shape for frame in frames if frame.ndim != 1]
+    if wrong:
+        raise UsageError(f"a frame of heights has shape {wrong[0]}; it must be (disks,), that of heights (frames, disks)")
+    if not any(frame.size for frame in frames):
+        raise UsageError(f"heights has {len(frames)} frames and no disk")
+    return np.concatenate(frames), np.cumsum([frame.size for frame in frames])
 
 
 class _Document(NamedTuple):

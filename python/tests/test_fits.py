@@ -105,6 +105,14 @@ def test_bad_data_are_a_status_and_bad_arguments_an_exception():
         shakebed.gamma_to_temperature(frequency=20, diameter=3e-3, initial_height=10)
 
 
+def test_frames_may_have_different_numbers_of_disks():
+    """Each frame counts once, however many disks it holds: one disk at 1 D, then three at 2 D, in bins of 1 D."""
+    found = shakebed.density_profile([[1.0], [2.0, 2.0, 2.0]] * 20, 10, kernel="top_hat:1", spacing=1, highest=3)
+    assert found.number_density == pytest.approx([0, 0.5 / 10, 1.5 / 10, 0])
+    same = shakebed.density_profile(np.tile([[1.0, 2.0]], (40, 1)), 10, kernel="top_hat:1", spacing=1, highest=3)
+    assert same.number_density == pytest.approx([0, 0.1, 0.1, 0])
+
+
 def test_density_of_known_centres_adds_up(scene):
     """The area under the profile is N D/W, whatever the kernel."""
     z = shakebed.simulate(scene).trajectory().array[:, :, 1]
@@ -115,5 +123,7 @@ def test_density_of_known_centres_adds_up(scene):
         assert np.allclose(np.sqrt(np.diag(profile.covariance)), profile.std_error)
     with pytest.raises(shakebed.UsageError, match="frames, disks"):
         shakebed.density_profile(z[0], 10.3)
+    with pytest.raises(shakebed.UsageError, match="no disk"):
+        shakebed.density_profile([[], []], 10.3)
     with pytest.raises(shakebed.UsageError, match="finite"):
         shakebed.density_profile(np.full((3, 3), np.nan), 10.3)

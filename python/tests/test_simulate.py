@@ -39,6 +39,7 @@ def test_results_are_those_of_the_command_line(scene, folder):
     assert np.array_equal(bed.floor_frame_profile.number_density, floor_frame["number_density"])
     for name, quantity in bed.observables.items():
         assert quantity == files[name], name
+    assert {"temperature_x", "temperature_z", "temperature_z_local", "center_of_mass_rise"} <= set(bed.observables)
     assert bed.energy["dissipated"] == files["energy_ledger"]["dissipated"]
     assert bed.counters["collisions"] == files["collisions"]
 

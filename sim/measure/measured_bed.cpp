@@ -66,6 +66,7 @@ class Observer final : public RunObserver {
     covariance();
     out_.temperature_x = bed_->temperature_x();
     out_.temperature_z = bed_->temperature_z();
+    out_.temperature_z_local = bed_->temperature_z_local();
     out_.spin_temperature = bed_->spin_temperature();
     if (std::holds_alternative<UniformGravity>(scene_.gravity)) {
       out_.centre_of_mass = bed_->centre_of_mass();

@@ -106,6 +106,7 @@ struct MeasuredBed {
   DiskProperties disks;
   std::vector<Snapshot> frames;
   std::vector<double> frame_phases;  // of the floor's cycle, 0 to 1
+  Measured temperature_z_local;      // of v_z without the mean velocity of each layer of 1 D at each phase
 
   [[nodiscard]] bool ok() const { return status == MeasureStatus::ok; }
   [[nodiscard]] std::string brief() const;  // one line
