@@ -14,6 +14,12 @@ namespace shakebed::pipelines {
 namespace {
 
 int verify(const Call& call, const std::filesystem::path& out) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(out, error))
+    throw InputError(fmt::format("{}: there is no such folder", out.string()));
+  if (!std::filesystem::exists(out / "manifest.json", error))
+    throw InputError(fmt::format(
+        "{}: holds no manifest.json, so no run has ended here. Give the folder that --out named", out.string()));
   const VerifyResult result = verify_output(out);
   if (call.json) {
     print(dump(Json{{"files", result.files}, {"problems", result.problems}}));

@@ -446,7 +446,8 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
   }
   std::sort(order.begin(), order.end());
   std::vector<std::size_t> chosen;
-  for (const auto& [ignored, i] : order) {
+  for (const auto& [ignored, place] : order) {
+    const std::size_t i = place;
     if (chosen.size() == options_.best) break;
     const bool apart = std::all_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
       double square = 0;

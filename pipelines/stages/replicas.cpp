@@ -188,10 +188,11 @@ Table replicas_table(const std::vector<Json>& results) {
   std::vector<std::pair<std::string, std::string>> quantities;  // name, unit
   for (const Json& one : results) {
     for (const auto& [key, value] : one.items()) {
+      const std::string& name = key;
       const bool known =
-          std::any_of(quantities.begin(), quantities.end(), [&](const auto& q) { return q.first == key; });
+          std::any_of(quantities.begin(), quantities.end(), [&](const auto& q) { return q.first == name; });
       if (!known && value.is_object() && value.contains("value"))
-        quantities.emplace_back(key, value.value("unit", std::string("1")));
+        quantities.emplace_back(name, value.value("unit", std::string("1")));
     }
   }
   std::vector<StatedColumn> columns{{"replica", "1", "number of the replica, from 0"}};

@@ -308,7 +308,7 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
   context.warning(
       fmt::format("the contact duration t_c = {} makes {:.2g} % of the contacts elastic, so T may be about {:.2g} % "
                   "too high. This t_c is a numerical cut-off, not the time that a real contact lasts{}. "
-                  "\"contact_duration\": {} would reduce this to about {:.2g} %, with more contacts",
+                  "\"contact_duration\": {} would reduce this to {:.2g} % or less, with more contacts",
                   text(duration), 100 * results.at("elastic_share").at("value").get<double>(),
                   100 * effect->get<double>(), contact_time_text(bed_), text(shorter), 100 * allowed_contact_effect));
 }

@@ -71,7 +71,8 @@ double trial_seconds(const sim::Scene& scene, const sim::MeasurementSchedule& sc
   sim::MeasurementSchedule part;
   part.period = schedule.period, part.phases = schedule.phases;
   part.settle = std::min(schedule.settle, std::max(trial_share * schedule.settle, shortest_trial * schedule.period));
-  part.periods = std::min(schedule.periods, 1 + static_cast<std::uint64_t>(trial_share * schedule.periods));
+  part.periods =
+      std::min(schedule.periods, 1 + static_cast<std::uint64_t>(trial_share * static_cast<double>(schedule.periods)));
   TrialClock clock;
   observers.push_back(&clock);
   const double start = thread_cpu_seconds();

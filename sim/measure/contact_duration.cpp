@@ -11,8 +11,9 @@ namespace {
 // 2 %, 0.04 and 5 % at e = 0.95, Gamma = 4, t_c = 1.4e-3, 3.5e-3; 0.09 and 5 %, 0.15 and 13 % at e = 0.8, Gamma = 2,
 // t_c = 3e-5, 1e-4; 0.066 and none at e = 0.6, friction 0.8, Gamma = 4, t_c = 1e-4.
 constexpr double heating = 1.0;
-// The share grows as t_c to a power of 0.3 (rough, dissipating), 0.4 (dense, Gamma = 2) to 0.8 (Gamma = 3).
-constexpr double growth = 0.4;
+// The share grows as t_c to a power of 0.3 (rough, dissipating), 0.4 (dense, Gamma = 2) to 0.8 (Gamma = 3). By the
+// slowest, the advised t_c is short enough in each.
+constexpr double growth = 0.3;
 
 }  // namespace
 
