@@ -1,5 +1,6 @@
 """What the tests share."""
 
+import ctypes
 import subprocess
 
 import numpy as np
@@ -25,6 +26,28 @@ SCENE = {
 @pytest.fixture
 def scene():
     return dict(SCENE)
+
+
+class _Mallinfo2(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_size_t) for name in
+                "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost".split()]
+
+
+def growth(work, *, warm=5, times=8):
+    """Bytes that are allocated more after `times` calls of work() than before, once `warm` calls were made (glibc)."""
+    mallinfo = ctypes.CDLL(None).mallinfo2
+    mallinfo.restype = _Mallinfo2
+
+    def allocated():
+        info = mallinfo()
+        return info.uordblks + info.hblkhd
+
+    for _ in range(warm):
+        work()
+    before = allocated()
+    for _ in range(times):
+        work()
+    return allocated() - before
 
 
 def shakebed_program(*arguments, **options):
