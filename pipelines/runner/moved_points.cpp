@@ -81,7 +81,8 @@ bool move_to_own_places(const std::map<std::string, std::string>& places, const 
     for (const fs::directory_entry& entry : fs::directory_iterator(points_dir))
       if (entry.is_directory() && is_in_use(entry.path())) return false;
     std::map<std::string, std::string> now_at;  // of a folder that was exchanged
-    for (const auto& [own, before] : places) {
+    for (const auto& [name, before] : places) {
+      const std::string& own = name;
       const std::string from = now_at.contains(before) ? now_at[before] : before;
       if (from == own) continue;
       exchange(points_dir / own, points_dir / from);

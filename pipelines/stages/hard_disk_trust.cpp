@@ -12,7 +12,7 @@ namespace {
 // Measured by `ctest -L study -R SoftSpheres -V` against tests/physics/reference/soft_spheres.csv. With friction, the
 // disks have the tangential restitution e^1.75 of the spheres' spring.
 // clang-format off
-constexpr std::array study{
+constexpr std::array studied_beds{
     HardDiskBed{0.6, 0, 4.85, 2, 1.025, 0.092, 1.013, 0.094, 0.674},
     HardDiskBed{0.6, 0, 15.5, 3, 0.953, 0.033, 1.017, 0.049, 0.342},
     HardDiskBed{0.6, 0.5, 4.85, 6, 1.149, 0.172, 0.945, 0.076, 0.502},
@@ -51,7 +51,7 @@ double distance(const HardDiskScene& scene, const HardDiskBed& bed) {
 
 const HardDiskBed* nearest(const HardDiskScene& scene) {
   const HardDiskBed* best = nullptr;
-  for (const HardDiskBed& bed : study) {
+  for (const HardDiskBed& bed : studied_beds) {
     if ((scene.friction >= least_friction) != (bed.friction > 0)) continue;
     if (best == nullptr || distance(scene, bed) < distance(scene, *best)) best = &bed;
   }
@@ -71,7 +71,7 @@ std::string of_bed(const HardDiskBed& bed) {
 
 }  // namespace
 
-std::span<const HardDiskBed> hard_disk_study() { return study; }
+std::span<const HardDiskBed> hard_disk_study() { return studied_beds; }
 
 HardDiskTrust trust_in_hard_disks(const HardDiskScene& scene) {
   HardDiskTrust trust;
