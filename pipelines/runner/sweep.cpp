@@ -115,7 +115,18 @@ class SweepRun {
           code_of_point(points_dir_ / (found == elsewhere.end() ? one.point->name : found->second), one.keys.point);
       one.done = !options_.force && is_done(one.earlier);
       kept_ += one.done;
+      if (one.done && !arguments_.dry_run) collect_again(*one.point);
     }
+  }
+
+  // A recipe may ask a finished point for other numbers than before.
+  void collect_again(const SweepPoint& point) const {
+    const fs::path folder = points_dir_ / point.name;
+    std::optional<Json> record = read_point(folder);
+    if (!record || (*record)["pointers"] == Json(pointers_)) return;
+    (*record)["cells"] = gather_cells(plan_at(plan_, point), folder, pointers_);
+    (*record)["pointers"] = pointers_;
+    write_file_atomically(folder / point_record, dump(*record));
   }
 
   // Points that were computed under another number. They are moved to their own place, but by a dry run. Shards work at

@@ -91,10 +91,15 @@ Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
     axes.push_back(kind_of(rows, columns.size()));
     columns.push_back({column_name(axis.pointer, axes.back().unit), axes.back().unit, axis.pointer});
   }
-  for (const std::string& pointer : collected) {
-    const std::string unit = unit_of_result(plan, pointer);
-    columns.push_back({column_name(pointer, unit), unit, pointer});
-    columns.push_back({column_name(pointer + "/std_error", unit), unit, "standard error of " + pointer});
+  for (const std::string& collected_pointer : collected) {
+    const std::string unit = unit_of_result(plan, collected_pointer);
+    // A result may have the name of an option that is an axis.
+    const bool named = std::any_of(columns.begin(), columns.end(), [&](const StatedColumn& column) {
+      return column.name == column_name(collected_pointer, unit);
+    });
+    const std::string pointer = collected_pointer + (named ? "/result" : "");
+    columns.push_back({column_name(pointer, unit), unit, collected_pointer});
+    columns.push_back({column_name(pointer + "/std_error", unit), unit, "standard error of " + collected_pointer});
   }
   if (columns.size() < rows.front().size())
     columns.push_back({std::string(verdict_column), "",

@@ -137,6 +137,26 @@ TEST(SweepTable, DoesNotSeeTheOrderOfItsPointsNorTheirShards) {
   EXPECT_EQ(run("shards", "[0.7, 0.9, 1.2]", {"2/2", "1/2"}), plain);
 }
 
+// Other numbers are read from the points that are there; a result with the name of an axis has a column of its own.
+TEST(SweepTable, HoldsOtherNumbersWhenTheRecipeAsksForThem) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::string& collect) {
+    write_text(folder / "r.json", R"({ "name": "t", "sweep": { "over": { "/stages/map/gamma": [3, 5] }, "collect": )" +
+                                      collect + R"( },
+      "stages": [ { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
+    const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o", "--quiet"}, folder.path());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("2 of 2 points done"));
+    return NumberTable(folder / "o/sweep.csv");
+  };
+  run(R"(["/map/critical_temperature"])");
+  const NumberTable table = run(R"(["/map/gamma"])");
+  EXPECT_THAT(table.header(), testing::ElementsAre("point", "replica", "status", "map_gamma", "map_gamma_result",
+                                                   "map_gamma_result_std_error"));
+  EXPECT_EQ(table("map_gamma", 1), 5);
+  EXPECT_EQ(table("map_gamma_result", 1), 5);
+}
+
 // Points are known by their values: one more or one fewer in the list renames folders and runs only what is new.
 TEST(SweepTable, KeepsWhatIsComputedWhenTheListOfValuesChanges) {
   const ScratchFolder folder;
