@@ -8,6 +8,7 @@
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/process.hpp"
+#include "pipelines/runner/moved_points.hpp"
 #include "pipelines/runner/sweep_points.hpp"
 #include "pipelines/runner/sweep_record.hpp"
 
@@ -38,16 +39,25 @@ void require_empty_queue(const fs::path& submitted) {
                     job, gather, job, gather));
 }
 
-// Shards with something left to do, as Slurm writes them: "1-3,7".
+// Shards with something left to do, as Slurm writes them: "1-3,7". Points that were computed under another number are
+// moved first, but by a dry run: the shards themselves move none.
 struct Tasks {
   std::string text;
   std::size_t tasks = 0, missing_points = 0;
 };
-Tasks tasks_of(const Plan& plan, const std::vector<SweepPoint>& points, std::size_t shards, const fs::path& out) {
+Tasks tasks_of(const Plan& plan, const std::vector<SweepPoint>& points, std::size_t shards,
+               const SlurmOptions& options) {
+  const fs::path folder = options.out / "points";
+  NamedKeys keys;
+  for (const SweepPoint& point : points) keys.emplace_back(point.name, keys_of(plan_at(plan, point)).point);
+  std::map<std::string, std::string> elsewhere = earlier_places(keys, folder);
+  if (!options.dry_run && move_to_own_places(elsewhere, folder)) elsewhere.clear();
   std::vector<std::uint8_t> waiting(shards, 0);
   Tasks tasks;
   for (const SweepPoint& point : points) {
-    if (is_done(code_of_point(out / "points" / point.name, keys_of(plan_at(plan, point)).point))) continue;
+    const auto found = elsewhere.find(point.name);
+    const fs::path place = folder / (found == elsewhere.end() ? point.name : found->second);
+    if (is_done(code_of_point(place, keys[point.index].second))) continue;
     waiting[point.index % shards] = 1;
     ++tasks.missing_points;
   }
@@ -108,7 +118,7 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   const std::size_t shards = std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size());
   const fs::path folder = options.out / "slurm", submitted = folder / "submitted.json";
   if (!options.dry_run) require_empty_queue(submitted);
-  const Tasks tasks = tasks_of(plan, points, shards, options.out);
+  const Tasks tasks = tasks_of(plan, points, shards, options);
   const bool runs = tasks.missing_points > 0;
   try {
     fs::create_directories(folder);

@@ -28,6 +28,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr std::string_view count_record = ".sweep";  // in points/: how many points the recipe has
 constexpr std::size_t most_failures = 20;           // that are listed one by one
 constexpr std::size_t most_learned = 50;            // points done before that say what stages take
 constexpr std::int64_t show_interval = 90'000'000;  // [ns]
@@ -78,6 +79,7 @@ class SweepRun {
     if (arguments_.dry_run) return say_what_would_run();
     try {
       fs::create_directories(points_dir_);
+      write_file_atomically(points_dir_ / count_record, dump(Json{{"points", all_.size()}}));
     } catch (const fs::filesystem_error& error) {
       throw StageError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.code().message()));
     }
@@ -459,9 +461,17 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
 Json sweep_status(const fs::path& out) {
   std::error_code error;
   if (!fs::is_directory(out / "points", error)) return nullptr;
-  std::uint64_t points = 0, done = 0, failed = 0;
+  std::uint64_t points = 0, done = 0, failed = 0, left = 0;
+  if (fs::is_regular_file(out / "points" / count_record, error))
+    points = read_json(out / "points" / count_record).value("points", std::uint64_t{0});
+  else if (fs::is_regular_file(out / "summary.json", error))  // as versions before 1.0 left it
+    points = read_json(out / "summary.json").value("points", std::uint64_t{0});
   for (const fs::directory_entry& entry : fs::directory_iterator(out / "points", error)) {
-    ++points;
+    if (!entry.is_directory(error)) continue;
+    if (entry.path().filename().string() >= point_name(points)) {
+      ++left;
+      continue;
+    }
     if (const auto record = read_point(entry.path())) {
       const int code = (*record)["code"].get<int>();
       if (code == exit_ok || code == exit_check_failed)
@@ -470,10 +480,7 @@ Json sweep_status(const fs::path& out) {
         ++failed;
     }
   }
-  // The recipe knows how many there should be.
-  if (fs::is_regular_file(out / "summary.json", error))
-    points = std::max(points, read_json(out / "summary.json").value("points", std::uint64_t{0}));
-  return Json{{"points", points}, {"done", done}, {"failed", failed}};
+  return Json{{"points", points}, {"done", done}, {"failed", failed}, {"left_over", left}};
 }
 
 }  // namespace shakebed::pipelines

@@ -27,7 +27,7 @@ struct SweepArguments {
 int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArguments& arguments, const Pages& pages,
                       Console& console);
 
-// {"points", "done", "failed"} of a folder with a sweep, null of any other.
+// {"points", "done", "failed", "left_over"} of a folder with a sweep, null of any other.
 Json sweep_status(const std::filesystem::path& out);
 
 }  // namespace shakebed::pipelines

@@ -179,6 +179,11 @@ TEST(SweepTable, KeepsWhatIsComputedWhenTheListOfValuesChanges) {
   EXPECT_EQ(read_text(point("000003") / "of"), "000002");
   run(next, "fresh", "--quiet");
   EXPECT_EQ(read_text(folder / "o/sweep.csv"), read_text(folder / "fresh/sweep.csv"));
+  // 3 alone: it moves to the front, the others are kept and are none of the sweep's.
+  run("[3]", "o", "--quiet");
+  EXPECT_EQ(read_text(point("000000") / "of"), "000000");
+  EXPECT_THAT(run_shakebed({"status", "o"}, folder.path()).out,
+              testing::AllOf(HasSubstr("1 of 1 points done, 0 failed"), HasSubstr("3 folders of points")));
   // Turned round: two pairs of folders change places.
   EXPECT_THAT(run("[6, 4, 3, 2]", "o", "--jobs=1"), HasSubstr("4 points, 4 up to date, 0 to run"));
   EXPECT_EQ(read_text(point("000000") / "of"), "000002");

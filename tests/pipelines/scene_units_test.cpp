@@ -380,9 +380,9 @@ TEST(TiltedBed, CountsInTheGravityOfItsPlane) {
 
 // In reduced units the gravity in the plane is the unit already.
 TEST(TiltedBed, IsTheSameInReducedUnits) {
-  const std::string disks = R"({ "disks": { "count": 12 }, "box": { "width": 12)";
-  EXPECT_EQ(options_of(disks + R"(, "tilt": 1 } })", true).gravity(), 1);
-  EXPECT_EQ(options_of(disks + R"(, "tilt": 1 } })", true).time_unit(), 1);
+  const std::string twelve_disks = R"({ "disks": { "count": 12 }, "box": { "width": 12)";
+  EXPECT_EQ(options_of(twelve_disks + R"(, "tilt": 1 } })", true).gravity(), 1);
+  EXPECT_EQ(options_of(twelve_disks + R"(, "tilt": 1 } })", true).time_unit(), 1);
 }
 
 TEST(TiltedBed, DoesNotLieFlat) {
@@ -426,11 +426,11 @@ TEST(PlatesInReducedUnits, ArePressedByTheTangentOfTheTilt) {
   const auto deceleration = [](const std::string& text) {
     return std::get<sim::RubbingPlates>(options_of(text, true).scene(1).box.plates).deceleration;
   };
-  const std::string disks = R"({ "disks": { "count": 12 }, )";
-  EXPECT_NEAR(deceleration(disks + R"("box": { "width": 12, "tilt": 1, "plates": { "friction": 0.5 } } })"),
+  const std::string twelve_disks = R"({ "disks": { "count": 12 }, )";
+  EXPECT_NEAR(deceleration(twelve_disks + R"("box": { "width": 12, "tilt": 1, "plates": { "friction": 0.5 } } })"),
               0.5 * std::tan(1), 1e-15);
   // On a horizontal plate: weightless in its plane.
-  EXPECT_EQ(deceleration(disks + R"("gravity": 0, "box": { "width": 12, "sides": "periodic", "lid": { "kind": "fixed",
+  EXPECT_EQ(deceleration(twelve_disks + R"("gravity": 0, "box": { "width": 12, "sides": "periodic", "lid": { "kind": "fixed",
     "height": 12 }, "plates": { "friction": 0.5, "pressing": 3 } } })"),
             1.5);
 }
