@@ -287,11 +287,14 @@ class Engine final : public Simulation {
   void go_on_pressed();
   void write_down_pressed();
   void end_press();
+  void soften_pressed();
+  void harden_pressed();
   void check_press(const FloorMotion::Motion& floor);
   bool press_until(double until);
   FloorMotion::Motion press_on(const FloorMotion::Motion& before, double next);
   void tell_pressed(double step) const;
   bool chatters();
+  bool is_cold() const;
   void keep_stretches();
   std::vector<PressedBed::Stretch> stretches_by_place() const;
   double spin_now(std::uint32_t i) const { return is_pressed_ ? pressed_.spin_at(i, now_ - pressed_to_) : spins_[i]; }

@@ -33,7 +33,17 @@ inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
 // 0.33 in one period in which a row locked: see tests/bench/README.md. A bed that has reached the limit is pressed
 // earlier in later periods, until one goes by without.
 inline constexpr double chattering = 0.6, chattering_on = 0.04;
-inline constexpr double softening = 1.05;       // of the contact time at most, between two checks
+// Cold ones, by T_x [m g D], from a lower limit on. They go on as soft disks through their flights, too, and land as
+// such: hard disks of e = 0.6 lose all they have at once when a cold bed lands, or keep too much of it by the contact
+// duration. Soft spheres of 10 to 20 us have T_x 0.0029 to 0.0043 at Gamma = 1.5, hard ones 0.0041 to 0.0122, beds that
+// land as hard disks and go on pressed 0.0017 to 0.0021.
+inline constexpr double cold = 0.02, chattering_of_cold = 0.22;
+inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
+// What springs that are still compressed may gain thereby [m g D], a disk and check.
+inline constexpr double gained_by_hardening = 1e-6;
+// Of the contact time at most, between two checks. What springs hold meanwhile is lost, and a landing bed is as long in
+// contact as it takes to soften: with 1.05 rough beds at Gamma = 1.2 have a fifth of T_z.
+inline constexpr double softening = 1.05, softening_of_rough = 1.005;
 inline constexpr double least_neighbours = 1;   // pairs a disk; rows on rows have three
 inline constexpr double neighbour_gap = 0.01;   // between two that are counted as such [D]
 inline constexpr double least_on_floor = 0.25;  // contacts with the floor meanwhile, a diameter of width
@@ -126,11 +136,24 @@ void Engine<Space, Rule, Sizes>::ask_press() {
 template <class Space, class Rule, class Sizes>
 bool Engine<Space, Rule, Sizes>::chatters() {
   const auto contacts = static_cast<double>(counters_.collisions() - contacts_when_counted_);
-  if (now_ - counted_since_ <= rest_period_)
-    return contacts * contact_duration_ >= (chatters_ ? chattering_on : chattering) * count_;
+  if (now_ - counted_since_ <= rest_period_) {
+    const double product = contacts * contact_duration_ / count_;
+    if (product >= (chatters_ ? chattering_on : chattering)) return true;
+    return product >= chattering_of_cold && is_cold();
+  }
   counted_since_ = now_;
   contacts_when_counted_ = counters_.collisions();
   return false;
+}
+
+template <class Space, class Rule, class Sizes>
+bool Engine<Space, Rule, Sizes>::is_cold() const {
+  double squares = 0;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const double vx = motion_at(disks_[i], now_).vx();
+    squares += vx * vx;
+  }
+  return squares < cold * count_;
 }
 
 // The tangential springs by the disks' labels: numbers change at a synchronisation.
@@ -212,27 +235,47 @@ void Engine<Space, Rule, Sizes>::end_press() {
   begin_interval();
 }
 
-// Sleeps, wakes, softens or ends, by what the bed does. After a step.
+// The contact time that follows from the contacts' speed, unless it is shorter by far.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
+void Engine<Space, Rule, Sizes>::soften_pressed() {
   const double approach = pressed_.approach(), speed = std::sqrt(pressed_.mean_square_speed());
   double contact_time = pressed_contact_time;
   if (approach * contact_time > pressed_travel) contact_time = pressed_travel / approach;
   if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
-  if (contact_time > press_contact_time_) {
-    press_contact_time_ = std::min(contact_time, softening * press_contact_time_);
-    pressed_.soften(press_contact_time_);
-  }
-  const bool falls_away = floor.acceleration + gravity_ < 0 && pressed_.floor_force() == 0;
-  if (!falls_away) {
+  if (contact_time <= press_contact_time_) return;
+  press_contact_time_ = std::min(contact_time, (Rule::spins ? softening_of_rough : softening) * press_contact_time_);
+  pressed_.soften(press_contact_time_);
+}
+
+// A bed in flight gets the contacts with which it is to land, as soon as its springs hold little.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::harden_pressed() {
+  if (press_contact_time_ <= landing_contact_time) return;
+  const double ratio = std::sqrt(pressed_.compressed() / (gained_by_hardening * count_));
+  if (ratio >= 1) return;
+  press_contact_time_ = std::max(landing_contact_time, ratio * press_contact_time_);
+  pressed_.soften(press_contact_time_);
+}
+
+// Sleeps, wakes, softens or ends, by what the bed does. After a step.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
+  const bool stays = Rule::spins && pressed_.side_temperature() < cold;
+  const bool apart = pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_;
+  stays&& apart ? harden_pressed() : soften_pressed();
+  const double weight = floor.acceleration + gravity_;
+  if (weight >= 0 || pressed_.floor_force() != 0) {
     released_at_ = never;
-    if (floor.acceleration + gravity_ > waking_weight && pressed_.fastest() < sleeping_speed &&
+    // A bed that stays soft in flight has the floor's speed there, too, for a moment.
+    const bool lies = !Rule::spins || pressed_.floor_force() > 0.5 * weight * count_;
+    if (lies && weight > waking_weight && pressed_.fastest() < sleeping_speed &&
         pressed_.mean_square_speed() < 2 * sleeping_temperature) {
       is_asleep_ = true;
       pressed_.lie(floor);
     }
     return;
   }
+  if (stays) return;
   released_at_ = std::min(released_at_, base_ + now_);
   if (pressed_.touching() < released_touching * count_ || base_ + now_ - released_at_ > longest_release) end_press();
 }

@@ -143,7 +143,7 @@ void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floo
   disks_.push_back({2 * far_off, 2 * far_off, 0, 0});
   force_.assign(4 * disks_.size(), 0);
   floor_work_ = damped_ = usual_approach_ = 0;
-  fastest_ = mean_square_speed_ = never;
+  fastest_ = mean_square_speed_ = side_temperature_ = never;
   soften(contact_time);
   if (rough_) {
     rim_.assign(count_, 0);
@@ -414,7 +414,7 @@ void PressedBed::add_rough_pair_forces() {
 
 void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
   until_check_ = steps_a_check;
-  double farthest = 0, fastest = 0, squares = 0;
+  double farthest = 0, fastest = 0, squares = 0, side_squares = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
     const TwoLanes moved = pair_at(&disks_[i].x) - TwoLanes{0, floor.position} - pair_at(&listed_[2 * i]);
     const TwoLanes speed = pair_at(&disks_[i].vx) - TwoLanes{0, floor.velocity};
@@ -423,9 +423,11 @@ void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
     if (rough_) square += rim_[i] * rim_[i];
     fastest = std::max(fastest, square);
     squares += square;
+    side_squares += disks_[i].vx * disks_[i].vx;
   }
   fastest_ = std::sqrt(fastest);
   mean_square_speed_ = squares / count_;
+  side_temperature_ = side_squares / count_;
   if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
     list_pairs(floor.position);
   } else if (rough_) {

@@ -65,6 +65,7 @@ class PressedBed {
   // Against the floor, at the last check.
   double fastest() const { return fastest_; }
   double mean_square_speed() const { return mean_square_speed_; }
+  double side_temperature() const { return side_temperature_; }  // mean v_x^2
 
   // After the last step, and `later` than that.
   State at(std::uint32_t i, double later) const;
@@ -193,7 +194,7 @@ class PressedBed {
   std::uint32_t until_check_ = steps_a_check;
   double usual_approach_ = 0;  // of neighbours
   double touching_ = 0, loss_rate_ = 0, pair_squares_ = 0, floor_force_ = 0, floor_work_ = 0, damped_ = 0;
-  double fastest_ = never, mean_square_speed_ = never;
+  double fastest_ = never, mean_square_speed_ = never, side_temperature_ = never;
   FloorMotion::Motion floor_at_{};  // that of the latest forces
 };
 

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <variant>
 #include <vector>
 
 #include "sim/engine/collision.hpp"
@@ -310,6 +311,89 @@ TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
     }
     const double weight = 120 / 12.3;
     EXPECT_NEAR(observer.floor_pressure().value, weight, 0.01 * weight) << gamma;
+  }
+}
+
+// T_x and T_z of a bed of 120, from looks at `phases` moments of each of the periods; read(i) gives {v_x, v_z}.
+struct ColdBed {
+  static constexpr int phases = 16, periods = 40;
+  std::array<double, phases> mean{}, squares{};
+  double side_squares = 0;
+  template <class Read>
+  void look(int phase, Read read) {
+    for (std::uint32_t i = 0; i < 120; ++i) {
+      const auto [vx, vz] = read(i);
+      side_squares += vx * vx;
+      mean[static_cast<std::size_t>(phase)] += vz;
+      squares[static_cast<std::size_t>(phase)] += vz * vz;
+    }
+  }
+  double temperature_x() const { return side_squares / (120.0 * phases * periods); }
+  double temperature_z() const {
+    constexpr double looks = 120.0 * periods;
+    double sum = 0;
+    for (std::size_t k = 0; k < phases; ++k) sum += squares[k] / looks - mean[k] / looks * (mean[k] / looks);
+    return sum / phases;
+  }
+};
+
+// Soft disks all the time, with the contacts with which cold beds land, are what LAMMPS has (tests/physics/reference).
+// Hard disks alone, with this contact duration, are far hotter.
+TEST(PressedRoughBed, IsAboutAsColdAsSoftDisksThroughout) {
+  Scene scene = rough_scene(1.5, 12.3, 0.6, 6e-4);
+  scene.disks.contact.friction = scene.box.floor_surface.friction = 0.8;
+  const auto temperatures = [&scene](bool presses) {
+    scene.presses = presses;
+    const auto bed = simulate(scene);
+    ColdBed cold;
+    Snapshot at;
+    for (int k = 0; k < ColdBed::periods * ColdBed::phases; ++k) {
+      bed->advance_to((20 + static_cast<double>(k) / ColdBed::phases) * rough_period);
+      bed->snapshot(at);
+      cold.look(k % ColdBed::phases, [&at](std::uint32_t i) { return std::array{at.vx[i], at.vz[i]}; });
+    }
+    return cold;
+  };
+  const ColdBed pressed = temperatures(true), hard = temperatures(false);
+
+  const auto start = simulate(scene);
+  Snapshot at;
+  start->snapshot(at);
+  std::vector<PressedBed::State> disks;
+  for (std::uint32_t i = 0; i < 120; ++i) disks.push_back({at.x[i], at.z[i], at.vx[i], at.vz[i]});
+  const FloorMotion floor(std::get<SinusoidalFloor>(scene.box.floor));
+  constexpr double contact_time = 1e-3;
+  constexpr int steps_a_look = 1 + static_cast<int>(rough_period / ColdBed::phases * 8 / contact_time);
+  constexpr double step = rough_period / ColdBed::phases / steps_a_look;
+  PressedBed bed = rough_disks(scene.disks.contact, of_a_sphere, 12.3);
+  bed.begin(disks, floor.motion(0), contact_time);
+  ColdBed soft;
+  for (int k = 0; k < (20 + ColdBed::periods) * ColdBed::phases; ++k) {
+    if (k >= 20 * ColdBed::phases) {
+      soft.look(k % ColdBed::phases, [&bed](std::uint32_t i) { return std::array{bed.at(i, 0).vx, bed.at(i, 0).vz}; });
+    }
+    for (int s = 0; s < steps_a_look; ++s)
+      bed.step(floor.motion((k * steps_a_look + s) * step), floor.motion((k * steps_a_look + s + 1) * step), step);
+  }
+  EXPECT_NEAR(pressed.temperature_x() / soft.temperature_x(), 1, 0.5);
+  EXPECT_NEAR(pressed.temperature_z() / soft.temperature_z(), 1, 0.5);
+  EXPECT_GT(hard.temperature_x() / soft.temperature_x(), 1.5);
+}
+
+// They make no contact as hard disks any more, and never sleep where they fly: the bed hits the floor each time.
+TEST(PressedRoughBed, StaysSoftInFlightWhileItIsCold) {
+  for (const double gamma : {1.2, 1.5}) {
+    const auto bed = simulate(rough_scene(gamma, 12.3, 0.6));
+    bed->advance_to(20 * rough_period);
+    const std::uint64_t contacts = bed->counters().collisions();
+    bool flew = false;
+    for (int k = 1; k <= 320; ++k) {
+      bed->advance_to((20 + k / 32.0) * rough_period);
+      flew = flew || bed->energy().compressed == 0;
+      ASSERT_LT(bed->energy().potential, 120 * 8);
+    }
+    EXPECT_TRUE(flew);
+    EXPECT_EQ(bed->counters().collisions(), contacts);
   }
 }
 

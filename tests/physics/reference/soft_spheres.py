@@ -164,6 +164,8 @@ def run(bed, scratch, lammps):
     write_start(base + ".data", count, seed, contact)
     variables = {"data": base + ".data", "dump_file": base + ".bin", "width": WIDTH, "stiffness": stiffness,
                  "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": friction,
+                 "tangential_stiffness": stiffness * 2 / 7, "pair_tangential": damping(0.5) / 2,
+                 "wall_tangential": damping(1.0) / 2,
                  "step": PERIOD / per_period, "period": PERIOD, "skin": 0.3,
                  "amplitude": gamma * GRAVITY / (2 * math.pi * FREQUENCY) ** 2 / DIAMETER,
                  "settle_steps": per_period * SETTLE, "measure_steps": per_period * MEASURE[layers],

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""Weakly shaken beds of rough soft disks, by LAMMPS: which of contacts alone and pressed beds is nearer to them.
+
+usage: weak_rough_beds.py [--most-cpu-seconds S] [--scratch FOLDER]
+
+The bed of figure.json of quinn-hong-eq6: 340 disks of 2.99 mm with the inertia of spheres, 30.301 D between hard,
+frictionless sides, e = 0.6, friction of disks and floor 0.8, floor of sinusoidal motion at 20 Hz. Runs the beds of
+plan() in order, as soft_spheres.py does, and appends each to weak_rough_beds.csv.
+
+Tangential springs of two kinds. "as pressed": so soft that what slips with speed 1 and sticks slips no more when the
+contact ends (b0 = 0), with a dashpot of exp(-1/2), which is what shakebed's pressed beds have. "two sevenths": that of
+soft_spheres.py, as quick as the normal spring, b0 about 0.4.
+"""
+import argparse
+import csv
+import math
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+import soft_spheres
+from soft_spheres import frames, mean_and_error
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+TABLE = os.path.join(HERE, "weak_rough_beds.csv")
+
+DIAMETER, GRAVITY, FREQUENCY = 2.99e-3, 9.81, 20.0  # m, m/s^2, Hz
+WIDTH, COUNT, RESTITUTION, FRICTION = 90.6 / 2.99, 340, 0.6, 0.8
+UNIT_OF_TIME = math.sqrt(DIAMETER / GRAVITY)  # s
+PERIOD = 1 / FREQUENCY / UNIT_OF_TIME
+STEPS_A_CONTACT, PHASES = 30, 32
+SETTLE, MEASURE = 20, 40  # periods
+AS_PRESSED, TWO_SEVENTHS = "as pressed", "two sevenths"
+
+COLUMNS = ("gamma,spring,contact_time_us,seed,temperature_x,temperature_x_error,temperature_z,temperature_z_error,"
+           "center_of_mass,center_of_mass_error,spread_of_height,cpu_seconds,lammps").split(",")
+
+
+def plan():
+    for gamma, spring, contact, seeds in (
+            (3, AS_PRESSED, 10, (1,)), (1.2, AS_PRESSED, 20, (1, 2)), (1.5, AS_PRESSED, 20, (1, 2)),
+            (1.2, AS_PRESSED, 10, (1, 2)), (1.5, AS_PRESSED, 10, (1, 2)), (1.2, TWO_SEVENTHS, 20, (1, 2)),
+            (1.5, TWO_SEVENTHS, 20, (1, 2)), (1.2, AS_PRESSED, 100, (1, 2)), (1.5, AS_PRESSED, 100, (1, 2)),
+            (3, AS_PRESSED, 10, (2,)), (2, AS_PRESSED, 10, (1, 2)), (1.2, AS_PRESSED, 5, (1, 2)),
+            (1.5, AS_PRESSED, 5, (1, 2)), (1.2, TWO_SEVENTHS, 10, (1, 2)), (1.5, TWO_SEVENTHS, 10, (1, 2))):
+        for seed in seeds:
+            yield gamma, spring, contact, seed
+
+
+def tangential(spring, stiffness, damping, contact_time):
+    """Stiffness, and damping of a pair and of a disk on a wall, whose contact lasts sqrt(2) times as long."""
+    if spring == TWO_SEVENTHS:
+        return stiffness * 2 / 7, damping(0.5) / 2, damping(1.0) / 2
+    loss, low, high = 0.5, 0.1, math.pi
+    for _ in range(60):  # cos(rate) = loss/rate sin(rate): the slip ends with the contact
+        rate = 0.5 * (low + high)
+        low, high = (rate, high) if math.cos(rate) > loss / rate * math.sin(rate) else (low, rate)
+    slipping = 2 / 7  # of the mass
+    return (0.5 * slipping * (rate**2 + loss**2) / contact_time**2, 2 * slipping * loss / contact_time,
+            2 * slipping * loss / (2**0.5 * contact_time))
+
+
+def starting_places(seed, rng):
+    """Odd seeds: the packing with which shakebed begins, 29 disks a row. Even seeds: disks at random, which fall."""
+    if seed % 2 == 1:
+        a_row = 29
+        apart = (WIDTH - 1) / (a_row - 0.5)
+        rise = math.sqrt(1 + 1e-6 - apart**2 / 4)
+        return [(0.5 + (k % a_row + 0.5 * (k // a_row % 2)) * apart, 0.5005 + k // a_row * rise) for k in range(COUNT)]
+    places, high = [], math.pi / 4 * COUNT / (0.3 * WIDTH) + 1
+    while len(places) < COUNT:
+        x, z = rng.uniform(0.5, WIDTH - 0.5), rng.uniform(0.5005, high)
+        if all((x - a)**2 + (z - b)**2 > 1 for a, b in places):
+            places.append((x, z))
+    return places
+
+
+def write_start(path, seed):
+    rng = np.random.default_rng(seed)
+    places = starting_places(seed, rng)
+    with open(path, "w") as out:
+        out.write(f"bed\n\n{COUNT} atoms\n1 atom types\n\n0 {WIDTH} xlo xhi\n-3 120 ylo yhi\n-0.5 0.5 zlo zhi\n\nAtoms # sphere\n\n")
+        for i, (x, z) in enumerate(places):
+            out.write(f"{i + 1} 1 1.0 1.909859317102744 {x:.8f} {z:.8f} 0.0\n")
+        out.write("\nVelocities\n\n")
+        for i in range(COUNT):
+            vx, vz = rng.normal(0, 0.1, 2)
+            out.write(f"{i + 1} {vx:.6f} {vz:.6f} 0 0 0 0\n")
+
+
+def run(bed, scratch, lammps):
+    gamma, spring, contact, seed = bed
+    contact_time = contact * 1e-6 / UNIT_OF_TIME
+    b = -math.log(RESTITUTION)
+    stiffness = 0.5 * (math.pi**2 + b * b) / contact_time**2  # reduced mass of a pair: 1/2
+    damping = lambda mass: 2 * math.sqrt(stiffness / mass) * b / math.sqrt(math.pi**2 + b * b)
+    kt, pair_tangential, wall_tangential = tangential(spring, stiffness, damping, contact_time)
+    per_period = 256 * math.ceil(PERIOD / (contact_time / STEPS_A_CONTACT) / 256)
+    base = os.path.join(scratch, f"gamma{gamma}-{spring.replace(' ', '-')}-{contact}us-{seed}")
+    write_start(base + ".data", seed)
+    variables = {"data": base + ".data", "dump_file": base + ".bin", "width": WIDTH, "stiffness": stiffness,
+                 "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": FRICTION,
+                 "tangential_stiffness": kt, "pair_tangential": pair_tangential, "wall_tangential": wall_tangential,
+                 "step": PERIOD / per_period, "period": PERIOD, "skin": 0.3,
+                 "amplitude": gamma * GRAVITY / (2 * math.pi * FREQUENCY) ** 2 / DIAMETER,
+                 "settle_steps": per_period * SETTLE, "measure_steps": per_period * MEASURE,
+                 "dump_steps": per_period // PHASES}
+    command = ["lmp", "-in", os.path.join(HERE, "soft_spheres.lmp"), "-log", base + ".log", "-screen", "none"]
+    for key, value in variables.items():
+        command += ["-var", key, str(value)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run(command, check=True)
+    cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    steps, states = zip(*frames(base + ".bin"))
+    looks = MEASURE * PHASES
+    steps, states = np.array(steps[1:looks + 1]), np.array(states[1:looks + 1])
+    assert len(steps) == looks
+    phase = steps % per_period * PHASES // per_period
+    tx, tz = np.zeros(looks), np.zeros(looks)
+    for p in range(PHASES):
+        here = phase == p
+        tx[here] = ((states[here, :, 2] - states[here, :, 2].mean()) ** 2).mean(1)
+        tz[here] = ((states[here, :, 3] - states[here, :, 3].mean()) ** 2).mean(1)
+    np.savez_compressed(base + ".npz", steps=steps, states=states.astype(np.float32), per_period=per_period)
+    row = list(bed)
+    for series in (tx, tz, states[:, :, 1].mean(1)):
+        row += ["%.6g" % number for number in mean_and_error(series)]
+    row.append("%.6g" % states[:, :, 1].std(1).mean())
+    for ending in (".data", ".bin"):
+        os.remove(base + ending)
+    return row + ["%.1f" % cpu, lammps]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--most-cpu-seconds", type=float, default=math.inf, help="begin no further bed after this much")
+    parser.add_argument("--scratch", default=tempfile.gettempdir())
+    options = parser.parse_args()
+    done = set()
+    if os.path.exists(TABLE):
+        with open(TABLE) as table:
+            done = {tuple(list(row.values())[:4]) for row in csv.DictReader(table)}
+    else:
+        with open(TABLE, "w") as table:
+            table.write(",".join(COLUMNS) + "\n")
+    lammps, spent = soft_spheres.version(), 0.0
+    for bed in plan():
+        if tuple(map(str, bed)) not in done and spent < options.most_cpu_seconds:
+            row = run(bed, options.scratch, lammps)
+            spent += float(row[COLUMNS.index("cpu_seconds")])
+            with open(TABLE, "a") as table:
+                csv.writer(table, lineterminator="\n").writerow(row)
+            print(*bed, "%.0f CPU s in all" % spent, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
