@@ -135,10 +135,12 @@ void describe_disks(Fields& f, DiskOptions& d) {
                "away. Without rest it makes ever smaller contacts, at up to a thousand times the cost"});
   f.boolean(
       "presses", d.presses,
-      {.help = "whether the disks of a bed are soft while it is pressed on the floor: linear springs and dashpots, "
-               "contacts of 0.007 sqrt(D/g) at most. Hard disks cost up to a thousand times as much there. It applies "
-               "to equal disks with constant restitutions of at least 0.3, without a bath. Disks with friction are "
-               "soft only where they make more than 0.6 sqrt(D/g) / contact_duration contacts each in a period"});
+      {.help =
+           "whether the disks of a bed are soft while it is pressed on the floor: linear springs and dashpots, "
+           "contacts of 0.007 sqrt(D/g) at most. Hard disks cost up to a thousand times as much there. It applies "
+           "to equal disks with constant restitutions of at least 0.3, without a bath. Disks with friction are "
+           "soft only where they make more than 0.6 sqrt(D/g) / contact_duration contacts each in a period, or 0.35 "
+           "while T_x is below 0.02 m g D"});
   f.object<SecondSpeciesOptions>(
       "second", d.second,
       [](Fields& g, SecondSpeciesOptions& s) {

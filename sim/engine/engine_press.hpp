@@ -33,16 +33,16 @@ inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
 // 0.33 in one period in which a row locked: see tests/bench/README.md. A bed that has reached the limit is pressed
 // earlier in later periods, until one goes by without.
 inline constexpr double chattering = 0.6, chattering_on = 0.04;
-// Cold ones, by T_x [m g D], from a lower limit on. They go on as soft disks through their flights, too, and land as
-// such: hard disks of e = 0.6 lose all they have at once when a cold bed lands, or keep too much of it by the contact
-// duration. Soft spheres of 10 to 20 us have T_x 0.0029 to 0.0043 at Gamma = 1.5, hard ones 0.0041 to 0.0122, beds that
-// land as hard disks and go on pressed 0.0017 to 0.0021.
-inline constexpr double cold = 0.02, chattering_of_cold = 0.22;
+// Cold ones, by T_x [m g D], from a lower limit on: above the period with the locked row. They stay soft in flight, and
+// land as soft disks. Hard disks lose all they have when a cold bed lands, or keep too much of it by the contact
+// duration. T_x at Gamma = 1.5: soft spheres of 10 to 30 us 0.0029 to 0.0043; hard disks 0.0041 to 0.0122. Beds that
+// land as hard disks and go on pressed have 0.0017 to 0.0021.
+inline constexpr double cold = 0.02, chattering_of_cold = 0.35;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
 // What springs that are still compressed may gain thereby [m g D], a disk and check.
 inline constexpr double gained_by_hardening = 1e-6;
-// Of the contact time at most, between two checks. What springs hold meanwhile is lost, and a landing bed is as long in
-// contact as it takes to soften: with 1.05 rough beds at Gamma = 1.2 have a fifth of T_z.
+// Of the contact time at most, between two checks. A part of what the springs hold is lost thereby: with 1.05 rough
+// beds at Gamma = 1.2 have a fifth of the T_z of soft spheres.
 inline constexpr double softening = 1.05, softening_of_rough = 1.005;
 inline constexpr double least_neighbours = 1;   // pairs a disk; rows on rows have three
 inline constexpr double neighbour_gap = 0.01;   // between two that are counted as such [D]

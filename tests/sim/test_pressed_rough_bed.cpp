@@ -316,7 +316,7 @@ TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
 
 // T_x and T_z of a bed of 120, from looks at `phases` moments of each of the periods; read(i) gives {v_x, v_z}.
 struct ColdBed {
-  static constexpr int phases = 16, periods = 40;
+  static constexpr int phases = 16, periods = 20;
   std::array<double, phases> mean{}, squares{};
   double side_squares = 0;
   template <class Read>
