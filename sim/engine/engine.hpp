@@ -419,6 +419,7 @@ class Engine final : public Simulation {
   double counted_since_ = 0;
   std::uint64_t contacts_when_counted_ = 0;
   bool chatters_ = false, pressed_in_interval_ = false;
+  bool floor_falls_ = false;  // faster than rough disks do, once a period
   std::vector<PressedBed::Stretch> stretches_;
 
   // --- bookkeeping

@@ -75,6 +75,11 @@ void Engine<Space, Rule, Sizes>::plan_press(bool wanted) {
     pressed_.set_up({width_, Space::wraps_x ? width_ : 0, lid_height_},
                     {disk_surface_, side_surface_, floor_surface_, lid_surface_},
                     Rule::spins ? inverse_inertia_ratio_ : 0);
+    if constexpr (Rule::spins) {
+      constexpr int moments = 256;
+      for (int k = 0; k < moments; ++k)
+        floor_falls_ = floor_falls_ || gravity_ + floor_.motion(floor_.period() * k / moments).acceleration < 0;
+    }
   }
 }
 
@@ -139,7 +144,7 @@ bool Engine<Space, Rule, Sizes>::chatters() {
   if (now_ - counted_since_ <= rest_period_) {
     const double product = contacts * contact_duration_ / count_;
     if (product >= (chatters_ ? chattering_on : chattering)) return true;
-    return product >= chattering_of_cold && is_cold();
+    return floor_falls_ && product >= chattering_of_cold && is_cold();
   }
   counted_since_ = now_;
   contacts_when_counted_ = counters_.collisions();
@@ -243,7 +248,7 @@ void Engine<Space, Rule, Sizes>::soften_pressed() {
   if (approach * contact_time > pressed_travel) contact_time = pressed_travel / approach;
   if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
   if (contact_time <= press_contact_time_) return;
-  press_contact_time_ = std::min(contact_time, (Rule::spins ? softening_of_rough : softening) * press_contact_time_);
+  press_contact_time_ = std::min(contact_time, (floor_falls_ ? softening_of_rough : softening) * press_contact_time_);
   pressed_.soften(press_contact_time_);
 }
 
@@ -260,14 +265,14 @@ void Engine<Space, Rule, Sizes>::harden_pressed() {
 // Sleeps, wakes, softens or ends, by what the bed does. After a step.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
-  const bool stays = Rule::spins && pressed_.side_temperature() < cold;
+  const bool stays = floor_falls_ && pressed_.side_temperature() < cold;
   const bool apart = pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_;
   stays&& apart ? harden_pressed() : soften_pressed();
   const double weight = floor.acceleration + gravity_;
   if (weight >= 0 || pressed_.floor_force() != 0) {
     released_at_ = never;
     // A bed that stays soft in flight has the floor's speed there, too, for a moment.
-    const bool lies = !Rule::spins || pressed_.floor_force() > 0.5 * weight * count_;
+    const bool lies = !floor_falls_ || pressed_.floor_force() > 0.5 * weight * count_;
     if (lies && weight > waking_weight && pressed_.fastest() < sleeping_speed &&
         pressed_.mean_square_speed() < 2 * sleeping_temperature) {
       is_asleep_ = true;
