@@ -267,7 +267,10 @@ template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
   const bool stays = floor_falls_ && pressed_.side_temperature() < cold;
   const bool apart = pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_;
-  stays&& apart ? harden_pressed() : soften_pressed();
+  if (stays && apart)
+    harden_pressed();
+  else
+    soften_pressed();
   const double weight = floor.acceleration + gravity_;
   if (weight >= 0 || pressed_.floor_force() != 0) {
     released_at_ = never;
