@@ -16,7 +16,7 @@ DOCS = pathlib.Path(__file__).resolve().parent
 ROOT = DOCS.parent
 NOTE = "<!-- Written by docs/write_reference.py; changes here are lost. -->\n"
 EXIT_CODES = {"UsageError": 2, "ConfigError": 3, "InputError": 4, "StageError": 5}
-MEANING = {2: "wrong use of the command line", 3: "a mistake in the recipe", 4: "a missing or unreadable input",
+MEANING = {2: "wrong use of the command line", 3: "a mistake in the recipe", 4: "a missing or unreadable input; of pictures, none can be read",
            5: "a stage could not do its work"}
 
 

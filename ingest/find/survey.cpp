@@ -38,6 +38,8 @@ constexpr double widest_rim = 1.1, spots_explained = 0.5;
 constexpr double much_smaller = 0.7;  // radii
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
+// Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
+constexpr double largest_proposed = 0.25;
 // px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
 // not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
 constexpr double coarse_px = 10, wide_enough_px = 24;
@@ -118,12 +120,14 @@ DrawingSigns signs_inside(const ChannelFrames& frames, const std::optional<Pixel
   return signs_of_drawing(cut_out(frame, part));
 }
 
+constexpr const char* spots = "spots without a rim are seen, as in any blurred pattern";
+
 // Things that are not round are no beads, nor are spots without a rim among much else.
 void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool any_shape) {
   candidate.not_round = !roundness.round();
   candidate.why_not_round = roundness.why_not();
   if (roundness.rim_width > widest_rim && candidate.explained_share < spots_explained)
-    candidate.why_not = "spots without a rim are seen, as in any blurred pattern";
+    candidate.why_not = spots;
   else if (!any_shape)
     candidate.why_not = candidate.why_not_round;
 }
@@ -269,6 +273,7 @@ void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const s
   enlarge(candidate, picture.reduction);
   candidate.gain_px *= picture.reduction;
   const bool given = !options.radius_px || is_the_given_one(candidate.rims.radius_px, *options.radius_px);
+  candidate.plausible = true;
   candidate.credible = given && (candidate.why_drawn.empty() || options.any_shape);
   if (!candidate.credible) return;
   if (survey.found && survey.candidates.front().gain_px > candidate.gain_px) return;
@@ -313,11 +318,15 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
     judge(candidate, learned.edge_length_px);
+    candidate.plausible =
+        candidate.why_not.empty() &&
+        candidate.rims.radius_px <= largest_proposed * std::min(frames.width, frames.height) / frames.reduction;
     if (const char* why = why_drawn(signs, candidate.explained_share)) candidate.why_drawn = why;
     if (candidate.why_not.empty() && !options.any_shape) candidate.why_not = candidate.why_drawn;
     if (candidate.why_not.empty())
       judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
                   options.any_shape);
+    candidate.plausible = candidate.plausible && candidate.why_not != spots;
     enlarge(candidate, frames.reduction);
     if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
       candidate.why_not =

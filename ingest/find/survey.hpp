@@ -24,6 +24,8 @@ struct SurveyCandidate {
   std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads
   bool credible = false;       // "no beads here" does not explain the picture as well
   std::string why_not;         // a sentence, unless credible
+  // The circles are no chance, so they may be beads of another shape, or smaller than those that are believed unasked.
+  bool plausible = false;
 };
 
 struct Survey {

@@ -104,9 +104,9 @@ std::vector<float> FrameExaminer::coverage_of(const GrayFrame& frame, const Fram
   const GrayFrame flat = flatten(seen_part(frame, film_.finder), film_.finder.light, light);
   const MeasureOptions& options = film_.options;
   int left = 0, right = frame.width;
-  if (options.left_wall_px)
+  if (options.left_wall_px && !options.periodic_sides)
     left = std::clamp(static_cast<int>(std::lround(*options.left_wall_px + 0.5)), 0, frame.width);
-  if (options.right_wall_px)
+  if (options.right_wall_px && !options.periodic_sides)
     right = std::clamp(static_cast<int>(std::lround(*options.right_wall_px + 0.5)), left, frame.width);
   std::vector<float> covered(static_cast<std::size_t>(frame.height));
   for (int row = 0; row < frame.height; ++row) {

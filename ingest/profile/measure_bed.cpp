@@ -452,6 +452,10 @@ std::vector<std::string> MeasureOptions::validate() const {
   require(positive(bead_diameter_m),
           formatted("bead_diameter_m is %g; the diameter of a bead is needed, in m", bead_diameter_m));
   require(positive(scale_m_per_px.value_or(1)), "scale_m_per_px must be above 0");
+  constexpr double least_bead = 1, widest_bead = 1e5;  // px
+  const double bead = bead_diameter_m / scale_m_per_px.value_or(0.01 * bead_diameter_m);
+  require(bead >= least_bead && bead <= widest_bead,
+          formatted("with the length of a pixel given (scale), a bead is %.3g px wide: check its unit", bead));
   require(positive(second_diameter_m.value_or(1)), "second_diameter_m must be above 0");
   require(positive(bin_width), formatted("bin_width is %g; it must be above 0", bin_width));
   require(kernel.kind != KernelKind::none && positive(kernel.width),

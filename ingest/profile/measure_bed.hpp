@@ -73,15 +73,16 @@ struct MeasureOptions {
   // The source's frames are reduced by this factor (FrameSourceOptions::reduction). All places and lengths, in and out,
   // are px of the frames as recorded.
   int reduction = 1;
-  std::size_t calibration_frames = 3;                       // taken evenly from the first calibration_window frames
-  bool profile_from_coverage = true;                        // also measure covered area, independently
-  unsigned threads = 1;                                     // results do not depend on it
+  std::size_t calibration_frames = 3;  // taken evenly from the first calibration_window frames
+  bool profile_from_coverage = true;   // also measure covered area, independently
+  unsigned threads = 1;                // results do not depend on it
   std::function<void(std::size_t frames_done)> progress{};  // called from one thread at a time
   // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
   // that memory hardly grows with the film. Floor and walls, unless given, then follow from the first geometry_frames
   // frames of the film (rim_frames at least, which tell the radius) instead of from all.
   std::function<void(const FrameReport& frame, const std::vector<MeasuredDisk>& disks)> disk_sink{};
   std::size_t geometry_frames = 100;
+  bool periodic_sides = false;  // beads stand out beyond the walls given: the covered area there counts, too
 
   // Why nothing can be measured with these options, one sentence each; empty when it can.
   [[nodiscard]] std::vector<std::string> validate() const;

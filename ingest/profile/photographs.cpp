@@ -95,6 +95,12 @@ BeadsSeen seen_in(const Survey& survey) {
   return {rims.polarity, rims.radius_px};
 }
 
+// Of the scale given, if any, to the beads seen.
+std::string scale_objection(const MeasureOptions& measure) {
+  if (!measure.scale_m_per_px) return {};
+  return why_not_scale(measure.bead_diameter_m, *measure.scale_m_per_px, measure.find.seen->radius_px);
+}
+
 double wrong_share(const std::vector<FoundDisk>& disks) {
   double wrong = 0;
   for (const FoundDisk& disk : disks) wrong += 1 - disk.probability;
@@ -190,6 +196,16 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
   return std::nullopt;
 }
 
+std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double radius_px) {
+  constexpr double most = 3;
+  const double given = bead_diameter_m / scale_m_per_px, seen = 2 * radius_px;
+  if (given <= most * seen && seen <= most * given) return {};
+  return formatted(
+      "with the length of a pixel given (scale), a bead of %g mm is %.3g px wide. The circles seen are %.3g px wide: "
+      "by their width a pixel is %.4g mm. Check the unit of scale, and the diameter",
+      1e3 * bead_diameter_m, given, seen, 1e3 * bead_diameter_m / seen);
+}
+
 int reduction_for(int width, int height, double radius_px) {
   const double pixels = static_cast<double>(width) * height;
   if (pixels <= large_frame_pixels) return 1;
@@ -270,6 +286,8 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
       measure.find.seen = seen_in(look->survey);
+      if (const std::string why = scale_objection(measure); !why.empty())
+        return refused(FindStatus::bad_input, look->path + ": " + why);
       source.channel = look->survey.candidates.front().channel;
       source.reduction = measure.reduction = reduction_for(look->width, look->height, measure.find.seen->radius_px);
       reduced_why = why_reduced(look->width, look->height, source.reduction);
@@ -295,6 +313,7 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
     const Survey survey = survey_of(first, options.find);
     if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
     measure.find.seen = seen_in(survey);
+    if (const std::string why = scale_objection(measure); !why.empty()) return refused(FindStatus::bad_input, why);
   }
   FrameSource source =
       FrameSource::from_generator(images.size(), [&](std::size_t index) { return frame_of(images[index]); });

@@ -66,6 +66,10 @@ inline constexpr std::size_t most_tried = 10;
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
                                        const FrameSourceOptions& source = {});
 
+// Why a length of a pixel cannot be that of a picture with circles of this radius; empty when it can. Within a factor
+// of three the circles may be the bright middle of beads, or hold their shadow, and the scale is believed.
+std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double radius_px);
+
 // By which factor frames of this size may be averaged (FrameSourceOptions::reduction): large beads need not be seen by
 // every pixel, a radius of 12 to 24 px is enough. 1 below two million pixels. Frames of more pixels than are held in
 // memory (FrameSourceOptions::largest_frame_pixels) are always reduced.

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "ingest/profile/velocities.hpp"
+#include "statistics/text.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
@@ -28,12 +31,25 @@ void Shaking::begin(const std::vector<FrameFindings>& frames, double diameter_px
     in_film_.known = false;
     in_film_.why_not = "the lowest beads move by less than two hundredths of a diameter";
   }
+  if (in_film_.known && !options_.shaking_frequency_hz) require_film(frames);
   bed.frequency_given = options_.shaking_frequency_hz.has_value();
   if (bed.frequency_given)
     turns_per_frame_ = *options_.shaking_frequency_hz / *options_.frame_rate_hz;
   else if (in_film_.known)
     choose_period();
   if (!bed.floor_given && turns_per_frame_) find_floor_in_motion(bed);
+}
+
+// Pictures at random times have no period, and in a sequence too slow to follow the beads it may be any.
+void Shaking::require_film(const std::vector<FrameFindings>& frames) {
+  const double followed = followed_share(frames, diameter_px_);
+  if (followed >= enough_followed) return;
+  in_film_.known = false;
+  in_film_.why_not = formatted(
+      "only %.0f %% of the beads are found again in the next picture, as in pictures at unrelated times or in too slow "
+      "a "
+      "film. A period seen in them may be by chance",
+      100 * followed);
 }
 
 // A bed that is thrown up in every second period repeats at half the floor's frequency, but does not lie on a floor

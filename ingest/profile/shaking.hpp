@@ -25,6 +25,7 @@ class Shaking {
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
+  void require_film(const std::vector<FrameFindings>& frames);
   void choose_period();
   void find_floor_in_motion(BedCalibration& bed);
   void take_found(BedCalibration& bed);

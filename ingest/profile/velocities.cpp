@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "ingest/find/nearby.hpp"
+#include "ingest/profile/frame_findings.hpp"
 #include "statistics/correlated_series.hpp"
 
 namespace shakebed::ingest {
@@ -69,6 +70,35 @@ std::vector<Link> link_disks(const Measurement& measurement, double largest_step
     }
   }
   return links;
+}
+
+namespace {
+
+// Disks with a frame after theirs.
+std::size_t followable(const std::vector<std::pair<std::size_t, std::size_t>>& ranges) {
+  std::size_t could = 0;
+  for (std::size_t frame = 0; frame + 1 < ranges.size(); ++frame)
+    if (ranges[frame + 1].second > 0) could += ranges[frame].second - ranges[frame].first;
+  return could;
+}
+
+double share_of(std::size_t links, std::size_t could) {
+  return could > 0 ? static_cast<double>(links) / static_cast<double>(could) : 0;
+}
+
+}  // namespace
+
+double followed_share(const std::vector<FrameFindings>& frames, double diameter_px) {
+  Measurement sequence;
+  for (const FrameFindings& frame : frames)
+    for (const std::vector<FoundDisk>* disks : {&frame.disks, &frame.second})
+      for (const FoundDisk& disk : *disks) {
+        MeasuredDisk placed;
+        placed.frame = frame.report.index;
+        placed.x = disk.x_px / diameter_px, placed.z = -disk.y_px / diameter_px;
+        sequence.disks.push_back(placed);
+      }
+  return share_of(link_disks(sequence, longest_step).size(), followable(ranges_of(sequence)));
 }
 
 namespace {
@@ -136,10 +166,7 @@ class StepStatistics {
 
   void count_links() {
     result_.links = links_.size();
-    std::size_t could = 0;
-    for (std::size_t frame = 0; frame + 1 < ranges_.size(); ++frame)
-      if (ranges_[frame + 1].second > 0) could += ranges_[frame].second - ranges_[frame].first;
-    result_.linked_share = could ? static_cast<double>(links_.size()) / static_cast<double>(could) : 0;
+    result_.linked_share = share_of(links_.size(), followable(ranges_));
   }
 
   void take_steps() {

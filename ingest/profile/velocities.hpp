@@ -9,10 +9,17 @@
 
 namespace shakebed::ingest {
 
+struct FrameFindings;
+
+// Share of the disks found again in the next frame below which frames are no film: links themselves are in doubt.
+constexpr double enough_followed = 0.9;
+// D between two frames; beyond it neighbours could be mistaken for one another.
+constexpr double longest_step = 0.45;
+
 struct VelocityOptions {
   double frame_rate_hz = 0;  // required, > 0
   double gravity_m_per_s2 = 9.81;
-  double largest_step = 0.45;   // D between two frames; beyond it neighbours could be mistaken for one another
+  double largest_step = longest_step;
   double flow_bin_width = 1.0;  // D: the mean flow is that of each height bin and each pair of frames
 };
 
@@ -35,12 +42,16 @@ struct VelocityMeasurement {
   double linked_share = 0;            // of the disks that could have been linked
   double mean_step = 0;               // D between frames
   std::vector<std::string> warnings;  // plain sentences, e.g. that the frames follow too slowly
-  // Enough disks are found again in the next frame for a temperature. With fewer, the links themselves are in doubt.
-  [[nodiscard]] bool usable() const { return linked_share >= 0.9; }
+  // Enough disks are found again in the next frame for a temperature.
+  [[nodiscard]] bool usable() const { return linked_share >= enough_followed; }
 };
 
 // Links each disk to the only one nearer than largest_step in the next frame, if both agree that they are nearest.
 std::vector<Link> link_disks(const Measurement& measurement, double largest_step);
+
+// Share of the disks of these frames that are found again in the frame after theirs, in those of the frames that have
+// one. Of pictures at unrelated times it is up to 0.6 in a dense bed.
+double followed_share(const std::vector<FrameFindings>& frames, double diameter_px);
 
 // T_x and T_z of the linked disks. The flow of each height bin in each pair of frames is subtracted; the lost degree of
 // freedom per bin is restored. The localisation error's share, by the stated variances, is subtracted. The finite-time

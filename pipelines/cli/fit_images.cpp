@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 
@@ -44,6 +46,8 @@ Enum choice_of(const std::optional<std::string>& text, const std::vector<std::st
 
 int preview_images(const Call& call, const ImageArguments& image) {
   PreviewRequest request{.files = image.files, .diameter = image.diameter, .options = {}, .folder = {}};
+  request.options.diameter = quantity_argument("--diameter", image.diameter, dimension::length);
+  if (image.scale) request.options.scale = quantity_argument("--scale", *image.scale, dimension::length_per_pixel);
   request.options.roi = image.roi;
   request.options.radius = image.radius;
   request.options.polarity = choice_of<BeadPolarity>(image.polarity, polarities);
@@ -91,6 +95,15 @@ Json extract_stage(const ImageArguments& image) {
   return stage;
 }
 
+// The standard error of a number that was rounded to the digits written, relative to it: of "2.5 mm" 0.1/sqrt(12)/2.5.
+double rounding_error(const std::string& text) {
+  const std::size_t end = text.find_first_not_of("0123456789.+-");
+  const std::string number = text.substr(0, end);
+  const std::size_t point = number.find('.');
+  const int decimals = point == std::string::npos ? 0 : static_cast<int>(number.size() - point - 1);
+  return std::pow(10, -decimals) / std::sqrt(12.0) / std::strtod(number.c_str(), nullptr);
+}
+
 // Gamma → T of the floor that was named.
 Json map_stage(const ImageArguments& image) {
   const double frequency = quantity_argument("--frequency", *image.frequency, dimension::frequency);
@@ -100,10 +113,11 @@ Json map_stage(const ImageArguments& image) {
   require_positive("--frequency", frequency), require_positive("--amplitude", amplitude),
       require_positive("--gravity", gravity);
   const double omega = 2 * std::numbers::pi * frequency;
-  Json stage{{"stage", "map"},
-             {"from", Json::array({"fit", "extract"})},
-             {"gamma", amplitude * omega * omega / gravity},
-             {"frequency", *image.frequency}};
+  const double gamma = amplitude * omega * omega / gravity;
+  const double relative = std::hypot(rounding_error(*image.amplitude), 2 * rounding_error(*image.frequency));
+  Json stage{
+      {"stage", "map"}, {"from", Json::array({"fit", "extract"})}, {"gamma", gamma}, {"frequency", *image.frequency}};
+  if (std::isfinite(relative)) stage["gamma_std_error"] = relative * gamma;
   if (image.initial_height) {
     const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
     const double height = diameters_argument("--initial-height", *image.initial_height, diameter);
@@ -169,8 +183,9 @@ Plan plan_of(const ImageArguments& image) {
 
 int fit_images(const Call& call, const ImageArguments& image) {
   check_arguments(image);
+  Plan plan = plan_of(image);  // a preview accepts what a run accepts
   if (image.preview) return preview_images(call, image);
-  return run_plan_command(call, image.run, plan_of(image));
+  return run_plan_command(call, image.run, std::move(plan));
 }
 
 // What is in the picture.

@@ -1,10 +1,14 @@
 // implements: pipelines/cli/commands.hpp
+#include <fmt/format.h>
+
+#include <cstdio>
 #include <numbers>
 
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/program.hpp"
 #include "pipelines/formats/errors.hpp"
+#include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/theory.hpp"
 
 namespace shakebed::pipelines {
@@ -39,6 +43,11 @@ MapQuestion question_of(const MapArguments& given) {
         quantity_argument("--amplitude", *given.amplitude, dimension::length) * omega * omega / question.gravity;
   }
   require_positive("--gamma", question.gamma);
+  if (const auto odd = odd_gamma(question.gamma))
+    std::fputs(fmt::format("warning: Gamma = {:.3g}. {}. Check the amplitude, the frequency and their units\n",
+                           question.gamma, *odd)
+                   .c_str(),
+               stderr);
   if (given.temperature)
     question.measured_temperature = diameters_argument("--temperature", *given.temperature, question.diameter);
   return question;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
+
 #include "pipelines/formats/errors.hpp"
 
 namespace shakebed::pipelines {
@@ -15,6 +17,7 @@ Json FrameGeometry::to_json() const {
   out["lowest"] = quantity_json(lowest, "D");
   out["width"] = width;
   out["height"] = height;
+  out["periodic"] = periodic;
   return out;
 }
 
@@ -32,7 +35,22 @@ FrameGeometry FrameGeometry::read(const std::filesystem::path& path) {
           .right_wall = value("right_wall"),
           .lowest = value("lowest"),
           .width = json.value("width", 0),
-          .height = json.value("height", 0)};
+          .height = json.value("height", 0),
+          .periodic = json.value("periodic", false)};
+}
+
+std::string FrameGeometry::sides_text() const {
+  return fmt::format("periodic sides at columns {} and {} of {} x {} px", left_wall, right_wall, width, height);
+}
+
+std::optional<FrameGeometry> FrameGeometry::from_sides_text(const std::string& text) {
+  FrameGeometry geometry;
+  geometry.periodic = true;
+  if (std::sscanf(text.c_str(), "periodic sides at columns %lf and %lf of %d x %d px", &geometry.left_wall,
+                  &geometry.right_wall, &geometry.width, &geometry.height) != 4)
+    return std::nullopt;
+  if (!(geometry.left_wall < geometry.right_wall) || geometry.width <= 0 || geometry.height <= 0) return std::nullopt;
+  return geometry;
 }
 
 }  // namespace shakebed::pipelines

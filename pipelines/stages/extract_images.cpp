@@ -1,6 +1,7 @@
 #include "pipelines/stages/extract_images.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "ingest/frames/png_text.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/measure_bed.hpp"
@@ -40,11 +42,14 @@ fs::path refusal_folder(const RunContext& context) { return context.output_direc
   write_preview(folder, look, options.images.texts, diameter);
   std::string message =
       fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (folder / "preview.html").string());
-  message += survey.candidates.empty()
-                 ? ". If there are beads, give their radius in pixels (--radius) and a region (--roi)"
-                 : ". If the beads are those of one of its pictures, crop to them with --roi, or give";
-  for (std::size_t k = 0; k < std::min<std::size_t>(2, survey.candidates.size()); ++k)
-    message += fmt::format("{} {}", k ? " or" : "", options_for(survey.candidates[k]));
+  const std::vector<std::string> proposals = proposed_options(survey);
+  message +=
+      proposals.empty()
+          ? ". No circles stand out, so there is no radius to propose. Photographs are needed of round beads, from "
+            "the side, sharp, each at least 8 pixels wide and brighter or darker than what is behind it. If yours "
+            "is one, give the region of the beads (--roi) and their radius in pixels (--radius)"
+          : fmt::format(". If the beads are those of one of its pictures, crop to them with --roi, or give {}",
+                        fmt::join(proposals, " or "));
   throw StageError(message);
 }
 
@@ -73,6 +78,10 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   if (!look) return true;  // measure_bed() says which files cannot be read
   if (!look->survey.found) refuse(options, context, *look);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
+  if (options.scale)
+    if (const std::string why = ingest::why_not_scale(options.diameter, *options.scale, chosen->rims.radius_px);
+        !why.empty())
+      throw StageError(fmt::format("{}: {}", look->path, why));
   if (chosen->not_round)
     context.warning(
         fmt::format("{}: the outlines are not those of disks ({}); they are measured because of shape "
@@ -220,6 +229,7 @@ class Extraction {
       use_rendered();
     } else {
       film_.paths = named_pictures(options_.images);
+      read_sides();
       round_ = use_first_look(options_, context_, film_, measure_);
     }
     std::optional<std::ifstream> truth_file;
@@ -235,6 +245,8 @@ class Extraction {
   // Scale, floor and walls of a render stage, unless they are to be found.
   void use_rendered() {
     const FrameGeometry geometry = FrameGeometry::read(rendered_->file("geometry.json"));
+    if (geometry.periodic && (!measure_.left_wall_px || *measure_.left_wall_px == geometry.left_wall))
+      use_periodic_sides(geometry);
     if (options_.use_geometry) {
       if (!measure_.pixel_aspect) measure_.pixel_aspect = 1;
       if (!measure_.lens_radial) measure_.lens_radial = 0;
@@ -249,6 +261,34 @@ class Extraction {
       measure_.lowest = (std::floor((std::min(0.0, geometry.lowest) - reach) / spacing) - 0.5) * spacing;
     }
     film_.paths.push_back((rendered_->directory / "frames").string());
+  }
+
+  // Periodic sides cannot be found: no bead stops there.
+  void use_periodic_sides(const FrameGeometry& geometry) {
+    measure_.periodic_sides = true;
+    measure_.left_wall_px = geometry.left_wall, measure_.right_wall_px = geometry.right_wall;
+  }
+
+  // Pictures of a simulated bed with periodic sides say so.
+  void read_sides() {
+    if (measure_.left_wall_px || measure_.find.roi) return;
+    const auto first = ingest::FrameSource::open(film_.paths, film_.source).first_origins(1);
+    const auto said = first.empty() ? std::nullopt : ingest::png_text(first.front().path, FrameGeometry::keyword);
+    const auto geometry = said ? FrameGeometry::from_sides_text(said->text) : std::nullopt;
+    if (!geometry) return;
+    if (geometry->width != said->width || geometry->height != said->height) {
+      context_.warning(fmt::format(
+          "{}: a simulated bed with periodic sides, in a picture that was cut or scaled: where the sides are is not "
+          "known. The width found may be 1 D too large, and the density too low by as much. Give the sides "
+          "(--left-wall, --right-wall)",
+          first.front().path));
+      return;
+    }
+    use_periodic_sides(*geometry);
+    context_.warning(
+        fmt::format("{}: a simulated bed with periodic sides. The width is that of its box, as the file says, from "
+                    "column {:g} to {:g}: beads that stand out of it belong to it",
+                    first.front().path, geometry->left_wall, geometry->right_wall));
   }
 
   ingest::Measurement measure(DisksOnTheWay& on_the_way) {
@@ -286,8 +326,9 @@ class Extraction {
       context_.warning(
           fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - most_bad_frames_named));
     if (options_.frame_rate && !(bed.shaking_frequency_hz > 0))
-      context_.warning("No shaking is seen in the film (" + bed.why_no_frequency +
-                       "): there are no profiles by phase. Give frequency (--frequency) if the bed is shaken.");
+      context_.warning(
+          "No frequency of a shaking is seen (" + bed.why_no_frequency +
+          "): there are no profiles by phase. Give frequency (--frequency) if this is a film of a shaken bed.");
     if (bed.shaking_frequency_hz > 0 && !options_.frame_rate)
       context_.warning(
           fmt::format("Times are by the film's own {:g} frames/s; if it was recorded faster, give frame_rate "
@@ -301,6 +342,14 @@ class Extraction {
     if (!round_)
       all.push_back({"The outlines are not those of disks, and the theory is one of disks.",
                      "Use positions and numbers of beads only."});
+    if (measure_.second_diameter_m && !found.second_finder) {
+      const double ratio = *measure_.second_diameter_m / measure_.bead_diameter_m;
+      all.push_back({fmt::format("Beads of a second diameter were asked for, and none were found. So the beads seen may be "
+                                 "of either kind, and every length wrong by up to {:.2g} %.",
+                                 100 * (std::max(ratio, 1 / ratio) - 1)),
+                     "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
+                     "of the first kind (--radius)."});
+    }
     for (const ingest::Objection& one : all)
       result["objections"].push_back(Json{{"why", one.why}, {"advice", one.advice}});
   }
@@ -315,8 +364,9 @@ class Extraction {
     add_objections(found, result);
     if (const auto truth = on_the_way.truth()) result["truth"] = *truth;
     write_file(context_.output("extract.json"), dump(result));
-    const BedDescription bed =
+    BedDescription bed =
         rendered_ != nullptr ? BedDescription::read(rendered_->file("bed.json")) : bed_seen(options_, found);
+    bed.periodic = bed.periodic || measure_.periodic_sides;
     write_file(context_.output("bed.json"), dump(bed.to_json()));
     on_the_way.quality_table(context_.table("quality.csv")).write(context_.output("quality.csv"));
     write_file(context_.output("quality.svg"), on_the_way.quality_figure());

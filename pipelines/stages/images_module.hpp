@@ -69,7 +69,7 @@ struct ExtractOptions {
 struct PreviewRequest {
   std::vector<std::string> files;
   std::string diameter;
-  ExtractOptions options;  // polarity, channel, radius and roi
+  ExtractOptions options;  // diameter, scale, polarity, channel, shape, radius and roi
   std::string folder;      // for preview.html
 };
 

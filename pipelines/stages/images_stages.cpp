@@ -24,6 +24,10 @@ Previewed preview_images(const PreviewRequest& request) {
   write_preview(request.folder, *look, request.files, request.diameter);
   if (!look->survey.found) return {false, fmt::format("{}: no beads: {}", look->path, look->survey.why_not)};
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
+  if (const auto scale = request.options.scale)
+    if (const std::string why = ingest::why_not_scale(request.options.diameter, *scale, best.rims.radius_px);
+        !why.empty())
+      return {false, fmt::format("{}: {}", look->path, why)};
   return {true, fmt::format(
                     "a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in channel {}; "
                     "expected share of wrong ones {:.1f} %. The run may find more",

@@ -13,6 +13,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
 #include "pipelines/stages/bed_facts.hpp"
+#include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/study_table.hpp"
 #include "pipelines/stages/theory.hpp"
 
@@ -25,6 +26,8 @@ class Map : public Stage {
     fields.number("gamma", gamma_,
                   {.help = "peak acceleration of the floor over g, Gamma; left out, that of the simulated bed",
                    .range = positive});
+    fields.number("gamma_std_error", gamma_std_error_,
+                  {.help = "standard error of gamma, stated beside it", .range = non_negative});
     fields.quantity("frequency", frequency_, dimension::frequency,
                     {.help = "frequency of the shaking; left out, that of the simulated bed", .range = positive});
     fields.quantity("diameter", diameter_, dimension::length,
@@ -115,6 +118,11 @@ class Map : public Stage {
     take_options(question);
     if (!(question.gamma > 0) || !(question.frequency > 0))
       throw InputError("the floor of this bed does not shake: there is no Gamma to map");
+    if (const auto odd = gamma_ ? odd_gamma(*gamma_) : std::nullopt)
+      context.warning(
+          fmt::format("Gamma = {:.3g}. {}. Check the amplitude, which is half the way between the floor's lowest and "
+                      "highest position, the frequency, and the units of both",
+                      *gamma_, *odd));
     Json json = map_json(question);
     if (const Input* study = context.find_input("study"); study != nullptr || !table_.empty()) {
       const StudyTable table =
@@ -165,7 +173,7 @@ class Map : public Stage {
   }
 
   void take_options(MapQuestion& question) const {
-    if (gamma_) question.gamma = *gamma_;
+    if (gamma_) question.gamma = *gamma_, question.gamma_std_error = gamma_std_error_;
     if (frequency_) question.frequency = *frequency_;
     if (diameter_) question.diameter = *diameter_;
     if (gravity_) question.gravity = *gravity_;
@@ -362,7 +370,7 @@ class Map : public Stage {
   InputFiles table_;
   TableColumns columns_;
   std::optional<double> bead_restitution_, bead_friction_;
-  std::optional<double> gamma_, frequency_, diameter_, gravity_, initial_height_, plateau_density_;
+  std::optional<double> gamma_, gamma_std_error_, frequency_, diameter_, gravity_, initial_height_, plateau_density_;
   double restitution_ = 0;
   std::string equation_ = "enskog";
 };

@@ -1,6 +1,8 @@
 // The page of a map stage: the formulas Gamma → T/T_c, and the temperature from simulated beds.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/stages/map.hpp"
 
@@ -51,14 +53,38 @@ std::string readings_html(const FinishedStage& stage, int&) {
   return out + "</table></div>\n";
 }
 
+// Of a Gamma that was given with its error: what it is, since all temperatures of the map follow from it.
+std::string gamma_terminal(const FinishedStage& stage) {
+  const Json& map = stage.result;
+  if (find_pointer(map, "/gamma/std_error") == nullptr || !map.contains("readings")) return "";
+  double least = 0, most = 0;
+  std::size_t formulas = 0;
+  for (const Json& row : map["readings"]) {
+    const Json* reduced = find_pointer(row, "/reduced_temperature/value");
+    if (!row.value("in_range", false) || reduced == nullptr) continue;
+    const double value = reduced->get<double>();
+    least = formulas == 0 ? value : std::min(least, value), most = std::max(most, value);
+    ++formulas;
+  }
+  std::string text = fmt::format("{}: Gamma = {}", stage.files.id, shown(map["gamma"]));
+  text += formulas == 0
+              ? ", where no formula for T applies"
+              : fmt::format(". From it {} {} T/T_c", formulas, formulas == 1 ? "formula gives" : "formulas give");
+  if (formulas == 1) text += fmt::format(" = {:.3g}", least);
+  if (formulas > 1) text += fmt::format(" from {:.3g} to {:.3g}", least, most);
+  return text + "\n";
+}
+
 }  // namespace
 
 StagePages map_pages() {
   return {
       .sections = {{ReportPlace::maps, "", readings_html}},
-      .warnings = {
-          {"formulas", WarningEffect::rest, "Use the formulas that are marked as in range in the table of the map."},
-          {"", WarningEffect::rest, "Run beds nearer to this one, and give them as the table of simulated beds."}}};
+      .warnings =
+          {{"Gamma = ", WarningEffect::answer, "Check amplitude and frequency: every T of the map follows from them."},
+           {"formulas", WarningEffect::rest, "Use the formulas that are marked as in range in the table of the map."},
+           {"", WarningEffect::rest, "Run beds nearer to this one, and give them as the table of simulated beds."}},
+      .terminal = gamma_terminal};
 }
 
 }  // namespace shakebed::pipelines

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "ingest/profile/candidate_picture.hpp"
 #include "pipelines/formats/files.hpp"
 
@@ -38,13 +40,16 @@ std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t num
   return fmt::format(
       "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} "
       "%; the "
-      "beads' rims are {:.0f} % of the edges in the picture. {}</p>\n<pre>{}</pre>\n<p><img src=\"preview_{}.png\" "
+      "beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" "
       "alt=\"the beads found\"></p>\n",
       number, candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark", candidate.rims.radius_px,
       ingest::name_of(candidate.channel), candidate.disks.size(), 100 * candidate.expected_wrong,
       100 * candidate.explained_share,
       candidate.credible ? "" : escaped(fmt::format("Not believed: {}.", candidate.why_not)),
-      escaped(fmt::format("{} {}", command, options_for(candidate))), number);
+      candidate.plausible || candidate.credible
+          ? fmt::format("<pre>{}</pre>\n", escaped(fmt::format("{} {}", command, options_for(candidate))))
+          : "",
+      number);
 }
 
 }  // namespace
@@ -73,6 +78,24 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
                      candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
                      candidate.rims.radius_px) +
          (candidate.not_round || !candidate.why_drawn.empty() ? " --shape any" : "");
+}
+
+std::vector<std::string> proposed_options(const ingest::Survey& survey) {
+  constexpr std::size_t most = 2;
+  constexpr double another = 1.05;
+  std::vector<std::string> options;
+  std::vector<const ingest::SurveyCandidate*> proposed;
+  for (const ingest::SurveyCandidate& candidate : survey.candidates) {
+    const auto same = [&](const ingest::SurveyCandidate* other) {
+      const double ratio = candidate.rims.radius_px / other->rims.radius_px;
+      return candidate.rims.polarity == other->rims.polarity && candidate.channel == other->channel &&
+             ratio < another && ratio * another > 1;
+    };
+    if (options.size() == most || !candidate.plausible || std::any_of(proposed.begin(), proposed.end(), same)) continue;
+    proposed.push_back(&candidate);
+    options.push_back(options_for(candidate));
+  }
+  return options;
 }
 
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,

@@ -32,5 +32,7 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
 
 // The options that take this candidate: --channel red --polarity dark --radius 22.9
 std::string options_for(const ingest::SurveyCandidate& candidate);
+// Those of the plausible candidates that differ, at most two.
+std::vector<std::string> proposed_options(const ingest::Survey& survey);
 
 }  // namespace shakebed::pipelines

@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 
+#include "ingest/frames/png_text.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/files.hpp"
@@ -56,6 +57,15 @@ class FrameDrawer {
         geometry_(geometry()) {}
 
   void draw() {
+    if (geometry_.periodic)
+      context_.warning(fmt::format(
+          "the bed has periodic sides, so the pictures show no walls. Beads stand out of the box by up to half a "
+          "diameter at either side. Taken for a bed between walls, it would be up to 1 D too wide, and its density up "
+          "to {:.1f} % too low. The pictures' files say so, and extract and fit-images then count the beads of the "
+          "box. "
+          "Where this is lost, as in pictures of another format or size, give the box: --left-wall {:g} --right-wall "
+          "{:g}",
+          100 / (extent_.width + 1), geometry_.left_wall, geometry_.right_wall));
     std::filesystem::create_directory(context_.output("frames"));
     begin_truth();
     draw_on_all_threads();
@@ -127,6 +137,7 @@ class FrameDrawer {
     geometry.floor = camera_.height - 0.5 - floor_depth();
     geometry.lowest = extent_.lowest;
     geometry.width = camera_.width, geometry.height = camera_.height;
+    geometry.periodic = bed_.periodic;
     return geometry;
   }
 
@@ -172,10 +183,15 @@ class FrameDrawer {
                     .velocity_y_px_per_s = -frame.vz[i] * velocity_px_};
         text += fmt::format("{},{},{:.6f},{:.6f},{:.6f}\n", index, i, disks[i].x_px, disks[i].y_px, disks[i].radius_px);
       }
-      ingest::write_png(context_.output("frames") / fmt::format("{:06d}.png", index), renderer.render(disks, index));
+      write(context_.output("frames") / fmt::format("{:06d}.png", index), renderer.render(disks, index));
       add_truth(index, std::move(text));
       context_.progress(static_cast<double>(++done_) / static_cast<double>(extent_.frames), "drawing");
     }
+  }
+
+  void write(const std::filesystem::path& path, const ingest::GrayFrame& frame) const {
+    ingest::write_png(path, frame);
+    if (geometry_.periodic) ingest::add_png_text(path, FrameGeometry::keyword, geometry_.sides_text());
   }
 
   void add_truth(std::size_t index, std::string text) {

@@ -488,7 +488,12 @@ void SceneOptions::check_scene(Fields& fields) const {
     if (fields.problem_count() > 0) return;
   }
   const sim::Scene laid_out = scene(1);
-  for (const sim::SceneProblem& problem : sim::check(laid_out)) fields.problem(problem.where, problem.what);
+  const std::vector<sim::SceneProblem> problems = sim::check(laid_out);
+  // Lengths are in D here: a bead that is too large, as by a number without unit, makes the box too small.
+  const auto odd = reduced_ || problems.empty() ? std::nullopt : odd_bead(disks_.diameter);
+  if (odd) fields.problem("/disks/diameter", odd->what, odd->suggestion);
+  for (const sim::SceneProblem& problem : problems)
+    if (!odd || !problem.where.starts_with("/box")) fields.problem(problem.where, problem.what);
   if (fields.problem_count() == 0 && laid_out.count() <= checked_when_read) {
     try {
       sim::place_disks(laid_out);

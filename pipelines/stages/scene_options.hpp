@@ -132,6 +132,8 @@ FloorTable read_floor_table(const std::filesystem::path& path);
 void warn_of_bead(Fields& fields, std::string_view pointer_below, double diameter);
 // The words for it, and what to do; nothing about an ordinary bead.
 std::optional<Misfit> odd_bead(double diameter);
+// Of a Gamma outside 1 to 50, at which no bed is thrown or none is studied: what and why.
+std::optional<std::string> odd_gamma(double gamma);
 // The same for a bead [m] that no photograph shows: a metre wide or more. With it the scale would be wrong by as much.
 std::optional<Misfit> impossible_bead(double diameter);
 

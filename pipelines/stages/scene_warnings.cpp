@@ -68,6 +68,12 @@ std::optional<Misfit> odd_bead(double diameter) {
                                : "Check its unit"};
 }
 
+std::optional<std::string> odd_gamma(double gamma) {
+  if (gamma >= least_gamma && gamma <= most_gamma) return std::nullopt;
+  return gamma < least_gamma ? std::string("Below Gamma = 1 the floor never throws the bed, which stays at rest on it")
+                             : fmt::format("Shaken beds are studied at Gamma from 1 to {:g}", most_gamma);
+}
+
 std::optional<Misfit> impossible_bead(double diameter) {
   return diameter >= largest_photographed ? odd_bead(diameter) : std::nullopt;
 }
@@ -99,7 +105,8 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
   const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion);
   if (sine == nullptr || !gravity_) return;
   const double value = gamma();
-  if (value >= least_gamma && value <= most_gamma) return;
+  const auto odd = odd_gamma(value);
+  if (!odd) return;
   const double omega = 2 * std::numbers::pi * sine->frequency;
   const std::string here = fmt::format(
       "Gamma = {:.3g}: the floor's amplitude is {} at {}", value, length_text(sine->amplitude),
@@ -107,11 +114,9 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
   const std::string four =
       fmt::format("Gamma = 4 needs an amplitude of {}", length_text(4 * *gravity() / (omega * omega)));
   if (value < least_gamma)
-    fields.warn("gamma below 1", sine->gamma ? "/floor/gamma" : "/floor/amplitude",
-                here + ". Below Gamma = 1 the floor never throws the bed, which stays at rest on it", four);
+    fields.warn("gamma below 1", sine->gamma ? "/floor/gamma" : "/floor/amplitude", here + ". " + *odd, four);
   else
-    fields.warn("gamma above 50", sine->gamma ? "/floor/gamma" : "/floor/amplitude",
-                here + fmt::format(". Shaken beds are studied at Gamma from 1 to {:g}", most_gamma),
+    fields.warn("gamma above 50", sine->gamma ? "/floor/gamma" : "/floor/amplitude", here + ". " + *odd,
                 sine->amplitude >= largest_bead && !reduced_
                     ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"? {}", sine->amplitude, four)
                     : four);

@@ -108,7 +108,7 @@ Json map_json(const MapQuestion& question) {
   bed.column = fit::column_from_initial_height(question.initial_height, question.plateau_density);
   bed.restitution = question.restitution;
   Json out;
-  out["gamma"] = quantity_json(question.gamma, "1");
+  out["gamma"] = quantity_json(question.gamma, "1", question.gamma_std_error);
   out["frequency"] = quantity_json(question.frequency, "Hz");
   out["diameter"] = quantity_json(question.diameter, "m");
   out["gravity"] = quantity_json(question.gravity, "m/s^2");

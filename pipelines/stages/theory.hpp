@@ -27,7 +27,8 @@ Json theory_json(const TheoryQuestion& question);
 std::string theory_text(const TheoryQuestion& question);
 
 struct MapQuestion {
-  double gamma = 0;           // peak acceleration [g]
+  double gamma = 0;  // peak acceleration [g]
+  std::optional<double> gamma_std_error;
   double frequency = 0;       // [Hz]
   double gravity = 9.81;      // [m/s^2]
   double diameter = 0;        // [m]

@@ -1,5 +1,6 @@
 #include "ingest/frames/frames.hpp"
 #include "ingest/frames/atomic_file.hpp"
+#include "ingest/frames/png_text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -96,6 +97,25 @@ TEST(Frames, PngComesBackAsItWasWritten) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) files += entry.exists();
   EXPECT_EQ(files, 1) << "a temporary file was left behind";
+}
+
+TEST(Frames, ATextStaysInItsPng) {
+  const test::ScratchFolder folder;
+  GrayFrame frame{7, 5, std::vector<float>(35, 90.0F)};
+  frame.pixels[8] = 200;
+  write_png(folder / "a.png", frame);
+  EXPECT_FALSE(png_text(folder / "a.png", "shakebed"));
+  add_png_text(folder / "a.png", "shakebed", "periodic sides");
+  const auto text = png_text(folder / "a.png", "shakebed");
+  ASSERT_TRUE(text);
+  EXPECT_EQ(text->text, "periodic sides");
+  EXPECT_EQ(text->width, 7);
+  EXPECT_EQ(text->height, 5);
+  EXPECT_FALSE(png_text(folder / "a.png", "shake")) << "another keyword";
+  EXPECT_EQ(read_frame(folder / "a.png").pixels, frame.pixels);
+  std::ofstream(folder / "b.png") << "\x89PNG\r\n\x1a\n and no more";
+  EXPECT_FALSE(png_text(folder / "b.png", "shakebed"));
+  EXPECT_FALSE(png_text(folder / "nowhere.png", "shakebed"));
 }
 
 TEST(Frames, FolderAndGlobAreReadInNaturalOrder) {

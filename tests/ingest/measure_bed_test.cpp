@@ -314,7 +314,7 @@ std::vector<GrayFrame> shaken_film(double amplitude_px, double phase, std::size_
     bed.rows = 6;
     bed.gas_count = 15;
     bed.gas_height_px = 30;
-    bed.seed = k + 1;
+    bed.seed = 1;  // a film: the same beads in every frame
     frames.push_back(renderer.render(make_synthetic_bed(bed), k));
   }
   return frames;
@@ -464,6 +464,36 @@ TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
   EXPECT_EQ(resting.calibration.shaking_frequency_hz, 0);
   EXPECT_FALSE(resting.calibration.why_no_frequency.empty());
   EXPECT_TRUE(resting.phases.empty());
+}
+
+// Pictures at unrelated times, put into an order in which the lowest beads rise and fall regularly.
+TEST(MeasureBed, PicturesThatAreNoFilmHaveNoFrequency) {
+  Camera camera;
+  camera.width = 340, camera.height = 300;
+  camera.blur_px = 0.8, camera.read_noise = 4;
+  std::vector<GrayFrame> frames;
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    SyntheticBed bed;
+    bed.left_wall_px = 20, bed.right_wall_px = 320;
+    bed.floor_px = 270 - 9 * std::sin(2 * std::numbers::pi * static_cast<double>(k) / 8);
+    bed.rows = 2, bed.gas_count = 60, bed.gas_height_px = 90, bed.jitter_px = 0, bed.seed = k + 1;
+    std::vector<RenderedDisk> disks = make_synthetic_bed(bed);
+    const double shift = 10.0 * static_cast<double>(k * 7 % 5) / 5;  // of the rows, which else are the same
+    std::erase_if(disks, [&](const RenderedDisk& disk) { return disk.y_px > 200 && disk.x_px + shift > 310; });
+    for (RenderedDisk& disk : disks)
+      if (disk.y_px > bed.floor_px - 35) disk.x_px += shift;
+    frames.push_back(render_frame(disks, camera, k));
+  }
+  MeasureOptions options = options_of();
+  options.frame_rate_hz = 500;
+  options.profile_from_coverage = false;
+  FrameSource source = FrameSource::from_frames(frames);
+  const Measurement found = measure_bed(source, options);
+  EXPECT_EQ(found.calibration.shaking_frequency_hz, 0);
+  EXPECT_NE(found.calibration.why_no_frequency.find("found again in the next picture"), std::string::npos)
+      << found.calibration.why_no_frequency;
+  EXPECT_TRUE(found.phases.empty());
+  EXPECT_NE(found.calibration.floor_reference, FloorReference::mean_of_motion);
 }
 
 TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {

@@ -20,7 +20,7 @@
 namespace shakebed::ingest {
 namespace {
 
-constexpr int width = 300, height = 240;
+constexpr int columns = 300, rows = 240;  // px
 constexpr double left = 15, right = 285, ground = 224.5;
 
 std::vector<RenderedDisk> crystal(double radius) {
@@ -67,12 +67,12 @@ struct Photograph {
 };
 void expect_all_found(const std::vector<RenderedDisk>& beads, const Photograph& photograph, const std::string& name) {
   Camera camera;
-  camera.width = width, camera.height = height;
+  camera.width = columns, camera.height = rows;
   camera.blur_px = photograph.blur_px, camera.read_noise = photograph.noise;
   if (photograph.bright) std::swap(camera.background_level, camera.bead_level);
   const GrayFrame frame = render_frame(beads, camera);
   const double radius = beads.front().radius_px;
-  const DisksFound found = find_disks(ImageView{width, height, frame.pixels.data(), PixelType::f32});
+  const DisksFound found = find_disks(ImageView{columns, rows, frame.pixels.data(), PixelType::f32});
   ASSERT_TRUE(found.ok()) << name << ": " << found.message;
   std::vector<test::DrawnBead> truth;
   for (const RenderedDisk& bead : beads) truth.push_back({bead.x_px, bead.y_px, radius, bead.y_px > radius});

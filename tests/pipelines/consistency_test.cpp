@@ -237,6 +237,18 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   }
 }
 
+// Lengths are checked in diameters: the error once named the width, which was right.
+TEST(Suggestions, NameTheDiameterWhoseUnitWasForgotten) {
+  ScratchFolder folder;
+  write_text(folder / "r.json", small_recipe());
+  const ProgramResult result =
+      run_shakebed({"validate", "r.json", "--set", "/stages/bed/disks/diameter=3"}, folder.path());
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.err.find("/disks/diameter: a bead of 3 m"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("did you mean \"3 mm\"?"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("/box/width"), std::string::npos) << result.err;
+}
+
 // The simulation would run for its whole time before the camera finds nothing to photograph.
 TEST(PhotographsOfABed, NeedFramesBeforeAnythingRuns) {
   ScratchFolder folder;

@@ -57,6 +57,28 @@ TEST_F(FitStage, ReportShowsTheAuditOfThePaper) {
   EXPECT_GE(audit["rows"].size(), 10U);
 }
 
+TEST_F(FitStage, AMapSaysItsGammaAndDoubtsOneThatNoBedHas) {
+  const auto mapped = [&](const std::string& gamma) {
+    return run(R"({ "stage": "map", "frequency": "20 Hz", "initial_height": 10.2, "diameter": "2.99 mm", "gamma": )" +
+               gamma + " }");
+  };
+  const ProgramResult usual = mapped("4, \"gamma_std_error\": 0.1");
+  ASSERT_EQ(usual.exit_code, 0) << usual.err;
+  EXPECT_NE(usual.out.find("map: Gamma = 4"), std::string::npos) << usual.out;
+  EXPECT_NE(usual.out.find("0.1"), std::string::npos) << usual.out;
+  EXPECT_EQ(usual.err.find("Gamma = "), std::string::npos) << usual.err;
+  const ProgramResult large = mapped("4024"), small = mapped("0.4");
+  EXPECT_NE(large.err.find("Gamma = 4.02e+03. Shaken beds are studied at Gamma from 1 to 50"), std::string::npos)
+      << large.err;
+  EXPECT_NE(small.err.find("Gamma = 0.4. Below Gamma = 1 the floor never throws the bed"), std::string::npos)
+      << small.err;
+  const ProgramResult command = run_shakebed(
+      {"map", "--amplitude", "2.5 m", "--frequency", "20 Hz", "--diameter", "3 mm", "--initial-height", "10"},
+      folder_.path());
+  EXPECT_EQ(command.exit_code, 0) << command.err;
+  EXPECT_NE(command.err.find("warning: Gamma = 4.02e+03"), std::string::npos) << command.err;
+}
+
 TEST_F(FitStage, MatchesAProfileAgainstSimulatedBeds) {
   std::string stages, ids;
   int seed = 100;

@@ -169,11 +169,27 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
   EXPECT_GT(map["readings"].size(), 4u);
   EXPECT_NEAR(map["gamma"].is_number() ? map["gamma"].get<double>() : map["gamma"]["value"].get<double>(), 3.2194,
               1e-3);
+  // Of digits 1 mm and 1 Hz apart, each rounded: 0.289 of either, and the frequency counts twice.
+  EXPECT_NEAR(error(map["gamma"]), 3.2194 * std::hypot(0.28868 / 2, 2 * 0.28868 / 20), 1e-3);
+  EXPECT_THAT(result.out, HasSubstr("map: Gamma = 3.2"));
+  EXPECT_THAT(result.err, Not(HasSubstr("Gamma = ")));
   EXPECT_NEAR(value(map["initial_height"]), value(extract["column_number"]) / 1.1, 1e-9) << "N D/W over phi_0";
   std::size_t overlays = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(*folder_ / "photos/extract"))
     overlays += entry.path().filename().string().starts_with("overlay_");
   EXPECT_EQ(overlays, 2u);
+}
+
+// Asked for beads of two kinds where only one is seen, nothing says which kind the scale is that of.
+TEST_F(Images, ASecondDiameterThatIsNotFoundLeavesNoTemperature) {
+  const std::string frame = (*folder_ / "o/render/frames/000000.png").string();
+  const ProgramResult result =
+      run_shakebed({"fit-images", frame, "--diameter", "3 mm", "--second-diameter", "2 mm", "--out", "two"},
+                   folder_->path());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const Json answer = read_json(*folder_ / "two/fit/fit.json")["answer"];
+  EXPECT_THAT(answer["why"].get<std::string>(), HasSubstr("every length wrong by up to 50 %"));
+  EXPECT_FALSE(answer.contains("temperature"));
 }
 
 TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
@@ -191,6 +207,11 @@ TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
   const ProgramResult preview =
       run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--preview", "--out", "p"}, folder_->path());
   EXPECT_EQ(preview.exit_code, 5) << preview.err;
+  // Where nothing was seen, nothing is proposed.
+  EXPECT_THAT(result.err, HasSubstr("No circles stand out"));
+  EXPECT_THAT(result.err, HasSubstr("at least 8 pixels wide"));
+  EXPECT_THAT(result.err, Not(HasSubstr("--radius ")));
+  EXPECT_THAT(read_text(*folder_ / "p/preview.html"), Not(HasSubstr("--radius")));
   EXPECT_TRUE(preview.out.empty() && fs::is_regular_file(*folder_ / "p/preview.html"));
   fs::create_directory(*folder_ / "empty");
   const ProgramResult empty = run_shakebed({"fit-images", "empty", "--diameter", "3 mm"}, folder_->path());
@@ -203,9 +224,38 @@ TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
   write_text(*folder_ / "broken.png", "\x89PNG\r\n\x1a\nnot an image");
   EXPECT_EQ(run_shakebed({"fit-images", "broken.png", "--diameter", "3 mm", "--out", "n"}, folder_->path()).exit_code,
             4);
+  fs::create_directory(*folder_ / "all-broken");
+  for (const char* name : {"1.png", "2.png", "3.png"})
+    write_text(*folder_ / "all-broken" / name, "\x89PNG\r\n\x1a\nnot an image");
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--preview"}}) {
+    std::vector<std::string> arguments{"fit-images", "all-broken", "--diameter", "3 mm", "--out", "n"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(run_shakebed(arguments, folder_->path()).exit_code, 4) << more.size();
+  }
   EXPECT_EQ(run_shakebed({"fit-images", "nowhere.png", "--diameter", "3 mm", "--out", "n"}, folder_->path()).exit_code,
             4);
   EXPECT_EQ(run_shakebed({"fit-images", "noise.pgm", "--diameter", "-3 mm"}, folder_->path()).exit_code, 2);
+}
+
+// A preview accepts the options that a run accepts, and no others.
+TEST_F(Images, APreviewTakesTheScaleAsARunDoes) {
+  ASSERT_EQ(result_->exit_code, 0);
+  const std::string picture = (*folder_ / "o/render/frames/000000.png").string();
+  const auto ends = [&](const char* scale, bool preview) {
+    std::vector<std::string> arguments{"fit-images", picture, "--diameter", "3 mm", "--scale", scale, "--out", "s"};
+    if (preview) arguments.emplace_back("--preview");
+    return run_shakebed(arguments, folder_->path());
+  };
+  for (const bool preview : {false, true}) {
+    const ProgramResult without_unit = ends("3", preview);
+    EXPECT_EQ(without_unit.exit_code, 3) << preview;
+    EXPECT_THAT(without_unit.err, HasSubstr("--scale: \"3\" has no unit"));
+    const ProgramResult another_unit = ends("3 m/px", preview);
+    EXPECT_EQ(another_unit.exit_code, 5) << preview;
+    EXPECT_THAT(another_unit.err, HasSubstr("with the length of a pixel given (scale), a bead of 3 mm is 0.001 px"));
+    EXPECT_THAT(another_unit.err, HasSubstr("a pixel is 0.15")) << "the true scale is 0.15 mm/px";
+  }
+  EXPECT_EQ(ends("0.15 mm/px", true).exit_code, 0);
 }
 
 // Ovals on a lattice, 1.3 times as long as wide, each turned another way, drawn pixel by pixel.
@@ -360,6 +410,35 @@ TEST_F(Images, CentresScatterByTheirStatedErrors) {
   EXPECT_NEAR(truth["recall"].get<double>(), matched / static_cast<double>(real.rows()), 1e-3);
   EXPECT_NEAR(std::sqrt(scaled_x / matched), 1, 0.35);
   EXPECT_NEAR(std::sqrt(scaled_y / matched), 1, 0.35);
+}
+
+// The pictures of a bed with periodic sides show no walls. Their files say where the sides are.
+TEST(PeriodicBed, HasTheWidthOfItsBoxInItsPictures) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "periodic", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 4, "replicas": 1,
+      "disks": { "count": 120, "diameter": "3 mm", "restitution": 0.9, "contact_duration": "20 us" },
+      "box": { "width": "36.9 mm", "sides": "periodic" },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "0.3 s", "measure": "0.5 s", "frames": { "count": 8 } },
+    { "stage": "render", "from": "bed", "scale": "0.2 mm/px", "noise": 3 },
+    { "stage": "extract", "id": "seen", "from": "render", "use_geometry": false } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("the bed has periodic sides, so the pictures show no walls"));
+  EXPECT_THAT(ran.err, HasSubstr("--left-wall 11.5 --right-wall 196"));
+  EXPECT_NEAR(value(read_json(folder / "o/seen/extract.json")["width"]), 12.3, 0.05);
+  fs::create_directory(folder / "copies");
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder / "o/render/frames"))
+    fs::copy_file(entry.path(), folder / "copies" / ("a" + entry.path().filename().string()));
+  const ProgramResult photographed =
+      run_shakebed({"fit-images", "copies", "--diameter", "3 mm", "--until", "extract", "--out", "p"}, folder.path());
+  ASSERT_EQ(photographed.exit_code, 0) << photographed.err;
+  EXPECT_THAT(photographed.err, HasSubstr("a simulated bed with periodic sides"));
+  const Json extract = read_json(folder / "p/extract/extract.json");
+  EXPECT_NEAR(value(extract["width"]), 12.3, 0.05);
+  EXPECT_NEAR(value(extract["column_number"]), 120 / 12.3, 0.01 * 120 / 12.3);
+  EXPECT_TRUE(read_json(folder / "p/extract/bed.json")["periodic"].get<bool>());
 }
 
 // A film of a shaken bed, whose temperatures and shaking the simulation knows; then every second frame of it.

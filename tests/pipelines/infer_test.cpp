@@ -63,9 +63,9 @@ TEST_F(Infer, SaysHowManyBedsGaveNoNumbers) {
   kill_after_beds(5);
   const std::vector<fs::path> beds = finished_beds();
   for (std::size_t i = 0; i < 2; ++i) {
-    Json numbers = Json::parse(read_text(beds[i]));
-    for (auto& number : numbers) number = nullptr;
-    write_text(beds[i], numbers.dump());
+    Json of_bed = Json::parse(read_text(beds[i]));
+    for (auto& number : of_bed) number = nullptr;
+    write_text(beds[i], of_bed.dump());
   }
   const ProgramResult result = run("o");
   ASSERT_EQ(result.exit_code, 0) << result.err;
