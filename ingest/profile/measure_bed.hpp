@@ -73,9 +73,9 @@ struct MeasureOptions {
   // The source's frames are reduced by this factor (FrameSourceOptions::reduction). All places and lengths, in and out,
   // are px of the frames as recorded.
   int reduction = 1;
-  std::size_t calibration_frames = 3;  // taken evenly from the first calibration_window frames
-  bool profile_from_coverage = true;   // also measure covered area, independently
-  unsigned threads = 1;                // results do not depend on it
+  std::size_t calibration_frames = 3;                       // taken evenly from the first calibration_window frames
+  bool profile_from_coverage = true;                        // also measure covered area, independently
+  unsigned threads = 1;                                     // results do not depend on it
   std::function<void(std::size_t frames_done)> progress{};  // called from one thread at a time
   // Receives each frame's disks, frames in order, from one thread at a time; Measurement::disks then stays empty, so
   // that memory hardly grows with the film. Floor and walls, unless given, then follow from the first geometry_frames

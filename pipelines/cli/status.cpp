@@ -128,7 +128,8 @@ int status(const Call& call, const fs::path& out) {
     text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
                         sweep["points"].get<std::uint64_t>(), sweep["failed"].get<std::uint64_t>());
     if (const auto left = sweep["left_over"].get<std::uint64_t>(); left > 0)
-      text += fmt::format("  {} folders of points that are no longer in the sweep: kept for when they are again\n", left);
+      text +=
+          fmt::format("  {} folders of points that are no longer in the sweep: kept for when they are again\n", left);
   }
   if (const fs::path submitted = out / "slurm" / "submitted.json"; fs::is_regular_file(submitted, error)) {
     json["submitted"] = read_json(submitted);

@@ -29,10 +29,10 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view count_record = ".sweep";  // in points/: how many points the recipe has
-constexpr std::size_t most_failures = 20;           // that are listed one by one
-constexpr std::size_t most_learned = 50;            // points done before that say what stages take
-constexpr std::int64_t show_interval = 90'000'000;  // [ns]
-constexpr std::size_t most_point_pages = 200;       // a page is 0.1 to 3 MB; points of larger sweeps have none
+constexpr std::size_t most_failures = 20;            // that are listed one by one
+constexpr std::size_t most_learned = 50;             // points done before that say what stages take
+constexpr std::int64_t show_interval = 90'000'000;   // [ns]
+constexpr std::size_t most_point_pages = 200;        // a page is 0.1 to 3 MB; points of larger sweeps have none
 
 struct Shard {
   std::uint64_t number = 1, of = 1;  // 1 to of

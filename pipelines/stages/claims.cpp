@@ -56,8 +56,9 @@ Measured read_number(const std::string& pointer, const std::vector<Input>& input
   Measured measured;
   if (found->is_object() && found->contains("value")) {
     if ((*found)["value"].is_number()) measured.value = (*found)["value"].get<double>();
-    if (found->contains("std_error") && (*found)["std_error"].is_number())
-      measured.error = (*found)["std_error"].get<double>();
+    // null: the error is not known, as of the middle of a range. Such a claim stays open.
+    if (found->contains("std_error"))
+      measured.error = (*found)["std_error"].is_number() ? (*found)["std_error"].get<double>() : NAN;
     measured.unit = found->value("unit", "");
   } else if (found->is_number()) {
     measured.value = found->get<double>();

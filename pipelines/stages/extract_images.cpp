@@ -344,11 +344,12 @@ class Extraction {
                      "Use positions and numbers of beads only."});
     if (measure_.second_diameter_m && !found.second_finder) {
       const double ratio = *measure_.second_diameter_m / measure_.bead_diameter_m;
-      all.push_back({fmt::format("Beads of a second diameter were asked for, and none were found. So the beads seen may be "
-                                 "of either kind, and every length wrong by up to {:.2g} %.",
-                                 100 * (std::max(ratio, 1 / ratio) - 1)),
-                     "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
-                     "of the first kind (--radius)."});
+      all.push_back(
+          {fmt::format("Beads of a second diameter were asked for, and none were found. So the beads seen may be "
+                       "of either kind, and every length wrong by up to {:.2g} %.",
+                       100 * (std::max(ratio, 1 / ratio) - 1)),
+           "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
+           "of the first kind (--radius)."});
     }
     for (const ingest::Objection& one : all)
       result["objections"].push_back(Json{{"why", one.why}, {"advice", one.advice}});

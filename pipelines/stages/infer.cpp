@@ -305,8 +305,11 @@ std::vector<ScaledTarget> Infer::scaled_targets(const RunContext& context) const
       if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
         throw InputError(fmt::format("{} has no number", target.at));
       target.value = (*found)["value"].get<double>();
-      if (found->contains("std_error") && (*found)["std_error"].is_number())
-        target.std_error = std::hypot(target.std_error, (*found)["std_error"].get<double>());
+      if (found->contains("std_error")) {
+        const Json& error = (*found)["std_error"];
+        if (!error.is_number()) throw InputError(fmt::format("{} has no standard error: it is no target", target.at));
+        target.std_error = std::hypot(target.std_error, error.get<double>());
+      }
     }
     const bool logarithmic = observables()[k].logarithmic;
     if (logarithmic && !(target.value > 0)) throw InputError(fmt::format("{} is not above 0", observables()[k].name));

@@ -18,6 +18,7 @@ using shakebed::pipelines::Json;
 using testing::HasSubstr;
 
 const std::string numbers = R"({"t": {"value": 1.0, "std_error": 0.1, "unit": "m g D"}, "none": {"value": null},
+    "range": {"value": 1.0, "std_error": null},
     "plain": 0.25, "yes": true, "no": false, "fit": {"p_value": 1e-12}})";
 
 class ClaimsVerdicts : public testing::Test {
@@ -43,6 +44,12 @@ TEST_F(ClaimsVerdicts, AValueAndItsTolerance) {
   EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.31)"), "open");
   EXPECT_EQ(verdict("/bed/t", R"("value": 1.5, "tolerance": 0.3)"), "does not hold");
   EXPECT_EQ(verdict("/bed/t", R"("value": 0.5, "tolerance": 0.3)"), "does not hold");
+}
+
+// The middle of a range has no standard error: it decides nothing.
+TEST_F(ClaimsVerdicts, OfANumberWhoseErrorIsNotKnownAreOpen) {
+  EXPECT_EQ(verdict("/bed/range", R"("value": 1, "tolerance": 0.5)"), "open");
+  EXPECT_EQ(verdict("/bed/range", R"("value": 5, "tolerance": 0.5)"), "open");
 }
 
 // 1.0 +- 0.1 over 0.25 without an error: 4 +- 0.4; over itself: 1 +- 0.1 sqrt(2), its errors taken as independent.

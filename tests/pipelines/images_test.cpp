@@ -183,9 +183,8 @@ TEST_F(Images, PhotographsNeedNoRecipe) {
 // Asked for beads of two kinds where only one is seen, nothing says which kind the scale is that of.
 TEST_F(Images, ASecondDiameterThatIsNotFoundLeavesNoTemperature) {
   const std::string frame = (*folder_ / "o/render/frames/000000.png").string();
-  const ProgramResult result =
-      run_shakebed({"fit-images", frame, "--diameter", "3 mm", "--second-diameter", "2 mm", "--out", "two"},
-                   folder_->path());
+  const ProgramResult result = run_shakebed(
+      {"fit-images", frame, "--diameter", "3 mm", "--second-diameter", "2 mm", "--out", "two"}, folder_->path());
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const Json answer = read_json(*folder_ / "two/fit/fit.json")["answer"];
   EXPECT_THAT(answer["why"].get<std::string>(), HasSubstr("every length wrong by up to 50 %"));

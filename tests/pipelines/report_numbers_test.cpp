@@ -141,8 +141,8 @@ TEST(SweepTable, DoesNotSeeTheOrderOfItsPointsNorTheirShards) {
 TEST(SweepTable, HoldsOtherNumbersWhenTheRecipeAsksForThem) {
   const ScratchFolder folder;
   const auto run = [&](const std::string& collect) {
-    write_text(folder / "r.json", R"({ "name": "t", "sweep": { "over": { "/stages/map/gamma": [3, 5] }, "collect": )" +
-                                      collect + R"( },
+    write_text(folder / "r.json",
+               R"({ "name": "t", "sweep": { "over": { "/stages/map/gamma": [3, 5] }, "collect": )" + collect + R"( },
       "stages": [ { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
     const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o", "--quiet"}, folder.path());
     EXPECT_EQ(ran.exit_code, 0) << ran.err;

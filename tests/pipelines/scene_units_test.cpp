@@ -430,9 +430,10 @@ TEST(PlatesInReducedUnits, ArePressedByTheTangentOfTheTilt) {
   EXPECT_NEAR(deceleration(twelve_disks + R"("box": { "width": 12, "tilt": 1, "plates": { "friction": 0.5 } } })"),
               0.5 * std::tan(1), 1e-15);
   // On a horizontal plate: weightless in its plane.
-  EXPECT_EQ(deceleration(twelve_disks + R"("gravity": 0, "box": { "width": 12, "sides": "periodic", "lid": { "kind": "fixed",
+  EXPECT_EQ(
+      deceleration(twelve_disks + R"("gravity": 0, "box": { "width": 12, "sides": "periodic", "lid": { "kind": "fixed",
     "height": 12 }, "plates": { "friction": 0.5, "pressing": 3 } } })"),
-            1.5);
+      1.5);
 }
 
 TEST(PlatesInSi, NeedSomethingThatPresses) {
