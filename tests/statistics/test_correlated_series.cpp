@@ -43,6 +43,15 @@ TEST(CorrelatedSeries, HasAMemoryDoneByHand) {
   EXPECT_DOUBLE_EQ(memory_of(std::span(series).first(8)), 1 + 2 * 5.0 / 8);
 }
 
+// Two peaks six values apart: what lies beyond five memories, here five values, is not asked.
+TEST(CorrelatedSeries, AsksNoFartherThanFiveMemories) {
+  std::vector<double> series(40, 0.0);
+  series[3] = series[9] = 1;
+  EXPECT_EQ(memory_of(series), 1);
+  series[9] = 0, series[8] = 1;  // five apart they are: one product, two squares
+  EXPECT_EQ(memory_of(series), 1 + 2 * 0.5);
+}
+
 TEST(CorrelatedSeries, HasNothingToTellOfFewValuesOrOfEqualOnes) {
   EXPECT_EQ(memory_of({}), 1);
   const std::vector<double> few = {1, -2, 1}, none(100, 0.0);

@@ -71,6 +71,13 @@ TEST(Kernel, CumulativeIsTheIntegralOfTheDensity) {
   }
   EXPECT_EQ(kernel_cumulative({}, -1e-9), 0);
   EXPECT_EQ(kernel_cumulative({}, 1e-9), 1);
+  // Without width all of it lies at 0, whatever its kind.
+  for (Kernel kernel : windows) {
+    kernel.width = 0;
+    EXPECT_EQ(kernel_cumulative(kernel, -1e-300), 0);
+    EXPECT_EQ(kernel_cumulative(kernel, 0), 1);
+    EXPECT_EQ(kernel_cumulative(kernel, 1e-300), 1);
+  }
 }
 
 TEST(Kernel, EverySpellingComesBack) {

@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "statistics/parallel.hpp"
@@ -23,6 +27,17 @@ TEST(ForEachIndex, OneThreadGoesInOrder) {
   std::vector<std::size_t> order;
   for_each_index(5, 1, [&](std::size_t i) { order.push_back(i); });
   EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 2, 3, 4}));
+}
+
+TEST(ForEachIndex, UsesNoMoreThreadsThanAsked) {
+  std::mutex mutex;
+  std::set<std::thread::id> seen;
+  for_each_index(30, 2, [&](std::size_t) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // time for others to begin, if there are any
+    const std::lock_guard lock(mutex);
+    seen.insert(std::this_thread::get_id());
+  });
+  EXPECT_LE(seen.size(), 2u);
 }
 
 TEST(ForEachIndex, ThrowsTheFirstFailureAndBeginsNothingAfterIt) {

@@ -178,6 +178,18 @@ TEST(TimeLeft, FollowsAPartThatBecomesSlower) {
   }
 }
 
+// The first part took 20 s instead of 10 s. A hundredth of the whole, 0.2 s, counts as done at the expected pace.
+TEST(TimeLeft, TrustsWhatIsExpectedLikeAHundredthOfTheWhole) {
+  double now = 0;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.expect(0, 10);
+  time.expect(1, 10);
+  time.begin(0);
+  now = 20;
+  time.end(0);
+  EXPECT_NEAR(*time.seconds(), 10 * (20 + 0.2) / (10 + 0.2), 1e-12);
+}
+
 // Expected 10 s, and it goes on and on without a word: the time left never becomes zero.
 TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
   double now = 0;

@@ -13,9 +13,11 @@ for each job. The standard library of Python 3.9 is enough.
 
 import argparse
 import csv
+import json
 import os
 import random
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -28,10 +30,7 @@ SOURCE = Path(__file__).resolve().parents[3]
 ROOMS = ("statistics", "sim", "fit", "ingest", "pipelines")
 COLUMNS = ("id", "room", "file", "offset", "line", "kind", "before", "after", "state", "noticed_by", "seconds")
 
-# Seconds after which a test program is stopped and the fault counts as noticed: several times what the slowest takes on
-# a busy machine, all tests of a program and its quick ones.
-TEST_TIMEOUT, QUICK_TIMEOUT = 400, 90
-BUILD_TIMEOUT = 900
+BUILD_TIMEOUT = 3600  # seconds, on a busy machine
 
 # Test programs by name: their place in the build. Those in tests/robustness/fuzz and the long ones are not used.
 PROGRAMS = {
@@ -47,17 +46,18 @@ PROGRAMS = {
     "digits_test": "tests/robustness/digits_test",
     "test_robustness": "tests/robustness/test_robustness",
 }
-# Tests that take more than a second (release build, 24 November 2026): they run when the quick ones have noticed nothing.
-SLOW = {
-    "test_sim": ("Engine.GoesOn*", "Tiles.*", "MovingFloor.IsMetWhere*", "Engine.Foresees*", "Engine.SaysWhere*",
-                 "Disks/EventQueueOrder*", "Engine.ReturnsAfter*", "ShellGrid*", "NarrowCell*"),
-    "test_fit": ("FitHardCases.AnyProfile*", "Coverage.*", "Answer.OfAny*", "SimulatedProfiles.Repeats*", "CrossCheck*",
-                 "Frames.Windows*", "FitHardCases.AHundred*", "Bounce.Nearly*", "Bias*"),
-    "test_ingest": ("Survey*", "FinderBenchmark*", "ShakingFrequency.Noise*", "Finder.APacked*", "Rim*", "RealFrames*",
-                    "HardCases.Half*", "HardCases.BeadsLit*", "HardCases.Saturated*", "HardCases.AFrame*",
-                    "HardCases.DisksOfThreeHundred*", "Finder.Steps*", "Finder.Rows*", "MeasureBed.TheShakers*",
-                    "MeasureBed.WithASink*", "MeasureBed.ASecond*", "Lens/*"),
-    "test_numbers": ("StatedErrors*", "StudyNumbers*", "Tampering*", "Replicas*", "InferNumbers*"),
+# Programs with the tests of a room.
+OWN = {
+    "statistics": ("test_statistics",),
+    "sim": ("test_sim",),
+    "fit": ("test_fit",),
+    "ingest": ("test_ingest", "extract_numbers_test"),
+    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test"),
+}
+# What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
+LAST = {
+    "pipelines": (("house.reference", ("python3", "SOURCE/docs/write_reference.py", "PROGRAM", "--check")),
+                  ("docs.quick", ("python3", "SOURCE/tests/house/run_docs.py", "PROGRAM", "SOURCE", "quick"))),
 }
 # The tests of a room first, then those of the rooms above.
 ORDER = {
@@ -65,7 +65,7 @@ ORDER = {
     "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "test_robustness"),
     "fit": ("test_fit", "test_numbers", "test_pipelines", "digits_test"),
     "ingest": ("test_ingest", "extract_numbers_test", "pipelines_images_test"),
-    "pipelines": ("extract_numbers_test", "test_numbers", "test_pipelines", "pipelines_images_test", "test_robustness"),
+    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test", "pipelines_images_test", "test_robustness"),
 }
 
 
@@ -156,6 +156,7 @@ def choose(arguments):
     rooms = [arguments.room] if arguments.room else list(ROOMS)
     rows = read_table(arguments.table)
     known = {(row["file"], row["offset"], row["after"]) for row in rows}
+    chosen = []
     for number, room in enumerate(rooms):
         places = []
         for path in source_files(room):
@@ -170,9 +171,13 @@ def choose(arguments):
             if (name, str(offset), after) in known:
                 continue
             wanted -= 1
-            rows.append(dict(id=f"r{len(rows) + 1}", room=room, file=name, offset=str(offset),
-                             line=str(text.count("\n", 0, offset) + 1), kind=kind, before=before, after=after,
-                             state="waiting", noticed_by="", seconds=""))
+            chosen.append(dict(id="", room=room, file=name, offset=str(offset),
+                               line=str(text.count("\n", 0, offset) + 1), kind=kind, before=before, after=after,
+                               state="waiting", noticed_by="", seconds=""))
+    generator.shuffle(chosen)  # the first of them are a sample, too
+    for row in chosen:
+        row["id"] = f"r{len(rows) + 1}"
+        rows.append(row)
     write_table(arguments.table, rows)
 
 
@@ -225,125 +230,413 @@ def write_table(path, rows):
     os.replace(f"{path}.new", path)
 
 
-def run_limited(command, seconds, **options):
-    """The exit code and the output of a command and its children, None for the code where the time ran out."""
+def run_limited(command, seconds, cpu_seconds=None, **options):
+    """The exit code, the output and the CPU seconds of a command and its children; None for the code where the time ran
+    out. cpu_seconds: what each of its processes may use."""
+    limit = (lambda: resource.setrlimit(resource.RLIMIT_CPU, (cpu_seconds, cpu_seconds + 5))) if cpu_seconds else None
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-                               start_new_session=True, **options)
+                               start_new_session=True, preexec_fn=limit, **options)
     try:
         output, _ = process.communicate(timeout=seconds)
-        return process.returncode, output
+        code = process.returncode
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-        return None, process.communicate()[0]
-
-
-def steps_of(room):
-    """Test programs in their order with the tests to run, the quick ones of a program before its slow ones."""
-    steps = []
-    for program in ORDER[room]:
-        slow = ":".join(SLOW.get(program, ()))
-        steps += [(program, f"-{slow}"), (program, slow)] if slow else [(program, "*")]
-    return steps
+        code, output = None, process.communicate()[0]
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return code, output, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 class Bench:
-    """One copy of the source with its build."""
+    """The programs of a finished release build, linked once more against shared libraries, of which the first holds the
+    objects of one fault. What the other libraries hold of the same functions is then not called."""
 
-    def __init__(self, work, number):
-        self.tree = work / f"tree-{number}"
-        self.build = self.tree / "build/release"  # as in the source: a compiler cache then knows the files
+    def __init__(self, work, base, number):
+        self.base = base
+        self.home = Path(re.search(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.*)$", (base / "CMakeCache.txt").read_text(),
+                                   re.MULTILINE).group(1))
+        self.built = Path(re.search(r"^# For build in directory: (.*)$", (base / "CMakeCache.txt").read_text(),
+                                    re.MULTILINE).group(1))  # another one, if the build was copied
+        self.work = work / f"bench-{number}"
+        self.overlay = self.work / "overlay"
+        self.fault = self.work / "lib/libfault.so"
+        self.cpu = 0.0
+        self.fit, self.unfit = set(), set()  # tests that pass, and that fail, without a fault
 
-    def prepare(self, programs):
-        names = subprocess.run(["git", "-C", str(SOURCE), "ls-files", "-z", "--cached", "--others",
-                                "--exclude-standard"], check=True, capture_output=True, text=True).stdout
-        wanted = {name for name in names.split("\0") if name and (SOURCE / name).is_file()}
-        for name in wanted:
-            self.copy(name)
-        for path in self.tree.rglob("*"):
-            name = str(path.relative_to(self.tree))
-            if path.is_file() and name not in wanted and not name.startswith("build/"):
-                path.unlink()
-        if not (self.build / "build.ninja").exists():
-            self.configure()
-        for program in programs:
-            code, output = self.make(program)
+    # --- linking -----------------------------------------------------------------------------------------------------
+    def here(self, command):
+        """A command of the build, for the place where the build is now and for this source."""
+        command = command.replace(str(self.built), "@BUILT@").replace(f"{self.home}/", f"{SOURCE}/")
+        command = re.sub(rf"{re.escape(str(self.home))}(?![\w/-])", str(SOURCE), command)
+        return command.replace("@BUILT@", str(self.base))
+
+    def run(self, command, seconds=BUILD_TIMEOUT):
+        code, output, cpu = run_limited(command if isinstance(command, list) else ["sh", "-c", command], seconds,
+                                        cwd=self.base)
+        self.cpu += cpu
+        return code, output
+
+    def must(self, command):
+        code, output = self.run(command)
+        if code != 0:
+            sys.exit(f"{command}\n{output[-3000:]}")
+
+    def prepare(self):
+        for name in ("bin", "lib/shakebed", "objects"):
+            (self.work / name).mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(self.overlay, ignore_errors=True)
+        targets = [*PROGRAMS.values(), "pipelines/shakebed", "shakebed_images"]
+        lines = subprocess.run(["ninja", "-C", str(self.base), "-t", "commands", *targets], check=True,
+                               capture_output=True, text=True).stdout.splitlines()
+        links = [line for line in lines if line.startswith(": &&")]
+        self.archives = {}  # by name: objects
+        for line in links:
+            found = re.search(r"/ar qc (\S+) +(.*?) && ", line)
+            if found:
+                self.archives[found.group(1)] = found.group(2).split()
+        self.links = {}  # program: its command
+        for line in links:
+            found = re.search(r" -o (\S+) ", line)
+            if found and "/ar qc" not in line:
+                self.links[found.group(1)] = line[len(": && "):].rsplit(" && :", 1)[0]
+        entries = json.loads((self.base / "compile_commands.json").read_text())
+        self.compiled = {}  # object: how it is compiled
+        for entry in entries:
+            output = re.search(r" -o (\S+)", entry["command"]).group(1)
+            self.compiled[output] = entry["command"]
+        self.sources = {}  # source: its object
+        for output, command in self.compiled.items():
+            unit = re.search(r" -c (\S+)$", command).group(1)
+            files = [unit]
+            if "/Unity/" in unit:
+                text = Path(unit.replace(str(self.built), str(self.base))).read_text()
+                files = re.findall(r'#include "(.*?)"', text)
+            for file in files:
+                if file.startswith(f"{self.home}/") and not file.startswith(str(self.built)):
+                    self.sources.setdefault(file[len(str(self.home)) + 1:], output)
+        self.depends = {}  # header: objects
+        output = None
+        for line in subprocess.run(["ninja", "-C", str(self.base), "-t", "deps"], check=True, capture_output=True,
+                                   text=True).stdout.splitlines():
+            if not line.startswith(" "):
+                output = line.split(":")[0]
+            elif line.strip().startswith(f"{self.home}/") and not line.strip().startswith(str(self.built)):
+                self.depends.setdefault(line.strip()[len(str(self.home)) + 1:], []).append(output)
+        self.shared = {}  # archive or object: the shared library that takes its place
+        for archive, objects in self.archives.items():
+            if re.match(r"(statistics|sim|fit|ingest|pipelines)/", archive):
+                self.shared[archive] = (Path(archive).stem, objects)
+        images = [name for name in self.links["pipelines/libshakebed_images.so"].split()
+                  if name.endswith(".o")]
+        program = [name for name in self.links["pipelines/shakebed"].split() if name.endswith(".o")]
+        self.groups = {"libimage_stages": images, "libprogram": program}
+        for name, (library, objects) in self.shared.items():
+            self.library(library, objects)
+        for library, objects in self.groups.items():
+            if library == "libprogram":
+                objects = [self.compile_again(name, lambda text: text.replace("-fPIE", "-fPIC")) for name in objects]
+            self.library(library, objects)
+        self.no_fault()
+        self.programs = {}
+        for output in self.links:
+            if output in targets or output.endswith("/libshakebed_images.so"):
+                self.link(output)
+
+    def library(self, name, objects):
+        target = self.work / f"lib/{name}.so"
+        if not target.exists():
+            self.must(["c++", "-shared", "-o", str(target), f"-Wl,-soname,{name}.so", *objects])
+
+    def compile_again(self, name, change):
+        """An object of the build with other flags."""
+        output = self.work / "objects" / name.replace("/", "+")
+        if not output.exists():
+            command = change(self.compiled[name].replace(str(self.built), str(self.base)))
+            self.must(re.sub(r" -o \S+", f" -o {output}", command))
+        return str(output)
+
+    def link_words(self, output):
+        """The objects and libraries of a program, with shared libraries for static ones."""
+        words = []
+        for word in self.links[output].split()[1:]:
+            if word in self.shared:
+                words.append(f"lib/{self.shared[word][0]}.so")
+            elif word.endswith("libshakebed_test_program.a"):
+                words += [self.own_program(name) for name in self.archives[word]]
+            elif output.endswith(".so") and word.endswith(".o"):
+                words.append(word)  # the module; nothing names its entry, so it would not ask for a library
+            elif word in self.groups["libimage_stages"] or word in self.groups["libprogram"]:
+                words.append("lib/libimage_stages.so" if word in self.groups["libimage_stages"] else "lib/libprogram.so")
+            elif word.endswith(".o") and "-DSHAKEBED_PROGRAM=" in self.compiled.get(word, ""):
+                words.append(self.own_program(word))
+            else:
+                words.append(word)
+        def place(word):  # objects, libraries of the tests, shared libraries, libraries of others
+            return 3 if re.match(r"/usr/lib|-l", word) else 2 if word.startswith("lib/") else 1 if word.endswith(".a") else 0
+
+        return sorted(words, key=place)
+
+    def own_program(self, name):
+        mine = str(self.work / "bin/shakebed")
+        return self.compile_again(name, lambda text: re.sub(r'(-DSHAKEBED_PROGRAM=\\")[^\\]*', rf"\g<1>{mine}", text))
+
+    def link(self, output, replaced=()):
+        """Links a program or the module, with the objects of `replaced` in place of its own."""
+        target = self.work / ("lib/shakebed" if output.endswith(".so") else "bin") / Path(output).name
+        if not replaced and target.exists():
+            return
+        words = [dict(replaced).get(word, word) for word in self.link_words(output)]
+        place = words.index("-o")
+        words[place + 1] = str(target)
+        words = [str(self.work / word) if word.startswith("lib/lib") and (self.work / word).exists() else word
+                 for word in words]
+        words = [word for word in words if word != "-Wl,-z,defs"]
+        words += [f"-Wl,-rpath,{self.work}/lib", f"-Wl,-rpath-link,{self.work}/lib", "-Wl,-z,lazy"]
+        if not output.endswith(".so"):
+            words.insert(0, f"-Wl,--no-as-needed {self.fault} -Wl,--as-needed")
+        self.must("c++ " + " ".join(words))
+
+    def no_fault(self):
+        if not (self.work / "objects/none.so").exists():
+            (self.work / "objects/none.cpp").write_text("")
+            self.must(["c++", "-shared", "-o", str(self.work / "objects/none.so"), "-Wl,-soname,libfault.so",
+                       str(self.work / "objects/none.cpp")])
+        shutil.copy(self.work / "objects/none.so", self.fault)
+
+    # --- one fault ---------------------------------------------------------------------------------------------------
+    def compile(self, name, source, output):
+        """Compiles `source`, a part of the object `name` or all of it, so that files of the overlay come first."""
+        command = self.here(self.compiled[name]).replace("-fPIE", "-fPIC") if name in self.groups["libprogram"] else \
+            self.here(self.compiled[name])
+        command = re.sub(r" -c \S+$", f" -c {source}", re.sub(r" -o \S+", f" -o {output}", command))
+        command = command.replace(" -I", f" -I{self.overlay} -I", 1)
+        if name.endswith("run_scene.cpp.o"):
+            command = command.replace(" -O3 ", " -O1 ")  # half the time; the same results
+        return self.run(("ccache " if shutil.which("ccache") else "") + command)
+
+    def unit(self, name):
+        """The source of an object, for this source tree."""
+        unit = Path(re.search(r" -c (\S+)$", self.compiled[name]).group(1).replace(str(self.built), str(self.base)))
+        if "/Unity/" not in str(unit):
+            return self.here(str(unit))
+        copy = self.work / "objects" / (name.replace("/", "+") + ".cxx")
+        copy.write_text(self.here(unit.read_text()))
+        return str(copy)
+
+    def build(self, file):
+        """Builds what a fault in `file`, which is in the overlay, changes: None or what the compiler says."""
+        parts, programs = [], {}
+        if file.endswith(".cpp"):
+            if file not in self.sources:
+                return "is in no program"
+            name = self.sources[file]
+            parts = [(name, str(self.overlay / file))]
+        else:
+            for name in self.depends.get(file, []):
+                owner = [output for output, command in self.links.items() if f" {name} " in command
+                         and output.startswith("tests/")]
+                if owner and name not in self.groups["libimage_stages"]:
+                    programs.setdefault(owner[0], []).append(name)
+                elif any(name in objects for _, objects in self.shared.values()) or \
+                        any(name in objects for objects in self.groups.values()):
+                    parts.append((name, self.unit(name)))
+        objects = []
+        for number, (name, source) in enumerate(parts):
+            output = str(self.work / f"objects/fault-{number}.o")
+            code, text = self.compile(name, source, output)
             if code != 0:
-                sys.exit(f"{program} is not built without a fault:\n{output[-3000:]}")
+                return text or "time"
+            objects.append(output)
+        libraries = {self.work / f"lib/{library}.so" for library, _ in self.shared.values()}
+        others = {word for command in self.links.values() for word in command.split()
+                  if re.search(r"/usr/lib/.*\.so|^-l", word)}
+        self.must(["c++", "-shared", "-o", str(self.fault), "-Wl,-soname,libfault.so", "-Wl,--as-needed", *objects,
+                   *map(str, libraries), *others, f"-Wl,-rpath,{self.work}/lib"])
+        for output, names in programs.items():
+            replaced = {}
+            for name in names:
+                changed = str(self.work / "objects" / (name.replace("/", "+") + ".fault.o"))
+                code, text = self.compile(name, self.unit(name), changed)
+                if code != 0:
+                    return text or "time"
+                replaced[str(self.work / "objects" / name.replace("/", "+"))
+                         if "-DSHAKEBED_PROGRAM=" in self.compiled[name] else name] = changed
+            self.changed_programs.append(output)
+            self.link(output, tuple(replaced.items()))
+        return None
 
-    # The release build, for the tests take minutes where nothing is optimised; one file a unit in the rooms that are
-    # otherwise compiled many files at once, so that a fault costs one file.
-    def configure(self):
-        own = self.tree / "build/one_file_a_unit.cmake"
-        own.parent.mkdir(parents=True, exist_ok=True)
-        own.write_text("cmake_language(DEFER CALL set_target_properties shakebed_statistics shakebed_fit"
-                       " shakebed_formats shakebed_pipelines shakebed_images PROPERTIES UNITY_BUILD OFF)\n")
-        launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-        subprocess.run(["cmake", "-G", "Ninja", "-S", str(self.tree), "-B", str(self.build),
-                        "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON", "-DCMAKE_UNITY_BUILD_BATCH_SIZE=8",
-                        f"-DCMAKE_PROJECT_shakebed_INCLUDE={own}", "-DSHAKEBED_PYTHON=OFF", "-DSHAKEBED_INSTALL=OFF",
-                        "-DSHAKEBED_BENCH=OFF", *launcher], check=True, stdout=subprocess.DEVNULL)
+    def start(self, program, tests, usual):
+        """The CPU may be used for several times what is usual; the machine may be busy with other things."""
+        return run_limited([str(self.work / "bin" / program), "--gtest_fail_fast", "--gtest_brief=1",
+                            "--gtest_filter=" + ":".join(tests)], 600 + 60 * usual, cpu_seconds=20 + int(4 * usual),
+                           cwd=self.work / "bin")
 
-    def copy(self, name):
-        source, target = SOURCE / name, self.tree / name
-        if not target.exists() or target.read_bytes() != source.read_bytes():
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(source, target)
-            os.utime(target)
+    def is_fit(self, program, test, usual):
+        """Whether a test that failed passes without the fault. Asked once a test."""
+        if test not in self.fit:
+            aside = self.fault.with_suffix(".aside")
+            os.replace(self.fault, aside)
+            self.no_fault()
+            code, _, cpu = self.start(program, [test], usual)
+            self.cpu += cpu
+            os.replace(aside, self.fault)
+            (self.fit if code == 0 else self.unfit).add(test)
+        return test in self.fit
 
-    def make(self, program):
-        return run_limited(["ninja", "-C", str(self.build), "-j1", program], BUILD_TIMEOUT)
-
-    def judge(self, row, depth):
-        path = self.tree / row["file"]
-        text = path.read_text()
+    def judge(self, row, times, part):
+        """(state, test that noticed) of a fault. Part: see groups_of()."""
+        text = (SOURCE / row["file"]).read_text()
         offset = int(row["offset"])
         if text[offset:offset + len(row["before"])] != row["before"]:
             return "misplaced", ""
-        path.write_text(text[:offset] + row["after"] + text[offset + len(row["before"]):])
+        changed = self.overlay / row["file"]
+        changed.parent.mkdir(parents=True, exist_ok=True)
+        changed.write_text(text[:offset] + row["after"] + text[offset + len(row["before"]):])
+        self.changed_programs = []
         try:
-            return self.judge_changed(row["room"], depth)
+            said = self.build(row["file"])
+            if said is not None:
+                return ("not in a program" if said == "is in no program" else "not built"), ""
+            return self.ask(row, times, part)
         finally:
-            path.write_text(text)
+            shutil.rmtree(self.overlay)
+            self.no_fault()
+            for output in self.changed_programs:
+                (self.work / "bin" / Path(output).name).unlink(missing_ok=True)
+                self.link(output)
 
-    def judge_changed(self, room, depth):
-        for program, tests in steps_of(room)[:depth]:
-            code, _ = self.make(program)
-            if code != 0:
-                return "not built", ""
-            code, output = run_limited([str(self.build / PROGRAMS[program]), "--gtest_fail_fast", "--gtest_brief=1",
-                                        f"--gtest_filter={tests}"],
-                                       QUICK_TIMEOUT if tests.startswith("-") else TEST_TIMEOUT, cwd=self.build)
-            if code is None:
-                return "noticed", f"{program} (did not end)"
-            if code != 0:
-                failed = re.findall(r"^\[  FAILED  \] ([\w.]+/?\w*)", output, re.MULTILINE)
-                return "noticed", failed[0] if failed else f"{program} (ended with {code})"
+    def ask(self, row, times, part):
+        for program, tests, usual in groups_of(row, times, part):
+            tests = [test for test in tests if test not in self.unfit]
+            while tests:
+                code, output, cpu = self.start(program, tests, usual)
+                self.cpu += cpu
+                if code == 0:
+                    break
+                failed = re.findall(r"^\[  FAILED  \] ([\w./]+)", output, re.MULTILINE)
+                if code is None or code == -signal.SIGXCPU or not failed:
+                    return "noticed", f"{program} ({'did not end' if code in (None, -signal.SIGXCPU) else f'ended with {code}'})"
+                if self.is_fit(program, failed[0], usual):
+                    return "noticed", failed[0]
+                print(f"{failed[0]} fails without a fault: not used", flush=True)
+                tests = [test for test in tests if test not in self.unfit]
+        if part == "first":
+            return "not at first", ""
+        for name, command in LAST.get(row["room"], ()):
+            code, output = self.run([word.replace("PROGRAM", str(self.work / "bin/shakebed"))
+                                     .replace("SOURCE", str(SOURCE)) for word in command], 1200)
+            if code not in (0, 77):
+                return "noticed", name
         return "survived", ""
+
+
+def quick_filter(base, program):
+    """What the quick tests of a program are, as --gtest_filter has it."""
+    folder, name = (base / program).parent, Path(program).name
+    for path, pattern in ((folder / f"{name}[1]_include.cmake", r"TEST_FILTER \[==\[(.*?)\]==\]"),
+                          (folder / f"{name}_quick_suites.cmake", r'set\(filter "(.*?)"\)')):
+        if path.exists():
+            found = re.search(pattern, path.read_text())
+            if found and found.group(1):
+                return found.group(1)
+    return "*"
+
+
+def usual_times(bench):
+    """Seconds of every quick test without a fault, as ctest has written them down: {program: {test: seconds}}."""
+    costs = {}
+    for name in ("Testing/Temporary/CTestCostData.txt", "CTestCostData.txt"):
+        if (bench.base / name).exists():
+            for line in (bench.base / name).read_text().splitlines():
+                words = line.split()
+                if len(words) == 3:
+                    costs[words[0]] = float(words[2])
+    times = {}
+    for program, place in PROGRAMS.items():
+        listed = subprocess.run([str(bench.work / "bin" / program), "--gtest_list_tests",
+                                 f"--gtest_filter={quick_filter(bench.base, place)}"], check=True, capture_output=True,
+                                text=True).stdout
+        suites, suite = {}, None
+        for line in listed.splitlines():
+            line = line.split("#")[0].rstrip()
+            if line.endswith(".") and not line.startswith(" "):
+                suite = suites.setdefault(line, [])
+            elif line.startswith("  ") and suite is not None:
+                suite.append(line.strip())
+        times[program] = {}
+        for suite, tests in suites.items():
+            shared = costs.get(suite[:-1], 0.3 * len(tests)) / max(1, len(tests))
+            for test in tests:
+                if "DISABLED_" not in suite + test:
+                    times[program][suite + test] = costs.get(suite + test, shared)
+    return times
+
+
+def likely_suites(file):
+    """Suites of the tests that include the header beside the file, or that bear its name."""
+    stem = Path(file).with_suffix("")
+    found = set()
+    for path in (SOURCE / "tests").rglob("*.cpp"):
+        text = path.read_text(errors="replace")
+        if f'"{stem}.hpp"' in text or re.fullmatch(rf"(test_)?{stem.name}(_numbers|_number)?(_test)?", path.stem):
+            found.update(re.findall(r"\b(?:TEST|TEST_F|TEST_P|TYPED_TEST)\((\w+),", text))
+    return found
+
+
+def groups_of(row, times, part):
+    """Lists of tests to be run one after the other, (program, tests, usual seconds). First the likely ones of the room
+    that take up to two seconds, the others of up to 0.3 s; then, unless only this part is wanted, the others of the
+    room, then those of the programs above, the quickest first."""
+    likely = likely_suites(row["file"])
+    own = OWN[row["room"]]
+    ranked = {}
+    for place, program in enumerate(dict.fromkeys(own + ORDER[row["room"]])):
+        for test, seconds in times[program].items():
+            suite = test.split(".")[0]
+            likely_one = suite in likely or any(piece in likely for piece in suite.split("/"))
+            band = next(number for number, limit in enumerate((0.3, 2, 8, 1e9)) if seconds <= limit)
+            if program == "pipelines_images_test":
+                band = 3  # its tests share one run
+            first = program in own and band < (2 if likely_one else 1)
+            if part in ("first", "all") and first or part in ("rest", "all") and not first:
+                rank = (0, not likely_one, band) if first else (1, program not in own, band)
+                ranked.setdefault((rank, place, program), []).append((test, seconds))
+    return [(program, [test for test, _ in tests], sum(seconds for _, seconds in tests))
+            for (_, _, program), tests in sorted(ranked.items())]
 
 
 def run(arguments):
     rows = read_table(arguments.table)
-    waiting = [row for row in rows if row["state"] == "waiting" and arguments.room in (None, row["room"])]
+    states = {"first": ("waiting",), "rest": ("not at first",), "all": ("waiting", "not at first")}[arguments.part]
+    waiting = [row for row in rows if row["state"] in states and arguments.room in (None, row["room"])
+               and (arguments.suffix is None or row["file"].endswith(arguments.suffix))
+               and (arguments.only is None or row["id"] in arguments.only)]
     ends = time.monotonic() + 3600 * arguments.hours
     lock = threading.Lock()
+    benches = [Bench(arguments.work, arguments.build, number) for number in range(arguments.jobs)]
+    for bench in benches:
+        bench.prepare()
+    times = usual_times(benches[0])
 
-    def work(number):
-        bench = Bench(arguments.work, number)
-        bench.prepare(dict.fromkeys(name for row in waiting for name, _ in steps_of(row["room"])[:arguments.depth]))
+    def work(bench):
         while True:
             with lock:
                 if not waiting or time.monotonic() > ends:
                     return
                 row = waiting.pop(0)
-            begin = time.monotonic()
-            row["state"], row["noticed_by"] = bench.judge(row, arguments.depth)
-            row["seconds"] = f"{time.monotonic() - begin:.0f}"
-            print(f"{row['id']} {row['file']}:{row['line']} {row['state']} {row['noticed_by']} {row['seconds']} s",
-                  flush=True)
-            with lock:
-                write_table(arguments.table, rows)
+            part = "rest" if row["state"] == "not at first" else arguments.part
+            bench.cpu = 0.0
+            state, noticed_by = bench.judge(row, times, part)
+            spent = float(row["seconds"] or 0) + bench.cpu
+            print(f"{row['id']} {row['file']}:{row['line']} {state} {noticed_by} {bench.cpu:.0f} s", flush=True)
+            with lock:  # the table may have been changed meanwhile
+                now = read_table(arguments.table)
+                for other in now:
+                    if other["id"] == row["id"]:
+                        other.update(state=state, noticed_by=noticed_by, seconds=f"{spent:.0f}")
+                write_table(arguments.table, now)
 
-    threads = [threading.Thread(target=work, args=(number,)) for number in range(arguments.jobs)]
+    threads = [threading.Thread(target=work, args=(bench,)) for bench in benches]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -378,11 +671,17 @@ def main():
     judged = commands.add_parser("run")
     judged.add_argument("--jobs", type=int, default=1)
     judged.add_argument("--hours", type=float, default=8)
-    judged.add_argument("--depth", type=int, help="only so many steps of a room's order")
+    judged.add_argument("--build", type=Path, default=SOURCE / "build/release", help="a finished release build")
+    judged.add_argument("--part", choices=("first", "rest", "all"), default="all",
+                        help="only the quickest tests of the fault's room; only the others")
+    judged.add_argument("--suffix", help="only faults in files that end so, .cpp or .hpp")
+    judged.add_argument("--only", nargs="+", help="only these faults")
     judged.add_argument("--room", choices=ROOMS)
     commands.add_parser("report")
     arguments = parser.parse_args()
     arguments.work = arguments.work.resolve()
+    if getattr(arguments, "build", None):
+        arguments.build = arguments.build.resolve()
     arguments.table = arguments.table or arguments.work / "mutants.csv"
     {"choose": choose, "named": named, "run": run, "report": report}[arguments.command](arguments)
 
