@@ -189,6 +189,32 @@ TEST(Safety, CleanRemovesOnlyResultsOfOurs) {
   EXPECT_TRUE(fs::exists(folder / "elsewhere/manifest.json"));
 }
 
+// By the time of its manifest, in each unit: what is a little older goes, what is a little younger stays.
+TEST(Safety, CleanRemovesOnlyWhatIsOlderThanAsked) {
+  const ScratchFolder folder;
+  const auto put = [&](const std::string& name, std::chrono::minutes age) {
+    fs::create_directories(folder / ("results/" + name));
+    write_text(folder / ("results/" + name + "/manifest.json"), "{}");
+    fs::last_write_time(folder / ("results/" + name + "/manifest.json"), fs::file_time_type::clock::now() - age);
+  };
+  using std::chrono::minutes;
+  for (const auto& [asked, age] :
+       {std::pair{"90min", minutes(90)}, {"36h", minutes(36 * 60)}, {"1.5d", minutes(36 * 60)}}) {
+    put("older", age + minutes(10));
+    put("younger", age - minutes(10));
+    put("new", minutes(0));
+    const ProgramResult said = run_shakebed({"clean", "results", "--older-than", asked, "--dry-run"}, folder.path());
+    EXPECT_EQ(said.out, "would remove results/older\n") << asked;
+    EXPECT_TRUE(fs::exists(folder / "results/older")) << asked;
+    ASSERT_EQ(run_shakebed({"clean", "results", "--older-than", asked}, folder.path()).exit_code, 0) << asked;
+    EXPECT_EQ(listing(folder / "results", ""),
+              (std::vector<std::string>{"new", "new/manifest.json", "younger", "younger/manifest.json"}))
+        << asked;
+  }
+  EXPECT_NE(run_shakebed({"clean", "results", "--older-than", "90"}, folder.path()).exit_code, 0) << "of what?";
+  EXPECT_TRUE(fs::exists(folder / "results/younger"));
+}
+
 TEST(Safety, ReportsEscapeWhatTheyShow) {
   const std::string attack = "<script>alert(1)</script><img src=x onerror=alert(2)>\\\" onload=alert(3) '&amp;";
   ScratchFolder folder;
