@@ -83,6 +83,32 @@ TEST(Renderer, ExposureSmearsAlongTheVelocity) {
   EXPECT_NEAR(b.second - a.second, 9.0 * 9.0 / 12, 0.02);  // a streak of 9 px
 }
 
+// The brighter side is as bright as without a gradient; light and its loss in the corners multiply.
+TEST(Renderer, LightChangesAcrossTheFrameAsAsked) {
+  Camera camera = plain(41, 21);
+  camera.background_level = 120;
+  camera.gradient_y = 0.4;
+  GrayFrame frame = render_frame({}, camera);
+  for (const int column : {0, 20, 40}) {
+    EXPECT_NEAR(frame.at(column, 0), 120 * 0.8 / 1.2, 1e-4);  // 1 - 0.4/2 of the middle's
+    EXPECT_NEAR(frame.at(column, 5), 120 * 0.9 / 1.2, 1e-4);
+    EXPECT_NEAR(frame.at(column, 10), 120 / 1.2, 1e-4);
+    EXPECT_NEAR(frame.at(column, 20), 120, 1e-4);
+  }
+  camera.gradient_y = 0;
+  camera.gradient_x = -0.4;
+  frame = render_frame({}, camera);
+  EXPECT_NEAR(frame.at(0, 7), 120, 1e-4);
+  EXPECT_NEAR(frame.at(30, 7), 120 * 0.9 / 1.2, 1e-4);
+  EXPECT_NEAR(frame.at(40, 7), 120 * 0.8 / 1.2, 1e-4);
+  camera.gradient_y = 0.4;
+  camera.vignette = 0.5;
+  frame = render_frame({}, camera);
+  EXPECT_NEAR(frame.at(20, 10), 120 / 1.4, 1e-4);
+  EXPECT_NEAR(frame.at(0, 20), 120 * 0.5, 1e-4);  // a corner, and the brightest
+  EXPECT_NEAR(frame.at(20, 0), 120 * 0.8 / 1.4 * (1 - 0.5 * 100 / (100 + 400)), 1e-4);
+}
+
 TEST(Renderer, NoiseHasTheVarianceAsked) {
   Camera camera = plain(400, 400);
   camera.background_level = 128;
