@@ -371,6 +371,31 @@ TEST(DisksThatBounceStraightUp, HaveNothingAcross) {
                                   {"pressure_xx_error", "pressure_zz_error"}});
 }
 
+// Rough disks in free flight, looked at before they meet anything: each keeps its own spin and its own velocity across.
+TEST(DisksInFreeFlight, KeepTheSpinsOfTheFileTheyStartFrom) {
+  const ScratchFolder folder;
+  shakebed::pipelines::TrajectoryFrame frame;
+  frame.width = 9;
+  frame.x = {1.5, 4.5, 7.5}, frame.z = {1.5, 2.25, 3.5}, frame.vx = {0.1, -0.2, 0.3}, frame.vz = {0.3, -0.2, 0.1};
+  frame.spin = {0.5, -1, 2};
+  {
+    shakebed::pipelines::TrajectoryWriter start(folder / "start.extxyz");
+    start.write(frame);
+    start.close();
+  }
+  write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 2,
+      "units": "reduced", "disks": { "count": 3, "inertia": "sphere", "friction": 0.3 }, "box": { "width": 9 },
+      "start": { "kind": "file", "file": "start.extxyz" }, "settle": 0, "measure": 0.1, "frames": { "count": 1 },
+      "compress": false } ] })");
+  const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  shakebed::pipelines::TrajectoryReader reader(folder / "o/bed/trajectory.extxyz");
+  shakebed::pipelines::TrajectoryFrame seen;
+  ASSERT_TRUE(reader.read(seen));
+  EXPECT_EQ(seen.spin, frame.spin);
+  EXPECT_EQ(seen.vx, frame.vx);
+}
+
 // Rows of six that hardly move: the lowest row is 6.06 D wide and sqrt(3)/2 D high.
 TEST(ColdBed, HasItsBottomRow) {
   const ScratchFolder folder;
