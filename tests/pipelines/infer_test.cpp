@@ -73,6 +73,20 @@ TEST_F(Infer, SaysHowManyBedsGaveNoNumbers) {
       << result.err;
 }
 
+// Round steps of 1, 2 or 5, of which at least three make up the range: 3 to 9 and 0.5 to 0.9.
+TEST_F(Infer, DividesTheAxesOfItsPairsByRoundSteps) {
+  std::vector<std::string> smaller;
+  for (const char* change : {"first=20", "rounds=0", "draws=100", "settle=5", "measure=20", "best=0", "calibration=0",
+                             "parameters/gamma/high=9"}) {
+    smaller.push_back("--set");
+    smaller.push_back(std::string("/stages/search/") + change);
+  }
+  ASSERT_EQ(run("o", smaller).exit_code, 0);
+  const std::string script = read_text(folder_ / "o/search/pairs.gp");
+  EXPECT_NE(script.find("set xrange [3:9]\nset xtics 2\n"), std::string::npos) << script;
+  EXPECT_NE(script.find("set yrange [0.5:0.9]\nset ytics 0.1\n"), std::string::npos) << script;
+}
+
 TEST_F(Infer, RefusesWhatMakesNoSense) {
   const auto refused = [&](const std::string& change, const std::string& words) {
     const ProgramResult result = run("wrong", {"--set", change});

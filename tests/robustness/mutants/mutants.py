@@ -345,7 +345,13 @@ class Bench:
     def library(self, name, objects):
         target = self.work / f"lib/{name}.so"
         if not target.exists():
-            self.must(["c++", "-shared", "-o", str(target), f"-Wl,-soname,{name}.so", *objects])
+            self.must(["c++", "-shared", "-o", str(target), f"-Wl,-soname,{name}.so", *objects, "-Wl,--as-needed",
+                       *self.others()])
+
+    def others(self):
+        """Libraries of others, as the programs name them."""
+        return sorted({word for command in self.links.values() for word in command.split()
+                       if re.search(r"^/usr/lib/.*\.so|^-l", word)})
 
     def compile_again(self, name, change):
         """An object of the build with other flags."""
@@ -448,10 +454,8 @@ class Bench:
                 return text or "time"
             objects.append(output)
         libraries = {self.work / f"lib/{library}.so" for library, _ in self.shared.values()}
-        others = {word for command in self.links.values() for word in command.split()
-                  if re.search(r"/usr/lib/.*\.so|^-l", word)}
         self.must(["c++", "-shared", "-o", str(self.fault), "-Wl,-soname,libfault.so", "-Wl,--as-needed", *objects,
-                   *map(str, libraries), *others, f"-Wl,-rpath,{self.work}/lib"])
+                   *map(str, libraries), *self.others(), f"-Wl,-rpath,{self.work}/lib"])
         for output, names in programs.items():
             replaced = {}
             for name in names:
@@ -514,6 +518,8 @@ class Bench:
                 if code == 0:
                     break
                 failed = re.findall(r"^\[  FAILED  \] ([\w./]+)", output, re.MULTILINE)
+                if code == 127:
+                    sys.exit(f"{program} is not loaded:\n{output[-3000:]}")
                 if code is None or code == -signal.SIGXCPU or not failed:
                     return "noticed", f"{program} ({'did not end' if code in (None, -signal.SIGXCPU) else f'ended with {code}'})"
                 if self.is_fit(program, failed[0], usual):
