@@ -109,6 +109,39 @@ TEST(SweepTable, HoldsItsAxesInSi) {
   for (std::size_t r = 0; r < 2; ++r) EXPECT_EQ(table.text("status", r), "ok");
 }
 
+// A number over two parameters: a map of up to forty columns. The number is a parameter itself, so each row is known.
+TEST(SweepTable, OfTwoParametersIsAMapOfAtMostFortyColumns) {
+  const ScratchFolder folder;
+  const auto page = [&](int columns) {
+    std::string gammas = "2";
+    for (int i = 1; i < columns; ++i) gammas += ", " + std::to_string(2 + 0.0625 * i);
+    write_text(folder / "r.json", R"({ "name": "t", "sweep": { "over": { "/stages/map/gamma": [)" + gammas +
+                                      R"(], "/stages/map/diameter": ["3 mm", "4 mm"] }, "collect": ["/map/diameter"] },
+      "stages": [ { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
+    const std::string out = std::to_string(columns);
+    EXPECT_EQ(run_shakebed({"run", "r.json", "--out", out}, folder.path()).exit_code, 0);
+    return read_text(folder / (out + "/report.html"));
+  };
+  const std::string widest = page(40);
+  const auto from = widest.find("<table class=\"map\">");
+  ASSERT_NE(from, std::string::npos);
+  const std::string map = widest.substr(from, widest.find("</table>", from) - from);
+  const auto count = [&](const std::string& words) {
+    std::size_t found = 0;
+    for (std::size_t at = map.find(words); at != std::string::npos; at = map.find(words, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<th scope=\"col\">"), 40U);
+  EXPECT_EQ(count("<th scope=\"col\">2.125</th>"), 1U);
+  const auto rows = map.find("<th scope=\"row\">4</th>");
+  ASSERT_NE(rows, std::string::npos);
+  EXPECT_LT(map.find("<th scope=\"row\">3</th>"), rows);
+  EXPECT_EQ(count("\">3</td>"), 40U);
+  EXPECT_EQ(count("\">4</td>"), 40U);
+  EXPECT_GT(map.find("\">4</td>"), rows);
+  EXPECT_EQ(page(41).find("<table class=\"map\">"), std::string::npos);
+}
+
 // A point's numbers depend on its values alone: not on its place in the sweep, nor on the shard that ran it.
 TEST(SweepTable, DoesNotSeeTheOrderOfItsPointsNorTheirShards) {
   const ScratchFolder folder;
