@@ -44,6 +44,21 @@ TEST(Enskog, MatchesNinetyDigitValuesOfFAndContactValue) {
   }
 }
 
+// Z = 1 + 2 nu chi for hard disks, whatever the formula of Z.
+TEST(EquationsOfState, HaveTheContactValueOfTheirPressure) {
+  for (const EquationOfState* equation : equations_of_state()) {
+    int asked = 0;
+    for (double nu = 0.04; nu < 0.7; nu += 0.03) {
+      const Value z = equation->compressibility_factor(nu_to_phi(nu)), chi = equation->contact_value(nu_to_phi(nu));
+      if (!z.ok() || !chi.ok()) continue;
+      EXPECT_NEAR(chi.value / ((z.value - 1) / (2 * nu)), 1, 1e-13 + 4e-16 * z.value / (z.value - 1))
+          << equation->name() << " " << nu;
+      ++asked;
+    }
+    EXPECT_GT(asked, 5) << equation->name();
+  }
+}
+
 TEST(Enskog, PrintedFormOfFIsTheOneComputed) {
   const EnskogConstants c = enskog_constants();
   for (double phi = 0.01; phi < close_packing_density; phi += 0.01) {

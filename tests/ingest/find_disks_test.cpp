@@ -180,6 +180,47 @@ TEST(Finder, StatedVarianceIsTheScatterOfLoneDisks) {
   EXPECT_NEAR(score.rms_px * score.rms_px / stated, 1.0, 0.42);
 }
 
+// Noise is as wide as a pixel of the camera. Where that covers two by two of the picture, as many levels tell a
+// quarter.
+TEST(Finder, StatedVarianceGrowsWithTheEnlargementOfThePicture) {
+  Camera camera;
+  camera.width = 260;
+  camera.height = 200;
+  camera.blur_px = 1;
+  camera.read_noise = 6;
+  std::vector<RenderedDisk> truth;
+  for (int k = 0; k < 12; ++k) truth.push_back({40.3 + 55.17 * (k % 4), 40.7 + 55.31 * (k / 4), 10, 0, 0});
+  GrayFrame frame = render_frame(truth, camera);
+  FinderCalibration calibration;
+  ASSERT_EQ(find_disks(frame, {}, &calibration).disks.size(), 12U);
+  const FindResult plain = find_disks(frame, calibration);
+  frame.enlargement = 2;
+  const FindResult enlarged = find_disks(frame, calibration);
+  ASSERT_EQ(plain.disks.size(), 12U);
+  ASSERT_EQ(enlarged.disks.size(), 12U);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(enlarged.disks[i].x_px, plain.disks[i].x_px);
+    EXPECT_NEAR(enlarged.disks[i].variance_x / plain.disks[i].variance_x, 4, 1e-9);
+    EXPECT_NEAR(enlarged.disks[i].variance_y / plain.disks[i].variance_y, 4, 1e-9);
+    EXPECT_NEAR(enlarged.disks[i].covariance_xy, 4 * plain.disks[i].covariance_xy, 1e-9 * plain.disks[i].variance_x);
+  }
+}
+
+// Fewer pixels than are looked at for the noise of larger frames.
+TEST(Finder, BeadsOfASmallFrameAreFound) {
+  Camera camera;
+  camera.width = 120;
+  camera.height = 110;
+  camera.blur_px = 1;
+  camera.read_noise = 4;
+  std::vector<RenderedDisk> truth;
+  for (int k = 0; k < 9; ++k) truth.push_back({24.3 + 34.2 * (k % 3), 22.7 + 31.4 * (k / 3), 9, 0, 0});
+  const test::Score score = test::score(find_disks(render_frame(truth, camera)).disks, truth, 120, 110);
+  EXPECT_EQ(score.recall(), 1.0);
+  EXPECT_EQ(score.precision(), 1.0);
+  EXPECT_LT(score.rms_px, 0.05);
+}
+
 TEST(Finder, TransparentBeadsAreNotTaken) {
   Camera camera;
   camera.width = 500;
