@@ -100,10 +100,11 @@ struct ToneFit {
 ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, double bead_level,
                           double radius_guess_px, double edge_guess_px);
 
+constexpr int sectors_of_bead = 16;
 // The profile averaged over the parts of rims that face open background: nothing within several edge widths, each part
 // measured from its own background to its own bead.
 struct FreeRim {
-  std::size_t sectors = 0;  // sixteen to a bead
+  std::size_t sectors = 0;  // sectors_of_bead to a bead
   double inner_px = 0;      // the profile is known from here outwards
   BeadProfile profile;
 };

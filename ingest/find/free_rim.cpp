@@ -12,7 +12,6 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr int sectors = 16;         // of a bead
 constexpr double spacing_px = 0.2;  // of the profile
 
 // Parts of the way from a bead's middle outwards.
@@ -29,7 +28,7 @@ struct FreeRimSample {
   double r;
   float level;
 };
-using Sectors = std::array<bool, sectors>;
+using Sectors = std::array<bool, sectors_of_bead>;
 
 // The sectors of a bead towards which no other lies.
 Sectors open_sectors(const std::vector<ModelDisk>& beads, std::size_t i, const Nearby& near, double reach) {
@@ -40,10 +39,10 @@ Sectors open_sectors(const std::vector<ModelDisk>& beads, std::size_t i, const N
     if (j == i) return false;
     const double dx = beads[j].x - bead.x, dy = beads[j].y - bead.y;
     const double distance = std::sqrt(dx * dx + dy * dy);
-    const double half = std::asin(std::min(1.0, reach / distance)) + 2 * std::numbers::pi / sectors / 2;
+    const double half = std::asin(std::min(1.0, reach / distance)) + 2 * std::numbers::pi / sectors_of_bead / 2;
     const double direction = std::atan2(dy, dx);
-    for (int s = 0; s < sectors; ++s) {
-      const double middle = (s + 0.5) * 2 * std::numbers::pi / sectors - std::numbers::pi;
+    for (int s = 0; s < sectors_of_bead; ++s) {
+      const double middle = (s + 0.5) * 2 * std::numbers::pi / sectors_of_bead - std::numbers::pi;
       if (std::abs(std::remainder(direction - middle, 2 * std::numbers::pi)) < half)
         open[static_cast<std::size_t>(s)] = false;
     }
@@ -52,9 +51,9 @@ Sectors open_sectors(const std::vector<ModelDisk>& beads, std::size_t i, const N
   return open;
 }
 
-std::array<std::vector<FreeRimSample>, sectors> samples_around(const GrayFrame& flat, const ModelDisk& bead,
-                                                               const Sectors& open, const FreeRimZones& zones) {
-  std::array<std::vector<FreeRimSample>, sectors> samples;
+std::array<std::vector<FreeRimSample>, sectors_of_bead> samples_around(const GrayFrame& flat, const ModelDisk& bead,
+                                                                       const Sectors& open, const FreeRimZones& zones) {
+  std::array<std::vector<FreeRimSample>, sectors_of_bead> samples;
   const int top = static_cast<int>(std::ceil(bead.y - zones.open_to)),
             bottom = static_cast<int>(std::floor(bead.y + zones.open_to));
   const int left = static_cast<int>(std::ceil(bead.x - zones.open_to)),
@@ -64,8 +63,8 @@ std::array<std::vector<FreeRimSample>, sectors> samples_around(const GrayFrame& 
       const double dx = column - bead.x, dy = row - bead.y;
       const double r = std::sqrt(dx * dx + dy * dy);
       if (r < zones.inner || r > zones.open_to) continue;
-      const int s =
-          std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * std::numbers::pi) + 0.5) * sectors), 0, sectors - 1);
+      const int s = std::clamp(static_cast<int>((std::atan2(dy, dx) / (2 * std::numbers::pi) + 0.5) * sectors_of_bead),
+                               0, sectors_of_bead - 1);
       if (open[static_cast<std::size_t>(s)]) samples[static_cast<std::size_t>(s)].push_back({r, flat.at(column, row)});
     }
   return samples;

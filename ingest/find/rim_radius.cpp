@@ -233,7 +233,7 @@ class RadiusFromRims {
   [[nodiscard]] RimChoice choose_open(const FreeRim& free_rim, bool linear_only) const {
     RimConditions open = conditions();
     open.knot_px = free_rim.profile.step_px;
-    open.beads = static_cast<double>(free_rim.sectors) / 16;
+    open.beads = static_cast<double>(free_rim.sectors) / sectors_of_bead;
     open.from_px = free_rim.inner_px;
     open.linear_only = linear_only;
     return choose_rim(free_rim.profile, open);

@@ -325,7 +325,13 @@ TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
   options.shaking_frequency_hz = 20;
   options.frame_rate_hz = 20 * 13.7;
   FrameSource source = FrameSource::from_frames(shaken_film(9, 0.3, 41, 1 / 13.7));
-  const BedCalibration bed = measure_bed(source, options).calibration;
+  const Measurement moving = measure_bed(source, options);
+  const BedCalibration& bed = moving.calibration;
+  // The first bin begins at the first multiple of the bins' width below the floor's lowest place, 9 of 20 px down.
+  const double lowest = moving.profile.bins.lowest, width = moving.profile.bins.width;
+  EXPECT_NEAR(lowest / width, std::round(lowest / width), 1e-9);
+  EXPECT_LE(lowest, -(9 - 0.4) / 20);
+  EXPECT_GT(lowest, -(9 + 0.4) / 20 - width);
   // Touching beads are those within 0.02 D = 0.4 px.
   EXPECT_NEAR(bed.floor_px, 270, 0.4);
   EXPECT_NEAR(bed.floor_amplitude_px, 9, 0.4);
