@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "fit/profile_fit/window.hpp"
 #include "fit/theory/expansion.hpp"
 #include "tests/fit/synthetic.hpp"
 
@@ -18,6 +19,51 @@ struct Problem {
   FitModel::Parameters start{0.12, 8.0, 1.10};
   std::unique_ptr<FitModel> model = make_fit_model("enskog-rectangle", 0.0, false, 0.25);
 };
+
+// Distances 1, 1, 0 and 2: of those that are not zero the median.
+TEST(MeasuredProfile, KnowsItsSpacingAndSaysWhichHeightsAreRepeated) {
+  Profile profile;
+  profile.height = {0, 1, 2, 2, 4};
+  profile.number_density = {1, 0.9, 0.8, 0.8, 0.1};
+  profile.std_error = {0.01, 0.01, 0.01, 0.01, 0.01};
+  MeasuredProfile measured;
+  FitResult result;
+  ASSERT_EQ(measure_profile(profile, measured, result), FitStatus::ok) << result.message;
+  EXPECT_EQ(measured.spacing, 1);
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_EQ(result.warnings[0], "1 bins repeat the height of another; each counts as a measurement of its own");
+}
+
+// Five heights of which one is left out and the last lies beyond the window: those that remain keep their own
+// densities, errors and covariance, which is the square of the matrix that whitens.
+TEST(Bins, AreTheUsableHeightsOfTheWindow) {
+  MeasuredProfile measured;
+  measured.height = {0, 1, 2, 3, 4};
+  measured.density = {10, 11, 12, 13, 14};
+  measured.error = {1, 2, 4, 5, 8};
+  measured.usable = {true, false, true, true, true};
+  const Window window{0, 3, ""};
+  const Bins alone = bins_of(measured, window, nullptr);
+  EXPECT_EQ(alone.height, (std::vector<double>{0, 2, 3}));
+  EXPECT_EQ(alone.density, (std::vector<double>{10, 12, 13}));
+  EXPECT_EQ(alone.inverse_error, (std::vector<double>{1, 0.25, 0.2}));
+  measured.covariance = Eigen::MatrixXd::Identity(5, 5);
+  for (Eigen::Index i = 0; i < 5; ++i) {
+    for (Eigen::Index j = 0; j < 5; ++j) {
+      const double correlation = i == j ? 1 : 0.1 * static_cast<double>(i + j) / 7;
+      measured.covariance(i, j) =
+          correlation * measured.error[static_cast<std::size_t>(i)] * measured.error[static_cast<std::size_t>(j)];
+    }
+  }
+  const Bins together = bins_of(measured, window, nullptr);
+  EXPECT_EQ(together.height, alone.height);
+  const Eigen::MatrixXd square = together.whitening * together.whitening.transpose();
+  const Eigen::Index chosen[] = {0, 2, 3};
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j)
+      EXPECT_NEAR(square(i, j), measured.covariance(chosen[i], chosen[j]), 1e-12) << i << j;
+  }
+}
 
 // 60 bins, T = 0.15, every seventh off by 8 errors, neighbours correlated by `correlation`^distance.
 Problem correlated_problem(double correlation) {

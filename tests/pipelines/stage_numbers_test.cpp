@@ -72,12 +72,12 @@ TEST(CriticalNumbers, AreCrossingsDoneByHand) {
 std::string profile(const std::string& rows) { return "height,number_density,std_error\n" + rows; }
 
 // The frames are above the simulation by 0.1 at height 0, below it by 0.15 at 1 (between 0.9 and 1.0) and not looked at
-// where they are thinner than 0.1. At the moments of the frames the simulation is off by 0 and 0.04.
+// where they are not above 0.1. At the moments of the frames the simulation is off by 0 and 0.04.
 TEST(FigureNumbers, AreDifferencesDoneByHand) {
   LoneStage figure(*find_stage("figure"));
   figure.add_input("extract", *find_stage("extract"), "e");
   figure.add_input("bed", *find_stage("simulate"), "s");
-  write_text(figure.file("e/profile.csv"), profile("0,1.0,0.01\n1,0.8,0.01\n2,0.05,0.01\n"));
+  write_text(figure.file("e/profile.csv"), profile("0,1.0,0.01\n1,0.8,0.01\n2,0.1,0.01\n"));
   write_text(figure.file("s/profile.csv"), profile("0,0.9,0.01\n2,1.0,0.01\n"));
   write_text(figure.file("s/profile_frames.csv"), profile("0,1.0,0.01\n1,0.76,0.01\n2,0.9,0.01\n"));
   write_text(figure.file("mine.csv"), profile("0,1.2,0.01\n2,0.1,0.01\n"));
@@ -94,6 +94,19 @@ TEST(FigureNumbers, AreDifferencesDoneByHand) {
   EXPECT_NEAR(value(row["largest_difference"]), 0.15, 1e-14);
   EXPECT_EQ(json["comparisons"][1]["with"], "simulation at the moments of the frames");
   EXPECT_NEAR(value(json["comparisons"][1]["mean_difference"]), 0.02, 1e-14);
+}
+
+TEST(FigureNumbers, TheWindowOfTheFitIsMarkedInThePicture) {
+  LoneStage figure(*find_stage("figure"));
+  figure.add_input("fit", *find_stage("fit"));
+  write_text(figure.file("fit.json"), R"({"model": "enskog", "temperature": {"value": 0.05, "unit": "m g D"},
+      "window": {"low": {"value": 2.5, "unit": "D"}, "high": {"value": 7.25, "unit": "D"}}})");
+  write_text(figure.file("curve.csv"), "height,number_density,smoothed_density\n0,1.1,1.1\n4,0.6,0.6\n9,0.01,0.01\n");
+  write_text(figure.file("windows.csv"), "low,temperature,std_error\n2.5,0.05,0.001\n");
+  figure.run("{}");
+  EXPECT_NE(read_text(figure.output("profile.gp")).find("rectangle from 2.5, graph 0 to 7.25, graph 1"),
+            std::string::npos);
+  EXPECT_NE(read_text(figure.output("profile.gp")).find("window of the fit"), std::string::npos);
 }
 
 // --- map
