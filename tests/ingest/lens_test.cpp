@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "ingest/profile/measure_bed.hpp"
@@ -66,6 +67,25 @@ TEST(Lens, ThereAndBackAgain) {
   }
   EXPECT_THROW(LensMap({3, 0}, 640, 480), std::invalid_argument);
   EXPECT_THROW(LensMap({1, 0.5}, 640, 480), std::invalid_argument);
+}
+
+// The two ways of interpolation, rows that stay rows and rows that bend, up to the border.
+TEST(Lens, ThatHardlyBendsLeavesEveryPixel) {
+  GrayFrame frame;
+  frame.width = 40;
+  frame.height = 30;
+  for (int row = 0; row < 30; ++row)
+    for (int column = 0; column < 40; ++column)
+      frame.pixels.push_back(static_cast<float>(20 + 0.1 * column * column + 0.2 * row * row));
+  for (const double radial : {0.0, 1e-9}) {
+    const GrayFrame seen = LensMap({1, radial}, 40, 30).corrected(frame);
+    const int across = (seen.width - 40) / 2, down = (seen.height - 30) / 2;  // beyond the border: its outermost pixels
+    for (int row = 0; row < seen.height; ++row)
+      for (int column = 0; column < seen.width; ++column)
+        EXPECT_NEAR(seen.at(column, row), frame.at(std::clamp(column - across, 0, 39), std::clamp(row - down, 0, 29)),
+                    1e-3)
+            << column << ' ' << row;
+  }
 }
 
 struct Case {
