@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 #include <string>
 
+#include "ingest/find/disk_map.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/bench/cases/finder_benchmark.hpp"
 #include "tests/ingest/test_files.hpp"
@@ -203,6 +205,35 @@ TEST(Finder, StatedVarianceGrowsWithTheEnlargementOfThePicture) {
     EXPECT_NEAR(enlarged.disks[i].variance_x / plain.disks[i].variance_x, 4, 1e-9);
     EXPECT_NEAR(enlarged.disks[i].variance_y / plain.disks[i].variance_y, 4, 1e-9);
     EXPECT_NEAR(enlarged.disks[i].covariance_xy, 4 * plain.disks[i].covariance_xy, 1e-9 * plain.disks[i].variance_x);
+  }
+}
+
+// Flat disks of level 1, cut by each side of the frame, with their centres half a radius beyond it: both maps show
+// them.
+TEST(DiskMap, ShowsDisksWhoseCentresLieBeyondTheFrame) {
+  constexpr double radius = 6;
+  const std::vector<RenderedDisk> truth{
+      {45, 35, radius}, {20, 72, radius}, {68, -3, radius}, {-3, 22, radius}, {92, 50, radius}};
+  GrayFrame frame;
+  frame.width = 90, frame.height = 70;
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column) {
+      double covered = 0;
+      for (const RenderedDisk& disk : truth)
+        covered += std::clamp(radius + 0.5 - std::hypot(column - disk.x_px, row - disk.y_px), 0.0, 1.0);
+      frame.pixels.push_back(static_cast<float>(covered));
+    }
+  BeadProfile profile;
+  profile.step_px = 0.1;
+  for (int k = 0; k < 80; ++k)
+    profile.level.push_back(static_cast<float>(std::clamp(radius + 0.5 - (k + 0.5) * profile.step_px, 0.0, 1.0)));
+  for (const auto& found : {find_candidates(frame, 1, radius, 0.25, radius),
+                            find_matched_candidates(frame, 1, profile, radius, 0.02, 0.25, radius)}) {
+    for (const RenderedDisk& disk : truth)
+      EXPECT_TRUE(
+          std::any_of(found.begin(), found.end(),
+                      [&](const DiskCandidate& one) { return std::hypot(one.x - disk.x_px, one.y - disk.y_px) < 1.5; }))
+          << disk.x_px << ' ' << disk.y_px << " of " << found.size();
   }
 }
 
