@@ -146,6 +146,25 @@ TEST(TimeReversal, BringsElasticDisksBack) {
 }
 
 // Layers of half a D from 1/4 up: their heights are those of their middles, wherever in a layer its disks lie.
+// Two that touch, a row of three and one alone, not in the order of their heights: 1, 4/3 and 0 neighbours a disk.
+TEST(OrderLayers, CountTheNeighboursOfTheirOwnDisks) {
+  Scene scene;
+  scene.box.width = 20;
+  DiskProperties disks;
+  Snapshot at;
+  at.x = {9, 2, 3, 15, 4, 10};
+  at.z = {5.5, 0.5, 0.5, 9.5, 0.5, 5.5};
+  disks.radius.assign(6, 0.5), disks.mass.assign(6, 1);
+  at.vx.resize(6), at.vz.resize(6);
+  OrderObserver order(scene, disks, {0, 1, 11});
+  order.observe(at);
+  const auto layers = order.layers();
+  ASSERT_EQ(layers.size(), 3U);
+  EXPECT_DOUBLE_EQ(layers[0].neighbours, 4.0 / 3);
+  EXPECT_DOUBLE_EQ(layers[1].neighbours, 1);
+  EXPECT_DOUBLE_EQ(layers[2].neighbours, 0);
+}
+
 TEST(OrderLayers, StandAtTheMiddleOfWhatTheyCover) {
   Scene scene;
   scene.box.width = 10;

@@ -510,11 +510,15 @@ class Bench:
                 self.link(output)
 
     def ask(self, row, times, part):
+        spent = 0
         for program, tests, usual in groups_of(row, times, part):
+            if self.limit and spent > self.limit:
+                return "survived", f"{program} and what follows were not asked"
             tests = [test for test in tests if test not in self.unfit]
             while tests:
                 code, output, cpu = self.start(program, tests, usual)
                 self.cpu += cpu
+                spent += cpu
                 if code == 0:
                     break
                 failed = re.findall(r"^\[  FAILED  \] ([\w./]+)", output, re.MULTILINE)
@@ -621,6 +625,7 @@ def run(arguments):
     lock = threading.Lock()
     benches = [Bench(arguments.work, arguments.build, number) for number in range(arguments.jobs)]
     for bench in benches:
+        bench.limit = arguments.limit
         bench.prepare()
     times = usual_times(benches[0])
 
@@ -680,6 +685,7 @@ def main():
     judged.add_argument("--build", type=Path, default=SOURCE / "build/release", help="a finished release build")
     judged.add_argument("--part", choices=("first", "rest", "all"), default="all",
                         help="only the quickest tests of the fault's room; only the others")
+    judged.add_argument("--limit", type=float, help="CPU seconds after which no further tests are asked of a fault")
     judged.add_argument("--suffix", help="only faults in files that end so, .cpp or .hpp")
     judged.add_argument("--only", nargs="+", help="only these faults")
     judged.add_argument("--room", choices=ROOMS)
