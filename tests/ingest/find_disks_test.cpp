@@ -9,6 +9,7 @@
 #include <string>
 
 #include "ingest/find/disk_map.hpp"
+#include "ingest/find/joint_fit.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/bench/cases/finder_benchmark.hpp"
 #include "tests/ingest/test_files.hpp"
@@ -234,6 +235,37 @@ TEST(DiskMap, ShowsDisksWhoseCentresLieBeyondTheFrame) {
           std::any_of(found.begin(), found.end(),
                       [&](const DiskCandidate& one) { return std::hypot(one.x - disk.x_px, one.y - disk.y_px) < 1.5; }))
           << disk.x_px << ' ' << disk.y_px << " of " << found.size();
+  }
+}
+
+// Nothing is taken out of a frame of uneven light: what a bead explains there and its amplitude are sums over the
+// pixels within a radius of its centre, done one by one.
+TEST(JointFit, JudgesABeadByThePixelsAroundIt) {
+  BeadProfile profile;
+  profile.step_px = 0.1;
+  for (int k = 0; k < 90; ++k) profile.level.push_back(static_cast<float>(std::clamp(8 - 0.1 * k, 0.0, 1.0)));
+  const ProfileTable table(profile, 7.5, 0.5, 0);
+  GrayFrame frame;
+  frame.width = 30, frame.height = 24;
+  for (int row = 0; row < 24; ++row)
+    for (int column = 0; column < 30; ++column)
+      frame.pixels.push_back(static_cast<float>(0.3 + 0.02 * column - 0.01 * row + 0.1 * ((column * row) % 3)));
+  JointFit fit(frame);
+  fit.set_table(&table);
+  for (const double x : {14.3, 2.6, 27.4}) {  // the second and the third are cut by the frame
+    std::vector<ModelDisk> disks(1);
+    disks[0].x = x, disks[0].y = 11.8;
+    fit.judge(disks, 5);
+    double left = 0, own = 0, both = 0;
+    for (int row = 0; row < 24; ++row)
+      for (int column = 0; column < 30; ++column) {
+        const double away = std::hypot(column - x, row - 11.8), e = static_cast<double>(frame.at(column, row));
+        if (away > 5) continue;
+        const double level = table.at(away * away);
+        left += e * e, own += level * level, both += (e + level) * level;
+      }
+    EXPECT_NEAR(disks[0].explained, 1 - left / own, 1e-5) << x;
+    EXPECT_NEAR(disks[0].amplitude, both / own, 1e-5) << x;
   }
 }
 
