@@ -159,6 +159,10 @@ TEST(ChartMap, CountsItsCellsAndMarks) {
   EXPECT_NE(data.find("1 10 0.7071067811865476 1.414213562373095 5 15 1"), std::string::npos) << data;
   EXPECT_NE(data.find("# floats: x y\n2 10\n2 20\n"), std::string::npos) << data;
   EXPECT_EQ(data.find("never"), std::string::npos);
+  // Only what has marks is drawn and has a place in the key.
+  const std::string script = read_text(chart.output("plane.gp"));
+  EXPECT_NE(script.find("floats"), std::string::npos);
+  EXPECT_EQ(script.find("never"), std::string::npos);
 }
 
 }  // namespace
