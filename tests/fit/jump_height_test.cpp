@@ -53,6 +53,20 @@ TEST(JumpHeight, OfASineIsWhatEveryWaveIsSearchedFor) {
   }
 }
 
+// A harmonic alone is a sine that is k times as fast: lengths in g over the square of the frequency are k^2 times less.
+TEST(JumpHeight, OfAHarmonicAloneIsThatOfAFasterSine) {
+  for (const int k : {2, 3}) {
+    const WaveForm harmonic = WaveForm::series("harmonic", {{k, 1.0, 0.0}});
+    for (double excess = 1e-4; excess < 10; excess *= 1.7) {
+      for (const JumpHeight kind : jump_heights) {
+        const double sine = jump_height(kind, 1 + excess).value;
+        EXPECT_NEAR(jump_height(kind, 1 + excess, harmonic).value * k * k / sine, 1, 1e-9 + 1e-15 / (excess * excess))
+            << to_string(kind) << " " << excess;
+      }
+    }
+  }
+}
+
 TEST(JumpHeight, IsNothingWhileTheFloorHoldsTheBall) {
   for (const JumpHeight kind : jump_heights) {
     EXPECT_EQ(jump_height(kind, 0.0).value, 0.0);
@@ -118,6 +132,17 @@ TEST(Bounce, DeadBallFliesAsSteppedIntegrationSays) {
     EXPECT_NEAR(s.flight_times.back(), stepped_flight_time(gamma, WaveForm::sine(), std::asin(1.0 / gamma)), 2e-5);
     for (std::size_t i = 0; i < jump_heights.size(); ++i) {
       EXPECT_NEAR(s.mean_height[i], jump_height(jump_heights[i], gamma).value, 1e-8);
+    }
+  }
+}
+
+TEST(Bounce, OnAHarmonicAloneFliesAsOnAFasterSine) {
+  for (const int k : {2, 3}) {
+    const WaveForm harmonic = WaveForm::series("harmonic", {{k, 1.0, 0.0}});
+    for (const double gamma : {1.02, 1.2, 2.0, 3.0}) {
+      const BounceOptions options{.restitution = 0.0, .transient = 20, .flights = 10};
+      const double on_sine = bounce(gamma, options).flight_times.back();
+      EXPECT_NEAR(bounce(gamma, options, harmonic).flight_times.back() * k / on_sine, 1, 1e-7) << k << ' ' << gamma;
     }
   }
 }
