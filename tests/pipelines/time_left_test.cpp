@@ -76,6 +76,26 @@ TEST(SweepProgress, NamesAPointThatWillTakeFarLongerThanTheOthers) {
   EXPECT_THAT(found[0], HasSubstr("leave the value out of the sweep or measure for a shorter time"));
 }
 
+// What the fit of a finished point took is learned for the fits. The bed is still known by its trials: the long point
+// stays the long one.
+TEST(SweepProgress, LearnsWhatNoTrialKnowsForItsOwnStageAlone) {
+  const Sweep sweep(recipe(R"(["1 s", "2 s", "20000 s", "3 s"])"));
+  SweepProgress progress(sweep.plan, sweep.all(), 1);
+  progress.trials([] { return false; });
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "fit");
+  write_text(folder / "fit/cost.json",
+             R"({"wall_seconds": 0.01, "cpu_seconds": 0.01, "threads": 1, "host": "here", "finished": "2026-01-01"})");
+  progress.learn(folder.path());
+  ASSERT_EQ(progress.long_points().size(), 1U);
+  EXPECT_THAT(progress.long_points()[0], HasSubstr("point 000002"));
+  // Were each fit to take a hundred times as long as that bed, all points would be alike.
+  write_text(folder / "fit/cost.json",
+             R"({"wall_seconds": 1e9, "cpu_seconds": 1, "threads": 1, "host": "here", "finished": "2026-01-01"})");
+  progress.learn(folder.path());
+  EXPECT_TRUE(progress.long_points().empty());
+}
+
 TEST(SweepProgress, NamesNothingWhereAllAreAlike) {
   const Sweep sweep(recipe(R"(["1 s", "1.1 s", "1.2 s"])"));
   SweepProgress progress(sweep.plan, sweep.all(), 1);
