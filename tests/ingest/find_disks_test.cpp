@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "ingest/find/bed_light.hpp"
 #include "ingest/find/disk_map.hpp"
 #include "ingest/find/joint_fit.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
@@ -236,6 +237,29 @@ TEST(DiskMap, ShowsDisksWhoseCentresLieBeyondTheFrame) {
                       [&](const DiskCandidate& one) { return std::hypot(one.x - disk.x_px, one.y - disk.y_px) < 1.5; }))
           << disk.x_px << ' ' << disk.y_px << " of " << found.size();
   }
+}
+
+// A frame whose levels are all 1.2 times the film's has its light 1.2 times as bright; one whose dark levels are 1.1
+// and whose bright ones 1.3 times the film's is no such frame, nor is one that differs by 3 %.
+TEST(LightAtFirstSight, IsThatOfFramesOfWhichAllLevelsHaveOneFactor) {
+  GrayFrame frame;
+  frame.width = frame.height = 20;
+  for (int k = 0; k < 400; ++k) frame.pixels.push_back(static_cast<float>(80 + 0.25 * k));
+  FinderCalibration calibration;
+  calibration.level_deciles = level_deciles(frame);
+  calibration.light.columns = calibration.light.rows = 1;
+  calibration.light.background = {160};
+  calibration.light.contrast = {-80};
+  const auto seen = [&](double dark, double bright) {
+    GrayFrame other = frame;
+    for (float& level : other.pixels) level *= static_cast<float>(level < 128 ? dark : bright);
+    return light_at_first_sight(other, calibration);
+  };
+  EXPECT_NEAR(seen(1.2, 1.2).gain, 1.2, 1e-5);
+  EXPECT_NEAR(seen(1.2, 1.2).shift, 0.2 * 160 / -80, 1e-5);
+  EXPECT_NEAR(seen(0.8, 0.8).gain, 0.8, 1e-5);
+  EXPECT_TRUE(seen(1.1, 1.3).plain());
+  EXPECT_TRUE(seen(1.03, 1.03).plain());
 }
 
 // Nothing is taken out of a frame of uneven light: what a bead explains there and its amplitude are sums over the
