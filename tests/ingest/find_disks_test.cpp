@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "ingest/calibrate/radius_vote.hpp"
 #include "ingest/find/bed_light.hpp"
 #include "ingest/find/disk_map.hpp"
 #include "ingest/find/joint_fit.hpp"
@@ -237,6 +238,23 @@ TEST(DiskMap, ShowsDisksWhoseCentresLieBeyondTheFrame) {
                       [&](const DiskCandidate& one) { return std::hypot(one.x - disk.x_px, one.y - disk.y_px) < 1.5; }))
           << disk.x_px << ' ' << disk.y_px << " of " << found.size();
   }
+}
+
+// Lone dark disks on an even background: all edges point to their centres, so nearly all vote for them, of one radius.
+TEST(RadiusVote, IsUnanimousWhereAllEdgesAreRimsOfOneSize) {
+  Camera camera;
+  camera.width = 260;
+  camera.height = 200;
+  camera.blur_px = 0.8;
+  std::vector<RenderedDisk> truth;
+  for (int k = 0; k < 12; ++k) truth.push_back({40.3 + 55.17 * (k % 4), 40.7 + 55.31 * (k / 4), 9, 0, 0});
+  const auto found = vote_for_radii(render_frame(truth, camera), 1, {5, 16});
+  ASSERT_FALSE(found.empty());
+  EXPECT_NEAR(found[0].radius, 9, 0.5);
+  EXPECT_EQ(found[0].sign, 1);
+  EXPECT_EQ(found[0].count, 12U);
+  EXPECT_GT(found[0].explained, 0.8);
+  EXPECT_GT(found[0].support, 0.9);
 }
 
 // A frame whose levels are all 1.2 times the film's has its light 1.2 times as bright; one whose dark levels are 1.1

@@ -161,6 +161,7 @@ struct Options {
   bool flag = false;
   std::string word = "x";
   std::vector<double> numbers{1, 2};
+  std::vector<std::string> words;
   std::variant<Flat, Steep> shape;
 };
 void describe(Fields& fields, Options& o) {
@@ -170,6 +171,7 @@ void describe(Fields& fields, Options& o) {
   fields.boolean("flag", o.flag);
   fields.text("word", o.word);
   fields.numbers("numbers", o.numbers);
+  fields.texts("words", o.words);
   fields.variant("shape", o.shape, {.help = "the shape"}, alternative<Flat>("flat", "level"),
                  alternative<Steep>("steep", "a slope",
                                     [](Fields& f, Steep& s) { f.number("slope", s.slope, {.range = zero_to_one}); }));
@@ -201,6 +203,15 @@ TEST(Options, KeepTheirDefaultsAndReadTheRest) {
   EXPECT_FALSE(o.rate);
   EXPECT_EQ(o.count, 5);
   EXPECT_EQ(std::get<Steep>(o.shape).slope, 0.5);
+}
+
+TEST(Options, AWordMayStandForAListOfOne) {
+  std::vector<Problem> problems;
+  EXPECT_EQ(decode(R"({"words": "one"})", problems).words, std::vector<std::string>{"one"});
+  EXPECT_EQ(decode(R"({"words": ["one", "two"]})", problems).words, (std::vector<std::string>{"one", "two"}));
+  EXPECT_TRUE(problems.empty());
+  decode(R"({"words": 3})", problems);
+  EXPECT_EQ(problems.size(), 1U);
 }
 
 TEST(Options, WhatIsWrittenOutReadsBackTheSame) {

@@ -357,7 +357,7 @@ class Bench:
         """An object of the build with other flags."""
         output = self.work / "objects" / name.replace("/", "+")
         if not output.exists():
-            command = change(self.compiled[name].replace(str(self.built), str(self.base)))
+            command = re.sub(r" -c \S+$", f" -c {self.unit(name)}", change(self.here(self.compiled[name])))
             self.must(re.sub(r" -o \S+", f" -o {output}", command))
         return str(output)
 
