@@ -45,7 +45,7 @@ Coverage cover(double reduced, const Kernel& kernel, double noise, std::uint64_t
   return coverage;
 }
 
-struct Row {
+struct CoverageRow {
   double reduced;
   Kernel kernel;
   double noise;
@@ -53,11 +53,11 @@ struct Row {
 };
 const Kernel gaussian{KernelKind::gaussian, 0.3}, bin{KernelKind::top_hat, 0.25};
 
-void expect_coverage(const std::vector<Row>& rows) {
+void expect_coverage(const std::vector<CoverageRow>& rows) {
   std::printf("[ coverage ] 1,000 synthetic profiles a row, 100 bins, T and shift free, nominal 95 %%\n");
   std::printf("[ coverage ] %6s %-10s %6s | %8s %10s %6s | %9s\n", "T/T_c", "kernel", "noise", "T +- s.e.",
               "likelihood", "shift", "mean pull");
-  for (const Row& row : rows) {
+  for (const CoverageRow& row : rows) {
     const Coverage c = cover(row.reduced, row.kernel, row.noise, row.seed);
     std::printf("[ coverage ] %6.2f %-10s %6.3f | %7.1f %% %8.1f %% %4.1f %% | %+9.3f\n", row.reduced,
                 std::string(to_string(row.kernel.kind)).c_str(), row.noise, 0.1 * c.by_error, 0.1 * c.by_likelihood,

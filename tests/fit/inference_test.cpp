@@ -12,7 +12,7 @@ namespace shakebed::fit {
 namespace {
 
 // A stand-in for a bed: two numbers of three parameters, with scatter.
-constexpr double scatter[] = {0.05, 0.1};
+constexpr double scatter_of[] = {0.05, 0.1};
 std::vector<double> stand_in(std::span<const double> p) {
   return {std::sin(2 * p[0]) + p[1] * p[1] + 0.3 * p[2], std::exp(p[0] * p[1]) - 0.8 * p[0] + p[2] * p[0]};
 }
@@ -23,22 +23,22 @@ TrainingSet stand_in_runs(std::size_t runs, std::size_t output, std::uint64_t se
   std::mt19937_64 generator(seed + output);
   for (std::size_t i = 0; i < runs; ++i)
     set.values.push_back(stand_in(std::span<const double>(set.points).subspan(3 * i, 3))[output] +
-                         scatter[output] * normal_quantile(even_number(generator)));
+                         scatter_of[output] * normal_quantile(even_number(generator)));
   return set;
 }
 
 TEST(Surrogate, PredictsFurtherRunsWithItsStatedError) {
   const Surrogate surrogate = Surrogate::train(stand_in_runs(100, 0, 1));
-  EXPECT_NEAR(surrogate.scatter(0) / scatter[0], 1, 0.25) << "of 100 runs, 3.5 standard errors";
+  EXPECT_NEAR(surrogate.scatter(0) / scatter_of[0], 1, 0.25) << "of 100 runs, 3.5 standard errors";
   std::mt19937_64 generator(5);
   double squares = 0;
   constexpr int further = 400;
   for (int i = 0; i < further; ++i) {
     const std::vector<double> point{even_number(generator), even_number(generator), even_number(generator)};
     const auto found = surrogate.predict(point);
-    const double value = stand_in(point)[0] + scatter[0] * normal_quantile(even_number(generator));
+    const double value = stand_in(point)[0] + scatter_of[0] * normal_quantile(even_number(generator));
     squares += std::pow(value - found.mean[0], 2) / found.variance[0];
-    EXPECT_LT(std::sqrt(found.variance[0]), 2 * scatter[0]);
+    EXPECT_LT(std::sqrt(found.variance[0]), 2 * scatter_of[0]);
   }
   EXPECT_NEAR(squares / further, 1, 0.35);
   double left_out = 0;
@@ -120,7 +120,7 @@ TEST(Calibration, OfAStandInHoldsItsIntervals) {
   for (int i = 0; i < truths; ++i) {
     const std::vector<double> truth{even_number(generator), even_number(generator), even_number(generator)};
     std::vector<double> measured = stand_in(truth);
-    for (std::size_t k = 0; k < 2; ++k) measured[k] += scatter[k] * normal_quantile(even_number(generator));
+    for (std::size_t k = 0; k < 2; ++k) measured[k] += scatter_of[k] * normal_quantile(even_number(generator));
     SamplingOptions options;
     options.first = 2048, options.further = 2048, options.enough = 200;
     const Posterior found = sample_posterior(

@@ -10,10 +10,10 @@
 namespace shakebed::fit {
 namespace {
 
-constexpr double temperature = 0.8, column = 12;
+constexpr double known_temperature = 0.8, known_column = 12;
 
 Profile measured(int bins, std::uint64_t seed) {
-  const auto truth = HydrostaticProfile::of_column(enskog(), temperature, {column, 1.10});
+  const auto truth = HydrostaticProfile::of_column(enskog(), known_temperature, {known_column, 1.10});
   return synthetic::profile_of(truth, {KernelKind::gaussian, 0.4}, bins, 18, 0.01, seed);
 }
 FitOptions options_of(const char* model) {
