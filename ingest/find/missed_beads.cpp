@@ -28,6 +28,11 @@ constexpr int fewest_open = 6;
 constexpr double faintest_edge = 0.25;
 constexpr double places_per_radius = 6;
 constexpr double farthest_gap = 1.5;  // radii of the beads, from a place to the nearest disk found
+// An edge is that of a wall or a floor where the tangent through it meets edges of the same direction on so much of the
+// way, to one side or to both together. The tops of touching beads in a row are met on a third of it; beads that touch
+// the wall hide a part of it. Radii of the beads; cosine.
+constexpr double tangent_from = 0.5, tangent_to = 3, same_direction = 0.95;
+constexpr double least_to_one_side = 0.6, least_to_both = 0.45;
 
 // Places of a map of edges that no disk covers.
 class FreePlaces {
@@ -44,6 +49,7 @@ class FreePlaces {
       const std::size_t at = edges.at(column, row);
       const double step = step_per_slope * static_cast<double>(std::hypot(edges.x[at], edges.y[at]));
       if (static_cast<double>(clearance_[at]) < covered * radius || step < faintest_edge * contrast) continue;
+      if (is_straight(pixel)) continue;
       for (int y = std::max(0, row - 1); y <= std::min(edges.height - 1, row + 1); ++y)
         for (int x = std::max(0, column - 1); x <= std::min(edges.width - 1, column + 1); ++x)
           edge_[edges.at(x, y)] = 1;
@@ -72,6 +78,27 @@ class FreePlaces {
   }
 
  private:
+  [[nodiscard]] bool is_straight(const RidgePixel& pixel) const {
+    const double one = straight_share(pixel, 1), other = straight_share(pixel, -1);
+    return std::max(one, other) >= least_to_one_side || (one + other) / 2 >= least_to_both;
+  }
+
+  // Along the tangent, to the side of this sign; 0 where the picture ends.
+  [[nodiscard]] double straight_share(const RidgePixel& pixel, int side) const {
+    int seen = 0, met = 0;
+    for (double away = tangent_from * radius_; away <= tangent_to * radius_; away += 1) {
+      const double x = static_cast<double>(pixel.x) - side * away * static_cast<double>(pixel.unit_y),
+                   y = static_cast<double>(pixel.y) + side * away * static_cast<double>(pixel.unit_x);
+      if (x < 0 || y < 0 || x >= edges_.width || y >= edges_.height) break;
+      ++seen;
+      const std::size_t at = edges_.at(static_cast<int>(x), static_cast<int>(y));
+      const float size = std::hypot(edges_.x[at], edges_.y[at]);
+      const float along = edges_.x[at] * pixel.unit_x + edges_.y[at] * pixel.unit_y;
+      met += size >= edges_.threshold && along >= static_cast<float>(same_direction) * size;
+    }
+    return seen > tangent_from * radius_ ? static_cast<double>(met) / seen : 0;
+  }
+
   [[nodiscard]] bool is_free(double x, double y, double radius) const {
     return static_cast<double>(clearance_[edges_.at(static_cast<int>(x), static_cast<int>(y))]) >=
            (1 - overlap) * radius;

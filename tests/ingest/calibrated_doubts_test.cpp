@@ -57,6 +57,50 @@ TEST(CalibratedDoubts, StatedSharesAreTrueWithinAFactorOfTwoAndNoPoorResultIsSil
   EXPECT_LT(sums.stated_wrong, 2 * sums.wrong + 0.03 * sums.disks);
 }
 
+// A loose bed between walls and on a floor of another grey, or on drawn lines: straight edges beside beads.
+test::DrawnBed bed_between_walls(unsigned seed, float wall, bool lines) {
+  constexpr int columns = 440, rows = 440, left = 20, right = 420, ground = 420;  // px
+  constexpr double radius = 10, height = 160;                                      // of the bed, 1/e
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> across(left + radius, right - radius), part(0, 1);
+  std::normal_distribution<float> noise(0, 3);
+  test::DrawnBed bed;
+  while (bed.beads.size() < 100) {
+    // One in four touches a wall or the floor.
+    double x = across(random), y = ground - radius + height * std::log(1 - part(random));
+    if (part(random) < 0.25) (part(random) < 0.5 ? y = ground - radius : x = left + radius);
+    const bool free = y > 2 * radius && std::none_of(bed.beads.begin(), bed.beads.end(), [&](const auto& other) {
+      return std::hypot(other.x - x, other.y - y) < 2 * radius + 0.5;
+    });
+    if (free) bed.beads.push_back({x - 0.5, y - 0.5, radius, true});
+  }
+  bed.frame.width = columns, bed.frame.height = rows;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const bool outside = x < left || x >= right || y >= ground;
+      const bool line = (x >= left - 3 && x < left) || (x >= right && x < right + 3) || (y >= ground && y < ground + 3);
+      double level = outside && (!lines || line) ? static_cast<double>(wall) : 220;
+      for (const test::DrawnBead& bead : bed.beads) {
+        const double cover = std::clamp(radius + 0.5 - std::hypot(bead.x - x, bead.y - y), 0.0, 1.0);
+        level += cover * (50 - level);
+      }
+      bed.frame.pixels.push_back(static_cast<float>(level) + noise(random));
+    }
+  return bed;
+}
+
+TEST(CalibratedDoubts, StraightEdgesOfWallsAreNoMissedBeads) {
+  unsigned seed = first_seed;
+  for (const float wall : {115.0F, 60.0F, 250.0F})
+    for (const bool lines : {false, true}) {
+      const test::DrawnBed bed = bed_between_walls(seed++, wall, lines);
+      const DisksFound found = found_in(bed.frame);
+      ASSERT_TRUE(found.ok()) << found.message;
+      EXPECT_GE(test::score_of(found.disks, bed.beads).f1(), 0.99) << wall << lines;
+      EXPECT_LT(found.calibration.expected_missed, 0.02) << wall << lines;
+    }
+}
+
 struct TwoSizes {
   double ratio, share_of_small;
 };
