@@ -83,6 +83,7 @@ class AnswerFinder {
     compare_readings();
     judge();
     combine();
+    advise();
     judge_interval();
     judge_surface();
     judge_shaking();
@@ -283,9 +284,6 @@ class AnswerFinder {
                             " fits (models and windows) agree within 20 % or their errors, and the model fits.";
     if (!x && !z && !input_.shaken)
       answer_.why += " This is the T of the profile: only velocities show whether T_x differs, as in shaken beds.";
-    answer_.advice = std::hypot(answer_.bias_uncertainty, answer_.misfit_error) > answer_.statistical_error
-                         ? "Most of the uncertainty comes from the model: a longer measurement does not reduce it."
-                         : "Most of the uncertainty is statistical: a longer measurement reduces it.";
   }
 
   // A temperature as the reasons state it, and its unit.
@@ -302,11 +300,15 @@ class AnswerFinder {
   // A profile alone does not show what shaking always does.
   void judge_shaking() {
     if (!answer_.ok() || !input_.shaken || input_.temperature_x || input_.temperature_z) return;
+    const std::string shaken =
+        "The bed is shaken, and no velocities are known: T_x and T_z may lie outside this range.";
     if (answer_.verdict == Verdict::one_temperature) {
       answer_.verdict = Verdict::no_single_temperature;
+      answer_.why = shaken + " In the profile: " + answer_.why;
       answer_.advice = "Quote this range as that of the profile. Measure velocities: a film with its frame rate.";
+    } else {
+      answer_.why += " " + shaken;
     }
-    answer_.why += " The bed is shaken: T_x and T_z may lie outside this range.";
   }
 
   // The greatest density from `low` to `high` [D] over the usual one, at most 1.
@@ -350,6 +352,21 @@ class AnswerFinder {
     const double far = std::min(quantile() * a.std_error / a.temperature, widest_interval);
     a.interval.low = a.temperature * std::exp(-far);
     a.interval.high = a.temperature * std::exp(far);
+  }
+
+  // Of one temperature: what its uncertainty comes from.
+  void advise() {
+    if (answer_.verdict != Verdict::one_temperature) return;
+    const double model = std::hypot(answer_.bias_uncertainty, answer_.misfit_error, answer_.spread);
+    const double greatest =
+        std::max({model, answer_.wall_uncertainty, answer_.contact_duration_uncertainty, answer_.statistical_error});
+    answer_.advice = greatest == answer_.statistical_error
+                         ? "Most of the uncertainty is statistical: a longer measurement reduces it."
+                     : greatest == model
+                         ? "Most of the uncertainty comes from the model: a longer measurement does not reduce it."
+                     : greatest == answer_.wall_uncertainty
+                         ? "Most of the uncertainty comes from the side walls: a wider bed reduces it."
+                         : "Most of the uncertainty comes from the contact duration: a shorter one reduces it.";
   }
 
   // An interval that is too wide leaves T open, however well the model fits.

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "ingest/profile/floor.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
@@ -54,9 +55,9 @@ class GeometryFinder {
     bed_.scale_relative_std_error = bed_.scale_given ? 0 : refined_.radius_std_error_px / refined_.radius_px;
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
     if (bed_.scale_given && std::abs(2 * refined_.radius_px / diameter_px_ - 1) > fair_scale)
-      warnings_.push_back("The scale given makes a bead " + std::to_string(diameter_px_ * refined_.recorded_px) +
-                          " px wide, but the frames show " +
-                          std::to_string(2 * refined_.radius_px * refined_.recorded_px) + " px.");
+      warnings_.push_back(formatted("The scale given makes a bead %.4g px wide, but the frames show %.4g px.",
+                                    diameter_px_ * refined_.recorded_px,
+                                    2 * refined_.radius_px * refined_.recorded_px));
   }
 
   void set_floor() {

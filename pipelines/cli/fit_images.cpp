@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <numbers>
@@ -145,11 +146,24 @@ Json recipe_of(const ImageArguments& image) {
 
 // Mistakes that would otherwise be located in a recipe that the user has not written.
 void check_arguments(const ImageArguments& image) {
-  const double diameter = quantity_argument("--diameter", image.diameter, dimension::length);
-  require_positive("--diameter", diameter);
-  if (!parse_quantity(image.diameter).has_unit)
-    throw UsageError(fmt::format("--diameter: \"{}\" has no unit. Write \"{}\"", image.diameter,
-                                 likely_quantity(image.diameter, diameter, dimension::length)));
+  const auto check = [](const char* name, const std::optional<std::string>& text, const Dimension& dimension) {
+    if (!text) return 0.0;
+    const double value = quantity_argument(name, *text, dimension);
+    require_positive(name, value);
+    if (!parse_quantity(*text).has_unit)
+      throw UsageError(
+          fmt::format("{}: \"{}\" has no unit. Write \"{}\"", name, *text, likely_quantity(*text, value, dimension)));
+    return value;
+  };
+  const double diameter = check("--diameter", image.diameter, dimension::length);
+  check("--second-diameter", image.second_diameter, dimension::length);
+  check("--scale", image.scale, dimension::length_per_pixel);
+  check("--amplitude", image.amplitude, dimension::length);
+  check("--frequency", image.frequency, dimension::frequency);
+  check("--frame-rate", image.frame_rate, dimension::frequency);
+  check("--gravity", image.gravity, dimension::acceleration);
+  if (const auto odd = odd_bead(diameter); odd && !impossible_bead(diameter))
+    std::fputs(fmt::format("warning: --diameter: {}. {}\n", odd->what, odd->suggestion).c_str(), stderr);
   if (const auto impossible = impossible_bead(diameter))
     throw UsageError(fmt::format("--diameter: {}. {}", impossible->what, impossible->suggestion));
   for (const std::string& file : image.files) {

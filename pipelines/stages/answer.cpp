@@ -147,7 +147,7 @@ AnswerScale answer_scale(const Json& answer) {
 
 std::string verdict_text(const Json& answer) {
   const bool number = find_pointer(answer, "/temperature/value") != nullptr;
-  return answer.value("verdict", "") + (number ? "" : " (none can be read)");
+  return number ? answer.value("verdict", "") : "no temperature can be read";
 }
 
 std::string answer_text(const Json& answer) {

@@ -27,6 +27,7 @@ namespace shakebed::pipelines {
 namespace {
 
 constexpr std::size_t most_bad_frames_named = 5;
+constexpr double most_off_scale = 0.1;  // of a scale and a diameter that are both given, by the radius found
 
 namespace fs = std::filesystem;
 
@@ -342,6 +343,12 @@ class Extraction {
     if (!round_)
       all.push_back({"The outlines are not those of disks, and the theory is one of disks.",
                      "Use positions and numbers of beads only."});
+    const double seen = 2 * found.calibration.radius_px, given = options_.diameter / found.calibration.scale_m_per_px;
+    if (found.calibration.scale_given && std::max(seen / given, given / seen) > 1 + most_off_scale)
+      all.push_back({fmt::format("By the scale and the diameter given, a bead is {:.4g} px wide. The beads found are "
+                                 "{:.4g} px wide: one of the two is wrong, and with it every length.",
+                                 given, seen),
+                     "Leave the scale out: it follows from the diameter. Or correct the one that is wrong."});
     if (measure_.second_diameter_m && !found.second_finder) {
       const double ratio = *measure_.second_diameter_m / measure_.bead_diameter_m;
       all.push_back(

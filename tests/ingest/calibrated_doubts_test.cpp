@@ -60,7 +60,7 @@ TEST(CalibratedDoubts, StatedSharesAreTrueWithinAFactorOfTwoAndNoPoorResultIsSil
 // A loose bed between walls and on a floor of another grey, or on drawn lines: straight edges beside beads.
 test::DrawnBed bed_between_walls(unsigned seed, float wall, bool lines) {
   constexpr int columns = 440, rows = 440, left = 20, right = 420, ground = 420;  // px
-  constexpr double radius = 10, height = 160;                                      // of the bed, 1/e
+  constexpr double radius = 10, height = 160;                                     // of the bed, 1/e
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> across(left + radius, right - radius), part(0, 1);
   std::normal_distribution<float> noise(0, 3);
@@ -70,8 +70,8 @@ test::DrawnBed bed_between_walls(unsigned seed, float wall, bool lines) {
     double x = across(random), y = ground - radius + height * std::log(1 - part(random));
     if (part(random) < 0.25) (part(random) < 0.5 ? y = ground - radius : x = left + radius);
     const bool free = y > 2 * radius && std::none_of(bed.beads.begin(), bed.beads.end(), [&](const auto& other) {
-      return std::hypot(other.x - x, other.y - y) < 2 * radius + 0.5;
-    });
+                        return std::hypot(other.x - x, other.y - y) < 2 * radius + 0.5;
+                      });
     if (free) bed.beads.push_back({x - 0.5, y - 0.5, radius, true});
   }
   bed.frame.width = columns, bed.frame.height = rows;

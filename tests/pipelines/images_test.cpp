@@ -247,7 +247,7 @@ TEST_F(Images, APreviewTakesTheScaleAsARunDoes) {
   };
   for (const bool preview : {false, true}) {
     const ProgramResult without_unit = ends("3", preview);
-    EXPECT_EQ(without_unit.exit_code, 3) << preview;
+    EXPECT_EQ(without_unit.exit_code, 2) << preview;
     EXPECT_THAT(without_unit.err, HasSubstr("--scale: \"3\" has no unit"));
     const ProgramResult another_unit = ends("3 m/px", preview);
     EXPECT_EQ(another_unit.exit_code, 5) << preview;
@@ -278,6 +278,20 @@ std::string picture_of_ovals() {
 }
 
 // The refusal names an option that, given as it stands, leads to the 54 ovals and a warning.
+// A scale that contradicts the diameter makes every length wrong: no temperature.
+TEST_F(Images, AScaleThatContradictsTheDiameterLeavesNoTemperature) {
+  const std::string frame = (*folder_ / "o/render/frames/000000.png").string();
+  const auto answer = [&](const char* scale) {
+    const ProgramResult result = run_shakebed(
+        {"fit-images", frame, "--diameter", "3 mm", "--scale", scale, "--out", "scaled", "--force"}, folder_->path());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return read_json(*folder_ / "scaled/fit/fit.json")["answer"].value("why", "");
+  };
+  const char* contradicted = "a bead is 17.14 px wide. The beads found are 20";
+  EXPECT_THAT(answer("0.175 mm/px"), HasSubstr(contradicted));
+  EXPECT_THAT(answer("0.155 mm/px"), Not(HasSubstr("By the scale and the diameter")));
+}
+
 TEST_F(Images, WhatIsNotRoundIsRefusedAndMeasuredOnDemand) {
   write_text(*folder_ / "ovals.pgm", picture_of_ovals());
   const std::vector<std::string> arguments{"fit-images", "ovals.pgm", "--diameter", "3 mm", "--out", "ovals"};
