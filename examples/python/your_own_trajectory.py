@@ -31,6 +31,7 @@ else:
     import ase.io
     heights = np.array([frame.positions[:, "xyz".index(up)] for frame in ase.io.read(file, index=":")])
 print("frames x disks:", heights.shape)
+# For find_answer, a bed between hard side walls also needs sides="hard" here: T is then corrected for the walls.
 profile = shakebed.density_profile(heights, width, highest=15)
 fit = shakebed.fit_profile(profile)
 print(fit.brief())

@@ -281,7 +281,8 @@ def find_answer(
         Diameter D of a disk ("2.99 mm", or a number in m). With it T/(m g) is given as a length.
     width_between_walls : float, optional
         Width of a bed between hard side walls [D]. Near them the bed is thinner. The answer corrects for this, and
-        states what is left as part of the error.
+        states what is left as part of the error. By default it is that of the `Profile`, if it knows its walls; 0: no
+        correction.
 
     Returns
     -------
@@ -298,6 +299,8 @@ def find_answer(
         `Bed.answer` and `MeasuredBed.answer` pass all that is known of a bed.
     """
     length = None if diameter is None else in_si(diameter, "length", "diameter")
+    if width_between_walls is None and isinstance(height, Profile):
+        width_between_walls = height.width_between_walls
     answer = _core.find_answer(*_data(height, density, error, covariance, covariance_samples, kernel),
                                None if column_number is None else number(column_number, "column_number"),
                                _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [],

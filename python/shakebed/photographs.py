@@ -170,7 +170,7 @@ class MeasuredBed:
     @property
     def profile(self) -> Profile:
         """Density [1/D^2] against the height above the floor [D]."""
-        return profile_from(self._bed.profile())
+        return profile_from(self._bed.profile(), self.width if self._bed.walls_seen else None)
 
     def answer(self) -> dict[str, Any]:
         """One temperature from all thermometers, as `find_answer` gives it.
@@ -183,7 +183,7 @@ class MeasuredBed:
                                    profile.covariance_samples, profile.kernel, self._bed.column_number, None, None,
                                    self._bed.objections(), self._diameter,
                                    self.floor_std_error * self.scale / self._diameter, self._bed.shaken,
-                                   self.width if self._bed.walls_seen else 0.0)
+                                   profile.width_between_walls or 0.0)
         return with_lengths(answer, self._diameter)
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _core
 from .errors import BedWarning, RecipeError, UsageError, input_error, recipe_error
-from .quantities import Progress, Quantity, as_json, reporter, table_html
+from .quantities import Progress, Quantity, as_json, number, reporter, table_html
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,6 +42,8 @@ class Profile(NamedTuple):
         Number of snapshots or frames.
     kernel : str
         Kernel through which the density was measured, such as "gaussian:0.5" (width in D).
+    width_between_walls : float or None
+        Width of the bed from wall to wall [D], if hard side walls are known; else None. `find_answer` corrects for them.
     """
 
     height: Array
@@ -51,9 +53,10 @@ class Profile(NamedTuple):
     covariance_samples: int
     samples: int
     kernel: str
+    width_between_walls: Optional[float] = None
 
 
-def profile_from(columns: dict[str, Any]) -> Profile:
+def profile_from(columns: dict[str, Any], width_between_walls: Optional[float] = None) -> Profile:
     """A Profile from the columns of the compiled module."""
     covariance = np.asarray(columns.get("covariance", ()), dtype=float)
     size = int(round(np.sqrt(covariance.size)))
@@ -65,6 +68,7 @@ def profile_from(columns: dict[str, Any]) -> Profile:
         int(columns.get("covariance_samples", 0)),
         int(columns["samples"]),
         columns["kernel"],
+        width_between_walls,
     )
 
 
@@ -127,7 +131,7 @@ def read_trajectory(path: Union[str, "os.PathLike[str]"], *, up: str = "z") -> T
 
 def density_profile(
     heights: Any, width: float, *, kernel: str = "gaussian:0.5", spacing: float = 0.25,
-    lowest: Optional[float] = None, highest: Optional[float] = None,
+    lowest: Optional[float] = None, highest: Optional[float] = None, sides: Optional[str] = None,
 ) -> Profile:
     """The density profile of disks whose centres are known.
 
@@ -137,11 +141,15 @@ def density_profile(
         Heights of the centres above the floor [D]; frames in the order of time. Frames of a sequence may have
         different numbers of disks.
     width : float
-        Width of the bed [D].
+        Width of the bed from wall to wall, or the period [D].
     kernel : str
         Kernel of the density: "gaussian:0.5", "top_hat:1" or "disk_chord:1" (widths in D).
     spacing, lowest, highest : float
         Heights of the profile [D]. By default lowest is 0 and highest is 1 D above the highest disk.
+    sides : {"hard", "periodic"}, optional
+        Sides of the bed. Between hard walls the bed is thinner near them, and T seems too high. With ``sides="hard"``
+        the profile keeps the width, and `find_answer` corrects for the walls. By default the sides are unknown, and
+        nothing is corrected.
 
     Returns
     -------
@@ -156,17 +164,28 @@ def density_profile(
     z, ends = _joined_frames(heights)
     if not np.isfinite(z).all():
         raise UsageError("heights holds numbers that are not finite")
+    if sides not in (None, "hard", "periodic"):
+        raise UsageError(f'sides is {sides!r}; it must be "hard" or "periodic", or be left out if unknown')
+    width, spacing = _number_in_diameters(width, "width"), _number_in_diameters(spacing, "spacing")
     for name, value in (("width", width), ("spacing", spacing)):
         if not (value > 0 and np.isfinite(value)):
             raise UsageError(f"{name} is {value}; it must be above 0")
-    low = 0.0 if lowest is None else float(lowest)
-    high = float(z.max()) + 1 if highest is None else float(highest)
+    low = 0.0 if lowest is None else _number_in_diameters(lowest, "lowest")
+    high = float(z.max()) + 1 if highest is None else _number_in_diameters(highest, "highest")
     if not high > low:
         raise UsageError(f"highest is {high}, not above lowest, {low}")
     points = int(np.floor((high - low) / spacing)) + 1
     if points > _most_heights:
         raise UsageError(f"spacing {spacing} makes {points} heights; take at most {_most_heights}")
-    return profile_from(_core.density_profile(z, ends, float(width), kernel, low, float(spacing), points))
+    return profile_from(_core.density_profile(z, ends, width, kernel, low, spacing, points),
+                        width if sides == "hard" else None)
+
+
+def _number_in_diameters(value: Any, name: str) -> float:
+    """A length in D that is a plain number, not a string."""
+    if isinstance(value, str):
+        raise UsageError(f"{name} is {value!r}; it must be a number in D: divide the length by the diameter of a disk")
+    return number(value, name)
 
 
 def _joined_frames(heights: Any) -> tuple[Array, Any]:
@@ -267,12 +286,16 @@ class Bed:
     @property
     def profile(self) -> Profile:
         """Density against the height above the mean position of the floor."""
-        return profile_from(self._bed.profile(False))
+        return profile_from(self._bed.profile(False), self._width_between_walls)
 
     @property
     def floor_frame_profile(self) -> Profile:
         """Density against the height above the moving floor."""
-        return profile_from(self._bed.profile(True))
+        return profile_from(self._bed.profile(True), self._width_between_walls)
+
+    @property
+    def _width_between_walls(self) -> Optional[float]:
+        return self.width if self._bed.hard_sides else None
 
     @property
     def observables(self) -> dict[str, Quantity]:
@@ -291,8 +314,7 @@ class Bed:
 
         seen, in_metres = self.observables, self.length_unit != 1
         return find_answer(self.profile, column_number=self.column_number, temperature_x=seen.get("temperature_x"),
-                           temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None,
-                           width_between_walls=self.width if self._bed.hard_sides else None)
+                           temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None)
 
     def trajectory(self) -> Trajectory:
         """The frames that the scene keeps (option "frames"), not copied."""

@@ -47,6 +47,32 @@ def test_a_profile_brings_its_covariance_and_kernel(curve):
         shakebed.fit_profile(curve.height)
 
 
+def test_a_profile_between_hard_walls_is_corrected_for_them(scene):
+    """density_profile(sides="hard") and a simulated bed bring the width that find_answer needs."""
+    bed = shakebed.simulate(scene)
+    z = bed.trajectory().array[:, :, 1]
+    unknown = shakebed.density_profile(z, bed.width)
+    hard = shakebed.density_profile(z, bed.width, sides="hard")
+    periodic = shakebed.density_profile(z, bed.width, sides="periodic")
+    assert hard.width_between_walls == bed.profile.width_between_walls == bed.floor_frame_profile.width_between_walls
+    assert hard.width_between_walls == pytest.approx(10.3)
+    assert unknown.width_between_walls is periodic.width_between_walls is None
+    corrected = shakebed.find_answer(unknown, width_between_walls=10.3)
+    assert shakebed.find_answer(hard) == corrected
+    uncorrected = shakebed.find_answer(unknown)
+    assert uncorrected["status"] == corrected["status"] == "ok"
+    assert corrected["temperature"] < uncorrected["temperature"]
+    assert shakebed.find_answer(periodic) == shakebed.find_answer(hard, width_between_walls=0) == uncorrected
+    seen = bed.observables
+    assert bed.answer() == shakebed.find_answer(
+        bed.profile, column_number=bed.column_number, temperature_x=seen["temperature_x"],
+        temperature_z=seen["temperature_z"], diameter="3 mm", width_between_walls=bed.width)
+
+
+def test_a_profile_between_periodic_sides_has_no_walls(curve):
+    assert curve.width_between_walls is None
+
+
 def test_fit_is_that_of_the_command_line(curve, tmp_path):
     rows = np.column_stack([curve.height, curve.number_density, curve.std_error])
     file = tmp_path / "profile.csv"
@@ -123,6 +149,13 @@ def test_density_of_known_centres_adds_up(scene):
         assert np.allclose(np.sqrt(np.diag(profile.covariance)), profile.std_error)
     with pytest.raises(shakebed.UsageError, match="frames, disks"):
         shakebed.density_profile(z[0], 10.3)
+    for wrong, words in ((dict(sides="walls"), "sides is 'walls'; it must be \"hard\" or \"periodic\""),
+                         (dict(width="30.9 mm"), "width is '30.9 mm'; it must be a number in D"),
+                         (dict(spacing="1 mm"), "spacing is '1 mm'; it must be a number in D"),
+                         (dict(highest="30 mm"), "highest is '30 mm'; it must be a number in D"),
+                         (dict(width=[1, 2]), "width is .* it must be a number")):
+        with pytest.raises(shakebed.UsageError, match=words):
+            shakebed.density_profile(z, **{"width": 10.3, **wrong})
     with pytest.raises(shakebed.UsageError, match="no disk"):
         shakebed.density_profile([[], []], 10.3)
     with pytest.raises(shakebed.UsageError, match="finite"):
