@@ -94,6 +94,15 @@ def test_the_answer_is_that_of_the_command_line(frames, measured):
     assert "Only 12 beads" in shakebed.measure_bed([image], "3 mm").answer()["why"]
 
 
+def test_the_profile_of_photographs_knows_the_walls_only_where_both_are_in_view(frames, measured):
+    bed = measured[0]
+    assert bed.profile.width_between_walls == bed.width
+    middle = 0.5 * (bed.disks["x_px"].min() + bed.disks["x_px"].max())
+    cut = shakebed.measure_bed(frames[0], "3 mm",
+                               roi=(0, 0, int(middle), int(bed.floor + bed.radius)))
+    assert cut.profile.width_between_walls is None
+
+
 def test_control_c_ends_the_search_in_one_picture():
     code = (
         "import sys, time, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
