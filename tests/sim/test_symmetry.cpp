@@ -165,6 +165,27 @@ TEST(OrderLayers, CountTheNeighboursOfTheirOwnDisks) {
   EXPECT_DOUBLE_EQ(layers[2].neighbours, 0);
 }
 
+// Three rows of four, the highest in the last bins of the histogram, whose smoothing ends there.
+TEST(OrderRows, ReachToTheEndOfTheirHistogram) {
+  Scene scene;
+  scene.box.width = 20;
+  DiskProperties disks;
+  Snapshot at;
+  for (const double z : {0.5, 1.25, 1.995}) {
+    for (int k = 0; k < 4; ++k) at.x.push_back(1 + 2 * k), at.z.push_back(z);
+  }
+  disks.radius.assign(12, 0.5), disks.mass.assign(12, 1);
+  at.vx.resize(12), at.vz.resize(12);
+  OrderObserver order(scene, disks, {0, 0.5, 4});
+  for (int look = 0; look < 100; ++look) order.observe(at);
+  const auto rows = order.rows();
+  ASSERT_EQ(rows.size(), 2U) << "the highest is not closed by one above it";
+  EXPECT_NEAR(rows[0].height, 0.5, 1e-12);
+  EXPECT_NEAR(rows[1].height, 1.25, 1e-12);
+  EXPECT_NEAR(rows[0].disks, 4, 1e-12);
+  EXPECT_NEAR(rows[1].disks, 4, 1e-12);
+}
+
 TEST(OrderLayers, StandAtTheMiddleOfWhatTheyCover) {
   Scene scene;
   scene.box.width = 10;
