@@ -286,61 +286,63 @@ class Bench:
             (self.work / name).mkdir(parents=True, exist_ok=True)
         shutil.rmtree(self.overlay, ignore_errors=True)
         targets = [*PROGRAMS.values(), "pipelines/shakebed", "shakebed_images"]
+        self.read_links(targets)
+        self.read_sources()
+        self.shared = {}  # archive: the shared library that takes its place, and its objects
+        for archive, objects in self.archives.items():
+            if re.match(r"(statistics|sim|fit|ingest|pipelines)/", archive):
+                self.shared[archive] = (Path(archive).stem, objects)
+        objects_of = lambda output: [word for word in self.links[output].split() if word.endswith(".o")]
+        self.groups = {"libimage_stages": objects_of("pipelines/libshakebed_images.so"),
+                       "libprogram": objects_of("pipelines/shakebed")}
+        for name, objects in self.shared.values():
+            self.library(name, objects)
+        for name, objects in self.groups.items():
+            if name == "libprogram":
+                objects = [self.compile_again(one, lambda text: text.replace("-fPIE", "-fPIC")) for one in objects]
+            self.library(name, objects)
+        self.no_fault()
+        for output in self.links:
+            if output in targets or output.endswith("/libshakebed_images.so"):
+                self.link(output)
+
+    def read_links(self, targets):
+        """How the build makes archives and links programs."""
         lines = subprocess.run(["ninja", "-C", str(self.base), "-t", "commands", *targets], check=True,
                                capture_output=True, text=True).stdout.splitlines()
-        links = [line for line in lines if line.startswith(": &&")]
-        self.archives = {}  # by name: objects
-        for line in links:
-            found = re.search(r"/ar qc (\S+) +(.*?) && ", line)
-            if found:
-                self.archives[found.group(1)] = found.group(2).split()
-        self.links = {}  # program: its command
-        for line in links:
-            found = re.search(r" -o (\S+) ", line)
-            if found and "/ar qc" not in line:
-                self.links[found.group(1)] = line[len(": && "):].rsplit(" && :", 1)[0]
-        entries = json.loads((self.base / "compile_commands.json").read_text())
-        self.compiled = {}  # object: how it is compiled
-        for entry in entries:
+        self.archives, self.links = {}, {}  # archive: objects; program: command
+        for line in lines:
+            archive, program = re.search(r"/ar qc (\S+) +(.*?) && ", line), re.search(r" -o (\S+) ", line)
+            if line.startswith(": &&") and archive:
+                self.archives[archive.group(1)] = archive.group(2).split()
+            elif line.startswith(": &&") and program:
+                self.links[program.group(1)] = line[len(": && "):].rsplit(" && :", 1)[0]
+
+    def in_source(self, path):
+        """A path of the source the build is of, as the source has it; None for other paths and generated ones."""
+        inside = path.startswith(f"{self.home}/") and not path.startswith(f"{self.built}/")
+        return path[len(str(self.home)) + 1:] if inside else None
+
+    def read_sources(self):
+        """Which object a source belongs to, how that is compiled, and which objects include a header."""
+        self.compiled, self.sources, self.depends = {}, {}, {}
+        for entry in json.loads((self.base / "compile_commands.json").read_text()):
             output = re.search(r" -o (\S+)", entry["command"]).group(1)
             self.compiled[output] = entry["command"]
-        self.sources = {}  # source: its object
-        for output, command in self.compiled.items():
-            unit = re.search(r" -c (\S+)$", command).group(1)
+            unit = re.search(r" -c (\S+)$", entry["command"]).group(1)
             files = [unit]
             if "/Unity/" in unit:
-                text = Path(unit.replace(str(self.built), str(self.base))).read_text()
-                files = re.findall(r'#include "(.*?)"', text)
+                files = re.findall(r'#include "(.*?)"', Path(unit.replace(str(self.built), str(self.base))).read_text())
             for file in files:
-                if file.startswith(f"{self.home}/") and not file.startswith(str(self.built)):
-                    self.sources.setdefault(file[len(str(self.home)) + 1:], output)
-        self.depends = {}  # header: objects
+                if self.in_source(file):
+                    self.sources.setdefault(self.in_source(file), output)
         output = None
         for line in subprocess.run(["ninja", "-C", str(self.base), "-t", "deps"], check=True, capture_output=True,
                                    text=True).stdout.splitlines():
             if not line.startswith(" "):
                 output = line.split(":")[0]
-            elif line.strip().startswith(f"{self.home}/") and not line.strip().startswith(str(self.built)):
-                self.depends.setdefault(line.strip()[len(str(self.home)) + 1:], []).append(output)
-        self.shared = {}  # archive or object: the shared library that takes its place
-        for archive, objects in self.archives.items():
-            if re.match(r"(statistics|sim|fit|ingest|pipelines)/", archive):
-                self.shared[archive] = (Path(archive).stem, objects)
-        images = [name for name in self.links["pipelines/libshakebed_images.so"].split()
-                  if name.endswith(".o")]
-        program = [name for name in self.links["pipelines/shakebed"].split() if name.endswith(".o")]
-        self.groups = {"libimage_stages": images, "libprogram": program}
-        for name, (library, objects) in self.shared.items():
-            self.library(library, objects)
-        for library, objects in self.groups.items():
-            if library == "libprogram":
-                objects = [self.compile_again(name, lambda text: text.replace("-fPIE", "-fPIC")) for name in objects]
-            self.library(library, objects)
-        self.no_fault()
-        self.programs = {}
-        for output in self.links:
-            if output in targets or output.endswith("/libshakebed_images.so"):
-                self.link(output)
+            elif self.in_source(line.strip()):
+                self.depends.setdefault(self.in_source(line.strip()), []).append(output)
 
     def library(self, name, objects):
         target = self.work / f"lib/{name}.so"
