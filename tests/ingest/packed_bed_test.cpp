@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/find/survey.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/drawing.hpp"
@@ -93,6 +94,21 @@ TEST(PackedBed, SmallBeadsOfADisorderedBedAreFoundByTheirFaces) {
   std::mt19937 random(31);
   expect_all_found(pile(4.4, random), {0.8, 5, false}, "pile of 4.4 px");
   expect_all_found(pile(6.4, random), {1.2, 2, true}, "pile of 6.4 px");
+}
+
+// A drawn crystal shows no edges but those of its beads: they are gone once the beads are taken out.
+TEST(PackedBed, ExplainsTheEdgesOfItsBeads) {
+  Camera camera;
+  camera.width = columns, camera.height = rows;
+  camera.blur_px = 0.8, camera.read_noise = 2;
+  ChannelFrames frames;
+  frames.width = columns, frames.height = rows;
+  frames.channels.push_back({Channel::grey, render_frame(crystal(4.3), camera)});
+  const Survey survey = take_survey(frames);
+  ASSERT_TRUE(survey.found) << survey.why_not;
+  EXPECT_NEAR(survey.candidates.front().rims.radius_px, 4.3, 0.1);
+  EXPECT_GT(survey.candidates.front().explained_share, 0.8);
+  EXPECT_LE(survey.candidates.front().explained_share, 1);
 }
 
 // Squares, hexagons and disks on a lattice; what part of a cell is covered at (u, v) pitches from its middle.
