@@ -6,9 +6,10 @@
   mutants.py run [--jobs 2] [--hours 8]        judges what waits; can be stopped and started again
   mutants.py report                            counts by room and the faults that no test noticed
 
-The table (--table, default mutants.csv in the work folder) holds one fault a line with its state: waiting, noticed,
-survived, not built, misplaced. The work folder (--work, default build/mutants) holds one copy of the source and one build
-for each job. The standard library of Python 3.9 is enough.
+The table (--table, default mutants.csv in the work folder) holds one fault a line with its state: waiting, noticed, not at
+first (the quickest tests of the room did not notice it), survived, not built, not in a program, misplaced. The work folder
+(--work, default build/mutants) holds programs for each job, linked from a finished release build (--build). The standard
+library of Python 3.9 is enough.
 """
 
 import argparse
@@ -374,13 +375,16 @@ class Bench:
             elif output.endswith(".so") and word.endswith(".o"):
                 words.append(word)  # the module; nothing names its entry, so it would not ask for a library
             elif word in self.groups["libimage_stages"] or word in self.groups["libprogram"]:
-                words.append("lib/libimage_stages.so" if word in self.groups["libimage_stages"] else "lib/libprogram.so")
+                group = "libimage_stages" if word in self.groups["libimage_stages"] else "libprogram"
+                words.append(f"lib/{group}.so")
             elif word.endswith(".o") and "-DSHAKEBED_PROGRAM=" in self.compiled.get(word, ""):
                 words.append(self.own_program(word))
             else:
                 words.append(word)
         def place(word):  # objects, libraries of the tests, shared libraries, libraries of others
-            return 3 if re.match(r"/usr/lib|-l", word) else 2 if word.startswith("lib/") else 1 if word.endswith(".a") else 0
+            if re.match(r"/usr/lib|-l", word):
+                return 3
+            return 2 if word.startswith("lib/") else 1 if word.endswith(".a") else 0
 
         return sorted(words, key=place)
 
@@ -396,8 +400,9 @@ class Bench:
         words = [dict(replaced).get(word, word) for word in self.link_words(output)]
         place = words.index("-o")
         words[place + 1] = str(target)
-        words = [str(self.work / word) if word.startswith("lib/lib") and (self.work / word).exists() else word
-                 for word in words]
+        # All of ours, also those that the program itself does not call: libfault.so may.
+        words = [f"-Wl,--no-as-needed {self.work / word} -Wl,--as-needed"
+                 if word.startswith("lib/lib") and (self.work / word).exists() else word for word in words]
         words = [word for word in words if word != "-Wl,-z,defs"]
         words += [f"-Wl,-rpath,{self.work}/lib", f"-Wl,-rpath-link,{self.work}/lib", "-Wl,-z,lazy"]
         if not output.endswith(".so"):
@@ -527,7 +532,8 @@ class Bench:
                 if code == 127:
                     sys.exit(f"{program} is not loaded:\n{output[-3000:]}")
                 if code is None or code == -signal.SIGXCPU or not failed:
-                    return "noticed", f"{program} ({'did not end' if code in (None, -signal.SIGXCPU) else f'ended with {code}'})"
+                    how = "did not end" if code in (None, -signal.SIGXCPU) else f"ended with {code}"
+                    return "noticed", f"{program} ({how})"
                 if self.is_fit(program, failed[0], usual):
                     return "noticed", failed[0]
                 print(f"{failed[0]} fails without a fault: not used", flush=True)
@@ -658,14 +664,13 @@ def run(arguments):
 
 def report(arguments):
     rows = read_table(arguments.table)
-    print("| room | judged | noticed | survived | not built |\n|---|---|---|---|---|")
+    print("| room | noticed | not at first | survived | not built | waiting |\n|---|---|---|---|---|---|")
     for room in ROOMS:
         states = [row["state"] for row in rows if row["room"] == room]
-        judged = states.count("noticed") + states.count("survived")
-        print(f"| {room} | {judged} | {states.count('noticed')} | {states.count('survived')} |"
-              f" {states.count('not built')} |")
+        counts = [states.count(state) for state in ("noticed", "not at first", "survived", "not built", "waiting")]
+        print(f"| {room} | {' | '.join(map(str, counts))} |")
     for row in rows:
-        if row["state"] == "survived":
+        if row["state"] in ("not at first", "survived"):
             print(f"{row['id']} {row['file']}:{row['line']} {row['kind']}: {row['before']!r} -> {row['after']!r}")
 
 
