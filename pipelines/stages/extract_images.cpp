@@ -35,7 +35,8 @@ namespace fs = std::filesystem;
 fs::path refusal_folder(const RunContext& context) { return context.output_directory().parent_path() / "no-beads"; }
 
 // Says what the first frame shows instead of beads.
-[[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look) {
+[[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
+                         const std::vector<std::string>& paths) {
   const ingest::Survey& survey = look.survey;
   const std::string diameter = fmt::format("{:g} mm", 1e3 * options.diameter);
   const fs::path folder = refusal_folder(context);
@@ -43,6 +44,8 @@ fs::path refusal_folder(const RunContext& context) { return context.output_direc
   write_preview(folder, look, options.images.texts, diameter);
   std::string message =
       fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (folder / "preview.html").string());
+  if (const std::string without = seen_without_options(paths, options); !without.empty())
+    throw StageError(message + ". " + without);
   const std::vector<std::string> proposals = proposed_options(survey);
   message +=
       proposals.empty()
@@ -77,7 +80,7 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
   if (!look) return true;  // measure_bed() says which files cannot be read
-  if (!look->survey.found) refuse(options, context, *look);
+  if (!look->survey.found) refuse(options, context, *look, film.paths);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
   if (options.scale)
     if (const std::string why = ingest::why_not_scale(options.diameter, *options.scale, chosen->rims.radius_px);

@@ -22,7 +22,11 @@ Previewed preview_images(const PreviewRequest& request) {
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
   write_preview(request.folder, *look, request.files, request.diameter);
-  if (!look->survey.found) return {false, fmt::format("{}: no beads: {}", look->path, look->survey.why_not)};
+  if (!look->survey.found) {
+    const std::string without = seen_without_options(paths, request.options);
+    return {false, fmt::format("{}: no beads: {}{}", look->path, look->survey.why_not,
+                               without.empty() ? "" : ". " + without)};
+  }
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
   if (const auto scale = request.options.scale)
     if (const std::string why = ingest::why_not_scale(request.options.diameter, *scale, best.rims.radius_px);

@@ -1,6 +1,7 @@
 #include "pipelines/stages/preview.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -67,6 +68,22 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
   std::vector<ingest::FrameOrigin> pictures;
   for (const std::string& path : paths) pictures.push_back({path, 0});
   return ingest::look_at_first(pictures, asked, source);
+}
+
+std::string seen_without_options(const std::vector<std::string>& paths, ExtractOptions options) {
+  std::vector<std::string> given;
+  if (options.polarity != BeadPolarity::automatic) given.emplace_back("polarity");
+  if (options.radius) given.emplace_back("radius");
+  if (options.channel != BeadChannel::automatic) given.emplace_back("channel");
+  if (given.empty()) return "";
+  options.polarity = BeadPolarity::automatic, options.channel = BeadChannel::automatic;
+  options.radius.reset();
+  const std::optional<FirstLook> look = look_at_first(paths, options);
+  if (!look || !look->survey.found) return "";
+  const ingest::SurveyCandidate& best = look->survey.candidates.front();
+  return fmt::format("Without the {} given, {} {} beads of {:.1f} px radius are seen", fmt::join(given, " and "),
+                     best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                     best.rims.radius_px);
 }
 
 std::string options_for(const ingest::SurveyCandidate& candidate) {

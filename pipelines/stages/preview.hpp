@@ -30,6 +30,10 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
                    const std::string& diameter);
 
+// What is seen where radius, polarity and channel are not given, a sentence; empty where none of them is given, or
+// nothing is seen either.
+std::string seen_without_options(const std::vector<std::string>& paths, ExtractOptions options);
+
 // The options that take this candidate: --channel red --polarity dark --radius 22.9
 std::string options_for(const ingest::SurveyCandidate& candidate);
 // Those of the plausible candidates that differ, at most two.

@@ -278,6 +278,18 @@ std::string picture_of_ovals() {
 }
 
 // The refusal names an option that, given as it stands, leads to the 54 ovals and a warning.
+// Options that exclude the beads: what is seen without them is said.
+TEST_F(Images, WrongPolarityIsNamedWhereBeadsAreSeenWithoutIt) {
+  const std::string frame = (*folder_ / "o/render/frames/000000.png").string();
+  for (const bool preview : {false, true}) {
+    std::vector<std::string> arguments{"fit-images", frame, "--diameter", "3 mm", "--polarity", "bright", "--out", "p"};
+    if (preview) arguments.emplace_back("--preview");
+    const ProgramResult result = run_shakebed(arguments, folder_->path());
+    EXPECT_EQ(result.exit_code, 5) << result.out;
+    EXPECT_THAT(result.err, testing::ContainsRegex("Without the polarity given, 1[0-9]+ dark beads of (9|10)"));
+  }
+}
+
 // A scale that contradicts the diameter makes every length wrong: no temperature.
 TEST_F(Images, AScaleThatContradictsTheDiameterLeavesNoTemperature) {
   const std::string frame = (*folder_ / "o/render/frames/000000.png").string();
