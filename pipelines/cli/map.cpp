@@ -69,13 +69,14 @@ void add_map(Program& program) {
   command.add_option("--gamma", given->gamma, "peak acceleration of the floor over g");
   command.add_option("--amplitude", given->amplitude, "amplitude of the floor with its unit, in place of --gamma");
   command.add_option("--frequency", given->frequency, "frequency of the floor: \"20 Hz\"")->required();
-  command.add_option("--diameter", given->diameter, "D")->required();
+  command.add_option("--diameter", given->diameter, "diameter D of a disk, with its unit: \"2.99 mm\"")->required();
   command.add_option("--initial-height", given->initial_height, initial_height_help)->required();
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
   command.add_option("--gravity", given->gravity, "acceleration of gravity (default: \"9.81 m/s^2\")");
   command.add_option("--restitution", given->restitution,
                      "coefficient of restitution of the single ball (default 0: one flight without rebound)");
-  command.add_option("--eos", given->equation, "equation of state (default: enskog)");
+  command.add_option("--eos", given->equation, "equation of state: enskog (default), henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
+                     "luding or best-of");
   command.add_option("--temperature", given->temperature,
                      "measured T, for which Gamma is computed: T/(m g) as a length, or T in m g D");
 }

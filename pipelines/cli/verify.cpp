@@ -15,6 +15,8 @@ namespace {
 
 int verify(const Call& call, const std::filesystem::path& out) {
   std::error_code error;
+  if (std::filesystem::is_regular_file(out, error))
+    throw InputError(fmt::format("{}: is a file. Give the folder that --out named", out.string()));
   if (!std::filesystem::is_directory(out, error))
     throw InputError(fmt::format("{}: there is no such folder", out.string()));
   if (!std::filesystem::exists(out / "manifest.json", error))

@@ -115,7 +115,7 @@ class Judge {
     if (!found) return;
     object(
         "still changing",
-        fmt::format("the bed still changes while it is measured: {} is {} by {:.2g} % in the second half of the time",
+        fmt::format("the bed still changes while it is measured: {} is {} by {:.0f} % in the second half of the time",
                     found->what, found->change > 0 ? "higher" : "lower", 100 * found->part),
         "Let it settle longer");
   }

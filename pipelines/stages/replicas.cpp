@@ -176,7 +176,7 @@ std::vector<std::string> replica_warnings(const std::vector<Json>& results, cons
         starts == ReplicaStarts::alternate ? " (" + by_start(results, found->key) + ")" : ""));
   if (const auto found = notable_drift_of(joined))
     warnings.push_back(fmt::format(
-        "the bed still changes while it is measured: {} is {} by {:.2g} ({:.2g} %) in the second half of the time, "
+        "the bed still changes while it is measured: {} is {} by {:.2g} ({:.0f} %) in the second half of the time, "
         "{:.1f} times the error of this difference. Let it settle longer",
         found->what, found->change > 0 ? "higher" : "lower", std::abs(found->change), 100 * found->part,
         std::abs(found->change) / found->error));

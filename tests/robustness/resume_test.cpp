@@ -71,7 +71,7 @@ void kill_and_resume(int replicas, std::uint32_t seed) {
   EXPECT_TRUE(checkpoint || killed < 4) << "there was nothing to go on from";
   const ProgramResult last = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   ASSERT_EQ(last.exit_code, 0) << last.err;
-  EXPECT_NE(read_text(folder / "o/bed/log.txt").find("goes on at"), std::string::npos);
+  EXPECT_NE(read_text(folder / "o/bed/log.txt").find("goes on after"), std::string::npos);
   const auto found = results_of(folder / "o");
   for (const auto& [name, text] : expected)
     EXPECT_TRUE(found.contains(name) && found.at(name) == text) << name << " is another";
