@@ -75,8 +75,10 @@ void add_map(Program& program) {
   command.add_option("--gravity", given->gravity, "acceleration of gravity (default: \"9.81 m/s^2\")");
   command.add_option("--restitution", given->restitution,
                      "coefficient of restitution of the single ball (default 0: one flight without rebound)");
-  command.add_option("--eos", given->equation, "equation of state: enskog (default), henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
-                     "luding or best-of");
+  command.add_option(
+      "--eos", given->equation,
+      "equation of state: enskog (default), henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
+      "luding or best-of");
   command.add_option("--temperature", given->temperature,
                      "measured T, for which Gamma is computed: T/(m g) as a length, or T in m g D");
 }

@@ -24,8 +24,8 @@ Previewed preview_images(const PreviewRequest& request) {
   write_preview(request.folder, *look, request.files, request.diameter);
   if (!look->survey.found) {
     const std::string without = seen_without_options(paths, request.options);
-    return {false, fmt::format("{}: no beads: {}{}", look->path, look->survey.why_not,
-                               without.empty() ? "" : ". " + without)};
+    return {false,
+            fmt::format("{}: no beads: {}{}", look->path, look->survey.why_not, without.empty() ? "" : ". " + without)};
   }
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
   if (const auto scale = request.options.scale)
