@@ -218,7 +218,7 @@ TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
   EXPECT_NE(empty.err.find("error: the folder \""), std::string::npos) << empty.err;
   const ProgramResult scale =
       run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--scale", "0.2 mm"}, folder_->path());
-  EXPECT_EQ(scale.exit_code, 3);
+  EXPECT_EQ(scale.exit_code, 2);
   EXPECT_NE(scale.err.find("error: --scale: \"0.2 mm\" is a length"), std::string::npos) << scale.err;
   write_text(*folder_ / "broken.png", "\x89PNG\r\n\x1a\nnot an image");
   EXPECT_EQ(run_shakebed({"fit-images", "broken.png", "--diameter", "3 mm", "--out", "n"}, folder_->path()).exit_code,
