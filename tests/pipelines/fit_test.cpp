@@ -256,10 +256,11 @@ class AnswerOfAProfile : public FitStage {
     shown = shown.substr(0, shown.find('<'));
     ASSERT_FALSE(shown.empty());
     shown[0] = static_cast<char>(std::tolower(shown[0]));
-    EXPECT_EQ(shown, answer.contains("temperature") ? verdict : "no temperature can be read");
+    const std::string said = answer.contains("temperature") ? verdict : "no temperature can be read";
+    EXPECT_EQ(shown, said);
     EXPECT_EQ(page_.find("class=\"banner\""), std::string::npos) << "the answer is the one statement";
-    for (const char* file : {"o/summary.md"}) EXPECT_THAT(read_text(folder_ / file), HasSubstr(verdict.substr(1)));
-    EXPECT_THAT(ran_.out, HasSubstr(verdict.substr(1)));
+    for (const char* file : {"o/summary.md"}) EXPECT_THAT(read_text(folder_ / file), HasSubstr(said.substr(1)));
+    EXPECT_THAT(ran_.out, HasSubstr(said.substr(1)));
     EXPECT_THAT(ran_.out, HasSubstr(answer["advice"].get<std::string>()));
   }
   ProgramResult ran_;
