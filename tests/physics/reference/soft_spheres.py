@@ -152,6 +152,30 @@ def version():
     return re.search(r"- (.+?)$", subprocess.run(["lmp", "-h"], capture_output=True, text=True).stdout, re.M).group(1)
 
 
+def cpu_seconds_of_lammps(variables, base):
+    """Runs soft_spheres.lmp with these variables; its log is base.log."""
+    command = ["lmp", "-in", os.path.join(HERE, "soft_spheres.lmp"), "-log", base + ".log", "-screen", "none"]
+    for key, value in variables.items():
+        command += ["-var", key, str(value)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run(command, check=True)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def looks_at(dump, looks, per_period):
+    """Steps, states (x, z, vx, vz of each disk), T_x and T_z of each look, without the mean velocities of its phase."""
+    steps, states = zip(*frames(dump))
+    steps, states = np.array(steps[1:looks + 1]), np.array(states[1:looks + 1])
+    assert len(steps) == looks
+    phase = steps % per_period * PHASES // per_period
+    tx, tz = np.zeros(looks), np.zeros(looks)
+    for p in range(PHASES):
+        here = phase == p
+        tx[here] = ((states[here, :, 2] - states[here, :, 2].mean()) ** 2).mean(1)
+        tz[here] = ((states[here, :, 3] - states[here, :, 3].mean()) ** 2).mean(1)
+    return steps, states, tx, tz
+
+
 def run(bed, scratch, lammps):
     e, friction, layers, gamma, contact, seed = bed
     count, name = A_ROW * layers, name_of(bed)
@@ -170,22 +194,8 @@ def run(bed, scratch, lammps):
                  "amplitude": gamma * GRAVITY / (2 * math.pi * FREQUENCY) ** 2 / DIAMETER,
                  "settle_steps": per_period * SETTLE, "measure_steps": per_period * MEASURE[layers],
                  "dump_steps": per_period // PHASES}
-    command = ["lmp", "-in", os.path.join(HERE, "soft_spheres.lmp"), "-log", base + ".log", "-screen", "none"]
-    for key, value in variables.items():
-        command += ["-var", key, str(value)]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    subprocess.run(command, check=True)
-    cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    steps, states = zip(*frames(base + ".bin"))
-    looks = MEASURE[layers] * PHASES
-    steps, states = np.array(steps[1:looks + 1]), np.array(states[1:looks + 1])
-    assert len(steps) == looks
-    phase = steps % per_period * PHASES // per_period
-    tx, tz = np.zeros(looks), np.zeros(looks)
-    for p in range(PHASES):
-        here = phase == p
-        tx[here] = ((states[here, :, 2] - states[here, :, 2].mean()) ** 2).mean(1)
-        tz[here] = ((states[here, :, 3] - states[here, :, 3].mean()) ** 2).mean(1)
+    cpu = cpu_seconds_of_lammps(variables, base)
+    _, states, tx, tz = looks_at(base + ".bin", MEASURE[layers] * PHASES, per_period)
     os.makedirs(PROFILES, exist_ok=True)
     write_profile(os.path.join(PROFILES, name + ".csv"), states[:, :, 1], MEASURE[layers])
     row = [name, e, friction, layers, gamma, contact, seed, count, SETTLE, MEASURE[layers]]

@@ -15,15 +15,13 @@ import argparse
 import csv
 import math
 import os
-import resource
-import subprocess
 import sys
 import tempfile
 
 import numpy as np
 
 import soft_spheres
-from soft_spheres import frames, mean_and_error
+from soft_spheres import cpu_seconds_of_lammps, looks_at, mean_and_error
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TABLE = os.path.join(HERE, "weak_rough_beds.csv")
@@ -109,22 +107,8 @@ def run(bed, scratch, lammps):
                  "amplitude": gamma * GRAVITY / (2 * math.pi * FREQUENCY) ** 2 / DIAMETER,
                  "settle_steps": per_period * SETTLE, "measure_steps": per_period * MEASURE,
                  "dump_steps": per_period // PHASES}
-    command = ["lmp", "-in", os.path.join(HERE, "soft_spheres.lmp"), "-log", base + ".log", "-screen", "none"]
-    for key, value in variables.items():
-        command += ["-var", key, str(value)]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    subprocess.run(command, check=True)
-    cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    steps, states = zip(*frames(base + ".bin"))
-    looks = MEASURE * PHASES
-    steps, states = np.array(steps[1:looks + 1]), np.array(states[1:looks + 1])
-    assert len(steps) == looks
-    phase = steps % per_period * PHASES // per_period
-    tx, tz = np.zeros(looks), np.zeros(looks)
-    for p in range(PHASES):
-        here = phase == p
-        tx[here] = ((states[here, :, 2] - states[here, :, 2].mean()) ** 2).mean(1)
-        tz[here] = ((states[here, :, 3] - states[here, :, 3].mean()) ** 2).mean(1)
+    cpu = cpu_seconds_of_lammps(variables, base)
+    steps, states, tx, tz = looks_at(base + ".bin", MEASURE * PHASES, per_period)
     np.savez_compressed(base + ".npz", steps=steps, states=states.astype(np.float32), per_period=per_period)
     row = list(bed)
     for series in (tx, tz, states[:, :, 1].mean(1)):
