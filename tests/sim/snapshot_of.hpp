@@ -21,6 +21,7 @@ inline void expect_same_bytes(const Simulation& a, const Simulation& b) {
   EXPECT_EQ(of_a.vz, of_b.vz);
   EXPECT_EQ(of_a.spin, of_b.spin);
   EXPECT_EQ(a.energy().dissipated, b.energy().dissipated);
+  EXPECT_EQ(a.energy().dissipated_on_plates, b.energy().dissipated_on_plates);
   EXPECT_EQ(a.energy().floor_work, b.energy().floor_work);
   EXPECT_EQ(a.counters().events(), b.counters().events());
 }

@@ -90,17 +90,21 @@ def starting_places(count, seed, rng):
     return places
 
 
-def write_start(path, count, seed, contact):
-    rng = np.random.default_rng([seed, contact])
-    places = starting_places(count, seed, rng)
+def write_atoms(path, width, places, speed, rng):
+    """Spheres of diameter and mass 1 at these places (x, z); velocities with this standard deviation."""
     with open(path, "w") as out:
-        out.write(f"bed\n\n{count} atoms\n1 atom types\n\n0 {WIDTH} xlo xhi\n-3 120 ylo yhi\n-0.5 0.5 zlo zhi\n\nAtoms # sphere\n\n")
+        out.write(f"bed\n\n{len(places)} atoms\n1 atom types\n\n0 {width} xlo xhi\n-3 120 ylo yhi\n-0.5 0.5 zlo zhi\n\nAtoms # sphere\n\n")
         for i, (x, z) in enumerate(places):
             out.write(f"{i + 1} 1 1.0 1.909859317102744 {x:.8f} {z:.8f} 0.0\n")
         out.write("\nVelocities\n\n")
-        for i in range(count):
-            vx, vz = rng.normal(0, 0.05 if seed % 2 == 1 else 0.7, 2)
+        for i in range(len(places)):
+            vx, vz = rng.normal(0, speed, 2)
             out.write(f"{i + 1} {vx:.6f} {vz:.6f} 0 0 0 0\n")
+
+
+def write_start(path, count, seed, contact):
+    rng = np.random.default_rng([seed, contact])
+    write_atoms(path, WIDTH, starting_places(count, seed, rng), 0.05 if seed % 2 == 1 else 0.7, rng)
 
 
 def frames(path):

@@ -21,7 +21,7 @@ import tempfile
 import numpy as np
 
 import soft_spheres
-from soft_spheres import cpu_seconds_of_lammps, looks_at, mean_and_error
+from soft_spheres import cpu_seconds_of_lammps, looks_at, mean_and_error, write_atoms
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TABLE = os.path.join(HERE, "weak_rough_beds.csv")
@@ -79,15 +79,7 @@ def starting_places(seed, rng):
 
 def write_start(path, seed):
     rng = np.random.default_rng(seed)
-    places = starting_places(seed, rng)
-    with open(path, "w") as out:
-        out.write(f"bed\n\n{COUNT} atoms\n1 atom types\n\n0 {WIDTH} xlo xhi\n-3 120 ylo yhi\n-0.5 0.5 zlo zhi\n\nAtoms # sphere\n\n")
-        for i, (x, z) in enumerate(places):
-            out.write(f"{i + 1} 1 1.0 1.909859317102744 {x:.8f} {z:.8f} 0.0\n")
-        out.write("\nVelocities\n\n")
-        for i in range(COUNT):
-            vx, vz = rng.normal(0, 0.1, 2)
-            out.write(f"{i + 1} {vx:.6f} {vz:.6f} 0 0 0 0\n")
+    write_atoms(path, WIDTH, starting_places(seed, rng), 0.1, rng)
 
 
 def run(bed, scratch, lammps):
