@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "fit/profile_fit/measured_profile.hpp"
 #include "fit/profile_fit/objections.hpp"
 #include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/side_walls.hpp"
 #include "fit/profile_fit/thermometers.hpp"
+#include "fit/theory/equation_of_state.hpp"
 #include "statistics/rest.hpp"
 
 namespace shakebed::fit {
@@ -48,11 +51,9 @@ constexpr double widest_factor = 2.0, widest_interval = 3.0;
 // 0.04 to 0.10 [m g D].
 constexpr double coldest_shown = 0.1;
 // Of hard side walls, after what they take from the density was put back: one standard error of T, relative, times W/D.
-// 36 beds in a bath, 10 to 40 D wide, beside the same beds with periodic sides: T of fluid ones was off by 0.1 D/W
-// (root mean square), that of beds denser than a fluid is by 0.8 D/W (walls keep a crystal from growing).
-constexpr double wall_effect = 0.1, wall_effect_on_crystal = 0.8;
-// At which hard disks freeze: a packing of 0.70 [1/D^2].
-constexpr double freezing_density = 0.89;
+// 56 beds in a bath, 10 to 40 D wide, beside the same beds with periodic sides: T of fluid ones was off by 0.09 to 0.16
+// D/W (root mean square), that of beds denser than a fluid is by 0.6 to 0.9 D/W (walls keep a crystal from growing).
+constexpr double wall_effect = 0.15, wall_effect_on_crystal = 0.8;
 // Steps in which the known bias and the temperature at which it is looked up settle.
 constexpr int bias_steps = 4;
 // The tail on which the solid's height is read, given T: without bias on true disks (tests/fit/bias_test.cpp). [1/D^2]
@@ -323,7 +324,7 @@ class AnswerFinder {
 
   [[nodiscard]] bool is_frozen() const {
     const std::vector<double>& density = seen_.profile.number_density;
-    return *std::max_element(density.begin(), density.end()) > freezing_density;
+    return *std::max_element(density.begin(), density.end()) > number_density(freezing_area_fraction);
   }
 
   // The fit of the whole column, whose misfit is known.
@@ -357,16 +358,15 @@ class AnswerFinder {
   // Of one temperature: what its uncertainty comes from.
   void advise() {
     if (answer_.verdict != Verdict::one_temperature) return;
-    const double model = std::hypot(answer_.bias_uncertainty, answer_.misfit_error, answer_.spread);
-    const double greatest =
-        std::max({model, answer_.wall_uncertainty, answer_.contact_duration_uncertainty, answer_.statistical_error});
-    answer_.advice = greatest == answer_.statistical_error
-                         ? "Most of the uncertainty is statistical: a longer measurement reduces it."
-                     : greatest == model
-                         ? "Most of the uncertainty comes from the model: a longer measurement does not reduce it."
-                     : greatest == answer_.wall_uncertainty
-                         ? "Most of the uncertainty comes from the side walls: a wider bed reduces it."
-                         : "Most of the uncertainty comes from the contact duration: a shorter one reduces it.";
+    const std::pair<double, const char*> parts[] = {
+        {answer_.statistical_error, "Most of the uncertainty is statistical: a longer measurement reduces it."},
+        {std::hypot(answer_.bias_uncertainty, answer_.misfit_error, answer_.spread),
+         "Most of the uncertainty comes from the model: a longer measurement does not reduce it."},
+        {answer_.wall_uncertainty, "Most of the uncertainty comes from the side walls: a wider bed reduces it."},
+        {answer_.contact_duration_uncertainty,
+         "Most of the uncertainty comes from the contact duration: a shorter one reduces it."}};
+    const auto smaller = [](const auto& a, const auto& b) { return a.first < b.first; };
+    answer_.advice = std::max_element(std::begin(parts), std::end(parts), smaller)->second;
   }
 
   // An interval that is too wide leaves T open, however well the model fits.

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "fit/theory/equation_of_state.hpp"
 
 namespace shakebed::fit {
 
 namespace {
 
-// At this packing and above a wall has no depletion: all disks are in contact.
-constexpr double densest = 1.0;
-
-double packing(double density) { return std::clamp(0.25 * std::numbers::pi * density, 0.0, densest); }
+// A wall has no depletion where no room is left.
+double packing(double density) { return std::clamp(area_fraction(density), 0.0, 1.0); }
 
 // What both walls take, as a part of the average: (1 - eta)/(1 + eta) D/W; and its product with the density,
 // differentiated by the density.

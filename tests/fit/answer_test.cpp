@@ -238,8 +238,12 @@ TEST(Answer, AllowsForHardWalls) {
     const Answer expected = find_answer(open), found = find_answer(walled);
     EXPECT_NEAR(found.temperature / expected.temperature, 1, 0.005);
     const bool crystal = temperature == 1.0;  // the plateau is close-packed, or below freezing
-    EXPECT_NEAR(found.wall_uncertainty, found.temperature * (crystal ? 0.8 : 0.1) / 20, 1e-15);
+    EXPECT_NEAR(found.wall_uncertainty, found.temperature * (crystal ? 0.8 : 0.15) / 20, 1e-15);
     EXPECT_GT(found.std_error, found.wall_uncertainty);
+    if (crystal) {
+      EXPECT_GT(found.wall_uncertainty, std::max(found.statistical_error, found.spread));
+      EXPECT_THAT(found.advice, testing::HasSubstr("comes from the side walls"));
+    }
     walled.width_between_walls = 0;
     EXPECT_GT(find_answer(walled).temperature / found.temperature, 1.01) << "without the correction it looks warmer";
   }
