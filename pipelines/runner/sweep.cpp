@@ -458,6 +458,17 @@ int run_sweep_command(const Plan& plan, const RunOptions& options, SweepArgument
   return SweepRun(plan, options, arguments, pages, console)();
 }
 
+namespace {
+
+// Whether a folder is that of a point with a number below this.
+bool is_point_below(const std::string& name, std::uint64_t points) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  return error == std::errc() && end == name.data() + name.size() && number < points;
+}
+
+}  // namespace
+
 Json sweep_status(const fs::path& out) {
   std::error_code error;
   if (!fs::is_directory(out / "points", error)) return nullptr;
@@ -468,7 +479,7 @@ Json sweep_status(const fs::path& out) {
     points = read_json(out / "summary.json").value("points", std::uint64_t{0});
   for (const fs::directory_entry& entry : fs::directory_iterator(out / "points", error)) {
     if (!entry.is_directory(error)) continue;
-    if (entry.path().filename().string() >= point_name(points)) {
+    if (!is_point_below(entry.path().filename().string(), points)) {
       ++left;
       continue;
     }

@@ -80,8 +80,6 @@ void set_replica_seeds(JsonNode& document, std::uint64_t replica) {
 
 }  // namespace
 
-std::string point_name(std::size_t index) { return fmt::format("{:06d}", index); }
-
 std::vector<SweepPoint> sweep_points(const Plan& plan) {
   const SweepOptions& sweep = *plan.sweep;
   const double total = combinations(sweep), all = total * static_cast<double>(sweep.replicas);
@@ -96,7 +94,7 @@ std::vector<SweepPoint> sweep_points(const Plan& plan) {
     SweepPoint point = combination(sweep, i);
     for (std::uint64_t replica = 0; replica < sweep.replicas; ++replica) {
       point.index = points.size();
-      point.name = point_name(points.size());
+      point.name = fmt::format("{:06d}", points.size());
       point.replica = replica;
       points.push_back(point);
     }

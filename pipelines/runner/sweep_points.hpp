@@ -15,7 +15,6 @@ struct SweepPoint {
   std::vector<Json> values;         // one an axis; null: as the recipe has it
   std::vector<std::size_t> places;  // of the values, in SweepAxis::places
 };
-std::string point_name(std::size_t index);
 // All points of a plan with a sweep, in order. Throws ConfigError when there are too many.
 std::vector<SweepPoint> sweep_points(const Plan& plan);
 // The plan of one point. Throws ConfigError, shown at the place of the value that is wrong.

@@ -356,7 +356,7 @@ class Extraction {
       const double ratio = *measure_.second_diameter_m / measure_.bead_diameter_m;
       all.push_back(
           {fmt::format("Beads of a second diameter were asked for, and none were found. So the beads seen may be "
-                       "of either kind, and every length wrong by up to {:.2g} %.",
+                       "of either kind, and every length wrong by up to {:.0f} %.",
                        100 * (std::max(ratio, 1 / ratio) - 1)),
            "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
            "of the first kind (--radius)."});

@@ -179,7 +179,7 @@ sim::RunControl BedRun::control() {
   control.progress = progress_;
   control.gone_on = [this](const sim::Simulation& simulation) {
     context_.log(
-        fmt::format("goes on after {:.2g} % of the simulated time", 100 * simulation.time() / plan_.schedule.end()));
+        fmt::format("goes on after {:.0f} % of the simulated time", 100 * simulation.time() / plan_.schedule.end()));
   };
   control.keep_due = [this](const sim::Simulation& simulation) { return keep_is_due(simulation); };
   control.keep = [this](const sim::Simulation& simulation, const sim::RunControl::State& state) {
