@@ -103,6 +103,7 @@ class AnswerFinder {
     answer_.status = FitStatus::unreadable;
     for (const Objection& one : all) {
       answer_.why += (answer_.why.empty() ? "" : " ") + one.why;
+      if (answer_.advice.find(one.advice) != std::string::npos) continue;  // two reasons, one cure
       answer_.advice += (answer_.advice.empty() ? "" : " ") + one.advice;
     }
     return false;
@@ -156,7 +157,9 @@ class AnswerFinder {
       answer_.why.clear();
       return true;
     }
-    answer_.advice = "Look at the profile: it must fall from a plateau to nothing over several heights.";
+    answer_.advice =
+        "Look at the profile: it must fall from a plateau to nothing over several heights. "
+        "That of a bed seen from above does not.";
     return false;
   }
 

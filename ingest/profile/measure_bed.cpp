@@ -385,12 +385,18 @@ class BedMeasurer {
   // What else deserves a word.
   void look_at_frames() {
     for (const std::string& warning : film_.finder.warnings) result_.warnings.push_back(warning);
-    std::size_t bad = 0;
+    std::size_t bad = 0, of_other_size = 0;
     std::string example;
     for (const FrameReport& report : result_.frames) {
       if (report.status == FrameStatus::good) continue;
       if (bad++ == 0) example = report.why;
+      of_other_size += report.status == FrameStatus::size_changed;
     }
+    if (of_other_size > 0)
+      result_.warnings.push_back(
+          std::to_string(of_other_size) + " of " + std::to_string(result_.frames.size()) +
+          " frames have another size in pixels than the first one, and are left out: heights and scale of two views "
+          "are not the same. Measure each size on its own.");
     if (bad)
       result_.warnings.push_back(std::to_string(bad) + " of " + std::to_string(result_.frames.size()) +
                                  " frames gave nothing; the first: " + example);

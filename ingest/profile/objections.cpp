@@ -37,7 +37,8 @@ std::vector<Objection> objections_to(const Measurement& found) {
     object("The lower border cuts beads: the floor is not in view, so heights have no origin.",
            "Show the floor in the picture, or give its row (\"floor\", --floor).");
   if (found.disk_total < least_disks)
-    object(formatted("Only %zu beads were found in all frames together.", found.disk_total), "Take more photographs.");
+    object(formatted("Only %zu beads were found in all frames together.", found.disk_total),
+           "Take more photographs of the bed from the side, or measure longer.");
   if (found.finder.rims && wrong + missed > most_doubtful)
     object(formatted("About %.0f %% of the disks found may be wrong, and %.0f %% of the beads may be missed.",
                      100 * wrong, 100 * missed),

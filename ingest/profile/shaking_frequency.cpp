@@ -15,6 +15,8 @@ constexpr double whole_turn = 2 * std::numbers::pi;
 constexpr std::size_t fewest_frames = 24;
 constexpr double oversampling = 5;  // of the frequencies tried
 constexpr double fewest_cycles = 3;
+// A line that noise makes as often as that is not worth naming.
+constexpr double clearly_chance = 0.5;
 
 // Time from the middle of the film [frames] and place; without the straight line through them.
 struct Series {
@@ -229,7 +231,7 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
     std::snprintf(text, sizeof text,
                   "the strongest line, at %.4f cycles per frame, arises by chance with a probability of %.2g",
                   likeliest_at, likeliest);
-    found.why_not = text;
+    found.why_not = likeliest < clearly_chance ? text : "the height of the lowest beads has no period";
     found.false_alarm = likeliest;
     return found;
   }

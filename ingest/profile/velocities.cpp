@@ -11,6 +11,7 @@
 #include "ingest/find/nearby.hpp"
 #include "ingest/profile/frame_findings.hpp"
 #include "statistics/correlated_series.hpp"
+#include "statistics/text.hpp"
 
 namespace shakebed::ingest {
 
@@ -260,20 +261,24 @@ class StepStatistics {
   }
 
   void warn() {
-    if (!result_.usable())
-      result_.warnings.emplace_back(
-          "Only " + std::to_string(static_cast<int>(100 * result_.linked_share)) +
-          " % of the disks could be followed from frame to frame: velocities are not reliable and do not enter "
-          "the answer. Use a higher frame rate.");
+    if (!result_.usable()) {
+      result_.warnings.push_back(
+          formatted("Only %.0f %% of the disks could be followed from frame to frame: velocities are not reliable and "
+                    "do not enter the answer. Use a higher frame rate.",
+                    100 * result_.linked_share));
+      return;
+    }
     if (result_.mean_step > 0.25)
-      result_.warnings.emplace_back(
-          "Disks move by " + std::to_string(result_.mean_step) +
-          " D between frames on average: fast disks are lost and T is too low. Use a higher frame rate.");
+      result_.warnings.push_back(
+          formatted("Disks move by %.2g D between frames on average: fast disks are lost, and the T of velocities is "
+                    "too low. Use a higher frame rate.",
+                    result_.mean_step));
     const double factor = std::max(result_.horizontal.finite_time_factor, result_.vertical.finite_time_factor);
     if (factor > large_correction)
-      result_.warnings.emplace_back("Velocities change between frames: T is corrected by a factor of " +
-                                    std::to_string(factor) +
-                                    ", and its error allows for 0.4 of this correction. Use a higher frame rate.");
+      result_.warnings.push_back(
+          formatted("Velocities change between frames: the T of velocities is corrected by a factor of %.3g, and its "
+                    "error allows for 0.4 of this correction. Use a higher frame rate.",
+                    factor));
   }
 
   const std::vector<MeasuredDisk>& disks_;

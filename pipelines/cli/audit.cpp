@@ -8,12 +8,12 @@
 namespace shakebed::pipelines {
 
 void add_audit(Program& program) {
-  program.add(
-      {"audit", "the paper's printed numbers against recomputed ones", "  shakebed audit\n  shakebed audit --json"},
-      [](const Call& call) {
-        print(call.json ? dump(audit_json()) : audit_text());
-        return exit_ok;
-      });
+  program.add({"audit", "the paper's printed numbers against recomputed ones",
+               "  shakebed audit\n  shakebed audit --json", false},
+              [](const Call& call) {
+                print(call.json ? dump(audit_json()) : audit_text());
+                return exit_ok;
+              });
 }
 
 }  // namespace shakebed::pipelines

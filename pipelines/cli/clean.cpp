@@ -88,9 +88,10 @@ int clean(const Call& call, const CleanArguments& given) {
 
 void add_clean(Program& program) {
   const auto given = std::make_shared<CleanArguments>();
-  CLI::App& command = program.add(
-      {"clean", "remove results", "  shakebed clean results --older-than 30d --dry-run\n  shakebed clean results/bed"},
-      [given](const Call& call) { return clean(call, *given); });
+  CLI::App& command =
+      program.add({"clean", "remove results",
+                   "  shakebed clean results --older-than 30d --dry-run\n  shakebed clean results/bed", false},
+                  [given](const Call& call) { return clean(call, *given); });
   command
       .add_option("folder", given->folder, "results folder, or a folder that holds results folders (default: results)")
       ->type_name("DIR");

@@ -46,10 +46,14 @@ Enum choice_of(const std::optional<std::string>& text, const std::vector<std::st
 }
 
 int preview_images(const Call& call, const ImageArguments& image) {
-  PreviewRequest request{.files = image.files, .diameter = image.diameter, .options = {}, .folder = {}};
+  PreviewRequest request{.files = image.files, .options = {}, .folder = {}};
   request.options.diameter = quantity_argument("--diameter", image.diameter, dimension::length);
   if (image.scale) request.options.scale = quantity_argument("--scale", *image.scale, dimension::length_per_pixel);
+  if (image.second_diameter)
+    request.options.second_diameter = quantity_argument("--second-diameter", *image.second_diameter, dimension::length);
   request.options.roi = image.roi;
+  request.options.floor = image.floor;
+  request.options.left_wall = image.left_wall, request.options.right_wall = image.right_wall;
   request.options.radius = image.radius;
   request.options.polarity = choice_of<BeadPolarity>(image.polarity, polarities);
   request.options.shape = choice_of<BeadShape>(image.shape, shapes);

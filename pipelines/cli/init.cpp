@@ -15,7 +15,7 @@ namespace shakebed::pipelines {
 void add_init(Program& program) {
   const auto file = std::make_shared<std::string>("bed.json");
   CLI::App& command = program.add(
-      {"init", "write a commented recipe to start from", "  shakebed init\n  shakebed init my-bed.json"},
+      {"init", "write a commented recipe to start from", "  shakebed init\n  shakebed init my-bed.json", false},
       [file](const Call& call) {
         std::error_code error;
         if (std::filesystem::exists(*file, error))

@@ -60,7 +60,8 @@ void add_map(Program& program) {
   CLI::App& command =
       program.add({"map", "Gamma → temperature, by every formula that the paper allows",
                    "  shakebed map --gamma 4 --frequency \"20 Hz\" --diameter \"2.99 mm\" --initial-height 10.2 "
-                   "--plateau-density 1.10"},
+                   "--plateau-density 1.10",
+                   false},
                   [given](const Call& call) {
                     const Json json = map_json(question_of(*given));
                     print(call.json ? dump(json) : map_text(json));

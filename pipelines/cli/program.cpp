@@ -37,7 +37,8 @@ Program::Program(int argc, char** argv)
 CLI::App& Program::add(const CommandText& text, std::function<int(const Call&)> work, CLI::App* parent) {
   CLI::App& command = *(parent == nullptr ? &app_ : parent)->add_subcommand(text.name, text.help);
   command.footer(fmt::format("Examples:\n{}", text.examples));
-  command.add_option("--out", call_.out, "folder for the results")->type_name("DIR");
+  CLI::Option* out = command.add_option("--out", call_.out, "folder for the results")->type_name("DIR");
+  if (!text.writes_folder) out->group("");
   command.add_flag("--json", call_.json, "JSON result on stdout, messages on stderr");
   command.add_flag("--quiet,-q", call_.quiet, "show the result, warnings and errors only");
   command.add_flag("--verbose,-v", call_.verbose, "show all messages of the stages");

@@ -19,6 +19,7 @@ struct Call {
 
 struct CommandText {
   const char *name, *help, *examples;
+  bool writes_folder = true;  // if not, --out is accepted, but not offered
 };
 
 class Program {

@@ -26,7 +26,7 @@ void add_reference(Program& program) {
   const auto stage = std::make_shared<std::string>();
   CLI::App& command =
       program.add({"reference", "reference page of a stage or of a recipe: options, numbers, tables (Markdown)",
-                   "  shakebed reference\n  shakebed reference fit\n  shakebed reference recipe"},
+                   "  shakebed reference\n  shakebed reference fit\n  shakebed reference recipe", false},
                   [stage](const Call&) {
                     print(stage->empty()       ? reference_index()
                           : *stage == "recipe" ? recipe_reference_page()

@@ -10,16 +10,16 @@ namespace shakebed::pipelines {
 
 void add_schema(Program& program) {
   const auto file = std::make_shared<std::string>();
-  CLI::App& command = program.add(
-      {"schema", "JSON Schema of a recipe, for editors and validators", "  shakebed schema > pipeline.schema.json"},
-      [file](const Call&) {
-        const std::string text = dump(recipe_schema());
-        if (file->empty())
-          print(text);
-        else
-          write_file_atomically(*file, text);
-        return exit_ok;
-      });
+  CLI::App& command = program.add({"schema", "JSON Schema of a recipe, for editors and validators",
+                                   "  shakebed schema > pipeline.schema.json", false},
+                                  [file](const Call&) {
+                                    const std::string text = dump(recipe_schema());
+                                    if (file->empty())
+                                      print(text);
+                                    else
+                                      write_file_atomically(*file, text);
+                                    return exit_ok;
+                                  });
   command.add_option("file", *file, "file that is written (default: stdout)")->type_name("FILE.json");
 }
 

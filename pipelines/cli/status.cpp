@@ -122,7 +122,12 @@ int status(const Call& call, const fs::path& out) {
   for (const Json& id : json["begun"])
     text += fmt::format("  {:<16} begun, not finished: its state is kept\n", id.get<std::string>());
   const Json sweep = sweep_status(out);
-  if (json["stages"].empty() && json["begun"].empty() && sweep.is_null()) text += "  no finished stage\n";
+  const bool nothing = json["stages"].empty() && json["begun"].empty() && sweep.is_null();
+  if (nothing && !json.contains("exit_code") && !json["running"].get<bool>() && !fs::exists(out / "slurm", error))
+    throw InputError(fmt::format(
+        "{}: holds no results: no stage has begun in it. Name the folder that a run was given with --out, as in {}",
+        out.string(), "results/bed"));
+  if (nothing) text += "  no finished stage\n";
   if (!sweep.is_null()) {
     json["sweep"] = sweep;
     text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
@@ -147,7 +152,7 @@ int status(const Call& call, const fs::path& out) {
 
 void add_status(Program& program) {
   const auto folder = std::make_shared<std::string>();
-  CLI::App& command = program.add({"status", "what a results folder holds", "  shakebed status results/bed"},
+  CLI::App& command = program.add({"status", "what a results folder holds", "  shakebed status results/bed", false},
                                   [folder](const Call& call) { return status(call, *folder); });
   command.add_option("folder", *folder, "the results folder")->required()->type_name("DIR");
 }

@@ -41,7 +41,8 @@ void add_theory(Program& program) {
   CLI::App& command = program.add(
       {"theory", "constants of the theory, T_c, solid height",
        "  shakebed theory --plateau-density 1.10\n  shakebed theory --plateau-density 1.10 --diameter \"2.99 mm\" "
-       "--initial-height 10.2 --temperature \"0.36 mm\" --json"},
+       "--initial-height 10.2 --temperature \"0.36 mm\" --json",
+       false},
       [given](const Call& call) {
         const TheoryQuestion question = question_of(*given);
         print(call.json ? dump_17_digits(theory_json(question)) : theory_text(question));

@@ -54,7 +54,7 @@ void add_validate(Program& program) {
   const auto given = std::make_shared<ValidateArguments>();
   CLI::App& command =
       program.add({"validate", "check a recipe: all mistakes at once, then those of the points of its sweep",
-                   "  shakebed validate bed.json"},
+                   "  shakebed validate bed.json", false},
                   [given](const Call& call) { return validate(call, *given); });
   command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
   add_preset(command, given->run);

@@ -40,7 +40,7 @@ int verify(const Call& call, const std::filesystem::path& out) {
 void add_verify(Program& program) {
   const auto folder = std::make_shared<std::string>();
   CLI::App& command =
-      program.add({"verify", "recompute the fingerprints of a results folder", "  shakebed verify results/bed"},
+      program.add({"verify", "recompute the fingerprints of a results folder", "  shakebed verify results/bed", false},
                   [folder](const Call& call) { return verify(call, *folder); });
   command.add_option("folder", *folder, "the results folder")->required()->type_name("DIR");
 }

@@ -154,7 +154,8 @@ std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, 
   }
   const std::string nearest = nearest_name(path, names);
   return Misfit{fmt::format("{} gives no result \"{}\"", gives, path),
-                nearest.empty() ? fmt::format("It gives {}", listed(names))
+                nearest.empty() ? fmt::format("It gives {}; \"shakebed reference {}\" says what they are",
+                                              listed(names), stage->kind)
                                 : fmt::format("Did you mean \"{}\"?", pointer_join("", stage->id) + nearest)};
 }
 

@@ -121,7 +121,7 @@ class BedStatement {
     list_.number("/disk_collisions", "1", "contacts between two disks");
     list_.number("/wall_collisions", "1", "contacts with sides and lid");
     list_.number("/floor_collisions", "1", "contacts with the floor");
-    list_.number("/elastic_contacts", "1", "contacts made elastic by the contact duration t_c");
+    list_.number("/elastic_contacts", "1", "contacts made elastic by the contact duration t_c, settling included");
     const Given clocked = given_if(bed_.contact_duration, "contacts have a duration t_c");
     list_.quantity("/elastic_share", "1", "share of the contacts that t_c made elastic, during the measurement",
                    clocked);

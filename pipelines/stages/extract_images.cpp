@@ -38,10 +38,9 @@ fs::path refusal_folder(const RunContext& context) { return context.output_direc
 [[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
                          const std::vector<std::string>& paths) {
   const ingest::Survey& survey = look.survey;
-  const std::string diameter = fmt::format("{:g} mm", 1e3 * options.diameter);
   const fs::path folder = refusal_folder(context);
   fs::create_directories(folder);
-  write_preview(folder, look, options.images.texts, diameter);
+  write_preview(folder, look, options.images.texts, options);
   std::string message =
       fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (folder / "preview.html").string());
   if (const std::string without = seen_without_options(paths, options); !without.empty())

@@ -597,7 +597,8 @@ class ProfilePicture {
   static std::string label_of_fit(const Json& result) {
     const std::string name = "our fit, " + result.value("model", "") + " alone";
     const bool unreadable = result.contains("answer") && !result.at("answer").contains("temperature");
-    if (unreadable || !result.value("describes_data", true)) return name + " (does not describe it)";
+    if (!result.value("describes_data", true)) return name + " (does not describe it)";
+    if (unreadable) return name + " (its T is not that of the bed)";
     const Json* t = find_pointer(result, "/temperature_over_mg/value");
     const Json* reduced = find_pointer(result, "/temperature/value");
     if (t != nullptr && t->is_number()) return fmt::format("{}: T/mg = {:.3g} mm", name, t->get<double>() * 1e3);

@@ -65,12 +65,11 @@ struct ExtractOptions {
   std::uint64_t overlays = 1;                   // frames drawn with what was found
 };
 
-// fit-images --preview: files and diameter as on the command line.
+// fit-images --preview: files as on the command line.
 struct PreviewRequest {
   std::vector<std::string> files;
-  std::string diameter;
-  ExtractOptions options;  // diameter, scale, polarity, channel, shape, radius and roi
-  std::string folder;      // for preview.html
+  ExtractOptions options;
+  std::string folder;  // for preview.html
 };
 
 struct Previewed {

@@ -21,7 +21,7 @@ Previewed preview_images(const PreviewRequest& request) {
     if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
-  write_preview(request.folder, *look, request.files, request.diameter);
+  write_preview(request.folder, *look, request.files, request.options);
   if (!look->survey.found) {
     const std::string without = seen_without_options(paths, request.options);
     return {false,

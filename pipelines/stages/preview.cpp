@@ -37,6 +37,40 @@ std::string quoted(const std::string& text) {
   return out + "'";
 }
 
+// Do they look for the same beads?
+bool same(const ingest::SurveyCandidate& one, const ingest::SurveyCandidate& other) {
+  constexpr double another = 1.05;
+  const double ratio = one.rims.radius_px / other.rims.radius_px;
+  return one.rims.polarity == other.rims.polarity && one.channel == other.channel && ratio < another &&
+         ratio * another > 1;
+}
+
+// The candidates that differ, and of which the condition holds; the best of each first.
+template <class Condition>
+std::vector<const ingest::SurveyCandidate*> different(const ingest::Survey& survey, std::size_t most,
+                                                      const Condition& holds) {
+  std::vector<const ingest::SurveyCandidate*> out;
+  for (const ingest::SurveyCandidate& candidate : survey.candidates) {
+    if (out.size() == most) break;
+    if (holds(candidate) &&
+        std::none_of(out.begin(), out.end(), [&](const auto* one) { return same(candidate, *one); }))
+      out.push_back(&candidate);
+  }
+  return out;
+}
+
+// What is given besides the option of a candidate, as on the command line.
+std::string given_besides(const ExtractOptions& options) {
+  std::string text = fmt::format(" --diameter \"{:g} mm\"", 1e3 * options.diameter);
+  if (options.second_diameter) text += fmt::format(" --second-diameter \"{:g} mm\"", 1e3 * *options.second_diameter);
+  if (options.scale) text += fmt::format(" --scale \"{:.6g} mm/px\"", 1e3 * *options.scale);
+  if (!options.roi.empty()) text += fmt::format(" --roi {:g}", fmt::join(options.roi, ","));
+  if (options.floor) text += fmt::format(" --floor {:g}", *options.floor);
+  if (options.left_wall) text += fmt::format(" --left-wall {:g}", *options.left_wall);
+  if (options.right_wall) text += fmt::format(" --right-wall {:g}", *options.right_wall);
+  return text;
+}
+
 std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t number, const std::string& command) {
   return fmt::format(
       "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} "
@@ -99,27 +133,17 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
 
 std::vector<std::string> proposed_options(const ingest::Survey& survey) {
   constexpr std::size_t most = 2;
-  constexpr double another = 1.05;
   std::vector<std::string> options;
-  std::vector<const ingest::SurveyCandidate*> proposed;
-  for (const ingest::SurveyCandidate& candidate : survey.candidates) {
-    const auto same = [&](const ingest::SurveyCandidate* other) {
-      const double ratio = candidate.rims.radius_px / other->rims.radius_px;
-      return candidate.rims.polarity == other->rims.polarity && candidate.channel == other->channel &&
-             ratio < another && ratio * another > 1;
-    };
-    if (options.size() == most || !candidate.plausible || std::any_of(proposed.begin(), proposed.end(), same)) continue;
-    proposed.push_back(&candidate);
-    options.push_back(options_for(candidate));
-  }
+  for (const auto* candidate : different(survey, most, [](const auto& one) { return one.plausible; }))
+    options.push_back(options_for(*candidate));
   return options;
 }
 
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
-                   const std::string& diameter) {
+                   const ExtractOptions& options) {
   std::string command = "shakebed fit-images";
   for (const std::string& file : files) command += " " + quoted(file);
-  command += fmt::format(" --diameter {}", quoted(diameter));
+  command += given_besides(options);
   std::string body;
   const ingest::Survey& survey = look.survey;
   body += survey.found
@@ -127,9 +151,11 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
                 "each bead: the run may find more of them, and states their radius with its error.</p>\n"
               : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const ingest::CandidatePictures pictures(look.path);
-  for (std::size_t k = 0; k < std::min(most_shown, survey.candidates.size()); ++k) {
-    pictures.write(folder / fmt::format("preview_{}.png", k + 1), &survey.candidates[k]);
-    body += section_of(survey.candidates[k], k + 1, command);
+  std::size_t number = 0;
+  for (const auto* candidate : different(survey, most_shown, [](const auto&) { return true; })) {
+    ++number;
+    pictures.write(folder / fmt::format("preview_{}.png", number), candidate);
+    body += section_of(*candidate, number, command);
   }
   if (survey.candidates.empty()) {
     pictures.write(folder / "preview_1.png", nullptr);
@@ -138,8 +164,10 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
   write_file_atomically(
       folder / "preview.html",
       fmt::format(
-          "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Beads in {0}</title>\n"
-          "<style>body{{font-family:sans-serif;max-width:1400px;margin:2em auto}}img{{max-width:100%}}"
+          "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+          "content=\"width=device-width,initial-scale=1\"><title>Beads in {0}</title>\n"
+          "<style>body{{font-family:sans-serif;line-height:1.5;max-width:1060px;margin:1em auto;padding:0 "
+          "1em;overflow-wrap:anywhere}}img{{max-width:100%}}"
           "pre{{background:#eee;padding:.6em;white-space:pre-wrap}}</style></head><body>\n<h1>Beads in {0}</h1>\n"
           "<p>{1} x {2} px. Magenta circles: probability 0.9 or more; yellow: less.</p>\n{3}</body></html>\n",
           escaped(look.path), look.width, look.height, body));

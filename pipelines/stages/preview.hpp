@@ -26,9 +26,10 @@ inline ingest::Channel channel_of(BeadChannel channel) {
 using ingest::FirstLook;
 std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options);
 
-// preview.html and preview_1.png .. preview_3.png in `folder`. `files` and `diameter` are those of the command line.
+// preview.html and preview_1.png .. preview_3.png in `folder`. `files` are those of the command line. The commands
+// shown repeat what the options give.
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
-                   const std::string& diameter);
+                   const ExtractOptions& options);
 
 // What is seen where radius, polarity and channel are not given, a sentence; empty where none of them is given, or
 // nothing is seen either.

@@ -55,6 +55,12 @@ class Profile(NamedTuple):
     kernel: str
     width_between_walls: Optional[float] = None
 
+    def __repr__(self) -> str:
+        ends = f"{self.height[0]:.3g} to {self.height[-1]:.3g} D" if len(self.height) else "no heights"
+        walls = "" if self.width_between_walls is None else f", {self.width_between_walls:.4g} D between hard walls"
+        return (f"<shakebed.Profile: n D^2 at {len(self.height)} heights, {ends}, of {self.samples} frames, "
+                f"kernel {self.kernel}{walls}>")
+
 
 def profile_from(columns: dict[str, Any], width_between_walls: Optional[float] = None) -> Profile:
     """A Profile from the columns of the compiled module."""
@@ -177,6 +183,9 @@ def density_profile(
     points = int(np.floor((high - low) / spacing)) + 1
     if points > _most_heights:
         raise UsageError(f"spacing {spacing} makes {points} heights; take at most {_most_heights}")
+    if len(ends) > 1 and _frames_are_equal(z, ends):
+        warnings.warn("All frames are the same: they say nothing about the error of the density. Its std_error of 0 "
+                      "is not an error estimate.", BedWarning, stacklevel=2)
     return profile_from(_core.density_profile(z, ends, width, kernel, low, spacing, points),
                         width if sides == "hard" else None)
 
@@ -197,6 +206,11 @@ def _joined_frames(heights: Any) -> tuple[Array, Any]:
     if not any(frame.size for frame in frames):
         raise UsageError(f"heights has {len(frames)} frames and no disk")
     return np.concatenate(frames), np.cumsum([frame.size for frame in frames])
+
+
+def _frames_are_equal(z: Array, ends: Any) -> bool:
+    frames = np.split(z, ends[:-1])
+    return all(np.array_equal(np.sort(frames[0]), np.sort(frame)) for frame in frames[1:])
 
 
 class _Document(NamedTuple):

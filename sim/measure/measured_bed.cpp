@@ -254,10 +254,12 @@ MeasuredBed measure(const Scene& scene, const MeasureOptions& options) {
 
 std::string MeasuredBed::brief() const {
   if (!ok()) return std::string(to_string(status)) + ": " + message;
-  return formatted("%llu disks, %llu periods: T_x = %.4g +- %.2g, T_z = %.4g +- %.2g, centre of mass %.5g +- %.2g D",
-                   static_cast<unsigned long long>(disks.mass.size()), static_cast<unsigned long long>(periods),
-                   temperature_x.value, temperature_x.std_error, temperature_z.value, temperature_z.std_error,
-                   centre_of_mass.value, centre_of_mass.std_error);
+  const char* const energy_unit = centre_of_mass.value != 0 ? "m g D" : "T0";
+  return formatted(
+      "%llu disks, %llu periods: T_x = %.4g +- %.2g %s, T_z = %.4g +- %.2g %s, centre of mass %.5g +- %.2g D",
+      static_cast<unsigned long long>(disks.mass.size()), static_cast<unsigned long long>(periods), temperature_x.value,
+      temperature_x.std_error, energy_unit, temperature_z.value, temperature_z.std_error, energy_unit,
+      centre_of_mass.value, centre_of_mass.std_error);
 }
 
 std::string MeasuredBed::full() const {

@@ -309,6 +309,11 @@ TEST_F(Pipeline, VerifyNoticesEveryChangedFile) {
   EXPECT_THAT(result.err, HasSubstr("fit/curve.csv: changed"));
   EXPECT_THAT(result.err, HasSubstr("bed/layers.csv: missing"));
   EXPECT_EQ(run({"verify", "nowhere"}).exit_code, 4);
+  EXPECT_EQ(run({"status", "o"}).exit_code, 0);
+  std::filesystem::create_directory(folder_ / "photographs");
+  const ProgramResult none = run({"status", "photographs"});
+  EXPECT_EQ(none.exit_code, 4);
+  EXPECT_THAT(none.err, HasSubstr("photographs: holds no results"));
 }
 
 TEST_F(Pipeline, ARunningPipelineHoldsTheFolderAndADeadOneDoesNot) {
