@@ -14,7 +14,8 @@ namespace {
 using State = PressedBed::State;
 
 constexpr double disk_radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
-constexpr double far_off = -100;                  // where the sentinels are: they touch nothing
+constexpr std::size_t sentinels = 2;              // behind the last disk, for lists of whole blocks of pairs
+constexpr double far_off = -100;                  // where they are: they touch nothing
 // A pair is asked until the next check if it would touch within so many times that many steps at the speed it has, or
 // at that which is usual.
 constexpr double foresight = 6;
@@ -136,7 +137,7 @@ void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floo
                        const std::vector<double>& spins, const std::vector<Stretch>& stretches) {
   disks_ = std::move(disks);
   count_ = static_cast<std::uint32_t>(disks_.size());
-  halfway_.resize(2 * std::size_t{count_});
+  halfway_.assign(2 * (std::size_t{count_} + sentinels), 0);
   for (std::uint32_t i = 0; i < count_; ++i) put_pair(&halfway_[2 * i], pair_at(&disks_[i].vx));
   last_step_ = 0;
   disks_.push_back({far_off, far_off, 0, 0});
@@ -146,10 +147,10 @@ void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floo
   fastest_ = mean_square_speed_ = side_temperature_ = never;
   soften(contact_time);
   if (rough_) {
-    rim_.assign(count_, 0);
+    rim_.assign(std::size_t{count_} + sentinels, 0);
     for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = disk_radius * spins[i];
     rim_halfway_ = rim_;
-    rim_force_.assign(count_, 0);
+    rim_force_.assign(std::size_t{count_} + sentinels, 0);
     wall_stretch_.assign(std::size_t{walls} * count_, 0);
     stretch_.clear();
     first_.clear();
@@ -256,13 +257,16 @@ void PressedBed::list_walls(double floor) {
   }
 }
 
-// Of all neighbours those that may touch before the next check.
+// Of all neighbours those that may touch before the next check, and those whose tangential springs are stretched, so
+// that these are let go.
+template <bool rough>
 void PressedBed::choose_active(double dt) {
   const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
   const std::size_t pairs = first_.size();
   const Lanes contact = all_lanes(4 * disk_radius * disk_radius);
   active_first_.resize(pairs + 4);
   active_second_.resize(pairs + 4);
+  if constexpr (rough) active_.resize(pairs + 4);
   std::size_t active = 0;
   Lanes approaches{};
   for (std::size_t p = 0; p < pairs; p += 4) {
@@ -271,16 +275,24 @@ void PressedBed::choose_active(double dt) {
     const Lanes squared = fused(d.x, d.x, d.z * d.z), closing = fused(d.x, d.vx, d.z * d.vz);
     const LaneMask near = fused(all_lanes(-2 * margin), all_lanes(1), squared) < contact;
     const LaneMask comes = fused(all_lanes(2 * ahead), closing, squared) < contact;
+    LaneMask asked = near | comes;
+    if constexpr (rough) {
+      Lanes stretch;
+      std::memcpy(&stretch, &stretch_[p], sizeof stretch);
+      asked |= stretch != Lanes{};
+    }
     approaches += closing * closing;
     for (std::size_t q = 0; q < 4; ++q) {
       active_first_[active] = first_[p + q];
       active_second_[active] = second_[p + q];
-      active += static_cast<std::size_t>((near[q] | comes[q]) & 1);
+      if constexpr (rough) active_[active] = static_cast<std::uint32_t>(p + q);
+      active += static_cast<std::size_t>(asked[q] & 1);
     }
   }
   for (; active % 4 != 0; ++active) {
     active_first_[active] = place_of(count_);
     active_second_[active] = place_of(count_ + 1);
+    if constexpr (rough) active_[active] = static_cast<std::uint32_t>(pairs);  // of no pair
   }
   active_first_.resize(active);
   active_second_.resize(active);
@@ -293,7 +305,7 @@ void PressedBed::choose_active(double dt) {
 // Stretched springs of pairs, before these are listed anew.
 void PressedBed::keep_stretches() {
   kept_.clear();
-  for (std::size_t p = 0; p < stretch_.size(); ++p) {
+  for (std::size_t p = 0; p < first_.size(); ++p) {
     if (stretch_[p] != 0) kept_.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
   }
 }
@@ -305,7 +317,7 @@ void PressedBed::place_stretches(std::vector<Stretch>& stretches) {
   };
   const auto less = [&key](const Stretch& a, const Stretch& b) { return key(a.disk, a.other) < key(b.disk, b.other); };
   std::sort(stretches.begin(), stretches.end(), less);
-  stretch_.assign(first_.size(), 0);
+  stretch_.assign(first_.size() + 1, 0);
   active_.resize(first_.size());
   for (std::size_t p = 0; p < first_.size(); ++p) {
     active_[p] = static_cast<std::uint32_t>(p);
@@ -320,7 +332,7 @@ void PressedBed::place_stretches(std::vector<Stretch>& stretches) {
 
 auto PressedBed::stretches() const -> std::vector<Stretch> {
   std::vector<Stretch> all;
-  for (std::size_t p = 0; p < stretch_.size(); ++p) {
+  for (std::size_t p = 0; p < first_.size(); ++p) {
     if (stretch_[p] != 0) all.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
   }
   for (std::uint32_t i = 0; i < wall_stretch_.size(); ++i) {
@@ -354,58 +366,78 @@ void PressedBed::let_go() {
   return {force, -force * way - 0.5 * grip.stiffness * (stretch * stretch - before * before)};
 }
 
-// As choose_active(). A pair whose spring is stretched is asked, so that it is let go.
-void PressedBed::choose_active_of_rough(double dt) {
-  const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
-  active_.clear();
-  double approaches = 0;
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
-    if (i >= count_) continue;
-    const TwoLanes d = gap_of(i, k), flow = d * (velocity_of(k) - velocity_of(i));
-    const double squared = d[0] * d[0] + d[1] * d[1], closing = flow[0] + flow[1];
-    approaches += closing * closing;
-    if (stretch_[p] != 0 || squared - 2 * margin < 1 || squared + 2 * ahead * closing < 1)
-      active_.push_back(static_cast<std::uint32_t>(p));
-  }
-  usual_approach_ = std::sqrt(approaches / static_cast<double>(std::max<std::size_t>(first_.size(), 1)));
+// Four numbers of disks, in the order of their places.
+[[gnu::always_inline]] inline Lanes numbers_at(const double* numbers, const std::uint32_t* places) {
+  const auto at = [&](int q) { return numbers[places[q] / sizeof(State)]; };
+  return Lanes{at(0), at(1), at(2), at(3)};
+}
+// Differences of four pairs of {x, z}, second less first.
+struct TwoDifferences {
+  Lanes x, z;
+};
+[[gnu::always_inline]] inline TwoDifferences differences_of_two(const double* numbers, const std::uint32_t* i,
+                                                                const std::uint32_t* k) {
+  const auto at = [&](std::uint32_t place) { return &numbers[2 * (place / sizeof(State))]; };
+  const Lanes d02 = two_pairs(at(k[0]), at(k[2])) - two_pairs(at(i[0]), at(i[2]));
+  const Lanes d13 = two_pairs(at(k[1]), at(k[3])) - two_pairs(at(i[1]), at(i[3]));
+  return {__builtin_shufflevector(d02, d13, 0, 4, 2, 6), __builtin_shufflevector(d02, d13, 1, 5, 3, 7)};
+}
+[[gnu::always_inline]] inline Lanes clamped(Lanes value, Lanes most) {
+  return select(value < -most, -most, select(most < value, most, value));
+}
+
+// The same of four pairs.
+[[gnu::always_inline]] inline auto PressedBed::pull(Lanes stretch, Lanes slip, Lanes slipped, Lanes normal_force) const
+    -> PulledLanes {
+  const Lanes stiffness = all_lanes(pair_.grip.stiffness), damping = all_lanes(pair_.grip.damping);
+  const Lanes most = all_lanes(pair_.grip.friction) * larger(normal_force, Lanes{});
+  const Lanes way = slipped * all_lanes(slip_time_), now = clamped(stretch + way, most / stiffness);
+  const Lanes force = clamped(-stiffness * now - damping * slip, most);
+  return {force, now, -force * way - all_lanes(0.5) * stiffness * (now * now - stretch * stretch)};
 }
 
 template <bool periodic>
 void PressedBed::add_rough_pair_forces() {
-  double squares = 0, count = 0;
-  const TwoLanes swap = {-1, 1};
-  for (const std::uint32_t p : active_) {
-    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
-    TwoLanes d = pair_at(&disks_[k].x) - pair_at(&disks_[i].x);
-    if constexpr (periodic) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
-    const double squared = d[0] * d[0] + d[1] * d[1];
-    double& stretch = stretch_[p];
-    if (!(squared < 4 * disk_radius * disk_radius)) {
-      if (stretch != 0) rubbed_ += 0.5 * pair_.grip.stiffness * stretch * stretch;
-      stretch = 0;
-      continue;
+  double squares = 0, count = 0, rubbed = 0;
+  const State* const disks = disks_.data();
+  const double *const halfway = halfway_.data(), *const rim = rim_.data(), *const rim_halfway = rim_halfway_.data();
+  double *const forces = force_.data(), *const rim_forces = rim_force_.data(), *const stretch = stretch_.data();
+  const double spin_up = inverse_inertia_ratio_, half_stiffness = 0.5 * pair_.grip.stiffness;
+  const Lanes one = all_lanes(1), stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping);
+  const std::size_t active = active_first_.size();
+  const std::uint32_t *i = active_first_.data(), *k = active_second_.data(), *pairs = active_.data();
+  for (const std::uint32_t* const end = i + active; i != end; i += 4, k += 4, pairs += 4) {
+    Differences d = differences(disks, i, k);
+    if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
+    const Lanes squared = d.x * d.x + d.z * d.z;
+    const LaneMask touch = squared < one;
+    const Lanes before = {stretch[pairs[0]], stretch[pairs[1]], stretch[pairs[2]], stretch[pairs[3]]};
+    if (!any_of(touch | (before != Lanes{}))) continue;
+    const Lanes distance = sqrt_lanes(squared), nx = d.x / distance, nz = d.z / distance;
+    const TwoDifferences past = differences_of_two(halfway, i, k);
+    const Lanes v = d.vx * nx + d.vz * nz, side = d.vz * nx - d.vx * nz, side_past = past.z * nx - past.x * nz;
+    const Lanes force = stiffness * (one - distance) - damping * v;
+    const PulledLanes pulled = pull(before, numbers_at(rim, i) + numbers_at(rim, k) - side,
+                                    numbers_at(rim_halfway, i) + numbers_at(rim_halfway, k) - side_past, force);
+    const Lanes fx = force * nx + pulled.force * nz, fz = force * nz - pulled.force * nx;
+    const Lanes lost = select(touch, pulled.lost, all_lanes(half_stiffness) * before * before);
+    const Lanes now = unless(~touch, pulled.stretch), spins = all_lanes(spin_up) * pulled.force, square = v * v;
+#pragma GCC unroll 4
+    for (int q = 0; q < 4; ++q) {
+      rubbed += lost[q];
+      stretch[pairs[q]] = now[q];
+      if (!touch[q]) continue;
+      const TwoLanes on_second = {fx[q], fz[q]};
+      const std::uint32_t first = disk_at(i[q]), second = disk_at(k[q]);
+      put_pair(forces + 4 * first, pair_at(forces + 4 * first) - on_second);
+      put_pair(forces + 4 * second, pair_at(forces + 4 * second) + on_second);
+      rim_forces[first] += spins[q];
+      rim_forces[second] += spins[q];
+      squares += square[q];
+      count += 1;
     }
-    const double distance = std::sqrt(squared);
-    const TwoLanes normal = d / both(distance), tangent = swap * __builtin_shufflevector(normal, normal, 1, 0);
-    const TwoLanes flow = velocity_of(k) - velocity_of(i), normal_flow = flow * normal, side_flow = flow * tangent;
-    const TwoLanes past = (pair_at(&halfway_[2 * k]) - pair_at(&halfway_[2 * i])) * tangent;
-    const double v = normal_flow[0] + normal_flow[1];
-    const double force = pair_.stiffness * (2 * disk_radius - distance) - pair_.damping * v;
-    squares += v * v;
-    count += 1;
-    TwoLanes on_second = both(force) * normal;
-    if (pair_.grip.friction > 0) {
-      const Pulled side = pull(stretch, pair_.grip, rim_[i] + rim_[k] - (side_flow[0] + side_flow[1]),
-                               rim_halfway_[i] + rim_halfway_[k] - (past[0] + past[1]), force);
-      on_second -= both(side.force) * tangent;
-      rim_force_[i] += inverse_inertia_ratio_ * side.force;
-      rim_force_[k] += inverse_inertia_ratio_ * side.force;
-      rubbed_ += side.lost;
-    }
-    put_pair(&force_[4 * i], pair_at(&force_[4 * i]) - on_second);
-    put_pair(&force_[4 * k], pair_at(&force_[4 * k]) + on_second);
   }
+  rubbed_ += rubbed;
   touching_ = count;
   pair_squares_ = squares;
 }
@@ -430,10 +462,8 @@ void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
   side_temperature_ = side_squares / count_;
   if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
     list_pairs(floor.position);
-  } else if (rough_) {
-    choose_active_of_rough(dt);
   } else {
-    choose_active(dt);
+    rough_ ? choose_active<true>(dt) : choose_active<false>(dt);
   }
 }
 

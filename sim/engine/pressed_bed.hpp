@@ -147,12 +147,16 @@ class PressedBed {
   Spring spring_of(const Surface& surface) const;
   Grip grip_of(const Surface& surface) const;
   Pulled pull(double& stretch, const Grip& grip, double slip, double slipped, double normal_force) const;
+  struct PulledLanes {
+    Lanes force, stretch, lost;
+  };
+  PulledLanes pull(Lanes stretch, Lanes slip, Lanes slipped, Lanes normal_force) const;
   double stretched() const;
   void list_pairs(double floor);
   void list_walls(double floor);
   void interleave();
+  template <bool rough>
   void choose_active(double dt);
-  void choose_active_of_rough(double dt);
   void keep_stretches();
   void place_stretches(std::vector<Stretch>& stretches);
   template <bool periodic>
@@ -182,12 +186,13 @@ class PressedBed {
   double inverse_inertia_ratio_ = 0;
   // R times the spin, foreseen and half a step before, and how it is accelerated.
   std::vector<double> rim_, rim_halfway_, rim_force_;
-  std::vector<double> stretch_, wall_stretch_;  // of pairs, as they are listed; {left, right, floor, lid} of each disk
-  std::vector<Stretch> kept_;                   // while neighbours are listed anew
-  std::vector<std::uint32_t> active_;           // pairs, as they are listed
-  double slip_time_ = 0;                        // the step whose forces are added
-  double rubbed_ = 0;                           // lost by tangential forces in this step
-  std::vector<double> listed_;                  // {x, z} when the neighbours were listed, z above the floor
+  // Of pairs, as they are listed, and of no pair; {left, right, floor, lid} of each disk.
+  std::vector<double> stretch_, wall_stretch_;
+  std::vector<Stretch> kept_;          // while neighbours are listed anew
+  std::vector<std::uint32_t> active_;  // pairs, as they are listed; those of active_first_
+  double slip_time_ = 0;               // the step whose forces are added
+  double rubbed_ = 0;                  // lost by tangential forces in this step
+  std::vector<double> listed_;         // {x, z} when the neighbours were listed, z above the floor
   // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
   std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
   std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;

@@ -42,15 +42,18 @@ std::vector<RenderedDisk> pile(double radius, std::mt19937& random) {
     const auto offer = [&](double x, double y) {
       const bool inside = x >= left + radius && x <= right - radius && y <= ground - radius + 1e-9;
       if (inside && std::none_of(beads.begin(), beads.end(), [&](const RenderedDisk& other) {
-            return std::hypot(other.x_px - x, other.y_px - y) < touching - 1e-7;
+            const double dx = other.x_px - x, dy = other.y_px - y, least = touching - 1e-7;
+            return dx * dx + dy * dy < least * least;
           }))
         places.push_back({x, y});
     };
     for (int k = 0; k < 20; ++k) offer(test::drawing::between(random, left, right), ground - radius);
     for (const RenderedDisk& one : beads)
       for (const RenderedDisk& other : beads) {
-        const double dx = other.x_px - one.x_px, dy = other.y_px - one.y_px, away = std::hypot(dx, dy);
-        if (!(dx > 0) || away >= 2 * touching) continue;
+        const double dx = other.x_px - one.x_px, dy = other.y_px - one.y_px;
+        if (!(dx > 0) || dx >= 2 * touching || std::abs(dy) >= 2 * touching) continue;
+        const double away = std::hypot(dx, dy);
+        if (away >= 2 * touching) continue;
         const double up = std::sqrt(touching * touching - away * away / 4);
         offer(one.x_px + dx / 2 + up * dy / away, one.y_px + dy / 2 - up * dx / away);
       }
