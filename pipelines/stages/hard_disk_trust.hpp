@@ -11,7 +11,6 @@ namespace shakebed::pipelines {
 struct HardDiskBed {
   double restitution, friction, column_number, gamma;
   double ratio_x, error_x, ratio_z, error_z;
-  double elastic_share;  // of the hard disks
 };
 std::span<const HardDiskBed> hard_disk_study();
 // Their t_c [sqrt(D/g)].

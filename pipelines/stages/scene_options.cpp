@@ -139,7 +139,7 @@ void describe_disks(Fields& f, DiskOptions& d) {
            "whether the disks of a bed are soft while it is pressed on the floor: linear springs and dashpots, "
            "contacts of 0.007 sqrt(D/g) at most. Hard disks cost up to a thousand times as much there. It applies "
            "to equal disks with constant restitutions of at least 0.3, without a bath. Disks with friction are "
-           "soft only where they make more than 0.6 sqrt(D/g) / contact_duration contacts each in a period, or 0.35 "
+           "soft only where they make more than 0.6 sqrt(D/g) / contact_duration contacts each in a period, or 0.02 "
            "while T_x is below 0.02 m g D"});
   f.object<SecondSpeciesOptions>(
       "second", d.second,

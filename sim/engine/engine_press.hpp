@@ -33,11 +33,11 @@ inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
 // 0.33 in one period in which a row locked: see tests/bench/README.md. A bed that has reached the limit is pressed
 // earlier in later periods, until one goes by without.
 inline constexpr double chattering = 0.6, chattering_on = 0.04;
-// Cold ones, by T_x [m g D], from a lower limit on: above the period with the locked row. They stay soft in flight, and
-// land as soft disks. Hard disks lose all they have when a cold bed lands, or keep too much of it by the contact
-// duration. T_x at Gamma = 1.5: soft spheres of 10 to 30 us 0.0029 to 0.0043; hard disks 0.0041 to 0.0122. Beds that
-// land as hard disks and go on pressed have 0.0017 to 0.0021.
-inline constexpr double cold = 0.02, chattering_of_cold = 0.35;
+// Cold ones, by T_x [m g D], from a lower limit on, which beds of 16 rows reach and beds of 5 do not. They stay soft in
+// flight, and land as soft disks. As hard disks they keep too much energy by the contact duration, or slide without
+// friction on walls that should stir them: at Gamma of 1.2, 1.5 and 2 events alone have 0.2, 0.8 and 1.9 times the T_x
+// of soft spheres. Beds that land as hard disks and go on pressed are too cold by two.
+inline constexpr double cold = 0.02, chattering_of_cold = 0.02;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
 // What springs that are still compressed may gain thereby [m g D], a disk and check.
 inline constexpr double gained_by_hardening = 1e-6;

@@ -256,8 +256,8 @@ TEST(SoftSpheres, StandBesideHardDisks) {
     EXPECT_NEAR(bed->error_z, z.error, 6e-4);
     differing += std::abs(x.value - 1) > 0.05 + 2 * x.error || std::abs(z.value - 1) > 0.05 + 2 * z.error;
   }
-  // Hard disks with the default t_c differ from soft spheres of 10 us by more than 5 % in one bed, which hardly moves.
-  EXPECT_EQ(differing, 1);
+  // No bed with the default t_c differs from soft spheres of 10 us by more than 5 % and two errors.
+  EXPECT_EQ(differing, 0);
   EXPECT_EQ(stored, shakebed::pipelines::hard_disk_study().size());
 }
 

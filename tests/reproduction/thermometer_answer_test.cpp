@@ -41,9 +41,12 @@ TEST(ThermometerTable, IsWhatBedsOfKnownTemperatureSay) {
     double misfit = 0;
     for (std::size_t t = 0; t < thermometer_count; ++t) {
       const Calibration found = calibrate(beds_near(known, t, row));
-      std::printf(" %+.1f ± %.1f |", 100 * found.bias.mean, 100 * found.bias.scatter);
+      std::printf(" %+.1f ± %.1f (%d) |", 100 * found.bias.mean, 100 * found.bias.scatter, found.beds);
       // The table is rounded to 0.1 %; another compiler's beds differ by their statistics.
       EXPECT_NEAR(found.bias.mean, table.of[t].mean, 4 * found.mean_error + 0.001) << table.temperature << " " << t;
+      if (found.beds < fewest_beds) {
+        EXPECT_EQ(table.of[t].scatter, scatter_of_unknown) << table.temperature << " " << t;
+      }
     }
     for (const Known& k : beds_near(known, 0, row)) misfit = std::max(misfit, k.model_error);
     std::printf(" %.3f |\n", misfit);

@@ -37,7 +37,10 @@ inline constexpr double calibration_temperatures[] = {0.03, 0.045, 0.065, 0.09, 
                                                       0.45, 0.7,   1.0,   1.5,  2.5,  4.5, 9.0};
 
 // The mean of `off`, and the scatter s from bed to bed beyond the stated errors: chi2 with s in quadrature is what so
-// many beds have left. The uncertainty of the mean is part of s.
+// many beds have left. The uncertainty of the mean is part of s. Of fewer beds than `fewest_beds`, few of many in which
+// there was anything to read, nothing follows for others.
+inline constexpr int fewest_beds = 8;
+inline constexpr double scatter_of_unknown = 2;
 struct Calibration {
   int beds = 0;
   KnownBias bias;
@@ -46,7 +49,8 @@ struct Calibration {
 inline Calibration calibrate(const std::vector<Known>& beds) {
   Calibration calibration;
   calibration.beds = static_cast<int>(beds.size());
-  if (beds.size() < 3) return calibration;
+  calibration.bias.scatter = scatter_of_unknown;
+  if (calibration.beds < fewest_beds) return calibration;
   const auto n = static_cast<double>(beds.size());
   double mean = 0, variance = 0;
   for (const Known& k : beds) mean += k.off / n;
