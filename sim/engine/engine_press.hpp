@@ -35,8 +35,8 @@ inline constexpr double pressed_crowd = 0.1, locked_crowd = 1;
 inline constexpr double chattering = 0.6, chattering_on = 0.04;
 // Cold ones, by T_x [m g D], from a lower limit on, which beds of 16 rows reach and beds of 5 do not. They stay soft in
 // flight, and land as soft disks. As hard disks they keep too much energy by the contact duration, or slide without
-// friction on walls that should stir them: at Gamma of 1.2, 1.5 and 2 events alone have 0.2, 0.8 and 1.9 times the T_x
-// of soft spheres. Beds that land as hard disks and go on pressed are too cold by two.
+// friction on walls that should stir them. Events alone had 0.2 to 1.9 times the T_x of soft spheres. Beds that land as
+// hard disks and go on pressed are too cold by two.
 inline constexpr double cold = 0.02, chattering_of_cold = 0.02;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
 // What springs that are still compressed may gain thereby [m g D], a disk and check.

@@ -86,16 +86,17 @@ struct GentleBed {
   double allowed, centre_allowed;                     // besides errors [m g D]; [D]
 };
 
-Measurement run_gentle_bed(double gamma, int periods, double width = 30.6) {
+Measurement run_gentle_bed(double gamma, int periods, double width = 30.6, const Surface& surface = {0.9, 0, 0}) {
   constexpr double d = 2e-3, f = 30;
   const double time_unit = std::sqrt(d / gravity);
   Scene scene;
   scene.gravity = UniformGravity{};
   scene.disks.species = {{500, 1, 1}};
-  scene.disks.contact = scene.box.floor_surface = {0.9, 0, 0};
+  scene.disks.contact = scene.box.floor_surface = surface;
+  scene.disks.inertia_ratio = 0.4;  // of spheres
   scene.disks.contact_duration = 1e-4;
   scene.box.width = width;
-  scene.box.sides = HardSides{{0.9, 0, 0}};
+  scene.box.sides = HardSides{surface};
   scene.box.floor = SinusoidalFloor{gamma * gravity / std::pow(2 * std::numbers::pi * f, 2) / d, f * time_unit};
   scene.start_temperature = 0.01;
   return measured(scene, 10, periods);
@@ -113,6 +114,16 @@ TEST(ShakenBed, IsThatOfSoftSpheresWhereItIsGentlyShaken) {
     expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);
     expect_law("largest overlap [D]", bed.overlap, 0, 0, 2e-3);
   }
+}
+
+// Walls with friction stir a bed that would else hardly move. Soft spheres: "rough sides" of reference/
+// weak_rough_beds.csv, one bed, 15 and 30 periods. Contacts alone have 0.0004, since t_c lets them slide on the walls.
+TEST(ShakenBed, IsThatOfSoftSpheresBetweenWallsWithFriction) {
+  const Measurement bed = run_gentle_bed(1.2, 30, 30.6, {0.6, 0.5, 0});
+  const double error = std::hypot(0.00035, bed.temperature_x.std_error);
+  expect_law("T_x [m g D]", bed.temperature_x.value, error, 0.00225, 2 * error);
+  expect_law("centre of mass [D]", bed.centre.value, std::hypot(bed.centre.std_error, 0.0044), 7.3194, 0.05);
+  expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);
 }
 
 // Below Gamma = 1 the floor never falls away: the bed comes to rest on it, and a run costs no more than its landing.

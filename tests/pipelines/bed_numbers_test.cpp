@@ -24,7 +24,7 @@ using shakebed::pipelines::replica_seed;
 constexpr double disks = 24, width = 6.3, period = 2.5, periods = 12, phases = 8, looks = periods * phases;
 const std::string shaken_bed =
     R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 5, "replicas": 1,
-    "disks": { "count": 24, "diameter": "4 mm", "restitution": 0.8, "friction": 0.2 }, "gravity": "10 m/s^2",
+    "disks": { "count": 24, "diameter": "4 mm", "restitution": 0.8, "friction": 0.2, "presses": false }, "gravity": "10 m/s^2",
     "box": { "width": "25.2 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
     "floor": { "motion": "sinusoidal", "amplitude": "1 mm", "frequency": "20 Hz", "restitution": 0.8 },
     "settle": "0 s", "measure": "0.6 s", "frames": { "count": 8, "phases": 8 },

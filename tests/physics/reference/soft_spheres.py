@@ -191,7 +191,7 @@ def run(bed, scratch, lammps):
     base = os.path.join(scratch, name)
     write_start(base + ".data", count, seed, contact)
     variables = {"data": base + ".data", "dump_file": base + ".bin", "width": WIDTH, "stiffness": stiffness,
-                 "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": friction,
+                 "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": friction, "side_friction": 0,
                  "tangential_stiffness": stiffness * 2 / 7, "pair_tangential": damping(0.5) / 2,
                  "wall_tangential": damping(1.0) / 2,
                  "step": PERIOD / per_period, "period": PERIOD, "skin": 0.3,

@@ -3,9 +3,10 @@
 
 usage: weak_rough_beds.py [--most-cpu-seconds S] [--scratch FOLDER]
 
-The bed of figure.json of quinn-hong-eq6: 340 disks of 2.99 mm with the inertia of spheres, 30.301 D between hard,
-frictionless sides, e = 0.6, friction of disks and floor 0.8, floor of sinusoidal motion at 20 Hz. Runs the beds of
-plan() in order, as soft_spheres.py does, and appends each to weak_rough_beds.csv.
+Disks with the inertia of spheres and one restitution throughout, floor of sinusoidal motion. "eq6": the bed of
+figure.json of quinn-hong-eq6, whose sides are smooth; "eq6 rough sides": the same with sides that rub as the floor
+does; "rough sides": 500 smaller disks between such sides. Runs the beds of plan() in order, as soft_spheres.py does,
+and appends each to weak_rough_beds.csv.
 
 Tangential springs of two kinds. "as pressed": so soft that what slips with speed 1 and sticks slips no more when the
 contact ends (b0 = 0), with a dashpot of exp(-1/2), which is what shakebed's pressed beds have. "two sevenths": that of
@@ -17,6 +18,7 @@ import math
 import os
 import sys
 import tempfile
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,15 +28,33 @@ from soft_spheres import cpu_seconds_of_lammps, looks_at, mean_and_error, write_
 HERE = os.path.dirname(os.path.abspath(__file__))
 TABLE = os.path.join(HERE, "weak_rough_beds.csv")
 
-DIAMETER, GRAVITY, FREQUENCY = 2.99e-3, 9.81, 20.0  # m, m/s^2, Hz
-WIDTH, COUNT, RESTITUTION, FRICTION = 90.6 / 2.99, 340, 0.6, 0.8
-UNIT_OF_TIME = math.sqrt(DIAMETER / GRAVITY)  # s
-PERIOD = 1 / FREQUENCY / UNIT_OF_TIME
+class Scene(NamedTuple):
+    diameter: float  # m
+    frequency: float  # Hz
+    width: float  # D
+    count: int
+    friction: float  # of disks and floor
+    side_friction: float
+    settle: int  # periods
+    measure: int
+
+    @property
+    def unit_of_time(self):
+        return math.sqrt(self.diameter / GRAVITY)  # s
+
+    @property
+    def period(self):
+        return 1 / self.frequency / self.unit_of_time
+
+
+GRAVITY, RESTITUTION = 9.81, 0.6  # m/s^2
+SCENES = {"eq6": Scene(2.99e-3, 20, 90.6 / 2.99, 340, 0.8, 0, 20, 40),
+          "eq6 rough sides": Scene(2.99e-3, 20, 90.6 / 2.99, 340, 0.8, 0.8, 10, 20),
+          "rough sides": Scene(2e-3, 30, 30.6, 500, 0.5, 0.5, 15, 30)}
 STEPS_A_CONTACT, PHASES = 30, 32
-SETTLE, MEASURE = 20, 40  # periods
 AS_PRESSED, TWO_SEVENTHS = "as pressed", "two sevenths"
 
-COLUMNS = ("gamma,spring,contact_time_us,seed,temperature_x,temperature_x_error,temperature_z,temperature_z_error,"
+COLUMNS = ("scene,gamma,spring,contact_time_us,seed,temperature_x,temperature_x_error,temperature_z,temperature_z_error,"
            "center_of_mass,center_of_mass_error,spread_of_height,cpu_seconds,lammps").split(",")
 
 
@@ -46,7 +66,10 @@ def plan():
             (3, AS_PRESSED, 10, (2,)), (2, AS_PRESSED, 10, (1, 2)), (1.2, AS_PRESSED, 5, (1, 2)),
             (1.5, AS_PRESSED, 5, (1, 2)), (1.2, TWO_SEVENTHS, 10, (1, 2)), (1.5, TWO_SEVENTHS, 10, (1, 2))):
         for seed in seeds:
-            yield gamma, spring, contact, seed
+            yield "eq6", gamma, spring, contact, seed
+    for scene, gamma, contact in (("eq6 rough sides", 1.2, 20), ("eq6 rough sides", 1.5, 20), ("eq6 rough sides", 1.2, 10),
+                                  ("rough sides", 1.2, 20), ("rough sides", 1.5, 20), ("rough sides", 2, 20)):
+        yield scene, gamma, AS_PRESSED, contact, 1
 
 
 def tangential(spring, stiffness, damping, contact_time):
@@ -62,45 +85,48 @@ def tangential(spring, stiffness, damping, contact_time):
             2 * slipping * loss / (2**0.5 * contact_time))
 
 
-def starting_places(seed, rng):
+def starting_places(scene, seed, rng):
     """Odd seeds: the packing with which shakebed begins, 29 disks a row. Even seeds: disks at random, which fall."""
     if seed % 2 == 1:
         a_row = 29
-        apart = (WIDTH - 1) / (a_row - 0.5)
+        apart = (scene.width - 1) / (a_row - 0.5)
         rise = math.sqrt(1 + 1e-6 - apart**2 / 4)
-        return [(0.5 + (k % a_row + 0.5 * (k // a_row % 2)) * apart, 0.5005 + k // a_row * rise) for k in range(COUNT)]
-    places, high = [], math.pi / 4 * COUNT / (0.3 * WIDTH) + 1
-    while len(places) < COUNT:
-        x, z = rng.uniform(0.5, WIDTH - 0.5), rng.uniform(0.5005, high)
+        return [(0.5 + (k % a_row + 0.5 * (k // a_row % 2)) * apart, 0.5005 + k // a_row * rise)
+                for k in range(scene.count)]
+    places, high = [], math.pi / 4 * scene.count / (0.3 * scene.width) + 1
+    while len(places) < scene.count:
+        x, z = rng.uniform(0.5, scene.width - 0.5), rng.uniform(0.5005, high)
         if all((x - a)**2 + (z - b)**2 > 1 for a, b in places):
             places.append((x, z))
     return places
 
 
-def write_start(path, seed):
+def write_start(path, scene, seed):
     rng = np.random.default_rng(seed)
-    write_atoms(path, WIDTH, starting_places(seed, rng), 0.1, rng)
+    write_atoms(path, scene.width, starting_places(scene, seed, rng), 0.1, rng)
 
 
 def run(bed, scratch, lammps):
-    gamma, spring, contact, seed = bed
-    contact_time = contact * 1e-6 / UNIT_OF_TIME
+    name, gamma, spring, contact, seed = bed
+    scene = SCENES[name]
+    contact_time = contact * 1e-6 / scene.unit_of_time
     b = -math.log(RESTITUTION)
     stiffness = 0.5 * (math.pi**2 + b * b) / contact_time**2  # reduced mass of a pair: 1/2
     damping = lambda mass: 2 * math.sqrt(stiffness / mass) * b / math.sqrt(math.pi**2 + b * b)
     kt, pair_tangential, wall_tangential = tangential(spring, stiffness, damping, contact_time)
-    per_period = 256 * math.ceil(PERIOD / (contact_time / STEPS_A_CONTACT) / 256)
-    base = os.path.join(scratch, f"gamma{gamma}-{spring.replace(' ', '-')}-{contact}us-{seed}")
-    write_start(base + ".data", seed)
-    variables = {"data": base + ".data", "dump_file": base + ".bin", "width": WIDTH, "stiffness": stiffness,
-                 "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": FRICTION,
+    per_period = 256 * math.ceil(scene.period / (contact_time / STEPS_A_CONTACT) / 256)
+    base = os.path.join(scratch, f"{name.replace(' ', '-')}-gamma{gamma}-{spring.replace(' ', '-')}-{contact}us-{seed}")
+    write_start(base + ".data", scene, seed)
+    variables = {"data": base + ".data", "dump_file": base + ".bin", "width": scene.width, "stiffness": stiffness,
+                 "pair_damping": damping(0.5), "wall_damping": damping(1.0), "friction": scene.friction,
+                 "side_friction": scene.side_friction,
                  "tangential_stiffness": kt, "pair_tangential": pair_tangential, "wall_tangential": wall_tangential,
-                 "step": PERIOD / per_period, "period": PERIOD, "skin": 0.3,
-                 "amplitude": gamma * GRAVITY / (2 * math.pi * FREQUENCY) ** 2 / DIAMETER,
-                 "settle_steps": per_period * SETTLE, "measure_steps": per_period * MEASURE,
+                 "step": scene.period / per_period, "period": scene.period, "skin": 0.3,
+                 "amplitude": gamma * GRAVITY / (2 * math.pi * scene.frequency) ** 2 / scene.diameter,
+                 "settle_steps": per_period * scene.settle, "measure_steps": per_period * scene.measure,
                  "dump_steps": per_period // PHASES}
     cpu = cpu_seconds_of_lammps(variables, base)
-    steps, states, tx, tz = looks_at(base + ".bin", MEASURE * PHASES, per_period)
+    steps, states, tx, tz = looks_at(base + ".bin", scene.measure * PHASES, per_period)
     np.savez_compressed(base + ".npz", steps=steps, states=states.astype(np.float32), per_period=per_period)
     row = list(bed)
     for series in (tx, tz, states[:, :, 1].mean(1)):
@@ -119,7 +145,7 @@ def main():
     done = set()
     if os.path.exists(TABLE):
         with open(TABLE) as table:
-            done = {tuple(list(row.values())[:4]) for row in csv.DictReader(table)}
+            done = {tuple(list(row.values())[:5]) for row in csv.DictReader(table)}
     else:
         with open(TABLE, "w") as table:
             table.write(",".join(COLUMNS) + "\n")
