@@ -37,16 +37,17 @@ inline constexpr double calibration_temperatures[] = {0.03, 0.045, 0.065, 0.09, 
                                                       0.45, 0.7,   1.0,   1.5,  2.5,  4.5, 9.0};
 
 // The mean of `off`, and the scatter s from bed to bed beyond the stated errors: chi2 with s in quadrature is what so
-// many beds have left. The uncertainty of the mean is part of s. Of fewer beds than `fewest_beds`, few of many in which
-// there was anything to read, nothing follows for others.
-inline constexpr int fewest_beds = 8;
-inline constexpr double scatter_of_unknown = 2;
+// many beds have left. The uncertainty of the mean is part of s. Of fewer readings than `fewest_beds` nothing follows
+// for other beds. Where less than `nearly_all` of the beds have a reading, which ones is a part of the bias, and s is
+// no less than the mean.
+inline constexpr int fewest_beds = 5;
+inline constexpr double scatter_of_unknown = 2, nearly_all = 2.0 / 3;
 struct Calibration {
   int beds = 0;
   KnownBias bias;
   double mean_error = 0;
 };
-inline Calibration calibrate(const std::vector<Known>& beds) {
+inline Calibration calibrate(const std::vector<Known>& beds, std::size_t all) {
   Calibration calibration;
   calibration.beds = static_cast<int>(beds.size());
   calibration.bias.scatter = scatter_of_unknown;
@@ -64,7 +65,8 @@ inline Calibration calibrate(const std::vector<Known>& beds) {
   }
   calibration.mean_error = std::sqrt(variance / n);
   constexpr double least_scatter = 0.004;  // thermometers.cpp says why
-  calibration.bias = {mean, std::max(least_scatter, std::hypot(high, calibration.mean_error))};
+  const double least = n < nearly_all * static_cast<double>(all) ? std::abs(mean) : least_scatter;
+  calibration.bias = {mean, std::max(least, std::hypot(high, calibration.mean_error))};
   return calibration;
 }
 
