@@ -267,9 +267,7 @@ PYBIND11_MODULE(_images, m) {
       .def_property_readonly("shaken", [](const ingest::BedFound& f) { return ingest::is_shaken(f.measurement); })
       .def_property_readonly("walls_seen",
                              [](const ingest::BedFound& f) { return !f.measurement.calibration.walls_are_frame_sides; })
-      .def_property_readonly(
-          "column_number",
-          [](const ingest::BedFound& f) { return f.measurement.count_in_width_mean / f.measurement.calibration.width; })
+      .def_property_readonly("column_number", [](const ingest::BedFound& f) { return f.measurement.column_number(); })
       .def_property_readonly("floor_std_error",
                              [](const ingest::BedFound& f) { return f.measurement.calibration.floor_std_error_px; })
       .def_property_readonly(

@@ -29,8 +29,8 @@ constexpr double admissible_uncertainty = 0.15;
 // A model fits that misses the densities by up to so many times what it misses on equilibrium beds.
 constexpr double admissible_misfit = 2.0;
 // What is known of the misfit is of beds whose windows hold this density and more. Where a window holds less, a model
-// may miss as much less: else a tail over a uniform background, as false disks make, passes for that of a hot gas.
-// [1/D^2]
+// may miss less by the square of it: else a tail over a uniform background, as false disks make, or a sum of two
+// exponentials passes for a hot gas. [1/D^2]
 constexpr double usual_density = 0.5;
 // The misfit that is known of beds without a crystal: none that matters. Below, a model misses the densities by so much
 // more; weights hold it also where the data are too poor to show it, as they do in the beds from which the biases are
@@ -227,7 +227,21 @@ class AnswerFinder {
     if (count == 0) return;
     spread_of_all_ = std::sqrt(all / count);
     spread_beyond_ = std::sqrt(beyond / count);
-    compared_ = count;
+    compared_ = distinct_fits() - 1;
+  }
+
+  // Thermometers with the same model on the same heights are one fit.
+  [[nodiscard]] int distinct_fits() const {
+    const auto same = [](const ThermometerReading& a, const ThermometerReading& b) {
+      return a.model == b.model && a.window_low == b.window_low && a.window_high == b.window_high &&
+             a.fitted.value == b.fitted.value;
+    };
+    std::vector<const ThermometerReading*> distinct{chosen_};
+    for (const ThermometerReading& reading : answer_.readings)
+      if (reading.admissible &&
+          std::none_of(distinct.begin(), distinct.end(), [&](const auto* one) { return same(*one, reading); }))
+        distinct.push_back(&reading);
+    return static_cast<int>(distinct.size());
   }
 
   // Whether two temperatures are more than the same_temperature apart, significantly.
@@ -271,8 +285,8 @@ class AnswerFinder {
       return;
     }
     const ThermometerReading& whole = whole_column();
-    const double misfit = part_of_usual_density(whole.window_low, whole.window_high) *
-                          (known_misfit(whole.temperature) + row_modulation * seen_.rows_seen);
+    const double part = part_of_usual_density(whole.window_low, whole.window_high);
+    const double misfit = part * (part * known_misfit(whole.temperature) + row_modulation * seen_.rows_seen);
     answer_.verdict = Verdict::model_does_not_fit;
     if (whole.model_error > std::max(least_misfit_, admissible_misfit * misfit)) {
       answer_.why = "The best model misses the densities by " + number(whole.model_error, 2) + " per D^2, " +
@@ -284,7 +298,7 @@ class AnswerFinder {
     answer_.verdict = Verdict::one_temperature;
     answer_.why = compared_ == 0
                       ? "Only one model and window can be trusted for this profile, and this model fits."
-                      : "All " + std::to_string(compared_ + 1) +
+                      : (compared_ == 1 ? "Both" : "All " + std::to_string(compared_ + 1)) +
                             " fits (models and windows) agree within 20 % or their errors, and the model fits.";
     if (!x && !z && !input_.shaken)
       answer_.why += " This is the T of the profile: only velocities show whether T_x differs, as in shaken beds.";

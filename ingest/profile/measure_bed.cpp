@@ -33,6 +33,9 @@ namespace {
 constexpr std::size_t most_expected_frames = 100000;
 // What deserves a warning: rms of n D^2 between coverage and centres; relative scatter of the contrast and of the bead
 // number from frame to frame; degrees of the floor's tilt.
+// Beads cut by the upper border, as a share of all, up to which those above it do not count in N D/W: at 10 m g D they
+// are ten times as many, half a per cent. And how far from it a Gaussian is nearly all seen [its widths].
+constexpr double most_cut_above = 5e-4, gaussian_edge = 3, fewest_bins = 4;
 constexpr double coverage_differs = 0.03, light_flickers = 0.02, number_varies = 0.01, floor_tilts = 0.5;
 // Frames that show how far the lowest beads move.
 constexpr std::size_t fewest_for_range = 5;
@@ -133,6 +136,7 @@ class BedMeasurer {
         result_.warnings.push_back(shaking_.warnings()[k]);
     }
     bins_.count = std::min(bins_.count, bins_up_to(options_.highest.value_or(highest_ + 1)));
+    if (cut_above_ > 0) end_below_upper_border();
     average_densities();
     if (coverage_) compare_coverage();
     if (shaking_.turns_per_frame()) average_phases(*shaking_.turns_per_frame());
@@ -155,6 +159,29 @@ class BedMeasurer {
       ++done;
       if (options_.progress) options_.progress(done);
     });
+  }
+
+  [[nodiscard]] double upper_border() const { return options_.find.roi ? options_.find.roi->top : 0.0; }
+
+  // Beads above the upper border are not seen: the profile ends where the kernel holds whole beads only. Of the beads
+  // beyond, about T/(m g D) times those that are cut, nothing is known.
+  void end_below_upper_border() {
+    const double middle = bed_.floor_px + 0.5 * bed_.floor_slope * film_.finder.width;
+    const double seen = (middle - upper_border() - refined_.radius_px) / diameter_px_;
+    const double reach = options_.kernel.kind == KernelKind::gaussian ? gaussian_edge * options_.kernel.width
+                                                                      : 0.5 * options_.kernel.width;
+    result_.column_known = static_cast<double>(cut_above_) <= most_cut_above * static_cast<double>(result_.disk_total);
+    if (options_.highest) {
+      warn("Beads are cut by the upper border of the frame: above %.1f D the profile lacks beads.", seen - reach);
+      return;
+    }
+    const double bins = std::floor((seen - reach - bins_.lowest) / bins_.width);
+    bins_.count = std::min(bins_.count, static_cast<std::size_t>(std::max(fewest_bins, bins)));
+    warn(
+        "Beads are cut by the upper border of the frame: the profile ends at %.1f D, below those that are not seen.%s "
+        "Show the whole bed.",
+        bins_.lowest + static_cast<double>(bins_.count) * bins_.width,
+        result_.column_known ? "" : " How many there are is unknown, and so is N D/W.");
   }
 
   void place_held() {
@@ -267,7 +294,7 @@ class BedMeasurer {
       if (in_width) (species == 1 ? heights : second_heights).push_back(z);
       highest_ = std::max(highest_, z);
       cut_below_ += species == 1 && disk.cut && disk.y_px > film_.finder.height - refined_.radius_px;
-      cut_above_ += species == 1 && disk.cut && disk.y_px < refined_.radius_px;
+      cut_above_ += species == 1 && disk.cut && disk.y_px < upper_border() + refined_.radius_px;
     };
     for (const FoundDisk& disk : frame.disks) add(disk, 1);
     for (const FoundDisk& disk : frame.second) add(disk, 2);

@@ -161,11 +161,16 @@ struct Measurement {
   double coverage_disagreement = 0;  // rms in n D^2: centres, seen through the bead, minus coverage
   std::vector<PhaseProfile> phases;
   double disk_count_mean = 0;
-  double disk_count_std = 0;          // scatter of the bead number from frame to frame
-  double count_in_width_mean = 0;     // of the disks whose centres lie between the walls ...
-  double count_in_width_std = 0;      // ... and its scatter
+  double disk_count_std = 0;       // scatter of the bead number from frame to frame
+  double count_in_width_mean = 0;  // of the disks whose centres lie between the walls ...
+  double count_in_width_std = 0;   // ... and its scatter
+  // N D/W, where it is known.
+  std::optional<double> column_number() const {
+    return column_known ? std::optional(count_in_width_mean / calibration.width) : std::nullopt;
+  }
   bool floor_out_of_view = false;     // the lower border cuts beads, and no floor was given
-  bool surface_out_of_view = false;   // the upper border cuts beads
+  bool surface_out_of_view = false;   // the upper border cuts beads, one a frame or more
+  bool column_known = true;           // no more beads are above the upper border than the column number's error allows
   Contacts contacts;                  // in the frames that geometry is found from
   std::size_t beside_bed = 0;         // disks left out, a few beyond an empty stretch beside the bed
   PixelRectangle bed_region;          // what lies between them, px of the recorded frame

@@ -164,7 +164,9 @@ class Reader {
     row.density = density_ >= 0 ? number(density_) : row.area * 4 / std::numbers::pi;
     row.error = given(error_) ? number(error_) : 0;
     row.samples = given(samples_) ? number(samples_) : 0;
-    if (row.density < 0) throw fail("a negative density");
+    if (row.density < 0)
+      throw fail(
+          "a negative density. A density from which a background was taken must be raised to 0, or its rows left out");
     if (!std::isfinite(row.density)) throw fail("a density beyond a double");
     if (row.error < 0) throw fail("a negative standard error");
     rows_.push_back(row);

@@ -28,7 +28,7 @@ ProfileTable table_of(const sim::Profile& profile, double width, double spacing)
     table.height.push_back(profile.height[i]);
     table.number_density.push_back(phi);
     table.std_error.push_back(profile.std_error[i]);
-    table.area_fraction.push_back(std::numbers::pi / 4 * phi);
+    table.area_fraction.push_back(profile.area_fraction[i]);
     table.samples.push_back(std::round(phi * width * spacing * static_cast<double>(profile.samples)));
   }
   return table;

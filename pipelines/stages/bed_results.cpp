@@ -146,6 +146,9 @@ class BedStatement {
     list_.text("/judgement/verdict", "\"holds\", or the most serious doubt about the numbers", judged);
     list_.text("/judgement/why", "all doubts about the numbers, the most serious first", judged);
     list_.text("/judgement/advice", "what to do", judged);
+    const Given mixed = given_if(bed_.two_species, "the disks are of two kinds");
+    list_.text("/objections/#/why", "reason against a temperature from the profile", mixed);
+    list_.text("/objections/#/advice", "what to do", mixed);
   }
 
   void profiles() {

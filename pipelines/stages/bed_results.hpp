@@ -17,6 +17,7 @@ struct BedOutput {
   bool tilted = false;  // and not in reduced units
   bool free_lid = false;
   bool rubs = false;  // on plates
+  bool two_species = false;
   std::uint32_t replicas = 1;
   ObserveOptions observe;
 };

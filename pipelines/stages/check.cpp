@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
@@ -111,6 +112,17 @@ double in_unit_of(const Json& expected, const Found& found, const std::string& w
   return quantity.value / unit.value;
 }
 
+// A tolerance that is a plain number beside a value with a unit is in the value's unit.
+double tolerance_in_unit_of(const Expectation& e, const Found& found) {
+  const bool plain = e.absolute.is_number() || !parse_quantity(e.absolute.get<std::string>()).has_unit;
+  if (!plain || !e.value.is_string()) return in_unit_of(e.absolute, found, "the tolerance");
+  const std::string text = e.value.get<std::string>();
+  char* unit = nullptr;
+  std::strtod(text.c_str(), &unit);
+  const std::string number = e.absolute.is_number() ? dump_canonical(e.absolute) : e.absolute.get<std::string>();
+  return in_unit_of(Json(fmt::format("{} {}", number, unit)), found, "the tolerance");
+}
+
 std::string text_of(const Json& json) { return json.is_string() ? json.get<std::string>() : dump_canonical(json); }
 
 Verdict judge(const std::string& pointer, const Expectation& e, const Json* json) {
@@ -146,7 +158,7 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
       const double expected = in_unit_of(e.value, found, "the expected value");
       double tolerance = 0;
       if (e.relative) tolerance = std::max(tolerance, *e.relative * std::abs(expected));
-      if (!e.absolute.is_null()) tolerance = std::max(tolerance, in_unit_of(e.absolute, found, "the tolerance"));
+      if (!e.absolute.is_null()) tolerance = std::max(tolerance, tolerance_in_unit_of(e, found));
       if (e.std_errors) {
         if (!found.std_error) throw std::invalid_argument("the result has no standard error");
         tolerance = std::max(tolerance, *e.std_errors * *found.std_error);

@@ -109,8 +109,8 @@ void add_geometry(const ingest::Measurement& found, Json& result) {
 void add_density(const ExtractOptions& options, const ingest::Measurement& found, Json& result) {
   const double width = found.calibration.width;
   const double samples = std::max<double>(1, static_cast<double>(found.profile.samples));
-  result["column_number"] =
-      quantity_json(found.count_in_width_mean / width, "1", found.count_in_width_std / width / std::sqrt(samples));
+  if (const auto column = found.column_number())
+    result["column_number"] = quantity_json(*column, "1", found.count_in_width_std / width / std::sqrt(samples));
   result["kernel"] = Json{{"kind", to_string(options.kernel.kind)}, {"width", options.kernel.width}};
   result["profile"] = profile_numbers(found.profile);
   if (found.coverage_profile) result["coverage_disagreement"] = quantity_json(found.coverage_disagreement, "1/D^2");
@@ -182,10 +182,10 @@ BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement
   return bed;
 }
 
-void write_profiles(RunContext& context, const ingest::Measurement& found, double column_number) {
+void write_profiles(RunContext& context, const ingest::Measurement& found) {
   const ingest::BedCalibration& bed = found.calibration;
   ProfileTable profile = table_of(found.profile, bed, "density profile of the disks found, mean over the frames");
-  profile.column_number = column_number;
+  profile.column_number = found.column_number();
   write_profile_csv(context.output("profile.csv"), profile);
   if (found.second_profile)
     write_profile_csv(context.output("second_profile.csv"),

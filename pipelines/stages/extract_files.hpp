@@ -27,7 +27,7 @@ Table frames_table(Table table, const std::vector<ingest::FrameReport>& frames);
 BedDescription bed_seen(const ExtractOptions& options, const ingest::Measurement& found);
 
 // profile.csv with its covariance; profiles of a second species, from covered area and by phase where there are some.
-void write_profiles(RunContext& context, const ingest::Measurement& found, double column_number);
+void write_profiles(RunContext& context, const ingest::Measurement& found);
 
 // Disks found and places rejected, frame by frame: missing and doubled beads show as dips and spikes.
 std::string count_figure(const std::vector<ingest::FrameReport>& frames);

@@ -365,7 +365,7 @@ class Extraction {
   }
 
   void write(const ingest::Measurement& found, DisksOnTheWay& on_the_way) {
-    write_profiles(context_, found, found.count_in_width_mean / found.calibration.width);
+    write_profiles(context_, found);
     frames_table(context_.table("frames.csv"), found.frames).write(context_.output("frames.csv"));
     Json result = bed_numbers(options_, found);
     result["quality"] = on_the_way.quality();

@@ -91,7 +91,8 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
 }
 
 void state_density(ResultList& list, const ExtractOptions& options) {
-  list.quantity("/column_number", "1", "column number N D/W: disks per diameter of width");
+  list.quantity("/column_number", "1", "column number N D/W: disks per diameter of width",
+                given_when("the upper border of the frame cuts no beads"));
   list.text("/kernel/kind", "kernel through which the density was measured");
   list.number("/kernel/width", "D", "its width");
   list.quantity("/profile/greatest_density", "1/D^2", "greatest density of the profile");

@@ -52,6 +52,7 @@ class Simulate : public Stage {
                              .tilted = bed_.tilt() && !bed_.description().reduced,
                              .free_lid = bed_.has_free_lid(),
                              .rubs = bed_.rubs(),
+                             .two_species = bed_.two_species(),
                              .replicas = replicas(),
                              .observe = ObserveOptions::from(observe_)});
   }
@@ -286,6 +287,10 @@ void Simulate::run(RunContext& context) const {
   }
   Json joined = replicas() > 1 ? joined_results(results) : results[0];
   if (bed_.gamma() > 0) joined["judgement"] = judgement_of(bed_, joined, results.size());
+  if (bed_.two_species())
+    joined["objections"] =
+        Json::array({Json{{"why", "The disks are of two kinds, and the models of a profile are those of equal disks."},
+                          {"advice", "Quote the kinetic T_x and T_z by name."}}});
   write_file(context.output("observables.json"), dump(joined));
   for (const std::string& warning : replica_warnings(results, joined, starts_of_replicas(context)))
     context.warning(warning);

@@ -155,18 +155,24 @@ Json map_json(const MapQuestion& question) {
 }
 
 std::string map_text(const Json& map) {
-  std::string out = fmt::format("Gamma = {:.6g}\n{:<40} {:>10} {:>12} {:>9}\n", map["gamma"]["value"].get<double>(),
-                                "reading", "H_0 / D", "T/T_c", "in range");
+  const bool measured = map.contains("measured_reduced_temperature");
+  std::string out = fmt::format("Gamma = {:.6g}\n{:<40} {:>10} {:>12} {:>9}{}\n", map["gamma"]["value"].get<double>(),
+                                "reading", "H_0 / D", "T/T_c", "in range", measured ? "  Gamma of measured T" : "");
   for (const Json& row : map["readings"]) {
     if (row["jump"].is_null()) {
       out += fmt::format("{:<40} {}\n", row["name"].get<std::string>(), row["status"].get<std::string>());
       continue;
     }
-    out += fmt::format("{:<40} {:>10.4f} {:>12.4f} {:>9}\n", row["name"].get<std::string>(),
+    out += fmt::format("{:<40} {:>10.4f} {:>12.4f} {:>9}", row["name"].get<std::string>(),
                        row["jump"]["value"].get<double>(), row["reduced_temperature"]["value"].get<double>(),
                        row["in_range"].get<bool>() ? "yes" : "no");
+    const Json* gamma = find_pointer(row, "/gamma_of_measured_temperature/value");
+    if (measured)
+      out += fmt::format(" {:>20}",
+                         gamma != nullptr && gamma->is_number() ? fmt::format("{:.4f}", gamma->get<double>()) : "none");
+    out += '\n';
   }
-  if (map.contains("measured_reduced_temperature")) {
+  if (measured) {
     out += fmt::format("measured T/T_c = {:.4f}\n", map["measured_reduced_temperature"]["value"].get<double>());
   }
   return out;

@@ -31,7 +31,7 @@ class Bed:
     floor_reference: str
     shaken: bool
     walls_seen: bool
-    column_number: float
+    column_number: Optional[float]
     frames: int
     disks_a_frame: float
     warnings: list[str]

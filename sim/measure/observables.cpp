@@ -84,8 +84,27 @@ BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::u
       covariance_(grid.points),
       centre_by_phase_(phases),
       layers_(phases * layer_count_) {
-  for (std::size_t i = 0; i < masses_.size(); ++i)
+  for (std::size_t i = 0; i < masses_.size(); ++i) {
     inertias_.push_back(scene.disks.inertia_ratio * masses_[i] * disks.radius[i] * disks.radius[i]);
+    const double area = std::numbers::pi * disks.radius[i] * disks.radius[i];
+    auto size = std::find_if(sizes_.begin(), sizes_.end(), [area](const Size& s) { return s.area == area; });
+    if (size == sizes_.end()) size = sizes_.insert(size, {area, {}});
+    size->disks.push_back(i);
+  }
+  if (sizes_.size() > 1) area_sums_.resize(2 * grid.points);
+}
+
+void BedObserver::add_area(const Snapshot& at) {
+  std::vector<double> density(grid_.points), heights;
+  for (const Size& size : sizes_) {
+    heights.clear();
+    for (const std::size_t i : size.disks) heights.push_back(at.z[i]);
+    for (std::size_t frame = 0; frame < 2; ++frame) {
+      std::fill(density.begin(), density.end(), 0.0);
+      add_density(grid_, kernel_, width_, heights, frame == 0 ? 0 : at.floor_position, density);
+      for (std::size_t i = 0; i < grid_.points; ++i) area_sums_[frame * grid_.points + i] += size.area * density[i];
+    }
+  }
 }
 
 void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
@@ -100,6 +119,7 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
     for (std::size_t i = 0; i < grid_.points; ++i)
       period_sum_[static_cast<std::size_t>(frame) * grid_.points + i] += share * density[i];
   }
+  if (!area_sums_.empty()) add_area(at);
   double z = 0, vx2 = 0, vz = 0, vz2 = 0, spin2 = 0;
   double mass = 0, in_bottom_row = 0;
   constexpr double row = std::numbers::sqrt3 / 2;
@@ -149,6 +169,9 @@ Profile BedObserver::density(bool floor_frame) const {
     profile.height.push_back(grid_.height(i));
     profile.number_density.push_back(means_.mean(first + i));
     profile.std_error.push_back(means_.std_error(first + i));
+    profile.area_fraction.push_back(area_sums_.empty()
+                                        ? sizes_.front().area * profile.number_density[i]
+                                        : area_sums_[first + i] / static_cast<double>(periods_ * phases_));
   }
   profile.samples = periods_ * phases_;
   return profile;

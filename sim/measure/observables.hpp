@@ -18,6 +18,7 @@ struct Profile {
   std::vector<double> height;          // D, above the floor's mean position (or the floor itself)
   std::vector<double> number_density;  // phi = n D^2
   std::vector<double> std_error;       // allows for correlation in time
+  std::vector<double> area_fraction;   // covered, by each disk's own area
   std::uint64_t samples = 0;           // snapshots
 };
 
@@ -72,8 +73,8 @@ class BedObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(periods_, period_sum_, means_, centre_series_, temperature_series_, covariance_, mean_vz_, mean_vz2_,
-            mean_mass_, centre_by_phase_, layers_);
+    archive(periods_, period_sum_, area_sums_, means_, centre_series_, temperature_series_, covariance_, mean_vz_,
+            mean_vz2_, mean_mass_, centre_by_phase_, layers_);
   }
 
  private:
@@ -81,11 +82,17 @@ class BedObserver {
     double count = 0, mass = 0, vx2 = 0, vz = 0, vz2 = 0;  // velocities weighted with the masses
     double spin = 0;                                       // I w^2
   };
+  void add_area(const Snapshot& at);
+  struct Size {
+    double area;
+    std::vector<std::size_t> disks;
+  };
   const LayerSums& layer(std::uint32_t phase, std::size_t index) const { return layers_[phase * layer_count_ + index]; }
 
   double width_;
   std::vector<double> masses_;
   std::vector<double> inertias_;  // I of each disk
+  std::vector<Size> sizes_;       // disks by their size
   std::uint32_t phases_;
   HeightGrid grid_;
   Kernel kernel_;
@@ -93,6 +100,7 @@ class BedObserver {
   double layer_bottom_;
   std::uint64_t periods_ = 0;
   std::vector<double> period_sum_;  // lab profile, floor profile, then scalars: see observe()
+  std::vector<double> area_sums_;   // of covered fractions, lab and floor profile; none where all disks are of one size
   BlockedMean means_;
   std::vector<double> centre_series_, temperature_series_;  // a value a period
   BlockedCovariance covariance_;

@@ -200,7 +200,7 @@ class ExtractTables : public testing::Test {
 };
 
 TEST_F(ExtractTables, HoldTheProfilesOfEverySource) {
-  write_profiles(extract_, a_measurement(), 2.5);
+  write_profiles(extract_, a_measurement());
   for (const auto& [name, density] : {std::pair{"profile.csv", 1.1},
                                       {"second_profile.csv", 0.9},
                                       {"coverage_profile.csv", 1.2},
