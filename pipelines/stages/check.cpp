@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdlib>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/markup.hpp"
@@ -21,10 +20,20 @@ struct Expectation {
   std::string note;
 };
 
+bool has_unit(const Json& json) {
+  if (!json.is_string()) return false;
+  try {
+    return parse_quantity(json.get<std::string>()).has_unit;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+}
+
 void describe_expectation(Fields& fields, Expectation& e) {
   fields.any("value", e.value, {.help = "expected value: a number, a quantity with its unit, a string, true or false"});
   fields.number("relative", e.relative, {.help = "tolerance as a part of the expected value", .range = non_negative});
-  fields.any("absolute", e.absolute, {.help = "tolerance in the value's unit"});
+  fields.any("absolute", e.absolute,
+             {.help = "tolerance: with its unit where the value has one, else in the unit of the result"});
   fields.number("std_errors", e.std_errors,
                 {.help = "tolerance in standard errors of the result", .range = non_negative});
   fields.any("least", e.least, {.help = "lower bound of the result, in place of or together with a value"});
@@ -49,14 +58,10 @@ void describe_expectation(Fields& fields, Expectation& e) {
   fields.require(!e.value.is_object() && !e.value.is_array(), "value",
                  "expected a number, a quantity, a string, true or false");
   const bool tolerance = e.relative || !e.absolute.is_null() || e.std_errors;
-  bool is_quantity = e.value.is_number();
-  if (e.value.is_string()) {
-    try {
-      is_quantity = parse_quantity(e.value.get<std::string>()).has_unit;
-    } catch (const std::invalid_argument&) {
-      is_quantity = false;
-    }
-  }
+  const bool is_quantity = e.value.is_number() || has_unit(e.value);
+  const bool plain = !e.absolute.is_null() && !has_unit(e.absolute);
+  fields.require(!plain || !has_unit(e.value), "absolute", "the expected value has a unit, and this tolerance has none",
+                 "Write it with its unit, as the value: \"0.1 mm\"");
   fields.require(!tolerance || is_quantity, "value", "a tolerance is given, but the expected value is no number");
   fields.require(!e.value.is_number_float() || tolerance, "value", "a number needs a tolerance",
                  "Add \"relative\", \"absolute\" or \"std_errors\"");
@@ -112,17 +117,6 @@ double in_unit_of(const Json& expected, const Found& found, const std::string& w
   return quantity.value / unit.value;
 }
 
-// A tolerance that is a plain number beside a value with a unit is in the value's unit.
-double tolerance_in_unit_of(const Expectation& e, const Found& found) {
-  const bool plain = e.absolute.is_number() || !parse_quantity(e.absolute.get<std::string>()).has_unit;
-  if (!plain || !e.value.is_string()) return in_unit_of(e.absolute, found, "the tolerance");
-  const std::string text = e.value.get<std::string>();
-  char* unit = nullptr;
-  std::strtod(text.c_str(), &unit);
-  const std::string number = e.absolute.is_number() ? dump_canonical(e.absolute) : e.absolute.get<std::string>();
-  return in_unit_of(Json(fmt::format("{} {}", number, unit)), found, "the tolerance");
-}
-
 std::string text_of(const Json& json) { return json.is_string() ? json.get<std::string>() : dump_canonical(json); }
 
 Verdict judge(const std::string& pointer, const Expectation& e, const Json* json) {
@@ -158,7 +152,7 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
       const double expected = in_unit_of(e.value, found, "the expected value");
       double tolerance = 0;
       if (e.relative) tolerance = std::max(tolerance, *e.relative * std::abs(expected));
-      if (!e.absolute.is_null()) tolerance = std::max(tolerance, tolerance_in_unit_of(e, found));
+      if (!e.absolute.is_null()) tolerance = std::max(tolerance, in_unit_of(e.absolute, found, "the tolerance"));
       if (e.std_errors) {
         if (!found.std_error) throw std::invalid_argument("the result has no standard error");
         tolerance = std::max(tolerance, *e.std_errors * *found.std_error);

@@ -50,7 +50,8 @@ TEST_F(CheckStage, ConvertsTheUnitOfATolerance) {
   EXPECT_TRUE(passes("t", R"("value": "0.4 mm", "absolute": "41 um")"));
   EXPECT_FALSE(passes("t", R"("value": "0.4 mm", "absolute": "39 um")"));
   EXPECT_FALSE(passes("t", R"("value": "0.32 mm", "absolute": "39 um")"));
-  EXPECT_TRUE(passes("t", R"("value": "0.4 mm", "absolute": 4.1e-5)")) << "a plain number is in the result's unit";
+  EXPECT_TRUE(passes("t", R"("value": 0.0004, "absolute": 4.1e-5)")) << "both in the result's unit";
+  EXPECT_THROW(passes("t", R"("value": "0.4 mm", "absolute": 0.1)"), std::runtime_error) << "0.1 of what?";
 }
 
 TEST_F(CheckStage, ConvertsTheUnitOfBounds) {

@@ -326,9 +326,12 @@ TEST(MapText, ShowsTheNumbersOfTheMap) {
   for (const Json& row : map["readings"]) {
     if (row["jump"].is_null()) continue;
     char line[200];
-    std::snprintf(line, sizeof line, "%-40s %10.4f %12.4f %9s\n", row["name"].get<std::string>().c_str(),
+    const Json& gamma = row["gamma_of_measured_temperature"];
+    char measured[40] = "none";
+    if (gamma.is_object()) std::snprintf(measured, sizeof measured, "%.4f", gamma["value"].get<double>());
+    std::snprintf(line, sizeof line, "%-40s %10.4f %12.4f %9s %20s\n", row["name"].get<std::string>().c_str(),
                   row["jump"]["value"].get<double>(), row["reduced_temperature"]["value"].get<double>(),
-                  row["in_range"].get<bool>() ? "yes" : "no");
+                  row["in_range"].get<bool>() ? "yes" : "no", measured);
     EXPECT_NE(text.find(line), std::string::npos) << line << "in\n" << text;
   }
   EXPECT_NE(text.find("Gamma = 4\n"), std::string::npos);
