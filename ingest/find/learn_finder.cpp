@@ -508,6 +508,17 @@ void require_consistent(const GrayFrame& frame) {
     throw std::invalid_argument("find_disks: the frame's pixel count is not width x height");
 }
 
+GrayFrame without_walls(const GrayFrame& frame, Polarity polarity, double radius_px) {
+  std::vector<SolidBorder> borders = find_solid_borders(frame);
+  drop_plain_background(borders, frame, polarity);
+  if (borders.empty()) return frame;
+  const LightField light =
+      estimate_light(without_borders(frame, borders, -border_margin(usual_edge)), radius_px, polarity);
+  std::erase_if(borders, [&](const SolidBorder& border) { return is_background(border, light, frame); });
+  complete_corners(borders, frame);
+  return without_borders(frame, borders, border_margin(usual_edge));
+}
+
 GrayFrame seen_part(const GrayFrame& recorded, const FinderCalibration& calibration) {
   GrayFrame frame = recorded;
   if (calibration.left_out)

@@ -48,6 +48,9 @@ double knot_for(double radius, double edge);
 // with `doubt` about the shading.
 double radius_error(const FinderCalibration& calibration, double spread, double beads, double doubt);
 
+// The frame with floor, walls and lid unseen, before beads of about this radius are known.
+GrayFrame without_walls(const GrayFrame& frame, Polarity polarity, double radius_px);
+
 // Throws std::invalid_argument when the frame's pixel count is not width * height.
 void require_consistent(const GrayFrame& frame);
 

@@ -6,6 +6,9 @@
 #include <utility>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/missed_beads.hpp"
+#include "ingest/find/packed_bed.hpp"
+#include "ingest/find/two_kinds.hpp"
 
 namespace shakebed::ingest {
 
@@ -17,6 +20,14 @@ GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const F
                        static_cast<std::size_t>(light.columns / 2)];
   for (float& level : left.pixels) level += background;
   return left;
+}
+
+BothKinds find_both_kinds(const GrayFrame& frame, const FilmCalibration& film, const FindOptions& options) {
+  const bool first_is_large = film.finder.radius_px > film.second->radius_px;
+  const TwoKinds kinds = first_is_large ? TwoKinds{film.finder, *film.second} : TwoKinds{*film.second, film.finder};
+  KindsFound found = find_two_kinds(frame, kinds, options);
+  return first_is_large ? BothKinds{std::move(found.large), std::move(found.small)}
+                        : BothKinds{std::move(found.small), std::move(found.large)};
 }
 
 namespace {
@@ -31,6 +42,8 @@ constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25;
 constexpr double small_correction = 0.01;
 // Of the expected radius: what is found is the second species when it is nearer than this, by faces and by rims.
 constexpr double nearly_by_faces = 0.08, nearly_by_rims = 0.1;
+// Of a radius by votes, or by rims that blur has moved inwards.
+constexpr double radius_off = 0.07;
 
 std::vector<const GrayFrame*> pointers_to(const std::vector<GrayFrame>& frames) {
   std::vector<const GrayFrame*> pointers;
@@ -64,10 +77,12 @@ class FilmLearner {
   FilmCalibration learn() {
     learn_from_first_frames();
     learn_lens();
-    tell_radius(calibrated_);
-    if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
-    calibrated_.beads.reset();
-    if (film_.options.second_diameter_m) learn_second();
+    if (!learn_both_kinds()) {
+      tell_radius(calibrated_);
+      if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
+      calibrated_.beads.reset();
+      if (film_.options.second_diameter_m) learn_second();
+    }
     if (enlargement_ > 1) {
       char text[200];
       std::snprintf(text, sizeof text,
@@ -202,6 +217,48 @@ class FilmLearner {
     return true;
   }
 
+  // What was seen first may be of either kind, or of both.
+  bool learn_both_kinds() {
+    MeasureOptions& options = film_.options;
+    if (!options.second_diameter_m || !find_.seen) return false;
+    const double ratio = *options.second_diameter_m / options.bead_diameter_m;
+    if (ratio == 1) return false;
+    const bool first_is_large = ratio < 1;
+    KindsAsked asked;
+    asked.ratio = first_is_large ? 1 / ratio : ratio;
+    asked.polarity = find_.seen->polarity;
+    const double smallest = find_.radius_px ? *find_.radius_px * (first_is_large ? 1 : ratio) : find_.seen->radius_px;
+    asked.from_px = smallest / (1 + radius_off);
+    asked.to_px = smallest * (find_.radius_px ? 1 : asked.ratio) * (1 + radius_off);
+    LearnedKinds learned = learn_two_kinds(pointers_to(straight_), asked, find_);
+    kinds_why_not_ = std::move(learned.why_not);
+    if (!learned.kinds) return false;
+    FinderCalibration &large = learned.kinds->large, &small = learned.kinds->small;
+    calibrated_ = {};
+    calibrated_.calibration = std::move(first_is_large ? large : small);
+    film_.second = std::move(first_is_large ? small : large);
+    film_.kinds_together = true;
+    options.profile_from_coverage = false;  // both kinds cover area
+    film_.finder = calibrated_.calibration;
+    count_missed();
+    return true;
+  }
+
+  // Of both kinds together: beads of one are none that the other misses.
+  void count_missed() {
+    FinderCalibration& first = calibrated_.calibration;
+    first.rims = rims_of(first);
+    const BothKinds both = find_both_kinds(straight_.back(), film_, find_);
+    std::vector<Circle> circles;
+    for (const FindResult* found : {&both.first, &both.second})
+      for (const FoundDisk& disk : found->disks) {
+        circles.emplace_back();
+        circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
+      }
+    const double missed = expected_missed_beads(straight_.back(), *first.rims, circles, find_.roi);
+    first.expected_missed = missed / std::max(1.0, static_cast<double>(circles.size()) + missed);
+  }
+
   void learn_second() {
     const FinderCalibration& first = calibrated_.calibration;
     if (find_.seen) {
@@ -292,6 +349,7 @@ class FilmLearner {
   std::vector<GrayFrame> recorded_, straight_;  // frames learned from, as recorded and true
   CalibrationResult calibrated_;
   double enlargement_ = 1;  // of the pictures
+  std::string kinds_why_not_;
 };
 
 }  // namespace

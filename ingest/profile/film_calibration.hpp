@@ -14,6 +14,7 @@ struct FilmCalibration {
   MeasureOptions options;  // as asked for, but places are those of the true frame (see lens.hpp)
   FinderCalibration finder;
   std::optional<FinderCalibration> second;
+  bool kinds_together = false;  // both are found by find_two_kinds()
   Lens lens;
   double aspect_std_error = 0, lens_radial_std_error = 0;  // of what was found
   int recorded_width = 0, recorded_height = 0;
@@ -22,6 +23,12 @@ struct FilmCalibration {
 
 // Reads the first frames. Throws InputError when none can be read or none shows a disk.
 FilmCalibration calibrate_film(FrameSource& source, const MeasureOptions& options);
+
+// The beads of both diameters in a frame.
+struct BothKinds {
+  FindResult first, second;
+};
+BothKinds find_both_kinds(const GrayFrame& frame, const FilmCalibration& film, const FindOptions& options);
 
 // The frame with the disks found painted over by the background behind them.
 GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder);

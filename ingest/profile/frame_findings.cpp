@@ -61,13 +61,18 @@ void FrameExaminer::find_disks_in(const GrayFrame& frame, FrameFindings& finding
   FrameReport& report = findings.report;
   FindOptions find = film_.options.find;
   find.learn_rim = report.index < rim_frames;
-  FindResult found = find_beads(frame, film_.finder, find);
+  FindResult found;
+  if (film_.kinds_together) {
+    BothKinds both = find_both_kinds(frame, film_, find);
+    found = std::move(both.first);
+    findings.second = std::move(both.second.disks);
+  } else {
+    found = find_beads(frame, film_.finder, find);
+    if (film_.second) findings.second = find_second(frame, found);
+  }
+  report.second = findings.second.size();
   findings.rim.profile = std::move(found.profile);
   findings.rim.profile_beads = found.profile_beads;
-  if (film_.second) {
-    findings.second = find_second(frame, found);
-    report.second = findings.second.size();
-  }
   if (!film_.lens.plain())  // what a margin repeats is no disk
     std::erase_if(found.disks, [&](const FoundDisk& disk) {
       const PixelPlace place = lens_.to_recorded({disk.x_px, disk.y_px});

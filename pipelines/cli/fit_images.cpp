@@ -231,7 +231,8 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       ->check(CLI::IsMember(shapes));
   command.add_flag("--preview", image.preview,
                    "only draw the disks found in the first frame, with the command for each alternative");
-  command.add_option("--second-diameter", image.second_diameter, "diameter of a second kind of beads, with its unit");
+  command.add_option("--second-diameter", image.second_diameter,
+                     "diameter of a second kind of beads, larger or smaller than the first, with its unit");
   command.add_option("--pixel-aspect", image.pixel_aspect, "width of a pixel over its height (default: found)");
   command.add_option(
       "--lens", image.lens,

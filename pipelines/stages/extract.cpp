@@ -145,7 +145,8 @@ class Extract : public Stage {
                      .example = "\"2.99 mm\""});
     fields.quantity(
         "second_diameter", options_.second_diameter, dimension::length,
-        {.help = "diameter of a second kind of beads; left out, such beads count as rejected", .range = positive});
+        {.help = "diameter of a second kind of beads, larger or smaller; left out, such beads count as rejected",
+         .range = positive});
     fields.quantity(
         "gravity", gravity_, dimension::acceleration,
         {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "

@@ -252,6 +252,13 @@ DrawnBed bed_of_two_sizes(std::mt19937& random, double ratio, double share_of_sm
   return photographed(random, scene, pile(random, scene, two_sizes(large_radius_px, ratio, share_of_small)));
 }
 
+DrawnBed strewn_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px) {
+  Scene scene = some_scene(random);
+  scene.face = fringed(uniform(random, 60, 90), uniform(random, 0, 25));
+  const RadiusOf radius_of = two_sizes(large_radius_px, ratio, share_of_small);
+  return photographed(random, scene, strewn(random, scene, radius_of, 1.03, 150));
+}
+
 const std::vector<BedKind>& drawn_beds() {
   using Random = std::mt19937;
   static const std::vector<BedKind> kinds = {

@@ -30,6 +30,9 @@ const std::vector<BedKind>& drawn_beds();
 // Two sizes: the smaller radius is the larger over `ratio`, and this share of the beads has it.
 DrawnBed bed_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px);
 
+// The same beads, of which few touch.
+DrawnBed strewn_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px);
+
 // Found disks beside the truth. A disk is right when its centre lies within a quarter of the radius of a bead's. Beads
 // that the border cuts count neither as missed nor, when they are found, as wrong.
 struct BedScore {

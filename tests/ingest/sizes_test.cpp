@@ -13,6 +13,9 @@
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/profile/measure_bed.hpp"
+#include "ingest/profile/photographs.hpp"
+#include "statistics/text.hpp"
+#include "tests/ingest/drawn_beds.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -99,6 +102,77 @@ TEST(Sizes, BeadsOfTwoSizesAreFoundEachWithItsRadius) {
            one.find("In the first frame 30 of 60 beads") != std::string::npos;
   }));
   EXPECT_LT(learned.calibration.expected_missed, 0.02);
+}
+
+// Large beads of 13 px, of which the diameter is given first or second.
+struct GivenDiameters {
+  double ratio = 1;
+  bool bright = false, large_first = false;
+};
+constexpr double large_px = 13, large_m = 3e-3;
+
+BedFound measured_with(test::DrawnBed& bed, const GivenDiameters& given) {
+  if (given.bright)
+    for (float& level : bed.frame.pixels) level = 255 - level;
+  const ImageView view{
+      .width = bed.frame.width, .height = bed.frame.height, .pixels = bed.frame.pixels.data(), .type = PixelType::f32};
+  MeasureOptions options;
+  options.bead_diameter_m = given.large_first ? large_m : large_m / given.ratio;
+  options.second_diameter_m = given.large_first ? large_m / given.ratio : large_m;
+  return measure_bed(std::vector<ImageView>{view}, options);
+}
+
+void expect_both_kinds(test::DrawnBed bed, const GivenDiameters& given) {
+  constexpr double least_recall = 0.98, least_told = 0.98, most_wrong = 0.02;
+  const BedFound found = measured_with(bed, given);
+  const Measurement& measured = found.measurement;
+  const std::string about = formatted("ratio %g, bright %d, the large ones first: %d. %s", given.ratio, given.bright,
+                                      given.large_first, found.message.c_str());
+  ASSERT_TRUE(found.ok() && measured.second_finder) << about;
+  double told = 0;
+  std::vector<FoundDisk> disks;
+  for (const MeasuredDisk& disk : measured.disks) {
+    disks.emplace_back();
+    disks.back().x_px = disk.x_px, disks.back().y_px = disk.y_px, disks.back().radius_px = disk.radius_px;
+    for (const test::DrawnBead& bead : bed.beads)
+      if (bead.whole && std::hypot(disk.x_px - bead.x, disk.y_px - bead.y) < 0.25 * bead.radius)
+        told += (disk.species == 1) == (given.large_first == (bead.radius > 0.99 * large_px));
+  }
+  const test::BedScore score = test::score_of(disks, bed.beads);
+  EXPECT_GE(score.hits, least_recall * score.beads) << about;
+  EXPECT_GE(told, least_told * score.hits) << about;
+  EXPECT_LE(score.wrong(), most_wrong * score.beads) << about;
+  const FinderCalibration &first = measured.finder, &second = *measured.second_finder;
+  const FinderCalibration &large = given.large_first ? first : second, &small = given.large_first ? second : first;
+  EXPECT_NEAR(large.radius_px, large_px, 2.5 * large.radius_std_error_px) << about;
+  EXPECT_NEAR(small.radius_px, large_px / given.ratio, 2.5 * small.radius_std_error_px) << about;
+  EXPECT_LT(first.radius_std_error_px, 0.025 * first.radius_px) << about;
+}
+
+// The first look sees one of the two kinds, which may be either.
+TEST(Sizes, BeadsOfTwoGivenDiametersAreFoundAndToldApart) {
+  std::mt19937 random(1);
+  expect_both_kinds(test::bed_of_two_sizes(random, 1.4, 0.5, large_px), {.ratio = 1.4});
+}
+
+TEST(Sizes, BeadsOfTwoGivenDiametersAreFoundAtEveryRatio) {
+  unsigned seed = 101;
+  for (const double ratio : {1.25, 1.6, 2.0})
+    for (const bool bright : {false, true})
+      for (const bool large_first : {false, true}) {
+        std::mt19937 random(seed++);
+        expect_both_kinds(test::bed_of_two_sizes(random, ratio, 0.5, large_px), {ratio, bright, large_first});
+        expect_both_kinds(test::strewn_of_two_sizes(random, ratio, 0.5, large_px), {ratio, bright, large_first});
+      }
+}
+
+// All beads are large ones, and a second diameter is given all the same.
+TEST(Sizes, ASecondDiameterThatNoBeadHasIsNotFound) {
+  for (const bool large_first : {true, false}) {
+    std::mt19937 random(3);
+    test::DrawnBed bed = test::bed_of_two_sizes(random, 1.4, 0, large_px);
+    EXPECT_FALSE(measured_with(bed, {.ratio = 1.4, .large_first = large_first}).measurement.second_finder);
+  }
 }
 
 TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {

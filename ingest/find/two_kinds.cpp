@@ -1,0 +1,320 @@
+#include "ingest/find/two_kinds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/candidates.hpp"
+#include "ingest/find/joint_fit.hpp"
+#include "ingest/find/learned_beads.hpp"
+#include "ingest/find/nearby.hpp"
+#include "statistics/text.hpp"
+
+namespace shakebed::ingest {
+
+namespace {
+
+// Shares of the sum of two radii, and score in the map: ideal disks are laid no nearer to one another, the best first.
+constexpr double least_laid_distance = 0.85, least_laid_score = 0.5;
+constexpr double radius_step = 1.025;  // of one radius tried to the next
+// Beyond the rim of a bead of the other kind its blurred edge is unseen, too [edge widths; px while only laid].
+constexpr double margin_edges = 2, laid_margin_px = 1.5;
+constexpr int rounds = 2;       // of learning
+constexpr double nearly = 0.1;  // of the radius expected: what is learned is that kind
+constexpr double same_ratio = 0.04;
+constexpr std::size_t fewest = 5;    // beads of either kind in the last frame
+constexpr double like_a_bead = 0.5;  // contrast units
+constexpr double most_unexplained = 0.1, most_undecided = 0.05;
+// A disk is decided when the other kind leaves more than its own by this share of the squares in which the kinds
+// differ.
+constexpr double clearly_decided = 0.25;
+
+struct Place {
+  double x = 0, y = 0, radius = 0;
+};
+using Places = std::vector<Place>;
+
+Places places_of(const FindResult& found) {
+  Places places;
+  for (const FoundDisk& disk : found.disks) places.push_back({disk.x_px, disk.y_px, disk.radius_px});
+  return places;
+}
+
+double margin_of(const FinderCalibration& large, const FinderCalibration& small) {
+  return margin_edges * std::max(large.edge_width_px, small.edge_width_px);
+}
+
+// visit(pixel) for the pixels of a frame nearer to a place than `reach`.
+template <class Visit>
+void for_pixels_around(const GrayFrame& frame, const Place& place, double reach, const Visit& visit) {
+  const int top = std::max(0, static_cast<int>(std::ceil(place.y - reach)));
+  const int bottom = std::min(frame.height - 1, static_cast<int>(std::floor(place.y + reach)));
+  for (int row = top; row <= bottom; ++row) {
+    const double half = std::sqrt(std::max(0.0, reach * reach - (row - place.y) * (row - place.y)));
+    const int left = std::max(0, static_cast<int>(std::ceil(place.x - half)));
+    const int right = std::min(frame.width - 1, static_cast<int>(std::floor(place.x + half)));
+    for (int column = left; column <= right; ++column)
+      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(column),
+            column - place.x, row - place.y);
+  }
+}
+
+GrayFrame without(GrayFrame frame, const Places& places, double margin_px) {
+  for (const Place& place : places)
+    for_pixels_around(frame, place, place.radius + margin_px,
+                      [&](std::size_t pixel, double, double) { frame.pixels[pixel] = unseen_level; });
+  return frame;
+}
+
+// Ideal disks of both radii where the flattened frame looks like them.
+struct Laid {
+  Places large, small;
+};
+Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
+  struct Candidate {
+    Place place;
+    double score = 0;
+  };
+  std::vector<Candidate> candidates;
+  const double noise = noise_of(flat);
+  for (const double radius : {large_px, small_px})
+    for (const DiskCandidate& one : candidates_in(flat, radius, noise, least_laid_score))
+      candidates.push_back({{one.x, one.y, radius}, one.score});
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& one, const Candidate& other) { return one.score > other.score; });
+  const Nearby near(candidates.size(), 2 * large_px * least_laid_distance,
+                    [&](std::size_t i) { return std::pair(candidates[i].place.x, candidates[i].place.y); });
+  std::vector<char> dropped(candidates.size(), 0);
+  Laid laid;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (dropped[i]) continue;
+    const Place& one = candidates[i].place;
+    (one.radius == large_px ? laid.large : laid.small).push_back(one);
+    near.any_near(one.x, one.y, [&](std::size_t k) {
+      const Place& other = candidates[k].place;
+      if (k > i && std::hypot(other.x - one.x, other.y - one.y) < least_laid_distance * (one.radius + other.radius))
+        dropped[k] = 1;
+      return false;
+    });
+  }
+  return laid;
+}
+
+// Mean square of what these disks leave of a flattened frame.
+double left_by(const GrayFrame& flat, const Laid& laid) {
+  std::vector<float> model(flat.pixels.size(), 0.0F);
+  for (const Places* places : {&laid.large, &laid.small})
+    for (const Place& place : *places)
+      for_pixels_around(flat, place, place.radius, [&](std::size_t pixel, double, double) { model[pixel] = 1; });
+  double squares = 0, count = 0;
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    if (unseen(flat.pixels[k])) continue;
+    const double gap = static_cast<double>(std::clamp(flat.pixels[k], -0.6F, 1.6F) - model[k]);
+    squares += gap * gap;
+    ++count;
+  }
+  return squares / std::max(1.0, count);
+}
+
+// The kinds are learned in turns.
+class KindsLearner {
+ public:
+  KindsLearner(const std::vector<const GrayFrame*>& frames, const KindsAsked& asked, const FindOptions& options)
+      : asked_(asked), find_(options) {
+    find_.polarity = asked.polarity;
+    find_.seen.reset();
+    find_.hold_radius = find_.learn_rim = false;
+    for (const GrayFrame* frame : frames) frames_.push_back(without_walls(*frame, asked.polarity, asked.from_px));
+  }
+
+  LearnedKinds learn() {
+    lay();
+    CalibrationResult large, small;
+    for (int round = 0; round < rounds; ++round) {
+      large = learned(large_px_, smalls_);
+      if (!large.found) return refused("large", large);
+      larges_ = found_with(large.calibration, smalls_);
+      small = learned(large.calibration.rim_radius_px / asked_.ratio, larges_);
+      if (!small.found) return refused("small", small);
+      smalls_ = found_with(small.calibration, larges_);
+      margin_px_ = margin_of(large.calibration, small.calibration);
+      large_px_ = large.calibration.rim_radius_px;
+    }
+    tell_radius(large);
+    tell_radius(small);
+    const double ratio = large.calibration.radius_px / small.calibration.radius_px;
+    if (std::abs(ratio / asked_.ratio - 1) > same_ratio)
+      return {{}, formatted("the radii found are as %.3g to 1", ratio)};
+    return {TwoKinds{std::move(large.calibration), std::move(small.calibration)}, {}};
+  }
+
+ private:
+  // Where the beads are, and their radius.
+  void lay() {
+    std::vector<GrayFrame> flats;
+    for (const GrayFrame& frame : frames_)
+      flats.push_back(flatten(frame, estimate_light(frame, asked_.from_px, asked_.polarity)));
+    double least = HUGE_VAL;
+    for (double radius = asked_.from_px; radius < asked_.to_px * radius_step; radius *= radius_step) {
+      const double left = left_by(flats.back(), lay_disks(flats.back(), radius, radius / asked_.ratio));
+      if (left >= least) continue;
+      least = left;
+      large_px_ = radius;
+    }
+    for (const GrayFrame& flat : flats) smalls_.push_back(lay_disks(flat, large_px_, large_px_ / asked_.ratio).small);
+  }
+
+  [[nodiscard]] std::vector<GrayFrame> frames_without(const std::vector<Places>& others) const {
+    std::vector<GrayFrame> rest;
+    for (std::size_t k = 0; k < frames_.size(); ++k) rest.push_back(without(frames_[k], others[k], margin_px_));
+    return rest;
+  }
+
+  CalibrationResult learned(double radius_px, const std::vector<Places>& others) {
+    const std::vector<GrayFrame> rest = frames_without(others);
+    std::vector<const GrayFrame*> pointers;
+    for (const GrayFrame& frame : rest) pointers.push_back(&frame);
+    find_.radius_px = radius_px;
+    CalibrationResult result = learn_finder(pointers, find_);
+    if (result.found && std::abs(result.calibration.rim_radius_px / radius_px - 1) > nearly) {
+      result.found = false;
+      result.why_not = formatted("the beads found instead have a radius of %.3g px instead of %.3g px",
+                                 result.calibration.rim_radius_px * find_.recorded_px, radius_px * find_.recorded_px);
+    }
+    return result;
+  }
+
+  [[nodiscard]] std::vector<Places> found_with(const FinderCalibration& finder,
+                                               const std::vector<Places>& others) const {
+    std::vector<Places> places;
+    for (const GrayFrame& frame : frames_without(others)) places.push_back(places_of(find_disks(frame, finder, find_)));
+    return places;
+  }
+
+  static LearnedKinds refused(const char* which, const CalibrationResult& result) {
+    return {{}, formatted("of the %s ones: %s", which, result.why_not.c_str())};
+  }
+
+  const KindsAsked asked_;
+  FindOptions find_;
+  std::vector<GrayFrame> frames_;
+  double large_px_ = 0, margin_px_ = laid_margin_px;
+  std::vector<Places> larges_, smalls_;  // of each frame
+};
+
+// Both kinds in one frame.
+class KindsFinder {
+ public:
+  KindsFinder(const GrayFrame& frame, const TwoKinds& kinds, const FindOptions& options)
+      : kinds_(kinds),
+        options_(options),
+        open_(without_walls(frame, kinds.large.polarity, kinds.large.rim_radius_px)),
+        large_(kinds.large.profile, kinds.large.rim_radius_px, kinds.large.edge_width_px, 0),
+        small_(kinds.small.profile, kinds.small.rim_radius_px, kinds.small.edge_width_px, 0),
+        margin_px_(margin_of(kinds.large, kinds.small)) {}
+
+  KindsFound find() {
+    const GrayFrame flat = flatten(open_, kinds_.large.light);
+    Places smalls = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px).small;
+    double margin = laid_margin_px;
+    std::size_t undecided = 0;
+    for (int round = 0; round < rounds; ++round) {
+      found_.large = find_disks(without(open_, smalls, margin), kinds_.large, options_);
+      margin = margin_px_;
+      found_.small = find_disks(without(open_, places_of(found_.large), margin), kinds_.small, options_);
+      undecided = drop_undecided();
+      if (undecided == 0) break;
+      smalls = places_of(found_.small);
+    }
+    const double all = static_cast<double>(found_.large.disks.size() + found_.small.disks.size() + undecided);
+    found_.undecided = static_cast<double>(undecided) / std::max(1.0, all);
+    found_.large.rejected += undecided;
+    found_.unexplained = unexplained();
+    return std::move(found_);
+  }
+
+ private:
+  // Takes out disks whose surroundings the other kind describes nearly as well.
+  std::size_t drop_undecided() {
+    std::vector<Place> all = places_of(found_.large);
+    const std::size_t larges = all.size();
+    for (const Place& place : places_of(found_.small)) all.push_back(place);
+    const GrayFrame flats[] = {flatten(open_, kinds_.large.light, found_.large.light),
+                               flatten(open_, kinds_.small.light, found_.small.light)};
+    const double reach = kinds_.large.rim_radius_px + 1;
+    const Nearby near(all.size(), reach + kinds_.large.rim_radius_px + margin_px_,
+                      [&](std::size_t i) { return std::pair(all[i].x, all[i].y); });
+    std::vector<char> drop(all.size(), 0);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const GrayFrame& flat = flats[i < larges ? 0 : 1];
+      Places others;
+      near.any_near(all[i].x, all[i].y, [&](std::size_t k) {
+        if (k != i) others.push_back(all[k]);
+        return false;
+      });
+      double as_large = 0, as_small = 0, apart = 0;
+      for_pixels_around(flat, all[i], reach, [&](std::size_t pixel, double dx, double dy) {
+        if (unseen(flat.pixels[pixel])) return;
+        for (const Place& other : others) {
+          const double x = all[i].x + dx - other.x, y = all[i].y + dy - other.y, far = other.radius + margin_px_;
+          if (x * x + y * y < far * far) return;
+        }
+        const double level = static_cast<double>(flat.pixels[pixel]), squared = dx * dx + dy * dy;
+        as_large += std::pow(level - large_.at(squared), 2);
+        as_small += std::pow(level - small_.at(squared), 2);
+        apart += std::pow(large_.at(squared) - small_.at(squared), 2);
+      });
+      drop[i] = (i < larges ? as_small - as_large : as_large - as_small) <= clearly_decided * apart;
+    }
+    std::size_t at = 0, dropped = 0;
+    for (std::vector<FoundDisk>* disks : {&found_.large.disks, &found_.small.disks})
+      dropped += std::erase_if(*disks, [&](const FoundDisk&) { return drop[at++] != 0; });
+    return dropped;
+  }
+
+  [[nodiscard]] double unexplained() const {
+    GrayFrame flat = flatten(open_, kinds_.large.light, found_.large.light);
+    const auto like_beads = [&] {
+      return static_cast<double>(std::count_if(flat.pixels.begin(), flat.pixels.end(), [](float level) {
+        return !unseen(level) && level > static_cast<float>(like_a_bead);
+      }));
+    };
+    const double all = like_beads();
+    for (const FindResult* found : {&found_.large, &found_.small})
+      flat = without(std::move(flat), places_of(*found), margin_px_);
+    return like_beads() / std::max(1.0, all);
+  }
+
+  const TwoKinds& kinds_;
+  const FindOptions& options_;
+  const GrayFrame open_;
+  const ProfileTable large_, small_;
+  const double margin_px_;
+  KindsFound found_;
+};
+
+}  // namespace
+
+LearnedKinds learn_two_kinds(const std::vector<const GrayFrame*>& frames, const KindsAsked& asked,
+                             const FindOptions& options) {
+  LearnedKinds learned = KindsLearner(frames, asked, options).learn();
+  if (!learned.kinds) return learned;
+  const KindsFound found = find_two_kinds(*frames.back(), *learned.kinds, options);
+  const std::size_t fewer = std::min(found.large.disks.size(), found.small.disks.size());
+  if (fewer < fewest)
+    learned.why_not = formatted("only %zu beads of one kind are seen", fewer);
+  else if (found.undecided > most_undecided)
+    learned.why_not = formatted("the kind of %.0f %% of the beads cannot be determined", 100 * found.undecided);
+  else if (found.unexplained > most_unexplained)
+    learned.why_not =
+        formatted("beads of both kinds explain only %.0f %% of what looks like beads", 100 * (1 - found.unexplained));
+  if (!learned.why_not.empty()) learned.kinds.reset();
+  return learned;
+}
+
+KindsFound find_two_kinds(const GrayFrame& frame, const TwoKinds& kinds, const FindOptions& options) {
+  return KindsFinder(frame, kinds, options).find();
+}
+
+}  // namespace shakebed::ingest
