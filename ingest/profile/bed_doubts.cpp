@@ -70,7 +70,7 @@ Contacts contacts_of(const std::vector<FrameFindings>& frames, double radius_px)
 BedEnds ends_of_bed(const std::vector<FrameFindings>& frames, double radius_px) {
   std::vector<double> centres;
   for (const FrameFindings& frame : frames)
-    for (const FoundDisk& disk : frame.disks) centres.push_back(disk.x_px);
+    frame.for_each_disk([&](const FoundDisk& disk) { centres.push_back(disk.x_px); });
   BedEnds bed;
   if (centres.size() < fewest_of_bed) return bed;
   std::sort(centres.begin(), centres.end());

@@ -83,11 +83,13 @@ class GeometryFinder {
     std::vector<double> leftmost, rightmost;
     for (const FrameFindings& frame : frames_) {
       double low = 1e9, high = -1e9;
-      for (const FoundDisk& disk : frame.disks) {
-        low = std::min(low, disk.x_px - refined_.radius_px);
-        high = std::max(high, disk.x_px + refined_.radius_px);
-      }
-      if (frame.disks.empty()) continue;
+      const auto reach_to = [&](const FoundDisk& disk, double radius) {
+        low = std::min(low, disk.x_px - radius);
+        high = std::max(high, disk.x_px + radius);
+      };
+      for (const FoundDisk& disk : frame.disks) reach_to(disk, refined_.radius_px);
+      for (const FoundDisk& disk : frame.second) reach_to(disk, disk.radius_px);
+      if (low > high) continue;
       leftmost.push_back(low);
       rightmost.push_back(high);
     }

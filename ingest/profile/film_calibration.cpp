@@ -220,14 +220,16 @@ class FilmLearner {
   // What was seen first may be of either kind, or of both.
   bool learn_both_kinds() {
     MeasureOptions& options = film_.options;
-    if (!options.second_diameter_m || !find_.seen) return false;
+    if (!options.second_diameter_m) return false;
     const double ratio = *options.second_diameter_m / options.bead_diameter_m;
     if (ratio == 1) return false;
     const bool first_is_large = ratio < 1;
+    const BeadsSeen seen =
+        find_.seen.value_or(BeadsSeen{calibrated_.calibration.polarity, calibrated_.calibration.rim_radius_px});
     KindsAsked asked;
     asked.ratio = first_is_large ? 1 / ratio : ratio;
-    asked.polarity = find_.seen->polarity;
-    const double smallest = find_.radius_px ? *find_.radius_px * (first_is_large ? 1 : ratio) : find_.seen->radius_px;
+    asked.polarity = seen.polarity;
+    const double smallest = find_.radius_px ? *find_.radius_px * (first_is_large ? 1 : ratio) : seen.radius_px;
     asked.from_px = smallest / (1 + radius_off);
     asked.to_px = smallest * (find_.radius_px ? 1 : asked.ratio) * (1 + radius_off);
     LearnedKinds learned = learn_two_kinds(pointers_to(straight_), asked, find_);
@@ -263,8 +265,7 @@ class FilmLearner {
     const FinderCalibration& first = calibrated_.calibration;
     if (find_.seen) {
       film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
-      if (!film_.second)
-        film_.warnings.emplace_back("No beads of the second diameter were found: no rims of that radius are seen.");
+      if (!film_.second) warn_of_no_second("no rims of that radius are seen.");
       return;
     }
     const double expected = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
@@ -277,12 +278,15 @@ class FilmLearner {
     if (is_second(result, expected))
       film_.second = std::move(result.calibration);
     else
-      film_.warnings.push_back("No beads of the second diameter were found: " +
-                               (result.found
-                                    ? "the beads found instead have a radius of " +
-                                          std::to_string(result.calibration.radius_px * find_.recorded_px) +
-                                          " px instead of " + std::to_string(expected * find_.recorded_px) + " px."
-                                    : result.why_not + "."));
+      warn_of_no_second(result.found ? "the beads found instead have a radius of " +
+                                           std::to_string(result.calibration.radius_px * find_.recorded_px) +
+                                           " px instead of " + std::to_string(expected * find_.recorded_px) + " px."
+                                     : result.why_not + ".");
+  }
+
+  void warn_of_no_second(const std::string& why) {
+    film_.warnings.push_back("No beads of the second diameter were found: " + why +
+                             (kinds_why_not_.empty() ? "" : " Both kinds together: " + kinds_why_not_ + "."));
   }
 
   static bool is_second(const CalibrationResult& one, double expected) {

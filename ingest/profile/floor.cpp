@@ -61,12 +61,12 @@ FloorPoints lowest_points(const std::vector<FrameFindings>& frames, double diame
   std::vector<std::vector<std::pair<double, double>>> lowest(columns);  // (bottom, x) per frame
   for (const FrameFindings& frame : frames) {
     std::vector<std::pair<double, double>> best(columns, {-1, 0});
-    for (const FoundDisk& disk : frame.disks) {
+    frame.for_each_disk([&](const FoundDisk& disk) {
       const double bottom = disk.y_px + disk.radius_px;
       const auto column = std::min(
           columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
       if (bottom > best[column].first) best[column] = {bottom, disk.x_px};
-    }
+    });
     for (std::size_t c = 0; c < columns; ++c)
       if (best[c].first > 0) lowest[c].push_back(best[c]);
   }
@@ -103,11 +103,11 @@ Line find_floor(const std::vector<FrameFindings>& frames, double diameter_px, in
 LowestBottoms lowest_bottoms(const FrameFindings& frame, double slope, double diameter_px, int width) {
   const std::size_t columns = std::max<std::size_t>(1, static_cast<std::size_t>(width / (1.5 * diameter_px)));
   LowestBottoms bottoms{frame.report.index, std::vector<double>(columns, -1e9)};
-  for (const FoundDisk& disk : frame.disks) {
+  frame.for_each_disk([&](const FoundDisk& disk) {
     const auto column = std::min(
         columns - 1, static_cast<std::size_t>(std::max(0.0, disk.x_px) / width * static_cast<double>(columns)));
     bottoms.y[column] = std::max(bottoms.y[column], disk.y_px + disk.radius_px - slope * disk.x_px);
-  }
+  });
   std::erase_if(bottoms.y, [](double y) { return y < -1e8; });
   return bottoms;
 }

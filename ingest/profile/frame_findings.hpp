@@ -13,6 +13,12 @@ struct FrameFindings {
   std::vector<FoundDisk> disks, second;
   FindResult rim;                      // of the first frames: their beads' profile
   std::vector<float> coverage_of_row;  // covered px of each row
+  // visit(disk) for those of both kinds.
+  template <class Visit>
+  void for_each_disk(const Visit& visit) const {
+    for (const std::vector<FoundDisk>* kind : {&disks, &second})
+      for (const FoundDisk& disk : *kind) visit(disk);
+  }
 };
 
 // Every frame on its own: what a frame gives depends on nothing but the film's calibration.
