@@ -19,15 +19,6 @@ GrayFrame map_frame(const GrayFrame& flat, double radius, double noise) {
   return smoothed(reduced(flat, factor));
 }
 
-// Those in an unseen part are none.
-std::vector<DiskCandidate> seen_ones(const GrayFrame& flat, std::vector<DiskCandidate> candidates) {
-  std::erase_if(candidates, [&](const DiskCandidate& candidate) {
-    const int column = static_cast<int>(std::lround(candidate.x)), row = static_cast<int>(std::lround(candidate.y));
-    return column >= 0 && row >= 0 && column < flat.width && row < flat.height && unseen(flat.at(column, row));
-  });
-  return candidates;
-}
-
 // A bead that hardly differs from the background over much of its area, of glass say, is nothing like an ideal disk.
 bool hollow(const BeadProfile& profile, double radius) {
   constexpr double well_filled = 0.5;
@@ -54,6 +45,14 @@ std::vector<float> residual_sizes(const JointFit& fit) {
 }
 
 }  // namespace
+
+std::vector<DiskCandidate> seen_ones(const GrayFrame& flat, std::vector<DiskCandidate> candidates) {
+  std::erase_if(candidates, [&](const DiskCandidate& candidate) {
+    const int column = static_cast<int>(std::lround(candidate.x)), row = static_cast<int>(std::lround(candidate.y));
+    return column >= 0 && row >= 0 && column < flat.width && row < flat.height && unseen(flat.at(column, row));
+  });
+  return candidates;
+}
 
 double noise_of(const GrayFrame& flat) {
   std::vector<float> sizes;

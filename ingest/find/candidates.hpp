@@ -18,6 +18,9 @@ constexpr double strong_blur = 0.14;
 // What a place in the map must score to be tried: a strongly blurred bead in a crystal scores 0.7.
 constexpr double least_candidate_score = 0.35;
 
+// Those of the places that are not in an unseen part of the frame.
+std::vector<DiskCandidate> seen_ones(const GrayFrame& flat, std::vector<DiskCandidate> candidates);
+
 // Noise of a flattened frame from its second differences along rows, of which edges and beads are a minority.
 double noise_of(const GrayFrame& flat);
 

@@ -48,7 +48,11 @@ class FrameFinder {
         fit_(flat_) {}
 
   FindResult find() {
-    disks_ = disks_at(candidates_by({calibration_.profile, radius_, edge_}, flat_, noise_, least_candidate_score));
+    return find_from(candidates_by({calibration_.profile, radius_, edge_}, flat_, noise_, least_candidate_score));
+  }
+
+  FindResult find_from(std::vector<DiskCandidate> places) {
+    disks_ = disks_at(seen_ones(flat_, std::move(places)));
     if (disks_.empty()) {
       result_.why_nothing = "no place in the frame looks like a bead of radius " +
                             std::to_string(radius_ * calibration_.recorded_px) + " px";
@@ -309,6 +313,11 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
     return nothing;
   }
   return FrameFinder(frame, calibration, options).find();
+}
+
+FindResult find_disks_from(const std::vector<DiskCandidate>& places, const GrayFrame& frame,
+                           const FinderCalibration& calibration, const FindOptions& options) {
+  return FrameFinder(frame, calibration, options).find_from(places);
 }
 
 FindResult find_disks(const GrayFrame& frame, const FindOptions& options, FinderCalibration* calibration_found) {

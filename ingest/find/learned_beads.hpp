@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "ingest/find/disk_map.hpp"
 #include "ingest/find/find_disks.hpp"
 #include "ingest/find/joint_fit.hpp"
 
@@ -47,6 +48,10 @@ double knot_for(double radius, double edge);
 // The standard error of a radius that follows from the rims of `beads` beads under noise `spread` (contrast units),
 // with `doubt` about the shading.
 double radius_error(const FinderCalibration& calibration, double spread, double beads, double doubt);
+
+// find_disks() that begins with beads at these places, those that are seen, in place of a search.
+FindResult find_disks_from(const std::vector<DiskCandidate>& places, const GrayFrame& frame,
+                           const FinderCalibration& calibration, const FindOptions& options);
 
 // The frame with floor, walls and lid unseen, before beads of about this radius are known.
 GrayFrame without_walls(const GrayFrame& frame, Polarity polarity, double radius_px);

@@ -23,7 +23,7 @@ constexpr double radius_step = 1.025, nearly = 0.1;
 // Beyond the rim of a bead of the other kind its blurred edge is unseen, too [edge widths; px while only laid]. With
 // 1 px at an edge of 1.3 px, small beads between large ones came out 0.6 % too large; so 0.1 %.
 constexpr double margin_edges = 2, laid_margin_px = 1.5;
-constexpr int rounds = 2;            // of learning, and of finding where a disk was undecided
+constexpr int rounds = 2;            // of learning, and of finding where disks were undecided
 constexpr double same_ratio = 0.04;  // of the radii found and of the diameters
 constexpr std::size_t fewest = 5;    // beads of either kind in the last frame
 // A disk is decided when the other kind leaves more than its own by this share of the squares in which they differ.
@@ -102,6 +102,15 @@ Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
   return laid;
 }
 
+// The beads of one kind in a frame without the other, from where they are thought to be. A search would take what is
+// left of several beads between unseen ones for one bead.
+FindResult find_from(const Places& start, const GrayFrame& rest, const FinderCalibration& finder,
+                     const FindOptions& options) {
+  std::vector<DiskCandidate> places;
+  for (const Place& place : start) places.push_back({place.x, place.y, 1});
+  return find_disks_from(places, rest, finder, options);
+}
+
 // Mean square of what these disks leave of a flattened frame.
 double left_by(const GrayFrame& flat, const Laid& laid) {
   std::vector<float> model(flat.pixels.size(), 0.0F);
@@ -135,10 +144,10 @@ class KindsLearner {
     for (int round = 0; round < rounds; ++round) {
       large = learned(large_px_, smalls_);
       if (!large.found) return refused("large", large);
-      larges_ = found_with(large.calibration, smalls_);
+      larges_ = found_from(larges_, large.calibration, smalls_);
       small = learned(large.calibration.rim_radius_px / asked_.ratio, larges_);
       if (!small.found) return refused("small", small);
-      smalls_ = found_with(small.calibration, larges_);
+      smalls_ = found_from(smalls_, small.calibration, larges_);
       margin_px_ = margin_of(large.calibration, small.calibration);
       large_px_ = large.calibration.rim_radius_px;
     }
@@ -163,7 +172,11 @@ class KindsLearner {
       least = left;
       large_px_ = radius;
     }
-    for (const GrayFrame& flat : flats) smalls_.push_back(lay_disks(flat, large_px_, large_px_ / asked_.ratio).small);
+    for (const GrayFrame& flat : flats) {
+      Laid laid = lay_disks(flat, large_px_, large_px_ / asked_.ratio);
+      larges_.push_back(std::move(laid.large));
+      smalls_.push_back(std::move(laid.small));
+    }
   }
 
   [[nodiscard]] std::vector<GrayFrame> frames_without(const std::vector<Places>& others) const {
@@ -186,10 +199,12 @@ class KindsLearner {
     return result;
   }
 
-  [[nodiscard]] std::vector<Places> found_with(const FinderCalibration& finder,
+  [[nodiscard]] std::vector<Places> found_from(const std::vector<Places>& start, const FinderCalibration& finder,
                                                const std::vector<Places>& others) const {
+    const std::vector<GrayFrame> rest = frames_without(others);
     std::vector<Places> places;
-    for (const GrayFrame& frame : frames_without(others)) places.push_back(places_of(find_disks(frame, finder, find_)));
+    for (std::size_t k = 0; k < rest.size(); ++k)
+      places.push_back(places_of(find_from(start[k], rest[k], finder, find_)));
     return places;
   }
 
@@ -217,13 +232,14 @@ class KindsFinder {
 
   KindsFound find() {
     const GrayFrame flat = flatten(open_, kinds_.large.light);
-    Places smalls = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px).small;
+    const Laid laid = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px);
+    Places smalls = laid.small;
     double margin = laid_margin_px;
     std::size_t undecided = 0;
     for (int round = 0; round < rounds; ++round) {
-      found_.large = find_disks(without(open_, smalls, margin), kinds_.large, options_);
+      found_.large = find_from(laid.large, without(open_, smalls, margin), kinds_.large, options_);
       margin = margin_px_;
-      found_.small = find_disks(without(open_, places_of(found_.large), margin), kinds_.small, options_);
+      found_.small = find_from(laid.small, without(open_, places_of(found_.large), margin), kinds_.small, options_);
       undecided = drop_undecided();
       if (undecided == 0) break;
       smalls = places_of(found_.small);
