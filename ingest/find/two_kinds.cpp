@@ -127,6 +127,18 @@ double left_by(const GrayFrame& flat, const Laid& laid) {
   return squares / std::max(1.0, count);
 }
 
+// One camera recorded both kinds: what tone curve and blur add to the radius of the rims is the same, and the kind that
+// shows it better decides.
+void share_camera(FinderCalibration& large, FinderCalibration& small) {
+  const bool by_large = large.radius_std_error_px < small.radius_std_error_px;
+  const FinderCalibration& sure = by_large ? large : small;
+  FinderCalibration& other = by_large ? small : large;
+  other.radius_px = other.rim_radius_px + sure.radius_px - sure.rim_radius_px;
+  other.radius_std_error_px = sure.radius_std_error_px;
+  other.tone_exponent = sure.tone_exponent;
+  other.radius_of_all_rims = false;
+}
+
 // The kinds are learned in turns.
 class KindsLearner {
  public:
@@ -153,6 +165,7 @@ class KindsLearner {
     }
     tell_radius(large);
     tell_radius(small);
+    share_camera(large.calibration, small.calibration);
     const double ratio = large.calibration.radius_px / small.calibration.radius_px;
     if (std::abs(ratio / asked_.ratio - 1) > same_ratio)
       return {{}, formatted("the radii found are as %.3g to 1", ratio)};

@@ -76,8 +76,8 @@ class FilmLearner {
 
   FilmCalibration learn() {
     learn_from_first_frames();
-    learn_lens();
-    if (!learn_both_kinds()) {
+    if (!learn_both_kinds()) {  // else no lens is looked for: rims of two sizes would mislead it
+      learn_lens();
       tell_radius(calibrated_);
       if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
       calibrated_.beads.reset();
