@@ -19,25 +19,25 @@ namespace {
 // Places in the map are good to a tenth of a radius.
 constexpr double least_laid_distance = 0.85, least_laid_score = 0.5;
 // From one radius tried to the next: learning finds a radius that is off by 10 %.
-constexpr double radius_step = 1.025, nearly = 0.1;
+constexpr double radius_step = 1.025, same_kind = 0.1;
 // Beyond the rim of a bead of the other kind its blurred edge is unseen, too [edge widths; px while only laid]. With
 // 1 px at an edge of 1.3 px, small beads between large ones came out 0.6 % too large; so 0.1 %.
 constexpr double margin_edges = 2, laid_margin_px = 1.5;
-constexpr int rounds = 2;            // of learning, and of finding where disks were undecided
-constexpr double same_ratio = 0.04;  // of the radii found and of the diameters
-constexpr std::size_t fewest = 5;    // beads of either kind in the last frame
+constexpr int looks_at_kinds = 2;            // of learning, and of finding where disks were undecided
+constexpr double same_ratio = 0.04;          // of the radii found and of the diameters
+constexpr std::size_t fewest_of_a_kind = 5;  // beads of either kind in the last frame
 // A disk is decided when the other kind leaves more than its own by this share of the squares in which they differ.
 constexpr double clearly_decided = 0.25;
 constexpr double like_a_bead = 0.5;  // contrast units
-constexpr double most_unexplained = 0.1, most_undecided = 0.05;
+constexpr double most_left_unexplained = 0.1, most_undecided = 0.05;
 
-struct Place {
+struct KnownPlace {
   double x = 0, y = 0, radius = 0;
 };
-using Places = std::vector<Place>;
+using KnownPlaces = std::vector<KnownPlace>;
 
-Places places_of(const FindResult& found) {
-  Places places;
+KnownPlaces places_of(const FindResult& found) {
+  KnownPlaces places;
   for (const FoundDisk& disk : found.disks) places.push_back({disk.x_px, disk.y_px, disk.radius_px});
   return places;
 }
@@ -48,7 +48,7 @@ double margin_of(const FinderCalibration& large, const FinderCalibration& small)
 
 // visit(pixel) for the pixels of a frame nearer to a place than `reach`.
 template <class Visit>
-void for_pixels_around(const GrayFrame& frame, const Place& place, double reach, const Visit& visit) {
+void for_pixels_around(const GrayFrame& frame, const KnownPlace& place, double reach, const Visit& visit) {
   const int top = std::max(0, static_cast<int>(std::ceil(place.y - reach)));
   const int bottom = std::min(frame.height - 1, static_cast<int>(std::floor(place.y + reach)));
   for (int row = top; row <= bottom; ++row) {
@@ -61,8 +61,8 @@ void for_pixels_around(const GrayFrame& frame, const Place& place, double reach,
   }
 }
 
-GrayFrame without(GrayFrame frame, const Places& places, double margin_px) {
-  for (const Place& place : places)
+GrayFrame without_beads(GrayFrame frame, const KnownPlaces& places, double margin_px) {
+  for (const KnownPlace& place : places)
     for_pixels_around(frame, place, place.radius + margin_px,
                       [&](std::size_t pixel, double, double) { frame.pixels[pixel] = unseen_level; });
   return frame;
@@ -70,11 +70,11 @@ GrayFrame without(GrayFrame frame, const Places& places, double margin_px) {
 
 // Ideal disks of both radii where the flattened frame looks like them.
 struct Laid {
-  Places large, small;
+  KnownPlaces large, small;
 };
 Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
   struct Candidate {
-    Place place;
+    KnownPlace place;
     double score = 0;
   };
   std::vector<Candidate> candidates;
@@ -90,10 +90,10 @@ Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
   Laid laid;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (dropped[i]) continue;
-    const Place& one = candidates[i].place;
+    const KnownPlace& one = candidates[i].place;
     (one.radius == large_px ? laid.large : laid.small).push_back(one);
     near.any_near(one.x, one.y, [&](std::size_t k) {
-      const Place& other = candidates[k].place;
+      const KnownPlace& other = candidates[k].place;
       if (k > i && std::hypot(other.x - one.x, other.y - one.y) < least_laid_distance * (one.radius + other.radius))
         dropped[k] = 1;
       return false;
@@ -104,18 +104,18 @@ Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
 
 // The beads of one kind in a frame without the other, from where they are thought to be. A search would take what is
 // left of several beads between unseen ones for one bead.
-FindResult find_from(const Places& start, const GrayFrame& rest, const FinderCalibration& finder,
+FindResult find_from(const KnownPlaces& start, const GrayFrame& rest, const FinderCalibration& finder,
                      const FindOptions& options) {
   std::vector<DiskCandidate> places;
-  for (const Place& place : start) places.push_back({place.x, place.y, 1});
+  for (const KnownPlace& place : start) places.push_back({place.x, place.y, 1});
   return find_disks_from(places, rest, finder, options);
 }
 
 // Mean square of what these disks leave of a flattened frame.
-double left_by(const GrayFrame& flat, const Laid& laid) {
+double squares_left(const GrayFrame& flat, const Laid& laid) {
   std::vector<float> model(flat.pixels.size(), 0.0F);
-  for (const Places* places : {&laid.large, &laid.small})
-    for (const Place& place : *places)
+  for (const KnownPlaces* places : {&laid.large, &laid.small})
+    for (const KnownPlace& place : *places)
       for_pixels_around(flat, place, place.radius, [&](std::size_t pixel, double, double) { model[pixel] = 1; });
   double squares = 0, count = 0;
   for (std::size_t k = 0; k < model.size(); ++k) {
@@ -153,7 +153,7 @@ class KindsLearner {
   LearnedKinds learn() {
     lay();
     CalibrationResult large, small;
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < looks_at_kinds; ++round) {
       large = learned(large_px_, smalls_);
       if (!large.found) return refused("large", large);
       larges_ = found_from(larges_, large.calibration, smalls_);
@@ -180,7 +180,7 @@ class KindsLearner {
       flats.push_back(flatten(frame, estimate_light(frame, asked_.from_px, asked_.polarity)));
     double least = HUGE_VAL;
     for (double radius = asked_.from_px; radius < asked_.to_px * radius_step; radius *= radius_step) {
-      const double left = left_by(flats.back(), lay_disks(flats.back(), radius, radius / asked_.ratio));
+      const double left = squares_left(flats.back(), lay_disks(flats.back(), radius, radius / asked_.ratio));
       if (left >= least) continue;
       least = left;
       large_px_ = radius;
@@ -192,19 +192,19 @@ class KindsLearner {
     }
   }
 
-  [[nodiscard]] std::vector<GrayFrame> frames_without(const std::vector<Places>& others) const {
+  [[nodiscard]] std::vector<GrayFrame> frames_without(const std::vector<KnownPlaces>& others) const {
     std::vector<GrayFrame> rest;
-    for (std::size_t k = 0; k < frames_.size(); ++k) rest.push_back(without(frames_[k], others[k], margin_px_));
+    for (std::size_t k = 0; k < frames_.size(); ++k) rest.push_back(without_beads(frames_[k], others[k], margin_px_));
     return rest;
   }
 
-  CalibrationResult learned(double radius_px, const std::vector<Places>& others) {
+  CalibrationResult learned(double radius_px, const std::vector<KnownPlaces>& others) {
     const std::vector<GrayFrame> rest = frames_without(others);
     std::vector<const GrayFrame*> pointers;
     for (const GrayFrame& frame : rest) pointers.push_back(&frame);
     find_.radius_px = radius_px;
     CalibrationResult result = learn_finder(pointers, find_);
-    if (result.found && std::abs(result.calibration.rim_radius_px / radius_px - 1) > nearly) {
+    if (result.found && std::abs(result.calibration.rim_radius_px / radius_px - 1) > same_kind) {
       result.found = false;
       result.why_not = formatted("the beads found instead have a radius of %.3g px instead of %.3g px",
                                  result.calibration.rim_radius_px * find_.recorded_px, radius_px * find_.recorded_px);
@@ -212,10 +212,11 @@ class KindsLearner {
     return result;
   }
 
-  [[nodiscard]] std::vector<Places> found_from(const std::vector<Places>& start, const FinderCalibration& finder,
-                                               const std::vector<Places>& others) const {
+  [[nodiscard]] std::vector<KnownPlaces> found_from(const std::vector<KnownPlaces>& start,
+                                                    const FinderCalibration& finder,
+                                                    const std::vector<KnownPlaces>& others) const {
     const std::vector<GrayFrame> rest = frames_without(others);
-    std::vector<Places> places;
+    std::vector<KnownPlaces> places;
     for (std::size_t k = 0; k < rest.size(); ++k)
       places.push_back(places_of(find_from(start[k], rest[k], finder, find_)));
     return places;
@@ -229,7 +230,7 @@ class KindsLearner {
   FindOptions find_;
   std::vector<GrayFrame> frames_;
   double large_px_ = 0, margin_px_ = laid_margin_px;
-  std::vector<Places> larges_, smalls_;  // of each frame
+  std::vector<KnownPlaces> larges_, smalls_;  // of each frame
 };
 
 // Both kinds in one frame.
@@ -246,13 +247,14 @@ class KindsFinder {
   KindsFound find() {
     const GrayFrame flat = flatten(open_, kinds_.large.light);
     const Laid laid = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px);
-    Places smalls = laid.small;
+    KnownPlaces smalls = laid.small;
     double margin = laid_margin_px;
     std::size_t undecided = 0;
-    for (int round = 0; round < rounds; ++round) {
-      found_.large = find_from(laid.large, without(open_, smalls, margin), kinds_.large, options_);
+    for (int round = 0; round < looks_at_kinds; ++round) {
+      found_.large = find_from(laid.large, without_beads(open_, smalls, margin), kinds_.large, options_);
       margin = margin_px_;
-      found_.small = find_from(laid.small, without(open_, places_of(found_.large), margin), kinds_.small, options_);
+      found_.small =
+          find_from(laid.small, without_beads(open_, places_of(found_.large), margin), kinds_.small, options_);
       undecided = drop_undecided();
       if (undecided == 0) break;
       smalls = places_of(found_.small);
@@ -267,9 +269,9 @@ class KindsFinder {
  private:
   // Takes out disks whose surroundings the other kind describes nearly as well.
   std::size_t drop_undecided() {
-    std::vector<Place> all = places_of(found_.large);
+    std::vector<KnownPlace> all = places_of(found_.large);
     const std::size_t larges = all.size();
-    for (const Place& place : places_of(found_.small)) all.push_back(place);
+    for (const KnownPlace& place : places_of(found_.small)) all.push_back(place);
     const GrayFrame flats[] = {flatten(open_, kinds_.large.light, found_.large.light),
                                flatten(open_, kinds_.small.light, found_.small.light)};
     const double reach = kinds_.large.rim_radius_px + 1;
@@ -278,7 +280,7 @@ class KindsFinder {
     std::vector<char> drop(all.size(), 0);
     for (std::size_t i = 0; i < all.size(); ++i) {
       const GrayFrame& flat = flats[i < larges ? 0 : 1];
-      Places others;
+      KnownPlaces others;
       near.any_near(all[i].x, all[i].y, [&](std::size_t k) {
         if (k != i) others.push_back(all[k]);
         return false;
@@ -286,7 +288,7 @@ class KindsFinder {
       double as_large = 0, as_small = 0, apart = 0;
       for_pixels_around(flat, all[i], reach, [&](std::size_t pixel, double dx, double dy) {
         if (unseen(flat.pixels[pixel])) return;
-        for (const Place& other : others) {
+        for (const KnownPlace& other : others) {
           const double x = all[i].x + dx - other.x, y = all[i].y + dy - other.y, far = other.radius + margin_px_;
           if (x * x + y * y < far * far) return;
         }
@@ -312,7 +314,7 @@ class KindsFinder {
     };
     const double all = like_beads();
     for (const FindResult* found : {&found_.large, &found_.small})
-      flat = without(std::move(flat), places_of(*found), margin_px_);
+      flat = without_beads(std::move(flat), places_of(*found), margin_px_);
     return like_beads() / std::max(1.0, all);
   }
 
@@ -332,11 +334,11 @@ LearnedKinds learn_two_kinds(const std::vector<const GrayFrame*>& frames, const 
   if (!learned.kinds) return learned;
   const KindsFound found = find_two_kinds(*frames.back(), *learned.kinds, options);
   const std::size_t fewer = std::min(found.large.disks.size(), found.small.disks.size());
-  if (fewer < fewest)
+  if (fewer < fewest_of_a_kind)
     learned.why_not = formatted("only %zu beads of one kind are seen", fewer);
   else if (found.undecided > most_undecided)
     learned.why_not = formatted("the kind of %.0f %% of the beads cannot be determined", 100 * found.undecided);
-  else if (found.unexplained > most_unexplained)
+  else if (found.unexplained > most_left_unexplained)
     learned.why_not =
         formatted("beads of both kinds explain only %.0f %% of what looks like beads", 100 * (1 - found.unexplained));
   if (!learned.why_not.empty()) learned.kinds.reset();
