@@ -360,6 +360,9 @@ class Extraction {
            "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
            "of the first kind (--radius)."});
     }
+    if (found.second_finder)
+      all.push_back({"The bed holds beads of two diameters, and the theory is one of equal disks.",
+                     "Use the profiles and numbers of both kinds."});
     for (const ingest::Objection& one : all)
       result["objections"].push_back(Json{{"why", one.why}, {"advice", one.advice}});
   }
