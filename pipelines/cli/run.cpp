@@ -18,6 +18,7 @@ void add(Program& program, const CommandText& text, bool dry) {
   });
   command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
   add_preset(command, given->run);
+  if (!dry) add_budget(command, given->run);
   add_run_options(command, given->run);
 }
 
@@ -27,7 +28,8 @@ void add_run(Program& program) {
   add(program,
       {"run", "run a pipeline",
        "  shakebed run bed.json\n  shakebed run bed.json --set /stages/bed/floor/amplitude=\"3 mm\" --out o\n"
-       "  shakebed run bed.json --dry-run\n  shakebed run sweep.json --jobs 8 --shard 2/4"},
+       "  shakebed run bed.json --budget \"1 %\"\n  shakebed run bed.json --dry-run\n  shakebed run sweep.json --jobs "
+       "8 --shard 2/4"},
       false);
 }
 

@@ -7,6 +7,7 @@
 
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/report/report.hpp"
+#include "pipelines/runner/budget.hpp"
 #include "pipelines/runner/manifest.hpp"
 #include "pipelines/runner/run.hpp"
 #include "pipelines/runner/sweep.hpp"
@@ -100,9 +101,11 @@ Answer dry_run(const Plan& plan, const RunOptions& options) {
 Answer real_run(const Plan& plan, const RunOptions& options, Console& console) {
   install_interrupt_handler();
   const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
+  const bool ended = outcome.code == exit_ok || outcome.code == exit_check_failed;
+  if (ended && !options.budget.is_null())
+    for (const std::string& line : reached_by_budget(plan, options.budget, outcome)) console.message(line);
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
-  const bool ended = outcome.code == exit_ok || outcome.code == exit_check_failed;
   return {outcome.code,
           terminal_text(plan, outcome) + fmt::format("{} {}\nreport:  {}\n", ended ? "results:" : "results so far:",
                                                      outcome.out.string(), (outcome.out / "report.html").string()),
@@ -117,6 +120,15 @@ Answer sweep(const Call& call, const RunArguments& run, const Plan& plan, const 
 }
 
 }  // namespace
+
+void add_budget(CLI::App& command, RunArguments& run) {
+  command
+      .add_option(
+          "--budget", run.budget,
+          "error of T_x, \"1 %\", or wall time, \"30 s\". A short pilot then chooses measured time, number and contact "
+          "duration of the simulated beds. With --dry-run only the pilot runs")
+      ->type_name("ERROR|TIME");
+}
 
 void add_preset(CLI::App& command, RunArguments& run) {
   command.add_option("--preset", run.preset, "preset of the recipe, such as \"quick\"; applied before --set")
@@ -158,12 +170,24 @@ void show_warnings(const Plan& plan) {
     std::fputs(fmt::format("warning: {}\n", to_string(warning.problem)).c_str(), stderr);
 }
 
-int run_plan_command(const Call& call, const RunArguments& run, const Plan& plan, Json* result) {
-  const RunOptions options = run_options(call, run, plan);
+int run_plan_command(const Call& call, const RunArguments& run, const Plan& given, Json* result) {
+  RunOptions options = run_options(call, run, given);
   Console console(level_of(call));
-  if (!plan.sweep && run.gather)
+  if (!given.sweep && run.gather)
     throw UsageError("--gather: this recipe has no \"sweep\", so there is nothing to gather");
-  if (!plan.sweep && run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");
+  if (!given.sweep && run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");
+  std::optional<BudgetedPlan> budgeted;
+  if (run.budget) {
+    const Budget budget = parse_budget(*run.budget);
+    if (given.sweep)
+      throw UsageError(
+          "--budget: this recipe has a \"sweep\", whose points need different times. Choose at one point, "
+          "with --set and without the sweep, and write the times into the recipe");
+    install_interrupt_handler();
+    budgeted = choose_by_budget(given, budget, options, console);
+    options.budget = budgeted->record;
+  }
+  const Plan& plan = budgeted ? budgeted->plan : given;
   Answer answer = plan.sweep    ? sweep(call, run, plan, options, console)
                   : run.dry_run ? dry_run(plan, options)
                                 : real_run(plan, options, console);

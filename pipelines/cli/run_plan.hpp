@@ -15,13 +15,15 @@ namespace shakebed::pipelines {
 
 struct RunArguments {
   std::vector<std::string> settings;
-  std::optional<std::string> preset, only, from, until, shard, data;
+  std::optional<std::string> preset, only, from, until, shard, data, budget;
   bool force = false, dry_run = false, gather = false;
   int jobs = 0;
 };
 // --preset; and --set, --only, --force ...
 void add_preset(CLI::App& command, RunArguments& run);
 void add_run_options(CLI::App& command, RunArguments& run);
+// --budget, for commands whose recipes hold beds.
+void add_budget(CLI::App& command, RunArguments& run);
 
 Console::Level level_of(const Call& call);
 // --out, by default results/NAME.

@@ -105,6 +105,7 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
   out["warnings"] = outcome.warnings;
   out["failed_checks"] = outcome.failed_checks;
   out["recipe"] = recipe_json(plan, options);
+  if (!options.budget.is_null()) out["budget"] = options.budget;
   out["document"] = plan.document.to_json();
   out["stages"] = Json::array();
   for (std::size_t i = 0; i < outcome.stages.size(); ++i)

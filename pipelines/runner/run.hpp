@@ -21,6 +21,7 @@ struct RunOptions {
   int jobs = 0;                                  // threads; 0: as many as there are processors
   std::vector<std::string> command_line;         // for the manifest
   std::vector<Setting> settings;                 // for the manifest: what --set changed
+  Json budget;                                   // for the manifest: what --budget chose and expects; null: none
   // Called from any thread with a stage's id and the share of its time that has passed.
   std::function<void(const std::string& id, double fraction)> on_progress{};
 };

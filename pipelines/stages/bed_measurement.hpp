@@ -61,6 +61,7 @@ class BedMeasurement {
   void write_densities(RunContext& context, const sim::Profile& lab, const sim::Profile& floor,
                        const std::vector<double>& covariance, std::size_t independent_blocks) const;
   std::uint64_t above_profile() const { return above_; }
+  const sim::Counters& counters_at_begin() const { return counters_; }  // of the measurement
 
   template <class Archive>
   void visit(Archive& archive) {

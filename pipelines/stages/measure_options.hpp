@@ -14,7 +14,8 @@ class BedMeasureOptions {
   sim::MeasureOptions reduced(double time_unit) const;
   // Names the options that cannot be, each at its place.
   void check(Fields& fields, double floor_period, double time_unit) const;
-  double settle() const { return settle_; }  // [s]
+  double settle() const { return settle_; }      // [s]
+  double duration() const { return duration_; }  // [s]
   bool keeps_frames() const { return measure_.frames > 0; }
 
  private:

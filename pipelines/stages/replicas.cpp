@@ -42,16 +42,9 @@ double root_mean_square(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-// 95 % of Student's distribution for the mean of n values, in those of a normal one.
-double few_values_factor(std::size_t n) {
-  const boost::math::students_t_distribution<double, InDouble> student(static_cast<double>(n - 1));
-  return boost::math::quantile(student, two_sided_95) /
-         boost::math::quantile(boost::math::normal_distribution<double, InDouble>(), two_sided_95);
-}
-
 // Of the mean of the replicas.
 double error_of_mean(double spread, double within, std::size_t n) {
-  const double between = few_values_factor(n) * spread;
+  const double between = few_beds_factor(n) * spread;
   return std::max(between, std::isfinite(within) ? within : 0) / std::sqrt(static_cast<double>(n));
 }
 
@@ -106,6 +99,13 @@ bool differ(double spread, double within, std::size_t n) {
 }
 
 }  // namespace
+
+double few_beds_factor(std::size_t n) {
+  if (n < 2) return 1;
+  const boost::math::students_t_distribution<double, InDouble> student(static_cast<double>(n - 1));
+  return boost::math::quantile(student, two_sided_95) /
+         boost::math::quantile(boost::math::normal_distribution<double, InDouble>(), two_sided_95);
+}
 
 // A quantity that some beds do not have has no mean; one without an error that is the same in all of them stays as it
 // is.

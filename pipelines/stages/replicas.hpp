@@ -25,6 +25,9 @@ enum class ReplicaStarts {
 // state. It is scaled by Student's t for the few replicas: 1.96 of it hold the mean of further beds in 95 % of all
 // cases.
 Json joined_results(const std::vector<Json>& results);
+// Error of the mean of n beds over their spread over sqrt(n): the 95 % of Student's distribution over those of a normal
+// one. 1 for a single bed.
+double few_beds_factor(std::size_t n);
 // Whether the bed, or all beds, hardly moved: what they differ by then says nothing.
 bool lies_still(const Json& joined);
 // The first of T_x, T_z and the rise by which n beds differ by more than each of them states.

@@ -122,13 +122,13 @@ void RunMeasurement::finish_frames(const fs::path& destination) {
 }
 
 void CpuClock::prepare(sim::Simulation&) {
-  before_ = 0;
+  before_ = settled_ = 0;
   start_ = thread_cpu_seconds();
 }
 double CpuClock::seconds() const { return before_ + thread_cpu_seconds() - start_; }
 void CpuClock::save(sim::ArchiveWriter& out) {
   double so_far = seconds();
-  out(so_far);
+  out(so_far, settled_);
 }
 
 // ------------------------------------------------------------------------------------------------ the run
@@ -160,6 +160,7 @@ void BedRun::operator()() {
   }
   require_precision(*simulation_, sound_, checkpoint_);
   cpu_seconds_ = clock_.seconds();
+  measuring_cpu_seconds_ = clock_.measuring_seconds();
 }
 
 sim::RunResult BedRun::measured(const std::vector<std::uint8_t>& kept) {

@@ -74,13 +74,15 @@ class RunMeasurement final : public sim::RunObserver {
 class CpuClock final : public sim::RunObserver {
  public:
   double seconds() const;
+  double measuring_seconds() const { return seconds() - settled_; }  // since the first look
   void prepare(sim::Simulation&) override;
+  void begin(sim::Simulation&) override { settled_ = seconds(); }
   void look(sim::Simulation&, const sim::Snapshot&, std::uint64_t, std::uint32_t) override {}
   void save(sim::ArchiveWriter& out) override;
-  void load(sim::ArchiveReader& in) override { in(before_); }
+  void load(sim::ArchiveReader& in) override { in(before_, settled_); }
 
  private:
-  double before_ = 0, start_ = 0;
+  double before_ = 0, start_ = 0, settled_ = 0;
 };
 
 class BedRun {
@@ -93,6 +95,10 @@ class BedRun {
 
   const BedMeasurement& measurement() const { return measurement_.bed(); }
   double cpu_seconds() const { return cpu_seconds_; }
+  double measuring_cpu_seconds() const { return measuring_cpu_seconds_; }
+  std::uint64_t measuring_events() const {
+    return simulation_->counters().events() - measurement().counters_at_begin().events();
+  }
   sim::Counters counters() const { return simulation_->counters(); }
   Json results(const SceneOptions& bed) const;  // of observables.json
   void write();                                 // everything but observables.json and bed.json
@@ -116,7 +122,7 @@ class BedRun {
   RunMeasurement measurement_;
   CpuClock clock_;
   std::unique_ptr<sim::Simulation> simulation_;
-  double cpu_seconds_ = 0;
+  double cpu_seconds_ = 0, measuring_cpu_seconds_ = 0;
 
   // The latest sound state, in memory, and when it was made and is to be made anew.
   std::vector<std::uint8_t> sound_;

@@ -159,6 +159,7 @@ struct Chain {
 using ChainReader = std::function<Chain(const JsonNode& recipe)>;
 
 // Options, and the work. One object for each stage of a recipe.
+class Scalable;  // effort.hpp
 class Stage {
  public:
   virtual ~Stage() = default;
@@ -175,6 +176,8 @@ class Stage {
   // About how many seconds of a processor run() takes, by a short trial of its work, 0.1 s or less; 0: little, or
   // unknown. The trial leaves no trace: it is for the time left alone. May throw what run() throws.
   virtual double trial_seconds() const { return 0; }
+  // How it is measured for longer or shorter, for --budget; nullptr where it cannot be. Called after describe.
+  virtual const Scalable* scalable() const { return nullptr; }
   // The bed that the stage makes or measures, from its options; empty if it only reads one. Later stages need not
   // state it again, and must not contradict it.
   virtual std::optional<BedDescription> bed() const { return std::nullopt; }

@@ -238,6 +238,7 @@ def run(
     *,
     set: Optional[Mapping[str, Any]] = None,
     preset: Optional[str] = None,
+    budget: Optional[str] = None,
     jobs: Optional[int] = None,
     force: bool = False,
     progress: Progress = None,
@@ -254,6 +255,9 @@ def run(
         Changes of the recipe: {"/stages/bed/seed": 7}.
     preset : str, optional
         Preset of the recipe, applied before `set`.
+    budget : str, optional
+        Error of T_x, "1 %", or wall time, "30 s". A short pilot then chooses how long each simulated bed is measured, the
+        number of beds and the contact duration.
     jobs : int, optional
         Number of threads. The results do not depend on it.
     force : bool
@@ -284,6 +288,7 @@ def run(
     for setting in settings:
         command += ["--set", setting]
     command += ["--preset", preset] if preset else []
+    command += ["--budget", budget] if budget else []
     command += ["--jobs", str(jobs)] if jobs else []
     command += ["--force"] if force else []
     call, close = reporter(progress, "running")

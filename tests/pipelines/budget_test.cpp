@@ -1,0 +1,283 @@
+// --budget: what is asked, what is chosen from a pilot, and what the program does with it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "pipelines/formats/json.hpp"
+#include "pipelines/runner/budget.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace shakebed::tests {
+namespace {
+
+using namespace pipelines;
+using testing::HasSubstr;
+
+TEST(BudgetText, IsAnErrorInPerCentOrATime) {
+  EXPECT_DOUBLE_EQ(parse_budget("1 %").error, 0.01);
+  EXPECT_DOUBLE_EQ(parse_budget("0.5%").error, 0.005);
+  EXPECT_EQ(parse_budget("1 %").seconds, 0);
+  EXPECT_DOUBLE_EQ(parse_budget("30 s").seconds, 30);
+  EXPECT_DOUBLE_EQ(parse_budget("5 min").seconds, 300);
+  EXPECT_EQ(parse_budget("30 s").error, 0);
+}
+
+std::string refusal(const std::string& text) {
+  try {
+    parse_budget(text);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(BudgetText, ThatIsNoBudgetIsRefusedWithItsReason) {
+  EXPECT_THAT(refusal("0 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("-1 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("nan %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("many %"), HasSubstr("no number"));
+  EXPECT_THAT(refusal("1 2 %"), HasSubstr("no number"));
+  EXPECT_THAT(refusal("3 kg"), HasSubstr("a mass"));
+  EXPECT_THAT(refusal("30"), HasSubstr("no unit"));
+  EXPECT_THAT(refusal("0 s"), HasSubstr("above 0"));
+  EXPECT_THAT(refusal("fast"), HasSubstr("\"1 %\""));
+}
+
+// Eight beds that state 4 % each after a length of 10, and scatter by as much.
+EffortReading eight_beds() {
+  EffortReading pilot;
+  pilot.effort = {10, 8, 0};
+  pilot.settling = 10;
+  pilot.within = pilot.spread = 0.04;
+  pilot.settling_work = {0.8, 8e5};
+  pilot.measuring_work = {1.6, 1.6e6};  // 0.02 s and 20,000 events a unit of length
+  return pilot;
+}
+// It settles for so long that more beds never pay.
+EffortLimits limits() { return {.settling = 1e4, .shortest = 1, .fewest_beds = 4}; }
+
+Budget error_of(double error) { return {.error = error, .text = "as asked"}; }
+
+TEST(EffortForAnError, GrowsAsItsInverseSquare) {
+  const EffortChoice two = choose_effort(eight_beds(), limits(), error_of(0.02), 1),
+                     one = choose_effort(eight_beds(), limits(), error_of(0.01), 1);
+  EXPECT_EQ(one.effort.beds, 4U);
+  EXPECT_NEAR(one.effort.length / two.effort.length, 4, 0.05) << "rounded to three digits";
+}
+
+// 0.04 at a length of 10: by hand, with Student's factor of four beds, 3.182/1.960.
+TEST(EffortForAnError, IsThatOfWhichTheStatedErrorIsAsAsked) {
+  const EffortChoice one = choose_effort(eight_beds(), limits(), error_of(0.01), 1);
+  const double student = 3.182446 / 1.959964;
+  const double length = 10 * std::pow(student * 0.04 / 0.01, 2) / 4;
+  EXPECT_NEAR(one.effort.length, length, 0.006 * length);
+  EXPECT_NEAR(one.stated_error, 0.01, 1e-4);
+  EXPECT_NEAR(one.error, 0.01 / student, 1e-4);
+  EXPECT_TRUE(one.possible);
+}
+
+TEST(EffortForAnError, CostsWhatThePilotsBedsCostForAsLong) {
+  const EffortChoice one = choose_effort(eight_beds(), limits(), error_of(0.01), 1);
+  // Of each bed: 10 settled as the pilot did, the rest of 10,000 and the measurement at the measuring rate.
+  const double cpu_of_bed = 0.1 + (1e4 - 10 + one.effort.length) * 0.02;
+  EXPECT_NEAR(one.work.cpu_seconds, 4 * cpu_of_bed, 1e-6 * cpu_of_bed);
+  EXPECT_NEAR(one.work.events, 4 * (1e5 + (1e4 - 10 + one.effort.length) * 2e4), 1);
+  EXPECT_NEAR(choose_effort(eight_beds(), limits(), error_of(0.01), 3).wall_seconds, 2 * cpu_of_bed, 1e-6 * cpu_of_bed)
+      << "four beds on three threads take two rounds";
+}
+
+TEST(EffortForAnError, TakesMoreBedsWhereSettlingIsCheap) {
+  EffortLimits quick = limits();
+  quick.settling = 10;
+  const EffortChoice one = choose_effort(eight_beds(), quick, error_of(0.01), 1);
+  EXPECT_GT(one.effort.beds, 4U) << "Student's factor falls with each bed";
+  EXPECT_NEAR(one.stated_error, 0.01, 1e-3);
+}
+
+TEST(EffortForAnError, IsOfAnEvenNumberOfBedsWhereEverySecondStartsOtherwise) {
+  EffortReading pilot = eight_beds();
+  pilot.spread = 0.3;
+  EffortLimits even = limits();
+  even.even_beds = true;
+  for (const double error : {0.02, 0.03, 0.04, 0.05})
+    EXPECT_EQ(choose_effort(pilot, even, error_of(error), 1).effort.beds % 2, 0U);
+}
+
+// A scatter of 30 % that does not pass with time leaves 3 % after a hundred beds, however long they are measured.
+TEST(EffortForAnError, TakesManyBedsWhereBedsDiffer) {
+  EffortReading pilot = eight_beds();
+  pilot.spread = 0.3;
+  const EffortChoice choice = choose_effort(pilot, limits(), error_of(0.03), 1);
+  EXPECT_GT(choice.effort.beds, 100U);
+  EXPECT_LT(choice.effort.beds, 200U);
+  EXPECT_LE(choice.error, 0.03);
+  EXPECT_GE(choice.effort.length, 10) << "no shorter than the beds that showed the scatter";
+}
+
+TEST(EffortForAnError, LeavesRoomForTheSystematicPart) {
+  EffortReading pilot = eight_beds();
+  pilot.systematic = 0.006;
+  const EffortChoice choice = choose_effort(pilot, limits(), error_of(0.01), 1);
+  EXPECT_NEAR(choice.stated_error, 0.008, 1e-4) << "0.6 and 0.8 make 1 %";
+  EXPECT_TRUE(choice.possible);
+}
+
+TEST(EffortForAnError, IsNotPossibleBelowTheSystematicPart) {
+  EffortReading pilot = eight_beds();
+  pilot.systematic = 0.02;
+  const EffortChoice choice = choose_effort(pilot, limits(), error_of(0.01), 1);
+  EXPECT_FALSE(choice.possible);
+  EXPECT_TRUE(std::isfinite(choice.effort.length));
+  EXPECT_GT(choice.error, 0.02);
+}
+
+TEST(EffortForATime, FitsIntoIt) {
+  EffortLimits quick = limits();
+  quick.settling = 10;
+  const Budget budget{.seconds = 60, .text = "60 s"};
+  for (const int jobs : {1, 2, 8}) {
+    const EffortChoice choice = choose_effort(eight_beds(), quick, budget, jobs);
+    EXPECT_TRUE(choice.possible);
+    EXPECT_LE(choice.wall_seconds, 60);
+    EXPECT_GT(choice.wall_seconds, 55) << jobs;
+  }
+  EXPECT_LT(choose_effort(eight_beds(), quick, budget, 8).error, choose_effort(eight_beds(), quick, budget, 1).error);
+}
+
+TEST(EffortForATime, IsNotPossibleBelowTheTimeToSettle) {
+  EXPECT_FALSE(choose_effort(eight_beds(), limits(), {.seconds = 60, .text = "60 s"}, 1).possible)
+      << "200 s of settling a bed";
+}
+
+TEST(NextPilot, IsLongerWhereTheChoiceIsMuchLonger) {
+  const EffortReading pilot = eight_beds();
+  const EffortChoice near = choose_effort(pilot, limits(), error_of(0.02), 1),
+                     far = choose_effort(pilot, limits(), error_of(0.001), 1);
+  EXPECT_FALSE(next_pilot(pilot, limits(), near, error_of(0.02)));
+  const auto next = next_pilot(pilot, limits(), far, error_of(0.001));
+  ASSERT_TRUE(next);
+  EXPECT_GT(next->length, far.effort.length / 12);
+  EXPECT_LT(next->length, far.effort.length);
+}
+
+TEST(NextPilot, HasAFinerModelWhereTheSystematicPartIsLarge) {
+  EffortReading pilot = eight_beds();
+  pilot.systematic = 0.01;
+  EffortLimits fine = limits();
+  const EffortChoice choice = choose_effort(pilot, fine, error_of(0.02), 1);
+  EXPECT_FALSE(next_pilot(pilot, fine, choice, error_of(0.02))) << "there is none";
+  fine.most_refinement = 2;
+  const auto next = next_pilot(pilot, fine, choice, error_of(0.02));
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->refinement, 1);
+}
+
+// ------------------------------------------------------------------------------------------------ the program
+
+// A hot, dilute bed: 40 disks, of which a second takes some ms.
+std::string recipe() {
+  return R"({"name": "hot", "stages": [
+    {"stage": "simulate", "id": "bed", "units": "reduced", "disks": {"count": 40, "restitution": 0.95, "contact_duration": 1e-5},
+     "box": {"width": 12.3, "sides": "periodic"},
+     "floor": {"motion": "sinusoidal", "frequency": 0.45, "gamma": 5, "restitution": 0.95},
+     "settle": 20, "measure": 40}]})";
+}
+
+ProgramResult run_hot(const ScratchFolder& folder, const std::vector<std::string>& more) {
+  write_text(folder / "hot.json", recipe());
+  std::vector<std::string> arguments{"run", "hot.json", "--out", "o", "--jobs", "1"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_shakebed(arguments, folder.path());
+}
+
+TEST(BudgetRun, SaysWhatItPicksAndWritesItIntoTheRecipe) {
+  const ScratchFolder folder;
+  const ProgramResult ran = run_hot(folder, {"--budget", "5 %"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("picks \"measure\""));
+  EXPECT_THAT(ran.err, HasSubstr("expects T_x to"));
+  const Json manifest = Json::parse(read_text(folder / "o" / "manifest.json"));
+  const Json& said = manifest["budget"]["stages"][0];
+  const Json resolved = Json::parse(read_text(folder / "o" / "resolved.json"))["stages"][0];
+  EXPECT_EQ(resolved["measure"], said["picked"]["/measure"]);
+  EXPECT_EQ(resolved["replicas"], said["picked"]["/replicas"]);
+  EXPECT_EQ(manifest["document"]["stages"][0]["measure"], said["picked"]["/measure"]);
+  const Json seen = Json::parse(read_text(folder / "o" / "bed" / "observables.json"));
+  EXPECT_NEAR(seen["events"].get<double>() / said["events"].get<double>(), 1, 0.3);
+  EXPECT_LE(said["stated_error"].get<double>(), 0.0501);
+}
+
+TEST(BudgetRun, IsRepeatedByRerunWithoutAPilot) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run_hot(folder, {"--budget", "5 %"}).exit_code, 0);
+  const ProgramResult again = run_shakebed({"rerun", "o", "--out", "again"}, folder.path());
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("identical"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "again" / ".pilot"));
+}
+
+TEST(BudgetRun, PicksTheSameWithTheSameSeed) {
+  const ScratchFolder first, second;
+  ASSERT_EQ(run_hot(first, {"--budget", "5 %", "--dry-run"}).exit_code, 0);
+  ASSERT_EQ(run_hot(second, {"--budget", "5 %", "--dry-run", "--jobs", "2"}).exit_code, 0);
+  const auto seen = [](const ScratchFolder& folder) {
+    return read_text(folder / "o" / ".pilot" / "bed" / "0" / "bed" / "observables.json");
+  };
+  EXPECT_EQ(seen(first), seen(second));
+  EXPECT_FALSE(std::filesystem::exists(first / "o" / "bed")) << "a dry run runs the pilot alone";
+}
+
+TEST(BudgetRun, KeepsToATime) {
+  const ScratchFolder folder;
+  const ProgramResult ran = run_hot(folder, {"--budget", "3 s"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json said = Json::parse(read_text(folder / "o" / "manifest.json"))["budget"]["stages"][0];
+  EXPECT_LE(said["wall_seconds"].get<double>() + said["pilot"]["wall_seconds"].get<double>(), 3);
+}
+
+TEST(BudgetRun, RefusesWhatIsNoBudget) {
+  const ScratchFolder folder;
+  const ProgramResult ran = run_hot(folder, {"--budget", "3 kg"});
+  EXPECT_EQ(ran.exit_code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("--budget: 3 kg is a mass"));
+}
+
+TEST(BudgetRun, RefusesATimeInWhichTheBedCannotSettle) {
+  const ScratchFolder folder;
+  const ProgramResult ran = run_hot(folder, {"--budget", "0.2 s", "--set", "/stages/bed/settle=2e5"});
+  EXPECT_EQ(ran.exit_code, 5) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("Allow more time"));
+}
+
+TEST(BudgetRun, NamesTheRecipeThatHasNothingToScale) {
+  const ScratchFolder folder;
+  write_text(folder / "study.json", R"({"name": "study",
+ "stages": [{"stage": "study", "parameter": {"name": "gamma", "values": [3], "set": ["/stages/bed/floor/gamma"]},
+   "stages": [{"stage": "simulate", "id": "bed", "units": "reduced", "disks": {"count": 10}, "box": {"width": 5},
+               "floor": {"motion": "sinusoidal", "frequency": 0.5, "gamma": 3}, "measure": 10}],
+   "collect": {"T_x": {"at": "/bed/temperature_x"}}}]})");
+  const ProgramResult ran = run_shakebed({"run", "study.json", "--budget", "1 %"}, folder.path());
+  EXPECT_EQ(ran.exit_code, 3) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("study.json:2:12: /stages: --budget: no stage here"));
+}
+
+TEST(BudgetRun, IsNotForSweeps) {
+  const ScratchFolder folder;
+  write_text(folder / "sweep.json", small_recipe(R"({"over": {"/stages/bed/seed": [1, 2]}})"));
+  const ProgramResult ran = run_shakebed({"run", "sweep.json", "--budget", "1 %"}, folder.path());
+  EXPECT_EQ(ran.exit_code, 2) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("sweep"));
+}
+
+TEST(BudgetRun, SaysThatABedLiesStill) {
+  const ScratchFolder folder;
+  const ProgramResult ran = run_hot(folder, {"--budget", "5 %", "--set", "/stages/bed/floor/gamma=0.5"});
+  EXPECT_EQ(ran.exit_code, 5) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("lies still"));
+}
+
+}  // namespace
+}  // namespace shakebed::tests
