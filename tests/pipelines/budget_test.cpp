@@ -4,10 +4,15 @@
 
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/quantity.hpp"
 #include "pipelines/runner/budget.hpp"
+#include "pipelines/stages/effort.hpp"
+#include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace shakebed::tests {
@@ -188,7 +193,7 @@ std::string recipe() {
 
 ProgramResult run_hot(const ScratchFolder& folder, const std::vector<std::string>& more) {
   write_text(folder / "hot.json", recipe());
-  std::vector<std::string> arguments{"run", "hot.json", "--out", "o", "--jobs", "1"};
+  std::vector<std::string> arguments{"run", "hot.json", "--out", "o"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run_shakebed(arguments, folder.path());
 }
@@ -221,7 +226,7 @@ TEST(BudgetRun, IsRepeatedByRerunWithoutAPilot) {
 
 TEST(BudgetRun, PicksTheSameWithTheSameSeed) {
   const ScratchFolder first, second;
-  ASSERT_EQ(run_hot(first, {"--budget", "5 %", "--dry-run"}).exit_code, 0);
+  ASSERT_EQ(run_hot(first, {"--budget", "5 %", "--dry-run", "--jobs", "1"}).exit_code, 0);
   ASSERT_EQ(run_hot(second, {"--budget", "5 %", "--dry-run", "--jobs", "2"}).exit_code, 0);
   const auto seen = [](const ScratchFolder& folder) {
     return read_text(folder / "o" / ".pilot" / "bed" / "0" / "bed" / "observables.json");
@@ -272,11 +277,59 @@ TEST(BudgetRun, IsNotForSweeps) {
   EXPECT_THAT(ran.err, HasSubstr("sweep"));
 }
 
-TEST(BudgetRun, SaysThatABedLiesStill) {
-  const ScratchFolder folder;
-  const ProgramResult ran = run_hot(folder, {"--budget", "5 %", "--set", "/stages/bed/floor/gamma=0.5"});
-  EXPECT_EQ(ran.exit_code, 5) << ran.err;
-  EXPECT_THAT(ran.err, HasSubstr("lies still"));
+// ------------------------------------------------------------------------------------------------ the bed
+
+// 40 disks of 3 mm at 20 Hz: sqrt(D/g) is 17.487 ms.
+std::unique_ptr<Stage> bed_stage(LoneStage& lone) {
+  return lone.read(R"({"disks": {"count": 40, "diameter": "3 mm", "restitution": 0.9, "contact_duration": "1 us"},
+    "gravity": "9.81 m/s^2", "box": {"width": "30 mm"},
+    "floor": {"motion": "sinusoidal", "gamma": 4, "frequency": "20 Hz", "restitution": 0.9},
+    "settle": "9 s", "measure": "2 s"})");
+}
+
+TEST(BudgetOfABed, ChangesItsTimeItsReplicasAndItsContactDuration) {
+  LoneStage lone(*find_stage("simulate"));
+  const std::unique_ptr<Stage> stage = bed_stage(lone);
+  const Scalable& bed = *stage->scalable();
+  EXPECT_EQ(bed.changes({1.5, 6, 0}), (Scalable::Changes{{"/measure", "1.5 s"}, {"/replicas", 6}}));
+  EXPECT_EQ(bed.limits().fewest_beds, 4U);
+  EXPECT_TRUE(bed.limits().even_beds);
+  EXPECT_DOUBLE_EQ(bed.limits().settling, 9);
+  EXPECT_NEAR(bed.limits().shortest, 16 / 20.0, 1e-12) << "periods";
+  EXPECT_NEAR(bed.pilot_length(), 64 / 20.0, 1e-12);
+  // 1 us is 5.7e-5 sqrt(D/g); a tenth of it is allowed, and in place of the hundredth 1e-6.
+  EXPECT_EQ(bed.limits().most_refinement, 2);
+  const auto contact_duration = [&](int refinement) {
+    return parse_quantity(bed.changes({1, 4, refinement}).at(2).second.get<std::string>()).value;
+  };
+  EXPECT_NEAR(contact_duration(1), 1e-7, 1e-12);
+  EXPECT_NEAR(contact_duration(2), 1e-6 * std::sqrt(0.003 / 9.81), 1e-14);
+}
+
+TEST(BudgetOfABed, ReadsErrorsRelativeToTheTemperature) {
+  LoneStage lone(*find_stage("simulate"));
+  const std::unique_ptr<Stage> stage = bed_stage(lone);
+  const Json result{{"temperature_x", {{"value", 0.5}, {"within", 0.01}, {"spread", 0.02}, {"std_error", 0.03}}},
+                    {"temperature_z", {{"value", 1}}},
+                    {"contact_duration_effect", {{"value", 0.004}}},
+                    {"events", 5000}};
+  const Json timings{{"simulation_cpu_seconds", 3.0}, {"measuring_cpu_seconds", 1.0}, {"measuring_events", 2000.0}};
+  const EffortReading reading = stage->scalable()->read({2, 4, 0}, result, timings);
+  EXPECT_DOUBLE_EQ(reading.within, 0.02);
+  EXPECT_DOUBLE_EQ(reading.spread, 0.04);
+  EXPECT_DOUBLE_EQ(reading.systematic, 0.004);
+  EXPECT_DOUBLE_EQ(reading.settling, 9);
+  EXPECT_DOUBLE_EQ(reading.settling_work.cpu_seconds, 2);
+  EXPECT_DOUBLE_EQ(reading.measuring_work.cpu_seconds, 1);
+  EXPECT_DOUBLE_EQ(reading.settling_work.events, 3000);
+  EXPECT_DOUBLE_EQ(stage->scalable()->read({2, 1, 0}, result, timings).within, 0.06) << "of one bed";
+}
+
+TEST(BudgetOfABed, ThatLiesStillIsRefused) {
+  LoneStage lone(*find_stage("simulate"));
+  const std::unique_ptr<Stage> stage = bed_stage(lone);
+  const Json still{{"temperature_x", {{"value", 1e-6}}}, {"temperature_z", {{"value", 1e-6}}}};
+  EXPECT_THROW(stage->scalable()->read({1, 4, 0}, still, Json::object()), StageError);
 }
 
 }  // namespace
