@@ -27,6 +27,7 @@
 #include "sim/engine/random.hpp"
 #include "sim/measure/contact_duration.hpp"
 #include "sim/measure/measure.hpp"
+#include "statistics/rest.hpp"
 #include "statistics/time_left.hpp"
 
 namespace shakebed::pipelines {
@@ -402,14 +403,17 @@ Scalable::Changes Simulate::pilot_changes(const Effort& effort) const {
 }
 
 EffortReading Simulate::read(const Effort& effort, const Json& result, const Json& timings) const {
-  if (lies_still(result))
-    throw StageError("the bed lies still: T_x is 0, and no error can be a part of it. Shake it harder");
   const auto number = [&](const Json& json, const char* pointer) {
     const Json* found = find_pointer(json, pointer);
     return found != nullptr && found->is_number() ? found->get<double>() : 0;
   };
   const bool several = effort.beds > 1;
   const double value = number(result, "/temperature_x/value");
+  if (!(value > temperature_at_rest))
+    throw StageError(
+        fmt::format("T_x is below {:g} m g D: the disks hardly move sideways, and no error can be a part of it. "
+                    "Leave --budget out",
+                    temperature_at_rest));
   EffortReading reading;
   reading.effort = effort;
   reading.settling = measure_.settle() + annealing_time() * bed_.time_unit();

@@ -325,10 +325,10 @@ TEST(BudgetOfABed, ReadsErrorsRelativeToTheTemperature) {
   EXPECT_DOUBLE_EQ(stage->scalable()->read({2, 1, 0}, result, timings).within, 0.06) << "of one bed";
 }
 
-TEST(BudgetOfABed, ThatLiesStillIsRefused) {
+TEST(BudgetOfABed, ThatDoesNotMoveSidewaysIsRefused) {
   LoneStage lone(*find_stage("simulate"));
   const std::unique_ptr<Stage> stage = bed_stage(lone);
-  const Json still{{"temperature_x", {{"value", 1e-6}}}, {"temperature_z", {{"value", 1e-6}}}};
+  const Json still{{"temperature_x", {{"value", 1e-6}}}, {"temperature_z", {{"value", 1}}}};
   EXPECT_THROW(stage->scalable()->read({1, 4, 0}, still, Json::object()), StageError);
 }
 

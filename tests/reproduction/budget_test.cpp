@@ -1,15 +1,17 @@
 // --budget on beds that nobody has seen: 20 for each error asked, drawn at random. The error is that of T_x against an
-// independent run of the same bed: other seeds, four times the measured time in all, twice the settling, and a contact
-// duration of 1e-5 sqrt(D/g). Costs are those of the chosen run alone, beside what was said before it.
+// independent run of the same bed: other seeds, twice the settling, and a contact duration of 1e-5 sqrt(D/g). It is
+// four times as long in all, or as long where the chosen run takes more than 2 s. Beds that are said to take more than
+// 10 s are not run, and are counted. Costs are those of the chosen run alone, beside what was said before it.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <random>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -22,7 +24,8 @@ using namespace shakebed::tests;
 using shakebed::pipelines::Json;
 
 constexpr std::uint64_t seed_of_beds = 20261126;
-constexpr int beds_asked = 20;
+constexpr int beds_asked = 20, least_run = 12;
+constexpr double most_cpu_seconds = 10, cpu_seconds_of_long_reference = 2;
 constexpr double contact_duration_of_reference = 1e-5;
 
 struct Bed {
@@ -74,28 +77,44 @@ struct Judged {
 
 class Budgets : public testing::TestWithParam<int> {};
 
-Judged judge(const Bed& bed, int per_cent, int seed) {
+// "... in 8.6 s of the processor ..."; infinite where it is minutes.
+double said_cpu_seconds(const std::string& text) {
+  std::smatch found;
+  if (!std::regex_search(text, found, std::regex("in ([0-9.]+) (ms|s) of the processor"))) return INFINITY;
+  return std::stod(found[1]) * (found[2] == "ms" ? 1e-3 : 1);
+}
+
+std::optional<Judged> judge(const Bed& bed, int per_cent, int seed) {
   const ScratchFolder folder;
   const double settle = 60 * bed.period();
   write_text(folder / "r.json", recipe_of(bed, seed, settle, 20 * bed.period(), "", ""));
   const std::string budget = fmt::format("{} %", per_cent);
+  const ProgramResult dry =
+      run_shakebed({"run", "r.json", "--jobs", "1", "--out", "o", "--budget", budget, "--dry-run"}, folder.path());
+  EXPECT_EQ(dry.exit_code, 0) << dry.err;
+  if (said_cpu_seconds(dry.err) > most_cpu_seconds) {
+    std::printf("| %d | %.2f | %.3f | %.3f | %.2f | %.3f | not run: %s\n", bed.count, bed.width, bed.restitution,
+                bed.friction, bed.gamma, bed.frequency, dry.err.substr(dry.err.rfind("picks")).c_str());
+    return std::nullopt;
+  }
   const ProgramResult ran =
       run_shakebed({"run", "r.json", "--quiet", "--jobs", "1", "--out", "o", "--budget", budget}, folder.path());
   EXPECT_EQ(ran.exit_code, 0) << ran.err;
-  if (ran.exit_code != 0) return {};
+  if (ran.exit_code != 0) return std::nullopt;
   const Json said = Json::parse(read_text(folder / "o" / "manifest.json"))["budget"]["stages"][0];
   const Json seen = Json::parse(read_text(folder / "o" / "bed" / "observables.json"));
   const Json cost = Json::parse(read_text(folder / "o" / "bed" / "cost.json"));
   const auto beds = said["beds"].get<int>();
   const double length = said["length"].get<double>();
+  const int times = cost["simulation_cpu_seconds"].get<double>() > cpu_seconds_of_long_reference ? 1 : 4;
   const bool many = beds > 16;
-  write_text(folder / "long.json", recipe_of(bed, seed + 500'000, 2 * settle, (many ? 1 : 4) * length,
-                                             fmt::format("\"replicas\": {},", many ? 4 * beds : std::max(beds, 8)),
+  write_text(folder / "long.json", recipe_of(bed, seed + 500'000, 2 * settle, (many ? 1 : times) * length,
+                                             fmt::format("\"replicas\": {},", many ? times * beds : std::max(beds, 8)),
                                              fmt::format(", \"contact_duration\": {}", contact_duration_of_reference)));
   const ProgramResult further =
       run_shakebed({"run", "long.json", "--quiet", "--jobs", "1", "--out", "long"}, folder.path());
   EXPECT_EQ(further.exit_code, 0) << further.err;
-  if (further.exit_code != 0) return {};
+  if (further.exit_code != 0) return std::nullopt;
   const Json truth = Json::parse(read_text(folder / "long" / "bed" / "observables.json"));
   const auto number = [](const Json& json, const char* part) { return json["temperature_x"][part].get<double>(); };
   const double mean = number(truth, "value");
@@ -142,18 +161,21 @@ TEST_P(Budgets, AreKeptOnNewBeds) {
       asked);
   std::vector<Judged> all;
   for (int k = 0; k < beds_asked; ++k) {
-    all.push_back(judge(draw.bed(), asked, 1000 * asked + k));
+    const std::optional<Judged> one = judge(draw.bed(), asked, 1000 * asked + k);
     ASSERT_FALSE(HasFailure());
+    if (one) all.push_back(*one);
   }
+  ASSERT_GE(all.size(), static_cast<std::size_t>(least_run)) << "beds were too dear";
   const std::vector<double> events = sorted(all, &Judged::events), cpu = sorted(all, &Judged::cpu);
   const std::vector<double> pilots = sorted(all, &Judged::pilot_share);
   const double error = rms(all, &Judged::error);
   std::printf(
-      "asked %d %%: rms error %.2f %% (that of the references: %.2f %%), expected %.2f %%, stated %.2f %%; events over "
+      "asked %d %%: %zu of %d beds: rms error %.2f %% (that of the references: %.2f %%), expected %.2f %%, stated %.2f "
+      "%%; events over "
       "said: median %.2f, %.2f to %.2f; CPU: median %.2f, %.2f to %.2f; pilots over run: median %.2f, most %.2f\n",
-      asked, 100 * error, 100 * rms(all, &Judged::reference_error), 100 * rms(all, &Judged::expected),
-      100 * rms(all, &Judged::stated), events[events.size() / 2], events.front(), events.back(), cpu[cpu.size() / 2],
-      cpu.front(), cpu.back(), pilots[pilots.size() / 2], pilots.back());
+      asked, all.size(), beds_asked, 100 * error, 100 * rms(all, &Judged::reference_error),
+      100 * rms(all, &Judged::expected), 100 * rms(all, &Judged::stated), events[events.size() / 2], events.front(),
+      events.back(), cpu[cpu.size() / 2], cpu.front(), cpu.back(), pilots[pilots.size() / 2], pilots.back());
   EXPECT_LE(100 * error, asked);
   EXPECT_GT(events.front(), 1 / 1.5);
   EXPECT_LT(events.back(), 1.5);
