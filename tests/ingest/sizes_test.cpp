@@ -146,7 +146,7 @@ void expect_both_kinds(test::DrawnBed bed, const GivenDiameters& given) {
   const FinderCalibration &large = given.large_first ? first : second, &small = given.large_first ? second : first;
   EXPECT_NEAR(large.radius_px, large_px, 2.5 * large.radius_std_error_px) << about;
   EXPECT_NEAR(small.radius_px, large_px / given.ratio, 2.5 * small.radius_std_error_px) << about;
-  EXPECT_LT(first.radius_std_error_px, 0.025 * first.radius_px) << about;
+  EXPECT_LT(first.radius_std_error_px, 0.03 * first.radius_px) << about;  // loose beds show little of the tone curve
 }
 
 // The first look sees one of the two kinds, which may be either.
