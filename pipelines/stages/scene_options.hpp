@@ -60,7 +60,7 @@ struct PeriodicLidOptions {
 enum class PlateMotion { floor, still };
 struct PlatesOptions {
   double friction = 0;
-  std::optional<double> pressing, interval;
+  std::optional<double> pressing, interval, contact_radius;
   PlateMotion motion = PlateMotion::floor;
 };
 struct BoxOptions {

@@ -47,6 +47,7 @@
 #include "sim/engine/neighbour_lists.hpp"
 #include "sim/engine/overlap.hpp"
 #include "sim/engine/plate_slide.hpp"
+#include "sim/engine/plate_spin.hpp"
 #include "sim/engine/policies.hpp"
 #include "sim/engine/pressed_bed.hpp"
 #include "sim/engine/random.hpp"
@@ -251,12 +252,19 @@ class Engine final : public Simulation {
   struct Rub {
     double flown_x = 0, flown_z = 0, before_x = 0, before_z = 0, after_x = 0, after_z = 0;
   };
+  // The same of the spin, where plates brake it.
+  struct SpinRub {
+    double before = 0, after = 0;
+  };
   [[gnu::cold]] void act_plates();
   [[gnu::cold]] void begin_rub();
+  SpinningSlide slide_on_plate(std::uint32_t i, double vx, double vz, double pull, double duration) const;
   FloorMotion::Motion plate_motion(double later) const;
   void push_from_plate(std::uint32_t i, double vx, double vz, double plate_velocity);
+  void turn_by_plate(std::uint32_t i, double spin);
   bool slides_on(std::uint32_t i, const Motion& motion) const;
   [[gnu::cold]] TwoLanes velocity_with_friction(std::uint32_t i, const Motion& motion) const;
+  [[gnu::cold]] double spin_with_friction(std::uint32_t i, const Motion& motion) const;
 
   // --- rest: engine_rest.hpp
   static constexpr bool rests_apply = Space::falls && Rule::dissipates && !Space::is_cell;
@@ -372,10 +380,11 @@ class Engine final : public Simulation {
   double synchronise_at_ = 1;
   double event_rate_ = 1;
   std::uint64_t events_at_synchronisation_ = 0;
-  double bath_at_ = never;  // next action of the reservoir
-  double rub_at_ = never;   // next action of the plates
-  std::vector<Rub> rubs_;   // empty for smooth plates
-  double checked_at_ = -1;  // for rows that lock, see locked()
+  double bath_at_ = never;          // next action of the reservoir
+  double rub_at_ = never;           // next action of the plates
+  std::vector<Rub> rubs_;           // empty for smooth plates
+  std::vector<SpinRub> spin_rubs_;  // empty unless plates brake the spin
+  double checked_at_ = -1;          // for rows that lock, see locked()
   // Events until that check, and until advance_towards() returns; in process_until() those beyond the next pause, which
   // is after events_to_pause_ - 1 more.
   std::uint64_t events_to_check_ = 1, events_to_return_ = 1, events_to_pause_ = 1;

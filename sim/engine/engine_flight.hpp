@@ -73,6 +73,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   if (plates != nullptr) {
     plates_ = *plates;
     rubs_.resize(count_);
+    if (Rule::spins && plates_.contact_radius > 0) spin_rubs_.resize(count_);
     begin_rub();
   }
   begin_interval();

@@ -9,6 +9,8 @@
 // Between, its velocity is the mean of the interval, which is wrong by half the deceleration times h at most. A disk
 // that meets something in the interval meets it with this error, which has no mean, and is then slowed down for half of
 // h at the end. The plates must not be felt by the loop over events, and are not: like the reservoirs they act between.
+//
+// Where the plates brake the spin, too, it has the mean of the interval between, as the velocity (plate_spin.hpp).
 #pragma once
 
 namespace shakebed::sim {
@@ -35,6 +37,25 @@ void Engine<Space, Rule, Sizes>::push_from_plate(std::uint32_t i, double vx, dou
   disk.vz = vz;
 }
 
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::turn_by_plate(std::uint32_t i, double spin) {
+  const double radius = sizes_.radius(i), inertia = sizes_.mass(i) * radius * radius / inverse_inertia_ratio_;
+  const double lost = 0.5 * inertia * (spins_[i] - spin) * (spins_[i] + spin);
+  dissipated_ += lost;
+  rubbed_ += lost;
+  spins_[i] = spin;
+}
+
+// The velocity is that relative to the plate. Without a patch the spin counts for nothing.
+template <class Space, class Rule, class Sizes>
+SpinningSlide Engine<Space, Rule, Sizes>::slide_on_plate(std::uint32_t i, double vx, double vz, double pull,
+                                                         double duration) const {
+  if (spin_rubs_.empty()) return {slide(vx, vz, pull, plates_.deceleration, duration), 0};
+  const double share = plates_.contact_radius / sizes_.radius(i);
+  return slide_spinning(vx, vz, plates_.contact_radius * spins_[i], share * share * inverse_inertia_ratio_, pull,
+                        plates_.deceleration, duration);
+}
+
 // The flights of the next interval, from records that are those of now_.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_rub() {
@@ -44,13 +65,17 @@ void Engine<Space, Rule, Sizes>::begin_rub() {
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Disk& disk = disks_[i];
     const double vx = disk.vx, vz = disk.vz;
-    const Slide way = slide(vx, vz - plate.velocity, pull, plates_.deceleration, h);
+    const auto [way, rim] = slide_on_plate(i, vx, vz - plate.velocity, pull, h);
     const double flown_x = way.x / h, flown_z = (way.z + (later.position - plate.position)) / h;
     Rub& rub = rubs_[i];
     rub.flown_x = flown_x, rub.flown_z = flown_z - hop;
     rub.before_x = flown_x - vx, rub.before_z = flown_z + hop - vz;
     rub.after_x = way.vx - flown_x, rub.after_z = way.vz + later.velocity - (flown_z - hop);
     push_from_plate(i, flown_x, flown_z + hop, plate.velocity);
+    if (spin_rubs_.empty()) continue;
+    const double spin = rim / plates_.contact_radius, mean = 0.5 * (spins_[i] + spin);
+    spin_rubs_[i] = {mean - spins_[i], spin - mean};
+    turn_by_plate(i, mean);
   }
   rub_at_ = now_ + h;
 }
@@ -72,6 +97,13 @@ TwoLanes Engine<Space, Rule, Sizes>::velocity_with_friction(std::uint32_t i, con
   return motion.velocity + TwoLanes{past * rub.after_x - left * rub.before_x, past * rub.after_z - left * rub.before_z};
 }
 
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::spin_with_friction(std::uint32_t i, const Motion& motion) const {
+  if (!slides_on(i, motion)) return spins_[i];
+  const double left = (rub_at_ - now_) / plates_.interval;
+  return spins_[i] + (1 - left) * spin_rubs_[i].after - left * spin_rubs_[i].before;
+}
+
 // The end of an interval, and the next one.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::act_plates() {
@@ -82,9 +114,11 @@ void Engine<Space, Rule, Sizes>::act_plates() {
     const Rub& rub = rubs_[i];
     if (slides_on(i, motion_at(disk, now_))) {
       push_from_plate(i, disk.vx + rub.after_x, disk.vz + rub.after_z, plate);
+      if (!spin_rubs_.empty()) turn_by_plate(i, spins_[i] + spin_rubs_[i].after);
     } else {
-      const Slide end = slide(disk.vx, disk.vz - plate, 0, plates_.deceleration, plates_.interval / 2);
+      const auto [end, rim] = slide_on_plate(i, disk.vx, disk.vz - plate, 0, plates_.interval / 2);
       push_from_plate(i, end.vx, end.vz + plate, plate);
+      if (!spin_rubs_.empty()) turn_by_plate(i, rim / plates_.contact_radius);
     }
   }
   begin_rub();

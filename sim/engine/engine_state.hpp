@@ -57,7 +57,11 @@ void Engine<Space, Rule, Sizes>::snapshot(Snapshot& out) const {
       out.vx[label] = velocity[0];
       out.vz[label] = velocity[1];
     }
-    if constexpr (Rule::spins) out.spin[label] = spin_now(i);
+    if constexpr (Rule::spins) {
+      out.spin[label] = spin_now(i);
+      if (!spin_rubs_.empty()) [[unlikely]]
+        out.spin[label] = spin_with_friction(i, motion);
+    }
     if constexpr (rests_apply) {
       if (!is_at_rest(i)) continue;
       out.vz[label] = out.floor_velocity;  // the mean over its hop

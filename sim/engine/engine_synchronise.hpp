@@ -76,6 +76,7 @@ void Engine<Space, Rule, Sizes>::renumber() {
   }
   if constexpr (rests_apply) permute(rest_height_);
   if (!rubs_.empty()) permute(rubs_);
+  if (!spin_rubs_.empty()) permute(spin_rubs_);
   if constexpr (!Sizes::equal) {
     permute(sizes_.radii);
     permute(sizes_.masses);
@@ -180,6 +181,7 @@ void Engine<Space, Rule, Sizes>::visit_state(Self& self, Visit visit) {
     visit(self.rub_at_);
     visit(self.rubbed_);
     for (auto& rub : self.rubs_) visit(rub);
+    for (auto& rub : self.spin_rubs_) visit(rub);
   }
   if constexpr (!Sizes::equal) {
     for (std::uint32_t i = 0; i < self.count_; ++i) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 
@@ -156,6 +157,11 @@ class Check {
             "the friction with the plates slows a disk down by more than 0, not by " + number(plates->deceleration));
     require(plates->interval > 0 && std::isfinite(plates->interval), "/box/plates/interval",
             "the interval at which friction with the plates acts is positive, not " + number(plates->interval));
+    double smallest = std::numeric_limits<double>::infinity();
+    for (const Species& s : scene_.disks.species) smallest = std::min(smallest, s.diameter / 2);
+    require(plates->contact_radius >= 0 && plates->contact_radius <= smallest, "/box/plates/contact_radius",
+            "the contact of a disk with the plate has a radius from 0 to that of the smallest disk, " +
+                number(smallest) + " D, not " + number(plates->contact_radius));
     if (const auto* sine = std::get_if<SinusoidalFloor>(&scene_.box.floor)) interval_of(*plates, 1 / sine->frequency);
     if (const auto* table = std::get_if<TabulatedFloor>(&scene_.box.floor)) interval_of(*plates, table->period);
   }

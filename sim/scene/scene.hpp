@@ -60,11 +60,13 @@ using Top = std::variant<OpenTop, Lid, PeriodicTop>;
 // The plates between which the disks are.
 struct SmoothPlates {};
 // A disk that moves against a plate is slowed down by `deceleration`, the friction coefficient times the acceleration
-// that presses it on the plate. One that rests on it stays there while nothing pulls more.
+// that presses it on the plate. One that rests on it stays there while nothing pulls more. Where its contact with the
+// plate has a radius, the plate also brakes its spin: the contact is pressed evenly [FarkasEtAl2003].
 struct RubbingPlates {
   double deceleration = 0;
-  double interval = 0.01;    // at which the friction acts
-  bool follow_floor = true;  // the plates move with the floor; else they stand still
+  double interval = 0.01;     // at which the friction acts
+  bool follow_floor = true;   // the plates move with the floor; else they stand still
+  double contact_radius = 0;  // of each disk with the plate; 0: the spin is not braked
 };
 using Plates = std::variant<SmoothPlates, RubbingPlates>;
 

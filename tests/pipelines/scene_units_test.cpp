@@ -415,6 +415,9 @@ TEST(PlatesInSi, AreInReducedUnits) {
   EXPECT_NEAR(pressed.deceleration, 0.2 * 3 / in_plane, 1e-15);
   EXPECT_NEAR(pressed.interval, 50e-6 / time, 1e-15);
   EXPECT_FALSE(pressed.follow_floor);
+  EXPECT_EQ(pressed.contact_radius, 0);
+  EXPECT_NEAR(plates(R"("tilt": "30 deg", "plates": { "friction": 0.2, "contact_radius": "100 um" })").contact_radius,
+              0.025, 1e-15);
   const sim::RubbingPlates fast = plates(R"("plates": { "friction": 1, "pressing": "3 m/s^2" })",
                                          R"(, "floor": { "motion": "sinusoidal", "frequency": "500 Hz", "gamma": 3 })");
   EXPECT_NEAR(fast.interval, 2e-3 / 0.02 / 50, 1e-12) << "a 50th of the period";
@@ -445,6 +448,10 @@ TEST(PlatesInSi, NeedSomethingThatPresses) {
               testing::ElementsAre(testing::HasSubstr("/box/plates: nothing presses")));
   EXPECT_TRUE(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2 })").empty());
   EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "pressing": "3 m/s^2" })"), testing::SizeIs(1));
+  EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2, "contact_radius": "2.1 mm" })"),
+              testing::ElementsAre(testing::HasSubstr("/box/plates/contact_radius: the contact of a disk")));
+  EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2, "contact_radius": "0 mm" })"),
+              testing::SizeIs(1));
   const std::string flat = R"({ "gravity": 0, "disks": { "count": 12 }, "box": { "width": 12, "sides": "periodic",
     "lid": { "kind": "fixed", "height": 12 }, )";
   EXPECT_THAT(problems_of(flat + R"("plates": { "friction": 0.2 }, "tilt": 1 } })", true), testing::SizeIs(2));

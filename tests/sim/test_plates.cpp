@@ -256,7 +256,7 @@ TEST(Plates, CloseTheLedgerOfAShakenBed) {
 }
 
 std::vector<Scene> scenes_between_plates() {
-  std::vector<Scene> scenes(4, shaken_between_plates(true));
+  std::vector<Scene> scenes(5, shaken_between_plates(true));
   scenes[1].box.plates = RubbingPlates{1.4, 0.013, false};
   scenes[1].bath = LangevinBath{2, 1, 0.37};
   scenes[2].disks.contact.friction = 0.3;
@@ -265,6 +265,8 @@ std::vector<Scene> scenes_between_plates() {
   scenes[3].gravity = Weightless{};
   scenes[3].disks.contact = Surface{0.95, 0, 0};
   scenes[3].box.top = Lid{14, {}};
+  scenes[4] = scenes[2];
+  scenes[4].box.plates = RubbingPlates{0.25, 0.01, true, 0.2};
   return scenes;
 }
 
@@ -328,6 +330,8 @@ TEST(Plates, NeedADecelerationAndAnIntervalThatResolvesTheFloor) {
   EXPECT_EQ(problems({0, 0.1}), std::vector<std::string>{"/box/plates"});
   EXPECT_EQ(problems({0.1, 0}), std::vector<std::string>{"/box/plates/interval"});
   EXPECT_EQ(problems({0.1, 0.2}), std::vector<std::string>{"/box/plates/interval"}) << "the period is 2.86";
+  EXPECT_TRUE(problems({0.1, 0.1, true, 0.5}).empty());
+  EXPECT_EQ(problems({0.1, 0.1, true, 0.51}), std::vector<std::string>{"/box/plates/contact_radius"});
 }
 
 }  // namespace
