@@ -258,10 +258,11 @@ class Engine final : public Simulation {
   };
   [[gnu::cold]] void act_plates();
   [[gnu::cold]] void begin_rub();
-  SpinningSlide slide_on_plate(std::uint32_t i, double vx, double vz, double pull, double duration) const;
+  [[gnu::noinline]] Slide slide_and_spin(std::uint32_t i, double vx, double vz, double pull, double duration,
+                                         double& spin) const;
   FloorMotion::Motion plate_motion(double later) const;
   void push_from_plate(std::uint32_t i, double vx, double vz, double plate_velocity);
-  void turn_by_plate(std::uint32_t i, double spin);
+  [[gnu::noinline]] void turn_by_plate(std::uint32_t i, double spin);
   bool slides_on(std::uint32_t i, const Motion& motion) const;
   [[gnu::cold]] TwoLanes velocity_with_friction(std::uint32_t i, const Motion& motion) const;
   [[gnu::cold]] double spin_with_friction(std::uint32_t i, const Motion& motion) const;

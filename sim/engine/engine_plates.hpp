@@ -46,14 +46,16 @@ void Engine<Space, Rule, Sizes>::turn_by_plate(std::uint32_t i, double spin) {
   spins_[i] = spin;
 }
 
-// The velocity is that relative to the plate. Without a patch the spin counts for nothing.
+// As slide(), of a disk whose spin the plates brake; `spin` becomes that after it.
 template <class Space, class Rule, class Sizes>
-SpinningSlide Engine<Space, Rule, Sizes>::slide_on_plate(std::uint32_t i, double vx, double vz, double pull,
-                                                         double duration) const {
-  if (spin_rubs_.empty()) return {slide(vx, vz, pull, plates_.deceleration, duration), 0};
+Slide Engine<Space, Rule, Sizes>::slide_and_spin(std::uint32_t i, double vx, double vz, double pull, double duration,
+                                                 double& spin) const {
   const double share = plates_.contact_radius / sizes_.radius(i);
-  return slide_spinning(vx, vz, plates_.contact_radius * spins_[i], share * share * inverse_inertia_ratio_, pull,
-                        plates_.deceleration, duration);
+  const SpinningSlide end =
+      slide_spinning(vx, vz, plates_.contact_radius * spins_[i], share * share * inverse_inertia_ratio_, pull,
+                     plates_.deceleration, duration);
+  spin = end.rim / plates_.contact_radius;
+  return end.way;
 }
 
 // The flights of the next interval, from records that are those of now_.
@@ -62,18 +64,21 @@ void Engine<Space, Rule, Sizes>::begin_rub() {
   const double h = plates_.interval;
   const FloorMotion::Motion plate = plate_motion(0), later = plate_motion(h);
   const double pull = -gravity_ - (later.velocity - plate.velocity) / h, hop = 0.5 * gravity_ * h;
+  const bool turns = !spin_rubs_.empty();
   for (std::uint32_t i = 0; i < count_; ++i) {
     const Disk& disk = disks_[i];
     const double vx = disk.vx, vz = disk.vz;
-    const auto [way, rim] = slide_on_plate(i, vx, vz - plate.velocity, pull, h);
+    double spin = 0;
+    const Slide way = turns ? slide_and_spin(i, vx, vz - plate.velocity, pull, h, spin)
+                            : slide(vx, vz - plate.velocity, pull, plates_.deceleration, h);
     const double flown_x = way.x / h, flown_z = (way.z + (later.position - plate.position)) / h;
     Rub& rub = rubs_[i];
     rub.flown_x = flown_x, rub.flown_z = flown_z - hop;
     rub.before_x = flown_x - vx, rub.before_z = flown_z + hop - vz;
     rub.after_x = way.vx - flown_x, rub.after_z = way.vz + later.velocity - (flown_z - hop);
     push_from_plate(i, flown_x, flown_z + hop, plate.velocity);
-    if (spin_rubs_.empty()) continue;
-    const double spin = rim / plates_.contact_radius, mean = 0.5 * (spins_[i] + spin);
+    if (!turns) continue;
+    const double mean = 0.5 * (spins_[i] + spin);
     spin_rubs_[i] = {mean - spins_[i], spin - mean};
     turn_by_plate(i, mean);
   }
@@ -108,17 +113,21 @@ double Engine<Space, Rule, Sizes>::spin_with_friction(std::uint32_t i, const Mot
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::act_plates() {
   const double plate = plate_motion(0).velocity;
+  const bool turns = !spin_rubs_.empty();
   for (std::uint32_t i = 0; i < count_; ++i) {
     bring_forward(i);
     const Disk& disk = disks_[i];
     const Rub& rub = rubs_[i];
     if (slides_on(i, motion_at(disk, now_))) {
       push_from_plate(i, disk.vx + rub.after_x, disk.vz + rub.after_z, plate);
-      if (!spin_rubs_.empty()) turn_by_plate(i, spins_[i] + spin_rubs_[i].after);
+      if (turns) turn_by_plate(i, spins_[i] + spin_rubs_[i].after);
     } else {
-      const auto [end, rim] = slide_on_plate(i, disk.vx, disk.vz - plate, 0, plates_.interval / 2);
+      double spin = 0;
+      const double h = plates_.interval / 2;
+      const Slide end = turns ? slide_and_spin(i, disk.vx, disk.vz - plate, 0, h, spin)
+                              : slide(disk.vx, disk.vz - plate, 0, plates_.deceleration, h);
       push_from_plate(i, end.vx, end.vz + plate, plate);
-      if (!spin_rubs_.empty()) turn_by_plate(i, rim / plates_.contact_radius);
+      if (turns) turn_by_plate(i, spin);
     }
   }
   begin_rub();
