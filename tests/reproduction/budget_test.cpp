@@ -28,7 +28,7 @@ constexpr int beds_asked = 20, least_run = 12;
 constexpr double most_cpu_seconds = 10, cpu_seconds_of_long_reference = 2;
 constexpr double contact_duration_of_reference = 1e-5;
 
-struct Bed {
+struct NewBed {
   int count;
   double width, restitution, friction, gamma, frequency;  // reduced
   double period() const { return 1 / frequency; }
@@ -41,8 +41,8 @@ class Draw {
   double from_to(double low, double high) {
     return low + (high - low) * std::ldexp(static_cast<double>(random_() >> 11), -53);
   }
-  Bed bed() {
-    Bed bed{};
+  NewBed bed() {
+    NewBed bed{};
     bed.width = std::round(100 * from_to(12, 20)) / 100;
     bed.count = static_cast<int>(std::lround(bed.width * from_to(2, 8)));
     bed.restitution = std::round(1000 * from_to(0.7, 0.98)) / 1000;
@@ -57,7 +57,7 @@ class Draw {
   std::mt19937_64 random_;
 };
 
-std::string recipe_of(const Bed& bed, int seed, double settle, double measure, const std::string& replicas,
+std::string recipe_of(const NewBed& bed, int seed, double settle, double measure, const std::string& replicas,
                       const std::string& contact_duration) {
   return fmt::format(
       R"({{ "name": "new-bed", "stages": [ {{ "stage": "simulate", "id": "bed", "units": "reduced", "seed": {}, {}
@@ -84,7 +84,7 @@ double said_cpu_seconds(const std::string& text) {
   return std::stod(found[1]) * (found[2] == "ms" ? 1e-3 : 1);
 }
 
-std::optional<Judged> judge(const Bed& bed, int per_cent, int seed) {
+std::optional<Judged> judge(const NewBed& bed, int per_cent, int seed) {
   const ScratchFolder folder;
   const double settle = 60 * bed.period();
   write_text(folder / "r.json", recipe_of(bed, seed, settle, 20 * bed.period(), "", ""));
