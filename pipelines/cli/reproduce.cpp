@@ -143,7 +143,6 @@ void add_reproduce(Program& program) {
                 "print the page of recorded results, or that of one recipe, and run nothing")
       ->excludes("--list");
   add_preset(command, given->run);
-  add_budget(command, given->run);
   add_run_options(command, given->run);
 }
 
