@@ -23,9 +23,8 @@ constexpr std::array<Thermometer, thermometer_count> table{{
 // 0.5 D. A row holds the values of the beds nearest to its T: the greatest error of the model of the first thermometer;
 // then, of each thermometer, the mean of ln(T fitted/T) and its scatter from bed to bed beyond the stated errors, the
 // mean's own uncertainty included, and no less than 0.4 %, the resolution of some 40 beds a row. The scatter is 2 where
-// fewer than 5 beds of a row have a reading: the thermometer then has no weight. It is no less than the mean where fewer
-// than two thirds have one. Measured again by
-// `ctest -L study -R ThermometerTable -V`.
+// fewer than 5 beds of a row have a reading: the thermometer then has no weight. It is no less than the mean where
+// fewer than two thirds have one. Measured again by `ctest -L study -R ThermometerTable -V`.
 // clang-format off
 constexpr std::array<KnownBiases, 14> biases{{
     {0.03, 0.020, {{{0.036, 0.396}, {0.189, 0.349}, {0.079, 0.338}, {0.044, 0.547}, {0.000, 2.000}, {-0.084, 0.329}, {0.000, 2.000}}}},

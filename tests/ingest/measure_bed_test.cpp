@@ -409,6 +409,26 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_THROW(measure_bed(source, options), std::invalid_argument);
 }
 
+// What is above the upper border is not seen: no density is stated there, and no column number.
+TEST(MeasureBed, EndsBelowAnUpperBorderThatCutsBeads) {
+  std::vector<GrayFrame> frames = film_of(4).frames;
+  constexpr int cut = 380;  // rows; the floor is at 500
+  for (GrayFrame& frame : frames) {
+    frame.pixels.erase(frame.pixels.begin(), frame.pixels.begin() + cut * frame.width);
+    frame.height -= cut;
+  }
+  FrameSource source = FrameSource::from_frames(frames);
+  const Measurement measured = measure_bed(source, options_of());
+  EXPECT_FALSE(measured.column_number());
+  EXPECT_THAT(measured.warnings, testing::Contains(testing::HasSubstr("cut by the upper border")));
+  const double border = measured.calibration.floor_px / (2 * measured.calibration.radius_px);
+  const DensityProfile& profile = measured.profile;
+  ASSERT_FALSE(profile.number_density.empty());
+  EXPECT_LE(profile.bins.middle(profile.number_density.size() - 1), border - 0.5 - 3 * 0.25);
+  FrameSource whole = FrameSource::from_frames(shaken_film(0, 0, 6, 1));
+  EXPECT_TRUE(measure_bed(whole, options_of()).column_number()) << "no bead is cut";
+}
+
 // Beads that the sides of the frame cut are not counted in the column number of the part that is seen.
 TEST(MeasureBed, CountsForTheColumnNumberWhatLiesWithinTheWidth) {
   MeasureOptions options = options_of();

@@ -86,6 +86,30 @@ TEST(Measure, SeesWhatAHandWrittenLoopSees) {
   EXPECT_EQ(found->centre_of_mass().value, expected.centre_of_mass().value);
 }
 
+// The area under the covered fraction is that of the disks over the width; the number of disks says nothing about it.
+TEST(Measure, CoveredFractionCountsTheAreaOfEachDisk) {
+  Scene scene = measured_bed_scene();
+  scene.disks.species = {{30, 1, 1}, {40, 0.5, 0.25}};
+  const auto bed = simulate(scene);
+  BedObserver observer(scene, bed->properties(), 8, {-6, 0.25, 240}, {KernelKind::gaussian, 0.5});
+  Snapshot at;
+  for (std::uint32_t phase = 0; phase < 8; ++phase) {
+    bed->advance_to((5 + phase / 8.0) / bed_frequency);
+    bed->snapshot(at);
+    observer.observe(at, phase);
+  }
+  for (const bool floor_frame : {false, true}) {
+    double area = 0, number = 0;
+    const Profile profile = observer.density(floor_frame);
+    for (std::size_t i = 0; i < profile.height.size(); ++i) {
+      area += 0.25 * profile.area_fraction[i];
+      number += 0.25 * profile.number_density[i];
+    }
+    EXPECT_NEAR(area * scene.box.width, std::numbers::pi / 4 * (30 + 40 * 0.25), 1e-6);
+    EXPECT_NEAR(number * scene.box.width, 70, 1e-6);
+  }
+}
+
 // Stopped at its 1st, 2nd, ... question, it goes on from what it kept last (or begins anew) and sees the same.
 TEST(Measure, GoesOnFromWhatItKeptToTheSameBytes) {
   Diary whole;

@@ -75,7 +75,8 @@ TEST(MeasuredBed, HeightsReachBelowTheFloorAndAboveTheLoosestBed) {
 }
 
 TEST(MeasuredBed, FilledHeightsLeaveOutTheKernelsTail) {
-  const Profile profile{.height = {0, 1, 2, 3, 4}, .number_density = {0, 1e-13, 0.4, 0, 2e-12}, .std_error = {}, .area_fraction = {}};
+  const Profile profile{
+      .height = {0, 1, 2, 3, 4}, .number_density = {0, 1e-13, 0.4, 0, 2e-12}, .std_error = {}, .area_fraction = {}};
   EXPECT_EQ(filled_heights(profile).first, 2U);
   EXPECT_EQ(filled_heights(profile).last, 5U);
   const Profile empty{.height = {0, 1}, .number_density = {0, 0}, .std_error = {}, .area_fraction = {}};
