@@ -121,9 +121,9 @@ StagePages extract_pages() {
           {"no profiles by phase", rest,
            "Give \"frequency\" if the pictures are a film of a shaken bed; record faster if they are."},
           {"frame_rate", rest, "Give \"frame_rate\" if the film was recorded faster than it plays."},
+          {"collide between frames", measurement, "Record faster, so that disks hardly collide between frames."},
           {"velocities", measurement, "Record faster: disks must move less than half a diameter between frames."},
           {"T is too low", measurement, "Record faster, so that fast disks are followed too."},
-          {"finite-time", measurement, "Record faster, so that velocities hardly change between frames."},
           {"", measurement, "Look through the film and the figures of the frames below."}}};
 }
 

@@ -85,7 +85,7 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
                 timed, true);
     list.number(pointer + "/finite_time_factor", "1", "correction for the time between frames", timed, true);
   }
-  list.truth("/velocities/usable", "whether enough disks were followed for a temperature", timed, true);
+  list.truth("/velocities/usable", "whether enough disks were followed, and hardly collided between frames, for a temperature", timed, true);
   list.number("/velocities/linked_share", "1", "share of the disks found again in the next frame", timed, true);
   list.quantity("/velocities/mean_step", "D", "mean displacement of a disk between two frames", timed, true);
 }

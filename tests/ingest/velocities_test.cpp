@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
 
 #include "ingest/synthetic/random_stream.hpp"
+#include "sim/engine/simulation.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -59,7 +63,8 @@ TEST(Velocities, TemperatureOfKnownWalkersWithFlowErrorAndMemory) {
   EXPECT_NEAR(measured.horizontal.over_mg_m / expected, 1, 0.07);
   EXPECT_NEAR(measured.vertical.over_mg_m / expected, 1, 0.07);
   EXPECT_GT(measured.horizontal.finite_time_factor, 1.05);
-  EXPECT_LT(measured.horizontal.std_error_m, 0.05 * expected);
+  // 0.6 of the correction, 1 - 1/1.11 for dt/tau = 1/3, and 2 % of statistics.
+  EXPECT_LT(measured.horizontal.std_error_m, 0.08 * expected);
 }
 
 TEST(Velocities, RestingDisksHaveNoTemperatureBeyondTheirError) {
@@ -78,6 +83,126 @@ TEST(Velocities, FramesTooFarApartAreToldSo) {
   options.frame_rate_hz = 20;
   EXPECT_FALSE(measure_velocities(measurement, options).warnings.empty());
   EXPECT_THROW(measure_velocities(measurement, {}), std::invalid_argument);
+}
+
+// A simulated bed filmed at `rate` (reduced units) with a localisation error of 0.003 D, and its temperatures from the
+// velocities that the simulation knows: both less the flow of each bin of height, one D high.
+struct FilmedBed {
+  VelocityMeasurement found;
+  double true_x = 0, true_z = 0;
+};
+
+class BedFilm {
+ public:
+  explicit BedFilm(double rate) : meter_(1, {.frame_rate_hz = rate, .gravity_m_per_s2 = 1}) {}
+
+  void add(const sim::Snapshot& now) {
+    std::vector<MeasuredDisk> disks;
+    std::map<long, std::vector<std::size_t>> bins;
+    for (std::size_t i = 0; i < now.x.size(); ++i) {
+      MeasuredDisk disk;
+      disk.x = now.x[i] + 0.003 * random_.normal();
+      disk.z = now.z[i] + 0.003 * random_.normal();
+      disk.radius_px = 10;
+      disk.std_error_px = 0.06;
+      disks.push_back(disk);
+      bins[static_cast<long>(std::floor(now.z[i]))].push_back(i);
+    }
+    meter_.add(disks);
+    for (const auto& [bin, members] : bins)
+      if (members.size() >= 3) square_less_mean(now, members);
+  }
+
+  FilmedBed result() { return {meter_.result(), x_ / count_, z_ / count_}; }
+
+ private:
+  void square_less_mean(const sim::Snapshot& now, const std::vector<std::size_t>& members) {
+    const double n = static_cast<double>(members.size());
+    double mean_x = 0, mean_z = 0;
+    for (const std::size_t i : members) mean_x += now.vx[i] / n, mean_z += now.vz[i] / n;
+    for (const std::size_t i : members) {
+      x_ += n / (n - 1) * std::pow(now.vx[i] - mean_x, 2);
+      z_ += n / (n - 1) * std::pow(now.vz[i] - mean_z, 2);
+      count_ += 1;
+    }
+  }
+
+  VelocityMeter meter_;
+  RandomStream random_{17};
+  double x_ = 0, z_ = 0, count_ = 0;
+};
+
+FilmedBed filmed(const sim::Scene& scene, double rate) {
+  const auto bed = sim::simulate(scene);
+  BedFilm film(rate);
+  sim::Snapshot now;
+  for (int frame = 0; frame < 400; ++frame) {
+    bed->advance_to(80 + frame / rate);
+    bed->snapshot(now);
+    film.add(now);
+  }
+  return film.result();
+}
+
+sim::Scene bed_in_bath(double temperature) {
+  sim::Scene scene;
+  scene.gravity = sim::UniformGravity{};
+  scene.disks.species = {{.count = 260}};
+  scene.box.width = 12.4;
+  scene.box.sides = sim::PeriodicSides{};
+  scene.bath = sim::LangevinBath{.temperature = temperature, .rate = 0.02, .interval = 0.5};
+  scene.start_temperature = temperature;
+  scene.seed = 91;
+  return scene;
+}
+
+sim::Scene shaken_bed(double gamma, double restitution, double friction) {
+  const sim::Surface contact{.restitution = restitution, .friction = friction};
+  const double frequency = 0.37, angular = 2 * std::numbers::pi * frequency;
+  sim::Scene scene;
+  scene.gravity = sim::UniformGravity{};
+  scene.disks = {.species = {{.count = 240}}, .contact = contact, .contact_duration = 1e-4};
+  scene.box.width = 17.3;
+  scene.box.sides = sim::HardSides{contact};
+  scene.box.floor = sim::SinusoidalFloor{.amplitude = gamma / (angular * angular), .frequency = frequency};
+  scene.box.floor_surface = contact;
+  scene.seed = 92;
+  return scene;
+}
+
+// Beds that collide many times between frames and hardly at all. Where a temperature is given, its error holds what is
+// wrong with it: 2.5 of them, of which the film's statistics are the smaller part. With the correction of all steps
+// together T of the shaken beds was up to 35 % low with a stated error of 9 %.
+TEST(Velocities, OfDenseBedsAreGivenOnlyWhereTheirErrorHoldsTheTruth) {
+  const std::map<std::string, sim::Scene> beds{{"in equilibrium, dense", bed_in_bath(0.6)},
+                                               {"in equilibrium", bed_in_bath(2.2)},
+                                               {"shaken, smooth", shaken_bed(3.5, 0.88, 0)},
+                                               {"shaken, rough", shaken_bed(4.2, 0.75, 0.2)}};
+  int given = 0;
+  for (const auto& [name, scene] : beds)
+    for (const double rate : {50.0, 10.0, 5.0, 2.8}) {  // 3,500 to 196 pictures a second of disks of 2 mm
+      const FilmedBed film = filmed(scene, rate);
+      const KineticTemperature &x = film.found.horizontal, &z = film.found.vertical;
+      std::printf("%s, %g frames a unit of time: T_x %.3f(%.3f) of the true, T_z %.3f(%.3f), factors %.2f %.2f%s\n",
+                  name.c_str(), rate, x.over_mg_m / film.true_x, x.std_error_m / film.true_x, z.over_mg_m / film.true_z,
+                  z.std_error_m / film.true_z, x.finite_time_factor, z.finite_time_factor,
+                  film.found.usable() ? "" : ", not given");
+      if (rate == 50) {
+        EXPECT_TRUE(film.found.usable());
+        EXPECT_NEAR(x.over_mg_m / film.true_x, 1, 0.1);
+        EXPECT_NEAR(z.over_mg_m / film.true_z, 1, 0.1);
+      }
+      if (!film.found.usable()) {
+        EXPECT_FALSE(film.found.warnings.empty());
+        continue;
+      }
+      ++given;
+      EXPECT_NEAR(x.over_mg_m, film.true_x, 2.5 * x.std_error_m);
+      EXPECT_NEAR(z.over_mg_m, film.true_z, 2.5 * z.std_error_m);
+      EXPECT_LT(x.std_error_m, 0.5 * x.over_mg_m);
+    }
+  EXPECT_GE(given, 8);
+  EXPECT_LE(given, 14);  // at 2.8 none of the dense ones
 }
 
 }  // namespace

@@ -167,7 +167,9 @@ TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
   EXPECT_EQ(z["finite_time_factor"], 1.2);
   EXPECT_EQ(json["linked_share"], 0.97);
   EXPECT_EQ(json["usable"], true);
-  velocities.linked_share = 0.65;
+  velocities.horizontal.finite_time_factor = 2.1;
+  EXPECT_EQ(velocity_numbers(velocities)["usable"], false);
+  velocities.horizontal.finite_time_factor = 1.1, velocities.linked_share = 0.65;
   EXPECT_EQ(velocity_numbers(velocities)["usable"], false);
   EXPECT_EQ(value(json["mean_step"]), 0.14);
   EXPECT_EQ(json["mean_step"]["unit"], "D");
