@@ -46,12 +46,13 @@ std::optional<PlaceInFrame> bottom_of(const LowestBottoms& bottoms);
 struct FloorMotion {
   bool known = false;
   double middle = 0, amplitude = 0, phase = 0;
-  double middle_std_error = 0;  // by the scatter of the touching beads
+  double middle_std_error = 0;  // by the scatter of the touching beads, and the extrapolation
   std::size_t touching = 0;     // beads
 };
 
 // A bottom counts in full while it is below the floor or at most a tolerance above it. The tolerance shrinks, so that
-// only the touching beads remain at the end. Known only if such beads are seen all around the period.
+// only the touching beads remain, and the floor is extrapolated to no tolerance. Known only if such beads are seen all
+// around the period.
 FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double diameter_px, double turns_per_frame);
 
 }  // namespace shakebed::ingest

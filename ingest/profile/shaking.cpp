@@ -15,9 +15,6 @@ constexpr double resting = 0.02;               // D: what touching beads scatter
 constexpr double clearly_more_contacts = 1.5;  // beads that touch a floor of twice the bed's frequency
 constexpr double doubted_frequency = 5;        // standard errors between a frequency given and one seen ...
 constexpr double smeared = 0.1;                // ... and turns between them over the film
-// D: by how much the mean of a floor in motion was off in five rendered films, root mean square. What its beads scatter
-// by when they touch it says less: they do not touch it alike at all phases.
-constexpr double unevenly_touched = 0.02;
 
 }  // namespace
 
@@ -76,7 +73,7 @@ void Shaking::find_floor_in_motion(BedCalibration& bed) {
         "The floor's motion could not be determined: beads touch it in too small a part of the shaker's period.");
   } else if (motion.amplitude > resting * diameter_px_) {
     bed.floor_px = motion.middle;
-    bed.floor_std_error_px = std::hypot(motion.middle_std_error, unevenly_touched * diameter_px_);
+    bed.floor_std_error_px = motion.middle_std_error;
     bed.floor_reference = FloorReference::mean_of_motion;
     bed.floor_amplitude_px = motion.amplitude;
     bed.floor_phase = motion.phase;

@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <string>
 
 #include "ingest/synthetic/random_stream.hpp"
 #include "sim/engine/simulation.hpp"
+#include "tests/ingest/shaken_bed.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -156,28 +156,15 @@ sim::Scene bed_in_bath(double temperature) {
   return scene;
 }
 
-sim::Scene shaken_bed(double gamma, double restitution, double friction) {
-  const sim::Surface contact{.restitution = restitution, .friction = friction};
-  const double frequency = 0.37, angular = 2 * std::numbers::pi * frequency;
-  sim::Scene scene;
-  scene.gravity = sim::UniformGravity{};
-  scene.disks = {.species = {{.count = 240}}, .contact = contact, .contact_duration = 1e-4};
-  scene.box.width = 17.3;
-  scene.box.sides = sim::HardSides{contact};
-  scene.box.floor = sim::SinusoidalFloor{.amplitude = gamma / (angular * angular), .frequency = frequency};
-  scene.box.floor_surface = contact;
-  scene.seed = 92;
-  return scene;
-}
-
 // Beds that collide many times between frames and hardly at all. Where a temperature is given, its error holds what is
 // wrong with it: 2.5 of them, of which the film's statistics are the smaller part. With the correction of all steps
 // together T of the shaken beds was up to 35 % low with a stated error of 9 %.
 TEST(Velocities, OfDenseBedsAreGivenOnlyWhereTheirErrorHoldsTheTruth) {
-  const std::map<std::string, sim::Scene> beds{{"in equilibrium, dense", bed_in_bath(0.6)},
-                                               {"in equilibrium", bed_in_bath(2.2)},
-                                               {"shaken, smooth", shaken_bed(3.5, 0.88, 0)},
-                                               {"shaken, rough", shaken_bed(4.2, 0.75, 0.2)}};
+  const std::map<std::string, sim::Scene> beds{
+      {"in equilibrium, dense", bed_in_bath(0.6)},
+      {"in equilibrium", bed_in_bath(2.2)},
+      {"shaken, smooth", shaken_bed({.gamma = 3.5, .restitution = 0.88})},
+      {"shaken, rough", shaken_bed({.gamma = 4.2, .restitution = 0.75, .friction = 0.2})}};
   int given = 0;
   for (const auto& [name, scene] : beds)
     for (const double rate : {50.0, 10.0, 5.0, 2.8}) {  // 3,500 to 196 pictures a second of disks of 2 mm
