@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <string>
+#include <tuple>
 
 #include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
@@ -451,6 +454,44 @@ TEST(Answer, OfABedWithABackgroundIsNotOneTemperature) {
         [](double d) { return 0.03 * d + 0.002; }));
     EXPECT_NE(answer.verdict, Verdict::one_temperature) << background << ": " << answer.why;
   }
+}
+
+// A gas that is thin throughout, of two temperatures. Where it holds a tenth of the usual density, a model must miss
+// its densities by a hundredth of what it misses dense beds by: with a tenth the four below passed for one temperature.
+TEST(Answer, OfAThinGasOfTwoTemperaturesIsNotOneTemperature) {
+  for (const double cold : {2.0, 3.0})
+    for (const double ratio : {3.0, 4.0}) {
+      const Answer answer = find_answer(made_of(
+          12 * cold, [&](double z) { return 0.02 * std::exp(-z / cold) + 0.02 * std::exp(-z / (ratio * cold)); },
+          [](double d) { return 0.005 * d + 0.00005; }));
+      EXPECT_NE(answer.verdict, Verdict::one_temperature) << cold << ", " << ratio << ": " << answer.why;
+    }
+}
+
+// Thermometers that fit the same model to the same heights are one fit, and count once.
+TEST(Answer, CountsFitsThatDiffer) {
+  std::set<std::size_t> seen;
+  for (const double depth : {0.02, 1.5, 20.0})
+    for (const double temperature : {0.4, 1.0, 4.0}) {
+      const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {depth, close_packing_density});
+      AnswerInput input;
+      input.kernel = usual_kernel;
+      input.base = 0.0;
+      const double top = synthetic::top_of(truth);
+      input.profile = synthetic::profile_of(truth, usual_kernel, static_cast<int>(4 * top), top, 0.001, 11);
+      const Answer answer = find_answer(input);
+      if (answer.verdict != Verdict::one_temperature) continue;
+      std::set<std::tuple<std::string, double, double, double>> fits;
+      for (const ThermometerReading& reading : answer.readings)
+        if (reading.admissible)
+          fits.emplace(reading.model, reading.window_low, reading.window_high, reading.fitted.value);
+      const std::string words = fits.size() == 1   ? "Only one model and window"
+                                : fits.size() == 2 ? "Both fits"
+                                                   : "All " + std::to_string(fits.size()) + " fits";
+      EXPECT_THAT(answer.why, testing::StartsWith(words)) << depth << ", " << temperature;
+      seen.insert(std::min<std::size_t>(fits.size(), 3));
+    }
+  EXPECT_GE(seen.size(), 2u) << "not all alike";
 }
 
 TEST(Answer, OfTwoLayersWithAGapIsNoTemperature) {

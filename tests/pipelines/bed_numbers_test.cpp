@@ -443,10 +443,14 @@ TEST(TwoSpecies, ShareTheirEnergyInEquilibrium) {
   write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 3,
       "units": "reduced", "disks": { "count": 40, "density": 1, "second": { "count": 40, "diameter": 1, "density": 3 } },
       "box": { "width": 60, "sides": "hard" }, "start_temperature": 10, "settle": 100, "measure": 1000,
-      "observe": ["species"] } ] })");
+      "observe": ["species"] }, { "stage": "fit", "id": "fit", "from": "bed" } ] })");
   const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   const Json numbers = Json::parse(read_text(folder / "o/bed/observables.json"));
+  // The models of a profile are those of equal disks, and the answer says so.
+  const Json answer = Json::parse(read_text(folder / "o/fit/fit.json"))["answer"];
+  EXPECT_NE(answer["verdict"], "one temperature");
+  EXPECT_NE(answer["why"].get<std::string>().find("two kinds"), std::string::npos) << answer["why"];
   const double light = value(numbers["temperature_first"]), heavy = value(numbers["temperature_second"]);
   EXPECT_EQ(numbers["temperature_first"]["unit"], "m g D");
   EXPECT_NEAR(value(numbers["temperature_ratio"]), heavy / light, 1e-12);
