@@ -20,6 +20,7 @@
 #include "ingest/profile/floor.hpp"
 #include "ingest/profile/frame_findings.hpp"
 #include "ingest/profile/frame_rows.hpp"
+#include "ingest/profile/mirror_image.hpp"
 #include "ingest/profile/reduced_bed.hpp"
 #include "ingest/profile/shaking.hpp"
 #include "statistics/parallel.hpp"
@@ -211,6 +212,7 @@ class BedMeasurer {
       result_.warnings.push_back(std::move(warning));
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
     result_.contacts = contacts_of(held_, 0.5 * diameter_px_);
+    if (const auto row = find_mirror_row(held_, diameter_px_)) leave_out_below(*row);
     if (!bed_.floor_given)
       result_.floor_sag =
           sag_of_floor(lowest_points(held_, diameter_px_, film_.finder.width), diameter_px_) / diameter_px_;
@@ -232,6 +234,12 @@ class BedMeasurer {
                                  : bed_.walls_are_frame_sides ? sides.right - sides.left
                                                               : bed_.right_wall_px - bed_.left_wall_px;
     coverage_.emplace(film_.finder, bed_, diameter_px_, counted_width, refined_.radius_px);
+  }
+
+  void leave_out_below(double row) {
+    PixelRectangle above = options_.find.roi.value_or(PixelRectangle{0, 0, film_.finder.width, film_.finder.height});
+    above.height = static_cast<int>(std::lround(row)) - above.top;
+    result_.above_mirror_image = above;
   }
 
   // A floor far outside the picture is that of another.

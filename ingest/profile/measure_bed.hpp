@@ -168,12 +168,14 @@ struct Measurement {
   std::optional<double> column_number() const {
     return column_known ? std::optional(count_in_width_mean / calibration.width) : std::nullopt;
   }
-  bool floor_out_of_view = false;     // the lower border cuts beads, and no floor was given
-  bool surface_out_of_view = false;   // the upper border cuts beads, one a frame or more
-  bool column_known = true;           // no more beads are above the upper border than the column number's error allows
-  Contacts contacts;                  // in the frames that geometry is found from
-  std::size_t beside_bed = 0;         // disks left out, a few beyond an empty stretch beside the bed
-  PixelRectangle bed_region;          // what lies between them, px of the recorded frame
+  bool floor_out_of_view = false;    // the lower border cuts beads, and no floor was given
+  bool surface_out_of_view = false;  // the upper border cuts beads, one a frame or more
+  bool column_known = true;          // no more beads are above the upper border than the column number's error allows
+  Contacts contacts;                 // in the frames that geometry is found from
+  std::size_t beside_bed = 0;        // disks left out, a few beyond an empty stretch beside the bed
+  PixelRectangle bed_region;         // what lies between them, px of the recorded frame
+  // The picture above the mirror image of the bed in its floor, px of the recorded frame; nothing where none is seen.
+  std::optional<PixelRectangle> above_mirror_image;
   double floor_sag = 0;               // D: the lowest disks lie on an arc of this height, none on a straight floor
   std::vector<std::string> warnings;  // plain sentences
 };

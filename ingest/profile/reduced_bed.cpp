@@ -51,6 +51,10 @@ void enlarge(MeasuredDisk& disk, const Enlargement& by) {
     *variance = by.length(by.length(*variance));
 }
 
+void enlarge(PixelRectangle& region, int factor) {
+  for (int* length : {&region.left, &region.top, &region.width, &region.height}) *length *= factor;
+}
+
 void enlarge(BedCalibration& bed, const Enlargement& by) {
   bed.scale_m_per_px = by.reduced_length(bed.scale_m_per_px);
   for (double* length :
@@ -75,8 +79,8 @@ Measurement measure_reduced_bed(FrameSource& source, const MeasureOptions& asked
   Measurement measurement = measure_bed(source, options);
   for (MeasuredDisk& disk : measurement.disks) enlarge(disk, by);
   enlarge(measurement.calibration, by);
-  for (int* length : {&measurement.bed_region.left, &measurement.bed_region.width, &measurement.bed_region.height})
-    *length *= asked.reduction;
+  enlarge(measurement.bed_region, asked.reduction);
+  if (measurement.above_mirror_image) enlarge(*measurement.above_mirror_image, asked.reduction);
   measurement.contacts.nearest_px = by.length(measurement.contacts.nearest_px);
   return measurement;
 }
