@@ -39,6 +39,7 @@ struct FoundDisk {
 struct BeadsSeen {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
+  bool one_sided = false;  // one side of the rim is hardly seen: the radius is that of a part of the bead
 };
 
 // Everything is found when left alone; each member overrides one finding.

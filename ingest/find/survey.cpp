@@ -30,8 +30,11 @@ constexpr double few_wrong = 0.1;       // beyond it, beads must make up a good 
 constexpr double good_part = 0.15;
 constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
-// Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all.
+// Of beads' rims every side is seen in some; of a pattern that circles fit by chance, the same sides miss in all. So
+// does the dark side of beads lit from the other. These are many, seen for the most part, and make up the picture.
 constexpr double least_side = 0.15;
+constexpr double one_sided_support = 0.6, one_sided_explained = 0.4, one_sided_by_chance = 0.02;
+constexpr double fewest_one_sided = 20;
 // Radii, over which the level changes at a rim: beads up to 0.44, softly enlarged ones 0.73, noise smoothed over a
 // length 1.4, blurred spots 1.6. Spots are beads where they, and little else, make up the picture.
 constexpr double widest_rim = 1.1, spots_explained = 0.5;
@@ -145,6 +148,9 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   const auto count = static_cast<double>(candidate.disks.size());
   const double wrong = candidate.expected_wrong * count;
   const double at_worst = (wrong + std::sqrt(wrong)) / std::max(1.0, count);  // a standard deviation more
+  candidate.one_sided = least_seen_side(candidate.disks) < least_side;
+  const bool lit_from_one_side = count >= fewest_one_sided && support >= one_sided_support * count &&
+                                 candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
   if (candidate.disks.empty())
     candidate.why_not = "no circle is seen more often than by chance";
   else if (at_worst > most_by_chance || (at_worst > few_wrong && candidate.explained_share < good_part))
@@ -152,7 +158,7 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
     candidate.why_not =
         formatted("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
-  else if (least_seen_side(candidate.disks) < least_side)
+  else if (candidate.one_sided && !lit_from_one_side)
     candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
     candidate.why_not = formatted("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);

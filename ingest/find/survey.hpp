@@ -19,6 +19,7 @@ struct SurveyCandidate {
   double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
+  bool one_sided = false;      // one side of the rim is hardly seen in any: light from the other side
   bool not_round = false;      // circles are seen, but on outlines that are not round ...
   std::string why_not_round;   // ... a sentence
   std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads

@@ -6,6 +6,7 @@
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/frames/smooth_field.hpp"
+#include "ingest/profile/touching_distance.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
@@ -63,7 +64,8 @@ Contacts contacts_of(const std::vector<FrameFindings>& frames, double radius_px)
       if (away < far) nearest_of_all.push_back(away);
   }
   contacts.expected = farther * (near * near - touching * touching) / (far * far - near * near);
-  contacts.nearest_px = quantile(std::move(nearest_of_all), 0.5);
+  contacts.nearest_px = contacts.touching_px = quantile(std::move(nearest_of_all), 0.5);
+  if (const auto distance = touching_distance(frames, radius_px)) contacts.touching_px = distance->px;
   return contacts;
 }
 
@@ -135,14 +137,14 @@ std::vector<std::string> doubts_of_bed(const Measurement& found, double bead_dia
         "but holes or printed dots. Or the outline seen is smaller than the bead, and scale, heights and density are "
         "wrong: if nearest beads touch, give --scale \"%.4g mm/px\".",
         contacts.nearest_px * found.calibration.scale_m_per_px / bead_diameter_m,
-        1e3 * bead_diameter_m / contacts.nearest_px));
+        1e3 * bead_diameter_m / contacts.touching_px));
   if (contacts.overlapping(bead_diameter_m / found.calibration.scale_m_per_px))
     doubts.push_back(formatted(
         "The disks found overlap: nearest centres are typically %.2f diameters apart. The outline seen is larger than "
         "the bead, by a shadow or a halo, or beads lie behind one another. If nearest beads touch, give --scale "
         "\"%.4g mm/px\".",
         contacts.nearest_px * found.calibration.scale_m_per_px / bead_diameter_m,
-        1e3 * bead_diameter_m / contacts.nearest_px));
+        1e3 * bead_diameter_m / contacts.touching_px));
   if (found.beside_bed > 0)
     doubts.push_back(formatted(
         "%zu disks beside the bed, beyond an empty stretch, are left out. To search the bed alone, give --roi "

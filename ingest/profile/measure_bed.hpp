@@ -128,6 +128,7 @@ struct BedCalibration {
   double left_wall_px = 0, right_wall_px = 0;
   double width = 0;  // D, between the walls
   bool floor_given = false, walls_given = false, scale_given = false;
+  bool outline_in_doubt = false;       // beads lit from one side, and too few touch to show their diameter
   bool walls_are_frame_sides = false;  // no walls seen: the profile is that of the part of the bed in view
 };
 
@@ -136,6 +137,7 @@ struct BedCalibration {
 struct Contacts {
   double seen = 0, expected = 0;
   double nearest_px = 0;               // the median over the disks of the distance to their nearest neighbour
+  double touching_px = 0;              // where these distances begin (touching_distance.hpp), or their median
   [[nodiscard]] bool missing() const;  // so few that these are no touching beads
   [[nodiscard]] bool overlapping(double diameter_px) const;  // the outline seen is too large
   [[nodiscard]] bool far_apart(double diameter_px) const;    // so far that these are holes or marks

@@ -41,6 +41,11 @@ std::vector<Objection> objections_to(const Measurement& found) {
                      "floor, and count as beads.",
                      above->top + above->height),
            formatted("Leave the image out: --roi %d,%d,%d,%d.", above->left, above->top, above->width, above->height));
+  if (found.calibration.outline_in_doubt)
+    object(
+        "The beads are lit from one side, and hardly any rim is seen on the other: the outline seen may be smaller "
+        "than the bead, and every length wrong.",
+        "Give the scale (--scale), light the beads from the front, or take more photographs of touching beads.");
   if (found.disk_total < least_disks)
     object(formatted("Only %zu beads were found in all frames together.", found.disk_total),
            "Take more photographs of the bed from the side, or measure longer.");

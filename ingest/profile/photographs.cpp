@@ -91,8 +91,8 @@ Survey survey_of(GrayFrame& frame, const FindOptions& options) {
 
 // The most credible kind of beads.
 BeadsSeen seen_in(const Survey& survey) {
-  const RimModel& rims = survey.candidates.front().rims;
-  return {rims.polarity, rims.radius_px};
+  const SurveyCandidate& best = survey.candidates.front();
+  return {best.rims.polarity, best.rims.radius_px, best.one_sided};
 }
 
 // Of the scale given, if any, to the beads seen.

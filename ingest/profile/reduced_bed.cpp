@@ -81,7 +81,8 @@ Measurement measure_reduced_bed(FrameSource& source, const MeasureOptions& asked
   enlarge(measurement.calibration, by);
   enlarge(measurement.bed_region, asked.reduction);
   if (measurement.above_mirror_image) enlarge(*measurement.above_mirror_image, asked.reduction);
-  measurement.contacts.nearest_px = by.length(measurement.contacts.nearest_px);
+  for (double* length : {&measurement.contacts.nearest_px, &measurement.contacts.touching_px})
+    *length = by.length(*length);
   return measurement;
 }
 

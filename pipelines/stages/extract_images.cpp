@@ -95,7 +95,7 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
         fmt::format("{}: {}; the circles are measured because of shape \"any\".", look->path, chosen->why_drawn));
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
-  measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px};
+  measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px, chosen->one_sided};
   source.reduction = measure.reduction = ingest::reduction_for(look->width, look->height, chosen->rims.radius_px);
   if (const std::string why = ingest::why_reduced(look->width, look->height, source.reduction); !why.empty())
     context.warning(why);

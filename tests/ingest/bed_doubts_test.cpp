@@ -134,13 +134,13 @@ TEST(BedDoubts, EachDoubtSaysWhatToDo) {
   Measurement found;
   found.calibration.scale_m_per_px = 1e-3 / diameter;
   EXPECT_TRUE(doubts_of_bed(found, 1e-3).empty());
-  found.contacts = {.seen = 0, .expected = 40, .nearest_px = 25};
+  found.contacts = {.seen = 0, .expected = 40, .nearest_px = 25.8, .touching_px = 25};
   found.beside_bed = 2;
   found.bed_region = {0, 0, 470, 480};
   found.floor_sag = 6.2;
   const std::vector<std::string> doubts = doubts_of_bed(found, 1e-3);
   ASSERT_EQ(doubts.size(), 3U);
-  EXPECT_NE(doubts[0].find("1.25 diameters apart"), std::string::npos) << doubts[0];
+  EXPECT_NE(doubts[0].find("1.29 diameters apart"), std::string::npos) << doubts[0];
   EXPECT_NE(doubts[0].find("--scale \"0.04 mm/px\""), std::string::npos) << doubts[0];
   EXPECT_NE(doubts[1].find("--roi 0,0,470,480"), std::string::npos) << doubts[1];
   EXPECT_NE(doubts[2].find("6.2 diameters"), std::string::npos) << doubts[2];

@@ -10,7 +10,7 @@
 #include "sim/engine/simulation.hpp"
 #include "tests/ingest/shaken_bed.hpp"
 
-namespace shakebed::ingest {
+namespace shakebed::ingest::mirror_image_test {
 namespace {
 
 constexpr double diameter_px = 16, floor_row = 400;
@@ -81,4 +81,4 @@ TEST(MirrorImage, IsObjectedTo) {
 }
 
 }  // namespace
-}  // namespace shakebed::ingest
+}  // namespace shakebed::ingest::mirror_image_test
