@@ -18,6 +18,10 @@ constexpr double fair_scale = 0.02;
 // Of the radius of beads lit from one side: three kinds of drawn spheres were off by 0.25 to 0.5 %, of which what is
 // stated besides is a half.
 constexpr double one_sided_light = 0.002;
+// Errors, within which the circles seen and the distance of touching beads agree. A distance that is larger by more
+// than the second factor is that of beads that do not touch (bed_doubts.hpp).
+constexpr double agreeing = 2, farthest_touching = 1.08;
+constexpr double worth_a_word = 0.01;  // of the diameter
 // In D: beads that reach farther beyond the frame's side are cut, so the bed extends beyond it.
 constexpr double clearly_cut = 0.02;
 
@@ -42,29 +46,62 @@ class GeometryFinder {
     radius.refine(refined_);
     if (refined_.profile.asymmetry)
       refined_.radius_std_error_px = std::hypot(refined_.radius_std_error_px, one_sided_light * refined_.radius_px);
-    if (options_.find.seen && options_.find.seen->one_sided) take_radius_from_contacts();
+    if (const std::optional<TouchingDistance> touching = touching_distance(frames_, refined_.radius_px))
+      weigh(*touching);
+    else if (half_seen() && !options_.scale_m_per_px)
+      bed_.outline_in_doubt = true;
     for (FrameFindings& frame : frames_)
       for (FoundDisk& disk : frame.disks)
         if (!disk.other_size) disk.radius_px = refined_.radius_px;
   }
 
-  // Beads lit from one side show a part of their outline, and circles through it are too small. All are shifted alike,
-  // so their distances are right.
-  void take_radius_from_contacts() {
-    const double seen_px = refined_.radius_px;
-    const std::optional<TouchingDistance> touching = touching_distance(frames_, seen_px);
-    if (touching && touching->px > 2 * seen_px) {
-      refined_.radius_px = 0.5 * touching->px;
-      refined_.radius_std_error_px = 0.5 * touching->std_error_px;
-      warnings_.push_back(
-          formatted("The beads are lit from one side, and hardly any rim is seen on the other. The circles seen are "
-                    "%.4g px wide; "
-                    "touching beads are %.4g +- %.1g px apart, and this is taken for their diameter.",
-                    2 * seen_px * refined_.recorded_px, touching->px * refined_.recorded_px,
-                    touching->std_error_px * refined_.recorded_px));
-    } else if (!options_.scale_m_per_px) {
-      bed_.outline_in_doubt = true;
-    }
+  bool half_seen() const { return options_.find.seen && options_.find.seen->one_sided; }
+
+  // The circles seen beside the distance of touching beads. Of beads lit from one side a part of the outline is seen,
+  // and circles through it are too small; all are shifted alike, so their distances are right.
+  void weigh(const TouchingDistance& touching) {
+    const double seen = 2 * refined_.radius_px, seen_error = 2 * refined_.radius_std_error_px,
+                 apart = touching.px - seen;
+    const bool agree = std::abs(apart) < agreeing * std::hypot(seen_error, touching.std_error_px);
+    if (half_seen() || (apart > 0 && !agree && touching.px < farthest_touching * seen))
+      take(touching);
+    else if (agree && (apart > 0 || touching.sharp))
+      average(touching);
+    else if (apart < 0 && touching.sharp)
+      doubt_outline(touching);
+  }
+
+  void take(const TouchingDistance& touching) {
+    warnings_.push_back(formatted(
+        "%s The circles seen are %.4g px wide. Touching beads are %.4g +- %.1g px apart, and this is taken for "
+        "their diameter.",
+        half_seen() ? "The beads are lit from one side, and hardly any rim is seen on the other."
+                    : "The outline seen is smaller than the beads.",
+        2 * refined_.radius_px * refined_.recorded_px, touching.px * refined_.recorded_px,
+        touching.std_error_px * refined_.recorded_px));
+    refined_.radius_px = 0.5 * touching.px;
+    refined_.radius_std_error_px = 0.5 * touching.std_error_px;
+  }
+
+  // By inverse variances; an outline known exactly stays.
+  void average(const TouchingDistance& touching) {
+    const double outline = std::pow(2 * refined_.radius_std_error_px, 2), distance = std::pow(touching.std_error_px, 2),
+                 share = outline / (outline + distance);
+    refined_.radius_px += 0.5 * share * (touching.px - 2 * refined_.radius_px);
+    refined_.radius_std_error_px *= std::sqrt(1 - share);
+  }
+
+  // Beads of several sizes may come nearer than those of the most frequent one touch, so the outline stands, with a
+  // part of the difference as error.
+  void doubt_outline(const TouchingDistance& touching) {
+    const double apart = 2 * refined_.radius_px - touching.px;
+    refined_.radius_std_error_px = std::hypot(refined_.radius_std_error_px, 0.25 * apart);
+    if (apart < worth_a_word * touching.px) return;
+    warnings_.push_back(formatted(
+        "Nearest beads are %.4g px apart, but the circles seen are %.4g px wide: the outline is larger than the bead, "
+        "by a "
+        "shadow or a halo, or beads are of several sizes. The error of the scale includes half of the difference.",
+        touching.px * refined_.recorded_px, 2 * refined_.radius_px * refined_.recorded_px));
   }
 
   void set_scale() {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "ingest/profile/bed_geometry.hpp"
+#include "ingest/profile/film_calibration.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "ingest/profile/touching_distance.hpp"
 #include "ingest/synthetic/random_stream.hpp"
@@ -105,7 +107,10 @@ void expect_measured(const std::vector<Look>& looks, int at_least) {
 }
 
 constexpr Look half_seen{10, 0.12, 0.6, 30, 32};
+// Lit from the front, the rim of a sphere is dark all around.
+constexpr Look soft_rim{5.6, 0.3, 1.35, 44, 36};
 TEST(SideLitSpheres, AreMeasuredByTheirContacts) { expect_measured({half_seen}, 1); }
+TEST(SideLitSpheres, WithASoftRimAreMeasuredByTheirContacts) { expect_measured({soft_rim}, 1); }
 // The third, whose light comes from below, may be refused.
 TEST(SideLitSpheres, OfOtherLooksAreMeasuredOrRefused) {
   expect_measured({{8, 0.35, 0.5, 40, 38}, {12, 0.25, 0.4, 40, 40}, {7, 0.6, 0.5, 52, 50}}, 2);
@@ -117,6 +122,7 @@ FrameFindings centres(const sim::Snapshot& bed, double diameter_px, double error
     FoundDisk disk;
     disk.x_px = bed.x[i] * diameter_px + error_px * random.normal();
     disk.y_px = -bed.z[i] * diameter_px + error_px * random.normal();
+    disk.variance_x = disk.variance_y = error_px * error_px;
     frame.disks.push_back(disk);
   }
   return frame;
@@ -136,6 +142,42 @@ TEST(TouchingDistance, IsTheDiameterOfSimulatedDisks) {
       EXPECT_NEAR(found->px, 20, 0.3) << disks;
       EXPECT_LT(found->std_error_px, 0.25);
     }
+}
+
+// The outline seen, its error, and what becomes of it beside a touching distance of 20.0 px.
+TEST(TouchingDistance, IsWeighedAgainstTheOutline) {
+  RandomStream random(6);
+  std::vector<FrameFindings> frames;
+  for (const sim::Snapshot& bed : bed_in_equilibrium(10, 21)) frames.push_back(centres(bed, 20, 0.04, random));
+  const auto weighed = [&](double radius, double error, BedCalibration& bed, bool one_side = false) {
+    FilmCalibration film;
+    film.options.bead_diameter_m = 2e-3;
+    film.finder.width = 500, film.finder.height = 600;
+    if (one_side) film.options.find.seen = BeadsSeen{Polarity::bright_beads, radius, true};
+    FinderCalibration refined;
+    refined.radius_px = radius, refined.radius_std_error_px = error;
+    std::vector<FrameFindings> copy = frames;
+    std::string words;
+    for (const std::string& warning : find_geometry(film, copy, refined, bed)) words += warning + "\n";
+    return words;
+  };
+  BedCalibration bed;
+  EXPECT_EQ(weighed(9.8, 0.3, bed).find("apart"), std::string::npos) << "they agree: the mean, without a word";
+  EXPECT_NEAR(bed.radius_px, 10, 0.06);
+  EXPECT_LT(bed.radius_std_error_px, 0.045);
+  EXPECT_NEAR(bed.scale_m_per_px, 1e-4, 6e-7);
+  EXPECT_NE(weighed(9.7, 0.02, bed).find("smaller than the beads"), std::string::npos);
+  EXPECT_NEAR(bed.radius_px, 10, 0.06);
+  EXPECT_NE(weighed(10.6, 0.02, bed).find("half of the difference"), std::string::npos);
+  EXPECT_NEAR(bed.radius_px, 10.6, 1e-12) << "or of several sizes";
+  EXPECT_NEAR(bed.radius_std_error_px, 0.3, 0.03);
+  EXPECT_EQ(weighed(9, 0.02, bed).find("apart"), std::string::npos) << "beads that do not touch";
+  EXPECT_NEAR(bed.radius_px, 9, 1e-12);
+  EXPECT_NE(weighed(8.5, 0.02, bed, true).find("lit from one side"), std::string::npos);
+  EXPECT_NEAR(bed.radius_px, 10, 0.06);
+  frames.resize(0);
+  weighed(8.5, 0.02, bed, true);
+  EXPECT_TRUE(bed.outline_in_doubt) << "no contacts are seen";
 }
 
 TEST(TouchingDistance, IsNoneOfFewDisksOrOfDisksFarApart) {
