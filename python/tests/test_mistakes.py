@@ -118,7 +118,7 @@ def test_profiles_that_cannot_be_fitted_say_where():
     ):
         fit = shakebed.fit_profile(*arguments)
         assert not fit.ok and words in fit.message, fit.message
-    for covariance, words in ((beyond, "correlation beyond 1"), (-np.diag(ERROR**2), "variance is negative"),
+    for covariance, words in ((beyond, "correlation outside -1 to 1"), (-np.diag(ERROR**2), "negative variance"),
                               (np.triu(np.ones((40, 40))), "not symmetric")):
         fit = shakebed.fit_profile(HEIGHT, DENSITY, covariance=covariance)
         assert not fit.ok and words in fit.message, fit.message
