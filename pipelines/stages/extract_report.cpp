@@ -100,7 +100,7 @@ StagePages extract_pages() {
            "Look through the film with the colours by quality for marked objects that are not beads."},
           {"beads may be missed", measurement,
            "Look through the film for beads without a circle; give a region (\"roi\") that contains only the bed."},
-          {"do not touch", measurement,
+          {"of the disks found touch", measurement,
            "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
            "(\"scale\")."},
           {"disks found overlap", measurement,
