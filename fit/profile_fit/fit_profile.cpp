@@ -202,7 +202,7 @@ class ProfileFitter {
     if (temperature_is_resolved(fitted_.solution, result_.temperature.std_error)) return;
     result_.status = FitStatus::unresolved_temperature;
     result_.message =
-        "the density falls more steeply than bins and kernel resolve, so only an upper limit of T exists. Measure at "
+        "the density falls more steeply than bins and kernel resolve, so only an upper limit of T is known. Measure at "
         "more closely spaced heights, with a narrower kernel";
   }
 

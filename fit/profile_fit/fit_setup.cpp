@@ -28,9 +28,8 @@ FitStatus check_numbers(const FitOptions& options, const FitModel& model, FitRes
     return bad_input(result, "the fixed shift is not a finite number; give a finite number or leave it out");
   }
   if (options.fixed_shift && model.place_is_column()) {
-    return bad_input(
-        result,
-        "this model has no free shift, because it follows from N D/W: give the column number instead of a shift");
+    return bad_input(result,
+                     "in this model the shift follows from N D/W and cannot be fixed: give the column number instead");
   }
   if (!kernel_is_valid(options.kernel))
     return bad_input(result, "the width of the kernel must be a finite number, 0 or more");
