@@ -521,7 +521,7 @@ TEST(Commands, FitProfileSaysWhichOfSeveralDensitiesItRead) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json fit = Json::parse(result.out);
   EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_bin"));
-  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_window is not read"));
+  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("these columns are ignored: phi_window."));
 }
 
 TEST(Commands, InitWritesARecipeThatIsGood) {
