@@ -38,9 +38,10 @@ std::vector<Objection> objections_to(const Measurement& found) {
            "Show the floor in the picture, or give its row (\"floor\", --floor).");
   if (const auto& above = found.above_mirror_image)
     object(formatted("The lowest disks found mirror those above row %d: they are the image of the bed in a polished "
-                     "floor, and count as beads.",
+                     "floor, but were counted as beads.",
                      above->top + above->height),
-           formatted("Leave the image out: --roi %d,%d,%d,%d.", above->left, above->top, above->width, above->height));
+           formatted("To leave this image out, give --roi %d,%d,%d,%d.", above->left, above->top, above->width,
+                     above->height));
   if (found.disk_total < least_disks)
     object(formatted("Only %zu beads were found in all frames together.", found.disk_total),
            "Take more photographs of the bed from the side, or measure longer.");
