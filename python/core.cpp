@@ -70,11 +70,12 @@ struct SceneOfRecipe {
 // What the stage `simulate` offers beyond one bed that is measured in memory.
 void refuse_more(const pipelines::PlannedStage& stage, const std::string& file) {
   const auto refuse = [&](const char* key) {
-    throw pipelines::ConfigError({{.file = file,
-                                   .at = {},
-                                   .pointer = stage.pointer + "/" + key,
-                                   .what = fmt::format("\"{}\" is not for a bed that is simulated in memory", key),
-                                   .suggestion = "Use shakebed.run() with a recipe"}});
+    throw pipelines::ConfigError(
+        {{.file = file,
+          .at = {},
+          .pointer = stage.pointer + "/" + key,
+          .what = fmt::format("\"{}\" cannot be used for a bed that is simulated in memory", key),
+          .suggestion = "Use shakebed.run() with a recipe"}});
   };
   if (stage.options.value("replicas", 1) != 1) refuse("replicas");
   if (stage.options.contains("schedule") && !stage.options["schedule"].empty()) refuse("schedule");
@@ -87,7 +88,7 @@ const pipelines::PlannedStage& simulate_stage_of(const pipelines::Plan& plan) {
   for (const pipelines::PlannedStage& stage : plan.stages) {
     if (stage.row->name != "simulate") continue;
     if (found != nullptr)
-      throw pipelines::UsageError("the recipe has more than one stage \"simulate\"; pass the one that is meant");
+      throw pipelines::UsageError("the recipe has more than one stage \"simulate\"; pass one of them");
     found = &stage;
   }
   if (found == nullptr) throw pipelines::UsageError("the recipe has no stage \"simulate\"");
@@ -240,7 +241,8 @@ class Stepper {
 
   void advance_to(double time) {
     if (!(time >= simulation_->time()) || !std::isfinite(time))
-      throw Mistake(fmt::format("the bed stands at time {}; it cannot go to {}", simulation_->time(), time));
+      throw Mistake(fmt::format("the bed is at time {} and cannot advance to {}; give a later, finite time",
+                                simulation_->time(), time));
     Caller caller(py::none{});
     {
       const py::gil_scoped_release release;
@@ -287,8 +289,7 @@ Doubles numbers_of(const py::object& values, const char* name) {
                            reinterpret_cast<PyObject*>(py::detail::npy_api::get().PyArray_Type_);
   if (plain_array && Doubles::check_(values)) return py::reinterpret_borrow<Doubles>(values);
   if (py::hasattr(values, "mask"))
-    throw Mistake(std::string(name) + " is a masked array; pass the values that count, " + name + "[~" + name +
-                  ".mask]");
+    throw Mistake(std::string(name) + " is a masked array; pass the valid values, " + name + "[~" + name + ".mask]");
   Doubles array = Doubles::ensure(values);
   if (!array)
     throw Mistake(std::string(name) + " cannot be read as numbers; pass an array, or a list without gaps in it");
@@ -331,8 +332,8 @@ fit::Profile profile_of(const py::object& height, const py::object& density, con
                         const py::object& covariance, int covariance_samples) {
   const Doubles heights = numbers_of(height, "height"), densities = numbers_of(density, "density");
   if (heights.ndim() != 1 || densities.ndim() != 1 || heights.size() != densities.size())
-    throw Mistake(fmt::format("height has shape {} and density {}; they must be equal, (heights,)", shape_of(heights),
-                              shape_of(densities)));
+    throw Mistake(fmt::format("height has shape {} and density has shape {}; both must have the same shape, (heights,)",
+                              shape_of(heights), shape_of(densities)));
   fit::Profile profile;
   profile.height = values_of(heights);
   profile.number_density = values_of(densities);
@@ -527,8 +528,8 @@ py::tuple read_trajectory(const std::string& path, bool y_is_up) {
         bed.trajectory.reserve(frames * frame.size() * columns);
       }
       if (frame.size() != bed.measured.disks.mass.size())
-        throw pipelines::InputError(fmt::format("{}: frame {} holds {} disks, the first one {}", path, bed.times.size(),
-                                                frame.size(), bed.measured.disks.mass.size()));
+        throw pipelines::InputError(fmt::format("{}: frame {} has {} disks, but the first frame has {}", path,
+                                                bed.times.size(), frame.size(), bed.measured.disks.mass.size()));
       sim::Snapshot at;
       at.time = frame.time, at.floor_position = frame.floor_position, at.floor_velocity = frame.floor_velocity;
       at.x = frame.x, at.z = frame.z, at.vx = frame.vx, at.vz = frame.vz, at.spin = frame.spin;

@@ -1,4 +1,4 @@
-// A bed of 100 dissipative disks on a shaking floor: stepped by hand, then measured.
+// A bed of 100 dissipative disks on a shaking floor: simulated step by step, then measured.
 #include <algorithm>
 #include <cstdio>
 #include <numbers>

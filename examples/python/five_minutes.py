@@ -37,7 +37,7 @@ print(answer["verdict"], ": T from %.2f to %.2f m g D" % (answer["low"], answer[
 print(answer["why"])
 
 # %% [markdown]
-# The same bed, stepped by hand.
+# The same bed, simulated step by step.
 
 # %%
 live = shakebed.Simulation(scene)

@@ -93,20 +93,22 @@ void audit_constants(std::vector<AuditRow>& rows) {
   const ExpansionConstants packed = expansion_constants(enskog(), close_packing_density);
   const OtherAlpha other = alpha_that_gives(printed::mu_0);
 
+  rows.push_back(numeric("mu_0", "text after eq. (4)", "", printed::mu_0, packed.mu_0,
+                         to_the_digits(printed::mu_0, packed.mu_0, 1e-5),
+                         "at phi_0 = 2/sqrt 3. The printed value follows from a coarse quadrature, or from another "
+                         "constant alpha of the pair function: alpha = " +
+                             text_of(other.alpha, 9) + " instead of " + text_of(enskog_constants().a, 9)));
   rows.push_back(numeric(
-      "mu_0", "text after eq. (4)", "", printed::mu_0, packed.mu_0, to_the_digits(printed::mu_0, packed.mu_0, 1e-5),
-      "at phi_0 = 2/sqrt 3; a coarse quadrature, or another alpha: alpha = " + text_of(other.alpha, 9) +
-          " in place of " + text_of(enskog_constants().a, 9) + " would give the print"));
-  rows.push_back(numeric("Lambda_1", "text after eq. (5)", "", printed::lambda_1, packed.lambda_1,
-                         to_the_digits(printed::lambda_1, packed.lambda_1, 1e-6),
-                         "at phi_0 = 2/sqrt 3; the alpha that gives the printed mu_0 gives " +
-                             text_of(other.lambda_1, 6) + ": one digit (5603 for 5503), or a coarse quadrature"));
+      "Lambda_1", "text after eq. (5)", "", printed::lambda_1, packed.lambda_1,
+      to_the_digits(printed::lambda_1, packed.lambda_1, 1e-6),
+      "at phi_0 = 2/sqrt 3. The alpha that gives the printed mu_0 gives Lambda_1 = " + text_of(other.lambda_1, 6) +
+          ". Possible causes: a wrong digit in print (5603 for 5503), or a coarse quadrature"));
   const double k_printed = expansion_coefficient(printed::lambda_1, printed::mu_0, close_packing_density);
-  rows.push_back(numeric(
-      "k = 2 Lambda_1 phi_0/mu_0^2 - 1", "eq. (5), from the two printed constants", "", k_printed, packed.k,
-      AuditStatus::explained,
-      "a small difference of large numbers: " + text_of(100.0 * (packed.lambda_1 / printed::lambda_1 - 1.0), 2) +
-          " % in Lambda_1 makes it " + text_of(packed.k / k_printed, 3) + " times larger"));
+  rows.push_back(numeric("k = 2 Lambda_1 phi_0/mu_0^2 - 1", "eq. (5), from the two printed constants", "", k_printed,
+                         packed.k, AuditStatus::explained,
+                         "k is a small difference of large numbers: a change of " +
+                             text_of(100.0 * (packed.lambda_1 / printed::lambda_1 - 1.0), 2) +
+                             " % in Lambda_1 makes it " + text_of(packed.k / k_printed, 3) + " times larger"));
 }
 
 // The bed of the experiment, with the plateau as measured.
@@ -120,15 +122,14 @@ void audit_temperatures(std::vector<AuditRow>& rows) {
   const Column as_measured = measured_column();
   const double critical_packed = d * critical_temperature(eos, as_packed).value;
   const double critical_measured = d * critical_temperature(eos, as_measured).value;
-  rows.push_back(
-      numeric("T_c/mg at phi_0 = 2/sqrt 3", "comparison with the experiment", "mm", printed::critical_temperature_mm,
-              critical_packed, AuditStatus::explained,
-              "the paper's constants are for phi_0 = 2/sqrt 3, but its T_c follows with the experiment's plateau: "
-              "see the next row"));
+  rows.push_back(numeric("T_c/mg at phi_0 = 2/sqrt 3", "comparison with the experiment", "mm",
+                         printed::critical_temperature_mm, critical_packed, AuditStatus::explained,
+                         "the paper's constants hold for phi_0 = 2/sqrt 3, but its T_c follows from the plateau "
+                         "density of the experiment: see the next row"));
   rows.push_back(numeric("T_c/mg at phi_0 = 1.10", "comparison with the experiment", "mm",
                          printed::critical_temperature_mm, critical_measured,
                          to_the_digits(printed::critical_temperature_mm, critical_measured, 1e-3),
-                         "the experiment's plateau is phi_0 = 1.10, not close packing"));
+                         "the plateau density of the experiment is phi_0 = 1.10, not close packing"));
   const double reduced = printed::temperature_mm / critical_measured;
   rows.push_back(numeric("T/T_c from T/mg = 0.36 mm", "comparison with the experiment", "",
                          printed::reduced_temperature, reduced,
@@ -156,7 +157,7 @@ void audit_published_profile(std::vector<AuditRow>& rows) {
   rows.push_back(numeric(
       "area under the published fit", "sum rule, phi_0 mu", "1/D", sum_rule, drawn.column_number(), AuditStatus::open,
       "with the shift 4.41/1.10 D the area is " + text_of(drawn.column_number(), 4) + ", with 4.41 D " +
-          text_of(as_product, 4) + "; the sum rule asks " + text_of(sum_rule, 4)));
+          text_of(as_product, 4) + "; by the sum rule it must be " + text_of(sum_rule, 4)));
 }
 
 // Misprints.
@@ -170,9 +171,12 @@ void audit_formulas(std::vector<AuditRow>& rows) {
   rows.push_back(statement("c4", "after eq. (3)", "(pi/2)(1 - alpha_1/alpha + alpha_2/alpha^2) alpha",
                            "(pi/2)(1 - alpha_1/alpha + alpha_2/alpha^2)/alpha = " + text_of(c.c4),
                            AuditStatus::explained, "a misprint: only the division gives f' = (1/phi) d(phi Z)/dphi"));
-  rows.push_back(statement(
-      "power of mu", "eq. (6)", "mu^2", "mu, from eq. (5); mu^2 if only the surface ball jumps", AuditStatus::explained,
-      "two readings: Delta z = H_0 gives mu, Delta z = H_0/mu gives mu^2; the map offers both by name"));
+  rows.push_back(statement("power of mu", "eq. (6)", "mu^2",
+                           "mu to the first power, from eq. (5) (mu: height of the bed at rest, in D); mu^2 if only "
+                           "the bead at the surface jumps",
+                           AuditStatus::explained,
+                           "Delta z = H_0 gives mu, and Delta z = H_0/mu gives mu^2 (Delta z: rise of the centre of "
+                           "mass; H_0: jump height of one ball). The map stage computes both"));
 }
 
 // T/T_c from Gamma, and the mass of a disk.
@@ -188,12 +192,12 @@ void audit_map(std::vector<AuditRow>& rows) {
     if (reading.name == "eq6/above_highest_floor/close_packed") nearest = reading.reduced_temperature;
     if (reading.name == "eq6/above_highest_floor/printed") with_printed = reading.reduced_temperature;
   }
-  rows.push_back(
-      numeric("T/T_c from the map", "eq. (6)", "", printed::map_reduced_temperature, nearest, AuditStatus::open,
-              "nearest candidate: H_0 = (Gamma - 1)^2/2, mu^2, k at 2/sqrt 3, with Gamma = 4 and f = 20 Hz assumed "
-              "from the literature, not printed; " +
-                  text_of(with_printed, 4) +
-                  " with the printed constants. H_0, Gamma and f are not printed, so no reading is claimed"));
+  rows.push_back(numeric("T/T_c from the map", "eq. (6)", "", printed::map_reduced_temperature, nearest,
+                         AuditStatus::open,
+                         "nearest candidate: H_0 = (Gamma - 1)^2/2, mu^2, k at phi_0 = 2/sqrt 3. Gamma = 4 and f = 20 "
+                         "Hz are not printed; they are assumed from the literature. The printed constants give " +
+                             text_of(with_printed, 4) +
+                             ". H_0, Gamma and f are not printed, so no candidate is claimed to be the paper's"));
   rows.push_back(statement("mass of a disk", "caption of Fig. 2 and text", "1.047e-6 and 2.090e-6", "either",
                            AuditStatus::explained, "T/(m g D) does not depend on m"));
 }
@@ -206,12 +210,13 @@ void audit_equilibrium_beds(std::vector<AuditRow>& rows) {
                    0.15 * critical_temperature(eos, {20.0 * close_packing_density, close_packing_density}).value)
           .value;
   rows.push_back(numeric("zeta_F at T/T_c = 0.15, mu = 20", "Fig. 1a: about 17 layers", "D", 17.0, layers,
-                         to_the_digits(17.0, layers, 1.0), "these are the condensed layers at that T < T_c, not mu"));
+                         to_the_digits(17.0, layers, 1.0),
+                         "this is the number of condensed layers at this T < T_c, not mu"));
   rows.push_back(statement("width of the bed", "Fig. 1: N = 1000, mu = 20, no W", "not printed",
                            "W = " + text_of(1000.0 / (20.0 * close_packing_density), 4) +
-                               " D with mu a height; W = 50 D with 20 rows of 50 (mu = " +
+                               " D if mu is a height; W = 50 D if there are 20 rows of 50 disks (mu = " +
                                text_of(1000.0 / 50.0 / close_packing_density, 4) + " D)",
-                           AuditStatus::open, "N D/W = phi_0 mu: both readings are offered"));
+                           AuditStatus::open, "N D/W = phi_0 mu: the program offers both widths"));
 }
 
 // The conclusion, and the list of references.
@@ -224,11 +229,10 @@ void audit_conclusion(std::vector<AuditRow>& rows) {
     evidence += std::string(equation->name()) + ": ";
     evidence += constants.ok() ? "mu_0 = " + text_of(constants.mu_0, 6) : std::string(to_string(constants.status));
   }
-  rows.push_back(
-      statement("condensation for any pressure", "conclusion", "the breakdown should persist for any pressure",
-                evidence, AuditStatus::explained,
-                "it persists only where the pressure stays finite at phi_0; with a pole at close packing, as true "
-                "disks have, every T is above T_c = 0"));
+  rows.push_back(statement("condensation for any pressure", "conclusion",
+                           "the breakdown should persist for any pressure", evidence, AuditStatus::explained,
+                           "it persists only where the pressure stays finite at phi_0. The pressure of true disks "
+                           "diverges at close packing: then T_c = 0, and every T is above it"));
   rows.push_back(statement("reference [11]", "list of references", "PRE 57", "PRE 54, R9 (1996)",
                            AuditStatus::explained, "a misprint"));
 }

@@ -153,7 +153,8 @@ double even_number(std::mt19937_64& generator) { return (static_cast<double>(gen
 std::vector<double> even_points(std::size_t dimensions, std::size_t count, std::uint64_t seed) {
   const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sequence(
       gsl_qrng_alloc(gsl_qrng_sobol, static_cast<unsigned>(dimensions)), gsl_qrng_free);
-  if (!sequence) throw std::invalid_argument("even points have from 1 to 40 dimensions");
+  if (!sequence)
+    throw std::invalid_argument("even_points: " + std::to_string(dimensions) + " dimensions; there must be 1 to 40");
   std::mt19937_64 generator(seed);
   std::vector<double> shift(dimensions), point(dimensions), out;
   for (double& one : shift) one = even_number(generator);

@@ -132,7 +132,8 @@ Surrogate Surrogate::train(const TrainingSet& set) {
   const std::size_t n = set.runs(), m = set.outputs;
   if (n < fewest_runs(set.parameters) || m == 0 || set.values.size() != n * m)
     throw std::invalid_argument("a surrogate of " + std::to_string(set.parameters) + " parameters needs at least " +
-                                std::to_string(fewest_runs(set.parameters)) + " runs, there are " + std::to_string(n));
+                                std::to_string(fewest_runs(set.parameters)) + " runs, but " + std::to_string(n) +
+                                " were given");
   Surrogate out;
   out.parameters_ = set.parameters, out.outputs_ = m, out.runs_ = n;
   out.points_ = set.points;

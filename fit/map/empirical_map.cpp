@@ -30,7 +30,9 @@ EmpiricalMap::EmpiricalMap(std::vector<MapAxis> axes, std::vector<MapPoint> poin
     }
   }
   if (points_.size() < axes_.size() + 2) {
-    fail(FitStatus::too_few_bins, "a map needs at least two points more than axes");
+    fail(FitStatus::too_few_bins, "the map has " + std::to_string(points_.size()) + " points; a fit of " +
+                                      std::to_string(axes_.size()) + " axes needs at least " +
+                                      std::to_string(axes_.size() + 2));
     return;
   }
   low_.assign(axes_.size(), std::numeric_limits<double>::infinity());

@@ -158,8 +158,8 @@ class AnswerFinder {
       return true;
     }
     answer_.advice =
-        "Look at the profile: it must fall from a plateau to nothing over several heights. "
-        "That of a bed seen from above does not.";
+        "Check the profile: the density must fall from a plateau to zero over several heights. In a bed photographed "
+        "from above it does not.";
     return false;
   }
 
@@ -255,8 +255,8 @@ class AnswerFinder {
     answer_.verdict = Verdict::no_single_temperature;
     if (is_at_rest()) {
       answer_.why = "The bed is at rest: T_x = " + amount(x->value, 2) + " and T_z = " + amount(z->value, 2) + unit() +
-                    ". Its profile shows how the disks are packed.";
-      answer_.advice = "Quote no T, or shake the bed harder.";
+                    ". Its profile shows only how the disks are packed, not a temperature.";
+      answer_.advice = "Do not quote a T of this bed. To measure one, shake the bed harder.";
       return;
     }
     if (x && z && differ(*x, *z, significant_kinetic)) {
@@ -264,24 +264,26 @@ class AnswerFinder {
       answer_.why = "The disks' velocities have two temperatures: T_x = " + amount(x->value) +
                     " and T_z = " + amount(z->value) + unit() +
                     (std::isfinite(apart) ? ", " + how_far(apart) + " apart." : ".");
-      answer_.advice = "Quote the range, or T_x and T_z by name; no equilibrium curve holds for this bed.";
+      answer_.advice =
+          "Quote T_x (horizontal motion) and T_z (vertical motion) separately, or quote the range of T. The density "
+          "profile of a bed in equilibrium does not describe this bed.";
       return;
     }
     const Estimate profile{chosen_->temperature, chosen_->std_error, false};
     for (const std::optional<Estimate>& kinetic : {x, z}) {
       if (!kinetic || !differ(profile, *kinetic, significant)) continue;
       const double apart = ratio_above_one(profile.value, kinetic->value);
-      answer_.why = "The profile's T = " + amount(profile.value) + unit() + " is " +
-                    (std::isfinite(apart) ? how_far(apart) + " away from" : "not") +
-                    " that of the disks' velocities, " + amount(kinetic->value) + unit() + ".";
-      answer_.advice = "Quote the range; check that floor, diameter and gravity are the bed's own.";
+      answer_.why = "The profile gives T = " + amount(profile.value) + unit() + ", but the disks' velocities give " +
+                    amount(kinetic->value) + unit() + (std::isfinite(apart) ? ", " + how_far(apart) + " apart." : ".");
+      answer_.advice = "Quote the range of T. Check that the floor, the diameter and gravity are those of this bed.";
       return;
     }
     if (farthest_ != nullptr) {
       answer_.why = "T depends on the range of heights that is fitted: " + amount(chosen_->temperature) + unit() +
                     " (" + chosen_->thermometer + ") or " + amount(farthest_->temperature) + unit() + " (" +
                     farthest_->thermometer + ").";
-      answer_.advice = "Quote the range; a bed that is shaken or loses energy in contacts has a T for every height.";
+      answer_.advice =
+          "Quote the range of T. In a bed that is shaken or loses energy in contacts, T differs from height to height.";
       return;
     }
     const ThermometerReading& whole = whole_column();
@@ -289,10 +291,11 @@ class AnswerFinder {
     const double misfit = part * (part * known_misfit(whole.temperature) + row_modulation * seen_.rows_seen);
     answer_.verdict = Verdict::model_does_not_fit;
     if (whole.model_error > std::max(least_misfit_, admissible_misfit * misfit)) {
-      answer_.why = "The best model misses the densities by " + number(whole.model_error, 2) + " per D^2, " +
+      answer_.why = "The best model deviates from the densities by " + number(whole.model_error, 2) + " per D^2, " +
                     number(whole.model_error / misfit, 2) +
-                    " times as much as it does on beds in equilibrium at this temperature.";
-      answer_.advice = "Look at the residuals; check the diameter, the origin of the heights and the kernel.";
+                    " times as much as for beds in equilibrium at this temperature.";
+      answer_.advice =
+          "Look at the residuals of the fit. Check the diameter, the origin of the heights and the kernel.";
       return;
     }
     answer_.verdict = Verdict::one_temperature;
@@ -301,7 +304,9 @@ class AnswerFinder {
                       : (compared_ == 1 ? "Both" : "All " + std::to_string(compared_ + 1)) +
                             " fits (models and windows) agree within 20 % or their errors, and the model fits.";
     if (!x && !z && !input_.shaken)
-      answer_.why += " This is the T of the profile: only velocities show whether T_x differs, as in shaken beds.";
+      answer_.why +=
+          " This is the T of the profile. Only velocities show whether T_x (horizontal motion) differs from it, as in "
+          "shaken beds.";
   }
 
   // A temperature as the reasons state it, and its unit.
@@ -319,11 +324,13 @@ class AnswerFinder {
   void judge_shaking() {
     if (!answer_.ok() || !input_.shaken || input_.temperature_x || input_.temperature_z) return;
     const std::string shaken =
-        "The bed is shaken, and no velocities are known: T_x and T_z may lie outside this range.";
+        "The bed is shaken, and its velocities are unknown: T_x (horizontal) and T_z (vertical) may lie outside this "
+        "range.";
     if (answer_.verdict == Verdict::one_temperature) {
       answer_.verdict = Verdict::no_single_temperature;
-      answer_.why = shaken + " In the profile: " + answer_.why;
-      answer_.advice = "Quote this range as that of the profile. Measure velocities: a film with its frame rate.";
+      answer_.why = shaken + " The profile alone: " + answer_.why;
+      answer_.advice =
+          "Quote this range as the T of the profile. To measure velocities, record a film and give its frame rate.";
     } else {
       answer_.why += " " + shaken;
     }
@@ -395,8 +402,8 @@ class AnswerFinder {
     const double factor = at.high / at.low;
     if (std::log(at.high / answer_.temperature) >= widest_interval) {
       answer_.status = FitStatus::unreadable;
-      answer_.why = misfit + "The profile does not even say within a factor of twenty what T is.";
-      answer_.advice = "Measure longer, or at finer heights where the density falls.";
+      answer_.why = misfit + "The profile does not determine T within a factor of 20.";
+      answer_.advice = "Measure longer, or at more closely spaced heights where the density falls.";
       return;
     }
     answer_.why =

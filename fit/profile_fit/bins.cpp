@@ -79,8 +79,9 @@ void weigh_by_covariance(const Eigen::MatrixXd& covariance, Bins& bins, FitResul
   double shrink = 0.0;
   const auto cholesky = safe_cholesky(correlation, shrink);
   if (shrink > 0.0 && result != nullptr) {
-    result->warnings.push_back("the covariance is not positive definite; its correlations were shrunk by " +
-                               number(100.0 * shrink, 2) + " %");
+    result->warnings.push_back(
+        "the covariance of the densities is not positive definite: its correlations were reduced by " +
+        number(100.0 * shrink, 2) + " %");
   }
   bins.whitening = covariance.diagonal().cwiseSqrt().asDiagonal() * Eigen::MatrixXd(cholesky.matrixL());
   if (bins.samples > 0) {  // shrunk correlations weigh; the errors come through those measured

@@ -54,7 +54,8 @@ class ProfileFitter {
     if (!fitted_.solution.has_curve) {
       result_.status = FitStatus::undefined_model;
       result_.message =
-          "the model has no curve for this profile: the equation of state ends below the densities it needs";
+          "the model has no curve for this profile: its equation of state is not defined at densities this high. "
+          "Choose another model, for example hydrostatic:best-of";
       return result_;
     }
     report_goodness();
@@ -82,7 +83,7 @@ class ProfileFitter {
           {measured_.height[i], measured_.density[i], measured_.errors_known ? measured_.error[i] : 0.0, 0.0, false});
     }
     if (*std::max_element(measured_.density.begin(), measured_.density.end()) <= 0.0) {
-      result_.message = "no bin has a positive density";
+      result_.message = "no bin has a density above 0: check the column of the density";
       return FitStatus::no_signal;
     }
     return FitStatus::ok;
@@ -95,10 +96,11 @@ class ProfileFitter {
     const std::size_t chosen = count_bins(measured_, window_);
     if (chosen < bins_needed() && !options_.window.low && !options_.window.high) {
       const Window all{std::max(options_.base, measured_.height.front()), measured_.height.back(),
-                       "all bins above the base: the rule leaves too few"};
+                       "all bins above the base, because the rule leaves too few"};
       if (count_bins(measured_, all) >= bins_needed()) {
-        result_.warnings.push_back("the window rule leaves only " + std::to_string(chosen) +
-                                   " bins; all bins above the base were used");
+        result_.warnings.push_back(
+            "the window rule leaves only " + std::to_string(chosen) +
+            " bins, too few for the fit: all bins above the base (lower edge of the bed) were used");
         window_ = all;
       }
     }
@@ -113,13 +115,15 @@ class ProfileFitter {
 
   FitStatus check_bins() {
     if (bins_.size() < bins_needed()) {
-      result_.message = "the window holds " + std::to_string(bins_.size()) + " bins; " +
+      result_.message = "the window contains " + std::to_string(bins_.size()) + " bins, but " +
                         std::to_string(setup_.parameters) + " free parameters need at least " +
-                        std::to_string(bins_needed());
+                        std::to_string(bins_needed()) + ". Widen the window, or measure at more heights";
       return FitStatus::too_few_bins;
     }
     if (is_free(FitModel::temperature) && is_flat(bins_, measured_.errors_known)) {
-      result_.message = "the profile does not fall anywhere in the window: nothing in it depends on the temperature";
+      result_.message =
+          "the density does not fall with height anywhere in the window, so it does not depend on the temperature. "
+          "Extend the window to the top of the bed";
       return FitStatus::no_tail;
     }
     return FitStatus::ok;
@@ -130,7 +134,8 @@ class ProfileFitter {
     const Goodness& good = fitted_.good;
     result_.status = solution.converged ? FitStatus::ok : FitStatus::not_converged;
     if (!solution.converged) {
-      result_.message = "no minimum after " + std::to_string(solution.iterations) + " iterations";
+      result_.message = "no minimum of chi2 was found in " + std::to_string(solution.iterations) +
+                        " iterations. Try another model or window";
     }
     result_.iterations = solution.iterations;
     result_.evaluations = solution.evaluations;
@@ -197,7 +202,8 @@ class ProfileFitter {
     if (temperature_is_resolved(fitted_.solution, result_.temperature.std_error)) return;
     result_.status = FitStatus::unresolved_temperature;
     result_.message =
-        "the profile falls more sharply than its bins and kernel can tell: the temperature is only bounded above";
+        "the density falls more steeply than bins and kernel resolve, so only an upper limit of T is known. Measure at "
+        "more closely spaced heights, with a narrower kernel";
   }
 
   void report_residuals() {

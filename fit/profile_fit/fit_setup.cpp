@@ -15,23 +15,30 @@ constexpr double rounding = 1e-12;
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 
 FitStatus check_numbers(const FitOptions& options, const FitModel& model, FitResult& result) {
-  if (!positive(options.plateau_density)) return bad_input(result, "the plateau density must be positive");
+  if (!positive(options.plateau_density))
+    return bad_input(result,
+                     "the plateau density phi_0 is " + number(options.plateau_density) + "; it must be above 0");
   if (options.column_number && !positive(*options.column_number)) {
-    return bad_input(result, "the column number N D/W must be positive");
+    return bad_input(result, "the column number N D/W is " + number(*options.column_number) + "; it must be above 0");
   }
   if (options.fixed_temperature && !positive(*options.fixed_temperature)) {
-    return bad_input(result, "the fixed temperature must be positive");
+    return bad_input(result, "the fixed temperature is " + number(*options.fixed_temperature) + "; it must be above 0");
   }
   if (options.fixed_shift && !std::isfinite(*options.fixed_shift)) {
-    return bad_input(result, "the fixed shift is not a finite number");
+    return bad_input(result, "the fixed shift is not a finite number; give a finite number or leave it out");
   }
   if (options.fixed_shift && model.place_is_column()) {
-    return bad_input(result, "a whole column has no shift of its own to fix: fix N D/W instead");
+    return bad_input(result,
+                     "in this model the shift follows from N D/W and cannot be fixed: give the column number instead");
   }
-  if (!kernel_is_valid(options.kernel)) return bad_input(result, "the kernel's width must be finite and not negative");
-  if (!std::isfinite(options.base)) return bad_input(result, "the base is not a finite number");
+  if (!kernel_is_valid(options.kernel))
+    return bad_input(result, "the width of the kernel must be a finite number, 0 or more");
+  if (!std::isfinite(options.base))
+    return bad_input(result,
+                     "the base (height of the lower edge of the bed, in D) is not a finite number; give a finite "
+                     "number or leave it out");
   if (!(options.confidence > 0.0 && options.confidence < 1.0)) {
-    return bad_input(result, "the confidence must lie between 0 and 1");
+    return bad_input(result, "the confidence is " + number(options.confidence) + "; it must lie between 0 and 1");
   }
   return FitStatus::ok;
 }
@@ -45,7 +52,8 @@ FitStatus check_plateau(const FitOptions& options, const FitModel& model, FitRes
     return FitStatus::undefined_model;
   }
   if (!is_whole_column(options) && options.plateau_density > model.largest_plateau() * (1.0 + rounding)) {
-    result.message = "the equation of state has no value at the plateau density " + number(options.plateau_density, 5);
+    result.message = "the equation of state has no value at the plateau density " + number(options.plateau_density, 5) +
+                     ". Give a lower plateau density or choose another model";
     return FitStatus::undefined_model;
   }
   return FitStatus::ok;
@@ -80,7 +88,7 @@ namespace {
 FitStatus make_model(const FitOptions& options, double resolution, std::unique_ptr<FitModel>& model,
                      FitResult& result) {
   if (options.constrain_column && !options.column_number) {
-    return bad_input(result, "constrain_column needs the column number N D/W");
+    return bad_input(result, "constrain_column needs the column number N D/W, which is unknown: give it too");
   }
   model = make_fit_model(options.model, options.base, options.constrain_column, resolution);
   if (!model) return bad_input(result, "there is no model named '" + options.model + "'");

@@ -47,9 +47,9 @@ void warn_about_an_outlier(const MeasuredProfile& measured, bool robust, FitResu
   }
   if (!measured.errors_known || result.dof <= 1 || worst <= outlier_errors || worst * worst <= outlier_share * rest)
     return;
-  result.warnings.push_back("one bin, at " + number(worst_height, 4) + " D, is " + number(worst, 2) +
-                            " standard errors off and makes most of chi2" +
-                            (robust ? "" : ": an outlier? The robust option bounds its influence"));
+  result.warnings.push_back("One density, at the height " + number(worst_height, 4) + " D, lies " + number(worst, 2) +
+                            " standard errors from the fit and contributes most of chi2." +
+                            (robust ? "" : " If it is an outlier, the option \"robust\" limits its influence."));
 }
 
 void warn_about_the_window(FitResult& result) {
@@ -78,7 +78,7 @@ void warn_about_the_sum_rule(FitResult& result) {
   if (result.solid_height.value > 0.0 &&
       off > std::max(sum_rule_change * result.solid_height.value, sum_rule_errors * result.solid_height.std_error)) {
     result.warnings.push_back("the fitted solid is " + number(result.solid_height.value) +
-                              " D high, the sum rule with this T asks " +
+                              " D high, but the sum rule with this T gives " +
                               number(std::max(0.0, result.solid_height_by_sum_rule)) + " D");
   }
 }
@@ -100,11 +100,12 @@ bool area_is_of_another_unit(double area, double column_number) {
 void warn_about_units(const MeasuredProfile& measured, const FitOptions& options, FitResult& result) {
   if (heights_look_like_metres(measured)) {
     result.warnings.push_back("the heights span only " + number(measured.height.back() - measured.height.front()) +
-                              " D: are they in metres? They should be in disk diameters");
+                              " D. If they are in metres, give them in disk diameters");
   }
   if (is_denser_than_close_packing(measured.greatest_mean)) {
-    result.warnings.push_back("the density averaged over one diameter reaches " + number(measured.greatest_mean, 4) +
-                              ", above close packing (1.155): is it n D^2, with the right D?");
+    result.warnings.push_back(
+        "the density averaged over one diameter reaches " + number(measured.greatest_mean, 4) +
+        ", above close packing (1.155). Check that it is n D^2 (n: disks per area) with the right D");
   }
   if (!options.column_number) return;
   const double given = *options.column_number;
@@ -113,8 +114,8 @@ void warn_about_units(const MeasuredProfile& measured, const FitOptions& options
   std::string text = "the area under the profile is " + number(measured.area, 4) + ", but N D/W is " +
                      number(given, 4) + " (ratio " + number(ratio) + ")";
   if (ratio > 0.0 && area_is_of_another_unit(measured.area, given)) {
-    text += ": the heights look to be in the wrong unit, or part of the bed is missing; heights divided by " +
-            number(ratio, 4) + " would agree";
+    text += ". The heights may be in a wrong unit, or part of the bed is missing. Heights divided by " +
+            number(ratio, 4) + " would agree with N D/W";
   }
   result.warnings.push_back(std::move(text));
 }
@@ -134,7 +135,7 @@ void warn_about_fit(const MeasuredProfile& measured, const FitOptions& options, 
     result.warnings.emplace_back("the plateau density is not determined: no part of the window lies on the plateau");
   }
   if (result.plateau_density.value >= setup.model->largest_plateau()) {
-    result.warnings.emplace_back("the plateau density ran to close packing, the end of its range");
+    result.warnings.emplace_back("the fitted plateau density reached close packing, the upper limit of its range");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fit/profile_fit/fit_profile.hpp"
+#include "fit/profile_fit/measured_profile.hpp"
 #include "statistics/correlated_series.hpp"
 
 namespace shakebed::fit {
@@ -20,7 +21,8 @@ bool shape_is_good(const ProfileFrames& frames, std::string& message) {
     return false;
   }
   if (frames.number_density.size() % bins != 0) {
-    message = "the densities are not a whole number of frames of " + std::to_string(bins) + " bins";
+    message = std::to_string(frames.number_density.size()) + " densities were given, which is not a multiple of the " +
+              std::to_string(bins) + " bins of a frame";
     return false;
   }
   for (const double value : frames.number_density) {
@@ -71,7 +73,8 @@ double normal(std::mt19937_64& generator) {
 
 FrameAverage average_frames(const ProfileFrames& frames) {
   FrameAverage average;
-  if (shape_is_good(frames, average.message) && frames.frames() < 2) average.message = "there is one frame only";
+  if (shape_is_good(frames, average.message) && frames.frames() < 2)
+    average.message = "there is only one frame, but errors need at least two";
   if (!average.message.empty()) {
     average.status = FitStatus::bad_input;
     return average;
@@ -93,9 +96,10 @@ namespace {
 std::string why_no_bootstrap(const ProfileFrames& frames, const BootstrapOptions& bootstrap) {
   std::string why;
   if (!shape_is_good(frames, why)) return why;
-  if (frames.frames() < 2) return "there is one frame only";
+  if (frames.frames() < 2) return "there is only one frame, but errors need at least two";
   if (bootstrap.resamples < 10 || !(bootstrap.confidence > 0.0 && bootstrap.confidence < 1.0))
-    return "at least 10 resamples and a confidence between 0 and 1 are needed";
+    return "the bootstrap has " + std::to_string(bootstrap.resamples) + " resamples and the confidence " +
+           number(bootstrap.confidence) + "; give at least 10 resamples and a confidence between 0 and 1";
   return "";
 }
 
@@ -205,8 +209,8 @@ BootstrapResult bootstrap_fit(const ProfileFrames& frames, const FitOptions& opt
   }
   result.succeeded = static_cast<int>(temperatures.size());
   if (result.succeeded < bootstrap.resamples / 2)
-    return refused(FitStatus::not_converged,
-                   "only " + std::to_string(result.succeeded) + " of the resamples could be fitted");
+    return refused(FitStatus::not_converged, "only " + std::to_string(result.succeeded) + " of " +
+                                                 std::to_string(bootstrap.resamples) + " resamples could be fitted");
   std::sort(temperatures.begin(), temperatures.end());
   std::sort(shifts.begin(), shifts.end());
   const double degrees = std::max(1.0, static_cast<double>(samples.windows.independent) - 1.0);

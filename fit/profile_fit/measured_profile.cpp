@@ -29,7 +29,7 @@ FitStatus check_covariance(const Profile& profile, FitResult& result) {
   std::vector<double> sigma;
   for (std::size_t i = 0; i < n; ++i) {
     const auto entry = [&](std::size_t a, std::size_t b) { return profile.covariance[a * n + b]; };
-    if (entry(i, i) < 0.0) return bad_input(result, "the covariance says that a variance is negative" + at_bin(i));
+    if (entry(i, i) < 0.0) return bad_input(result, "the covariance has a negative variance" + at_bin(i));
     sigma.push_back(std::sqrt(entry(i, i)));
     const auto between = [i](std::size_t j) {
       return " between bins " + std::to_string(j) + " and " + std::to_string(i);
@@ -40,7 +40,7 @@ FitStatus check_covariance(const Profile& profile, FitResult& result) {
         return bad_input(result, "the covariance is not symmetric" + between(j));
       }
       if (std::abs(entry(i, j)) > limit * (1.0 + 1e-6)) {
-        return bad_input(result, "the covariance has a correlation beyond 1" + between(j));
+        return bad_input(result, "the covariance has a correlation outside -1 to 1" + between(j));
       }
     }
   }
@@ -59,7 +59,7 @@ FitStatus check_numbers(const Profile& profile, FitResult& result) {
                                  std::to_string(profile.std_error.size()) + " standard errors");
   }
   if (!profile.covariance.empty() && profile.covariance.size() != n * n) {
-    return bad_input(result, "the covariance has " + std::to_string(profile.covariance.size()) + " entries, " +
+    return bad_input(result, "the covariance has " + std::to_string(profile.covariance.size()) + " entries, but " +
                                  std::to_string(n) + " bins need " + std::to_string(n * n));
   }
   for (std::size_t i = 0; i < n; ++i) {
@@ -102,10 +102,12 @@ void clean_errors(const Profile& profile, const std::vector<std::size_t>& order,
     measured.error.assign(n, 1.0);
     if (!profile.std_error.empty() || !profile.covariance.empty()) {
       result.warnings.emplace_back(
-          "all standard errors are zero, so every bin has the same weight and the errors come from the scatter");
+          "all standard errors are zero: every bin has the same weight, and the errors of the fit follow from the "
+          "residuals");
     } else {
       result.warnings.emplace_back(
-          "no standard errors were given, so every bin has the same weight and the errors come from the scatter");
+          "no standard errors were given: every bin has the same weight, and the errors of the fit follow from the "
+          "residuals");
     }
     return;
   }
@@ -124,7 +126,7 @@ void clean_errors(const Profile& profile, const std::vector<std::size_t>& order,
   if (filled > 0) {
     result.warnings.push_back((filled == 1 ? "1 bin has" : std::to_string(filled) + " bins have") +
                               " a density but no standard error; the median error, " + number(typical) +
-                              ", was taken there");
+                              ", was used there");
   }
 }
 
@@ -155,8 +157,8 @@ void measure_spacing(MeasuredProfile& measured, FitResult& result) {
     }
   }
   if (repeated > 0) {
-    result.warnings.push_back(std::to_string(repeated) +
-                              " bins repeat the height of another; each counts as a measurement of its own");
+    result.warnings.push_back((repeated == 1 ? "1 bin repeats" : std::to_string(repeated) + " bins repeat") +
+                              " the height of another bin; each counts as an independent measurement");
   }
   measured.spacing = median_of(std::move(gaps));
 }
@@ -181,7 +183,8 @@ void measure_area(MeasuredProfile& measured, FitResult& result) {
     i = j;
   }
   if (negative > 0) {
-    result.warnings.push_back(std::to_string(negative) + " bins have a negative density; they were used as they are");
+    result.warnings.push_back((negative == 1 ? "1 bin has" : std::to_string(negative) + " bins have") +
+                              " a negative density; no density was changed");
   }
   result.area = measured.area;
 }

@@ -39,7 +39,7 @@ class ProfileReader {
     greatest_ = *std::max_element(measured_.one_diameter_mean.begin(), measured_.one_diameter_mean.end());
     if (!(greatest_ > 0.0)) return {};  // no signal, which the fits say
     if (!(measured_.area > 0.0)) {
-      object("The densities are negative, on average.", "Check what was subtracted from them.");
+      object("The densities are negative, on average.", "Check the background that was subtracted from them.");
       return found_;
     }
     look_at_heights();
@@ -60,7 +60,7 @@ class ProfileReader {
         std::count_if(measured_.density.begin(), measured_.density.end(), [](double d) { return d > 0.0; });
     if (static_cast<std::size_t>(filled) >= least_heights) return;
     object(
-        "Only " + std::to_string(filled) + " heights have a density.",
+        "Only " + std::to_string(filled) + " heights have a density above 0.",
         "Measure the density at " + std::to_string(least_heights) + " heights or more, half a diameter apart or less.");
   }
 
@@ -72,11 +72,11 @@ class ProfileReader {
     if (is_denser_than_close_packing(rows_seen_ < few_rows ? greatest_ : 0.5 * greatest_))
       object("The density averaged over one diameter reaches " + number(greatest_, 4) +
                  " per D^2, above close packing (1.155).",
-             "Check the diameter D, and that the density is n D^2.");
+             "Check the diameter D, and that the density is n D^2 (n: disks per area).");
     if (column_number_ && area_is_of_another_unit(measured_.area, *column_number_))
       object("The area under the profile is " + number(measured_.area, 3) + ", but N D/W is " +
                  number(*column_number_, 3) + ".",
-             "Check the unit of the heights, and that the profile holds the whole bed.");
+             "Check the unit of the heights, and that the profile contains the whole bed.");
   }
 
   [[nodiscard]] std::size_t densest() const {
@@ -121,11 +121,11 @@ class ProfileReader {
         measured_.errors_known ? std::hypot(error_of_mean(densest()), error_of_mean(measured_.size() - 1)) : 0.0;
     if (top <= fallen * greatest_ && greatest_ - top >= fall_errors * error) return;
     const std::string values = number(greatest_, 2) + " per D^2 where it is greatest, and " + number(top, 2) +
-                               " at the top, " + number(measured_.height.back(), 3) + " D";
+                               " at the greatest height, " + number(measured_.height.back(), 3) + " D";
     if (top > fallen * greatest_)
       object("The density does not fall with height: it is " + values + ".",
-             "T follows from how the density falls: look at the bed from the side, with floor and surface in view, and "
-             "measure heights upwards.");
+             "T follows from the decrease of the density with height. Photograph the bed from the side, with floor and "
+             "surface in view. Measure heights upwards.");
     else if (found_.empty())
       object("The density does not fall by more than its errors: it is " + values + ".",
              "Take more photographs of the bed from the side, or measure longer.");
@@ -160,7 +160,7 @@ class ProfileReader {
     if (!(above > most_above * measured_.area)) return;
     object(number(100.0 * above / measured_.area, 2) + " % of the disks lie above a gap at " +
                number(measured_.height[first], 3) + " D.",
-           "Check what lies above the gap; leave it out if it is no part of the bed.");
+           "Check the densities above the gap, and leave them out if they do not belong to the bed.");
   }
 
   MeasuredProfile measured_;

@@ -364,7 +364,8 @@ MatchResult match_simulated(const Profile& measured, const std::vector<Simulated
     return result;
   };
   if (std::string why = why_bad(measured, library); !why.empty()) return refused(FitStatus::bad_input, std::move(why));
-  if (!(greatest_density(measured) > 0.0)) return refused(FitStatus::no_signal, "no bin has a positive density");
+  if (!(greatest_density(measured) > 0.0))
+    return refused(FitStatus::no_signal, "no bin has a density above 0: check the column of the density");
   const Target target = target_of(measured, options);
   result.bins = static_cast<int>(target.height.size());
   result.dof = result.bins - 1;

@@ -14,7 +14,7 @@ constexpr std::array<Thermometer, thermometer_count> table{{
     {"whole column from 5 D up", "hydrostatic:best-of", false, 5.0, 0.0, true},
     {"whole column, densities below 0.8", "hydrostatic:best-of", false, 1.5, 0.8, true},
     {"whole column, densities below 0.4", "hydrostatic:best-of", false, 1.5, 0.4, true},
-    {"Enskog curve of the paper", "enskog-rectangle", false, 1.5, 0.0, false},
+    {"Enskog curve of Quinn and Hong (2000)", "enskog-rectangle", false, 1.5, 0.0, false},
     {"Enskog curve, densities below 0.6", "enskog-rectangle", false, 1.5, 0.6, false},
 }};
 

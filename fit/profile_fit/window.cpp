@@ -56,7 +56,8 @@ class WindowRule {
       while (start < peak_ && mean_[start] < options_.plateau_fraction * measured_.greatest_mean) ++start;
       window_.low = measured_.height[start];
       window_.rule = "from " + number(window_.low, 4) + " D, the lowest height above " + number(excluded_, 4) +
-                     " D (floor layers and kernel left out) where the density averaged over one diameter reaches " +
+                     " D (without the floor layers and the reach of the kernel) where the density averaged over one "
+                     "diameter reaches " +
                      number(100.0 * options_.plateau_fraction) + " % of its greatest value";
     }
   }

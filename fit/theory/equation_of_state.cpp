@@ -428,8 +428,8 @@ class KolafaRottner final : public EquationOfState {
  public:
   KolafaRottner()
       : EquationOfState({"kolafa-rottner", "Kolafa and Rottner", "KolafaRottner2006",
-                         "fluid branch to freezing (area fraction 0.70); a loop inside the transition, no number above "
-                         "phi = 0.90",
+                         "fluid branch to freezing (area fraction 0.70); an unphysical loop inside the transition, no "
+                         "value above phi = 0.90",
                          freezing_area_fraction / per_density, 0.90, freezing_area_fraction / per_density, false,
                          0.0}) {}
   Local local(double phi) const override { return KolafaRottnerForm<double>::local(phi); }

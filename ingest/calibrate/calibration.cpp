@@ -136,7 +136,7 @@ class RadiusChoice {
   }
 
   RadiusEstimate refused() {
-    estimate_.why_not = "no circle of any radius: no rim in the frame points to a common centre";
+    estimate_.why_not = "no circle of any radius was found: no edges in the frame have a common centre";
     return std::move(estimate_);
   }
 
@@ -152,7 +152,7 @@ RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity, double
                                double largest_radius_px) {
   if (frame.width < 5 || frame.height < 5) {
     RadiusEstimate estimate;
-    estimate.why_not = "the frame is smaller than 5 x 5 px: too small to hold a disk";
+    estimate.why_not = "the frame is smaller than 5 x 5 px, too small for a disk";
     return estimate;
   }
   const double shorter = std::min(frame.width, frame.height);

@@ -204,7 +204,7 @@ Blocks blocks_of(const GrayFrame& small, int block) {
       blocks.add(small, top, left, bottom, right, static_cast<std::size_t>(area / 3));
     }
   if (blocks.upper.empty()) blocks.add(small, 0, 0, small.height, small.width, 1);  // hardly anything in view
-  if (blocks.upper.empty()) throw std::invalid_argument("estimate_light: nothing of the frame is to be seen");
+  if (blocks.upper.empty()) throw std::invalid_argument("estimate_light: no pixel of the frame may be used");
   return blocks;
 }
 

@@ -97,9 +97,10 @@ DrawingSigns signs_of_drawing(const GrayFrame& frame) {
 
 const char* why_drawn(const DrawingSigns& signs, double explained_share) {
   if (signs.looks_ruled() && (signs.ruled_lines > lines_of_a_box || explained_share < share_of_beads))
-    return "straight ruled lines and areas of one level are seen, as in a plot or a page";
+    return "straight ruled lines and areas of one grey level are seen, as in a plot or a page";
   if (signs.looks_drawn() && explained_share < share_of_beads)
-    return "areas of one level without noise are seen, as in a drawing, and the circles are a small part of it";
+    return "areas of one grey level without noise are seen, as in a drawing, and the circles are only a small part of "
+           "it";
   return nullptr;
 }
 

@@ -242,7 +242,8 @@ class FrameFinder {
     result_.rejected = dropped_;
     result_.steps = fit_.steps();
     if (disks.empty()) {
-      result_.why_nothing = std::to_string(dropped_) + " places were tried, but none is filled like a bead of radius " +
+      result_.why_nothing = std::to_string(dropped_) +
+                            " places were examined, but none looks like a filled bead of radius " +
                             std::to_string(radius_ * calibration_.recorded_px) + " px";
       return;
     }
@@ -295,9 +296,10 @@ std::vector<std::string> FindOptions::validate() const {
   std::vector<std::string> problems;
   if (radius_px && !(*radius_px > 0 && std::isfinite(*radius_px)))
     problems.push_back(formatted("radius_px is %g; it must be above 0", *radius_px));
-  if (hold_radius && !radius_px) problems.emplace_back("hold_radius holds radius_px, which is not given");
+  if (hold_radius && !radius_px)
+    problems.emplace_back("hold_radius fixes the radius at radius_px, which is missing: give radius_px");
   if (roi && (roi->width <= 0 || roi->height <= 0))
-    problems.push_back(formatted("roi is %d px wide and %d px high; it must hold pixels", roi->width, roi->height));
+    problems.push_back(formatted("roi is %d px wide and %d px high; both must be above 0", roi->width, roi->height));
   if (joint_fit_sweeps < 0)
     problems.push_back(formatted("joint_fit_sweeps is %d; it must be 0 or more", joint_fit_sweeps));
   return problems;
@@ -308,7 +310,7 @@ FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibrati
   if (frame.width != calibration.width || frame.height != calibration.height) {
     FindResult nothing;
     nothing.why_nothing = "the frame is " + std::to_string(frame.width) + " x " + std::to_string(frame.height) +
-                          " px, the film was learned at " + std::to_string(calibration.width) + " x " +
+                          " px, but the beads were learned in frames of " + std::to_string(calibration.width) + " x " +
                           std::to_string(calibration.height) + " px";
     return nothing;
   }
@@ -334,7 +336,8 @@ FindResult find_disks(const GrayFrame& frame, const FindOptions& options, Finder
 GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const FinderCalibration& calibration) {
   require_consistent(frame);
   if (frame.width != calibration.width || frame.height != calibration.height)
-    throw std::invalid_argument("residual_frame: the frame has not the size of the film's frames");
+    throw std::invalid_argument(
+        "residual_frame: the frame differs in size from the frames in which the beads were learned");
   const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light, found.light);
   const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
   JointFit fit(flat);

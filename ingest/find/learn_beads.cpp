@@ -76,7 +76,7 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
   }
   found.disks = std::move(kept);
   drop_lonely_doubtful(found, rims.radius_px);
-  if (found.disks.empty() && found.why_nothing.empty()) found.why_nothing = "no disk has a rim";
+  if (found.disks.empty() && found.why_nothing.empty()) found.why_nothing = "none of the disks has a visible rim";
 }
 
 // Of all beads: those that rims show and that are not reported, or those that seem to lie between the disks found,
@@ -290,7 +290,7 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
   if (!result.found)
-    result.why_not = "no rim of " + std::to_string(rims.model.radius_px * options.recorded_px) + " px is seen";
+    result.why_not = "no rim of radius " + std::to_string(rims.model.radius_px * options.recorded_px) + " px is seen";
   return result;
 }
 
@@ -324,7 +324,8 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
     if (!outside) result.disks.push_back(disk);
   }
   if (result.disks.empty())
-    result.why_nothing = "no rim of " + std::to_string(calibration.radius_px * calibration.recorded_px) + " px is seen";
+    result.why_nothing =
+        "no rim of radius " + std::to_string(calibration.radius_px * calibration.recorded_px) + " px is seen";
   return result;
 }
 

@@ -137,13 +137,13 @@ class BeadLearner {
     const int first_round = start_.before ? 1 : 0;
     for (int round = first_round;; ++round) {
       fit_beads(round);
-      if (beads_->total() == 0) return refused("no filled disk fits");
+      if (beads_->total() == 0) return refused("no model of a filled disk fits them");
       if (round == 0 && !background_looked_at_ && corrects_background()) {
         --round;
         continue;
       }
       keep_good_beads(round);
-      if (!(beads_->spread < hopeless)) return refused("no model of bead and light describes the frame");
+      if (!(beads_->spread < hopeless)) return refused("no model of the bead and the light describes the frame");
       const bool enough = round + 1 >= first_round + least_rounds && settled_;
       if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_learning_rounds || enough) break;
       if (options_.learn_profile || round < 2) learn_bead(round);
@@ -157,7 +157,7 @@ class BeadLearner {
 
  private:
   [[nodiscard]] std::string suspected(const std::string& circles) const {
-    return circles + " of " + std::to_string(radius_ * options_.recorded_px) + " px were suspected, but ";
+    return circles + " of " + std::to_string(radius_ * options_.recorded_px) + " px radius were examined, but ";
   }
 
   Learned refused(const std::string& why) {
@@ -328,7 +328,7 @@ class BeadLearner {
 
   Learned concluded() {
     const std::size_t total = beads_->total();
-    if (total == 0) return refused("none is filled like a bead");
+    if (total == 0) return refused("none looks like a filled bead");
     const double spread = beads_->spread, noise = noise_of(beads_->flats.front());
     CalibrationResult& result = all_.result;
     if (spread * spread > noise * noise + most_left_over * most_left_over) {
@@ -351,9 +351,8 @@ class BeadLearner {
     result.beads = beads_;
     constexpr std::size_t few = 5;
     if (total < few)
-      calibration.warnings.push_back(
-          "Only " + std::to_string(total) +
-          " disks were found, from which the shape of a bead is learned: its radius is uncertain. Use more frames.");
+      calibration.warnings.push_back("The shape of a bead was learned from only " + std::to_string(total) +
+                                     " disks, so its radius is uncertain. Use more frames.");
     all_.unexplained = unexplained_of(*beads_->fits.front(), light_);
     all_.one_sided = profile_.asymmetry != nullptr;
     all_.complete = spread < 1.5 * noise + 0.03;
@@ -534,7 +533,7 @@ GrayFrame seen_part(const GrayFrame& recorded, const FinderCalibration& calibrat
 CalibrationResult learn_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   CalibrationResult result;
   if (frames.empty()) {
-    result.why_not = "there is no frame to learn from";
+    result.why_not = "there is no frame from which beads could be learned";
     return result;
   }
   for (const GrayFrame* frame : frames) require_consistent(*frame);
@@ -543,7 +542,7 @@ CalibrationResult learn_finder(const std::vector<const GrayFrame*>& frames, cons
 
 CalibrationResult learn_again(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
                               const FinderCalibration& before) {
-  if (frames.empty()) throw std::invalid_argument("learn_again: there is no frame to learn from");
+  if (frames.empty()) throw std::invalid_argument("learn_again: there is no frame from which beads could be learned");
   for (const GrayFrame* frame : frames) require_consistent(*frame);
   const Start start{before.rim_radius_px, before.polarity, &before};
   return BeadLearner(frames, options, start, {.one_sided = before.profile.asymmetry != nullptr}).learn().result;

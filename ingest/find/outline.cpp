@@ -352,28 +352,28 @@ std::string Roundness::why_not() const {
   if (outlines == 0) return {};
   if (on_circle < least_on_circle)
     return formatted(
-        "the outlines are not round: only %.1f %% of a typical one lies on its circle (%.0f %% are needed)",
+        "the outlines are not round: only %.1f %% of a typical outline lies on its circle (at least %.0f %% is needed)",
         100 * on_circle, 100 * least_on_circle);
   if (gap > largest_gap)
-    return formatted("the outlines are open: %.0f %% of the circumference is missing (at most %.0f %% may)", 100 * gap,
+    return formatted("the outlines are open: %.0f %% of the circumference is missing (allowed: %.0f %%)", 100 * gap,
                      100 * largest_gap);
   const double own_limit = common_elongation + largest_own_elongation;
   if (common_elongation > largest_common_elongation || harmonic[2] > own_limit) {
     const double limit = common_elongation > largest_common_elongation ? largest_common_elongation : own_limit;
-    return formatted("the outlines are oval, their axes in the ratio %.2f (at most %.2f)",
+    return formatted("the outlines are oval: the ratio of their axes is %.2f (allowed: %.2f)",
                      (1 + harmonic[2]) / (1 - harmonic[2]), (1 + limit) / (1 - limit));
   }
   for (std::size_t q = 3; q <= highest_harmonic; ++q)
     if (harmonic[q] > largest_harmonic)
       return formatted(
-          "the outlines are not round: they have %.0f corners or bulges, %.1f %% of the radius high (at most %.0f %%)",
+          "the outlines are not round: they have %.0f corners or bulges, %.1f %% of the radius high (allowed: %.0f %%)",
           static_cast<double>(q), 100 * harmonic[q], 100 * largest_harmonic);
   if (deviation > largest_deviation)
-    return formatted("the outlines are not round: they depart from a circle by %.1f %% of the radius (at most %.0f %%)",
-                     100 * deviation, 100 * largest_deviation);
+    return formatted(
+        "the outlines are not round: they deviate from a circle by %.1f %% of the radius (allowed: %.0f %%)",
+        100 * deviation, 100 * largest_deviation);
   if (not_round > most_not_round)
-    return formatted("%.0f %% of the outlines are not round (at most %.0f %% may be)", 100 * not_round,
-                     100 * most_not_round);
+    return formatted("%.0f %% of the outlines are not round (allowed: %.0f %%)", 100 * not_round, 100 * most_not_round);
   return {};
 }
 

@@ -108,7 +108,7 @@ PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const Fi
   bed.disks = std::move(found.disks);
   if (!bed.packing.convinces()) {
     bed.faces.found = false;
-    bed.faces.why_not = "disks that touch do not describe the frame";
+    bed.faces.why_not = "a model of disks that touch does not describe the frame";
   }
   return bed;
 }

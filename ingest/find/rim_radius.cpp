@@ -187,7 +187,7 @@ class RadiusFromRims {
     if (calibration_.tone_exponent != 1)
       calibration_.warnings.push_back(
           "The rims are steeper on their dark side, as in pictures encoded for display. The radius was therefore "
-          "measured in light: " +
+          "measured in levels converted to light intensity: " +
           std::to_string(calibration_.radius_px * calibration_.recorded_px) +
           " px. From the recorded levels it would be " + std::to_string(rim_radius_ * calibration_.recorded_px) +
           " px.");

@@ -152,16 +152,17 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
   const bool lit_from_one_side = count >= fewest_one_sided && support >= one_sided_support * count &&
                                  candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
   if (candidate.disks.empty())
-    candidate.why_not = "no circle is seen more often than by chance";
+    candidate.why_not = "no circles are seen beyond what chance gives";
   else if (at_worst > most_by_chance || (at_worst > few_wrong && candidate.explained_share < good_part))
-    candidate.why_not = formatted("up to %.0f %% of the %.0f circles may have arisen by chance", 100 * at_worst, count);
+    candidate.why_not = formatted("up to %.0f %% of the %.0f circles may be due to chance", 100 * at_worst, count);
   else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
-    candidate.why_not =
-        formatted("only %.0f circles are seen, and no more than %.0f %% of their rims", count, 100 * support / count);
+    candidate.why_not = formatted("only %.0f circles are seen, and only %.0f %% of their rims is visible", count,
+                                  100 * support / count);
   else if (candidate.one_sided && !lit_from_one_side)
     candidate.why_not = "one side of the rim is missing from all circles";
   else if (candidate.explained_share < least_explained)
-    candidate.why_not = formatted("the circles' rims are only %.1f %% of the edges", 100 * candidate.explained_share);
+    candidate.why_not = formatted("the rims of the circles make up only %.1f %% of the edges in the picture",
+                                  100 * candidate.explained_share);
 }
 
 // Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.
@@ -173,9 +174,9 @@ void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
           other.explained_share <= candidate.explained_share)
         continue;
       candidate.credible = false;
-      candidate.why_not =
-          formatted("things of %.1f px that are not round make up more of the edges than circles of %.1f px",
-                    other.rims.radius_px, candidate.rims.radius_px);
+      candidate.why_not = formatted(
+          "objects of %.1f px radius that are not round explain more of the edges than circles of %.1f px radius",
+          other.rims.radius_px, candidate.rims.radius_px);
     }
   }
 }
@@ -289,12 +290,12 @@ void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const s
 
 // Why no beads are found and, where what is seen is small, what helps.
 std::string why_none(const Survey& survey) {
-  if (survey.candidates.empty()) return "no circle is seen more often than by chance";
+  if (survey.candidates.empty()) return "no circles are seen beyond what chance gives";
   const SurveyCandidate& best = survey.candidates.front();
   if (!best.not_round || best.rims.radius_px > coarse_px) return best.why_not;
   return best.why_not + formatted(
-                            ". At a radius of %.1f px, blur alone makes outlines of touching beads look so: if "
-                            "these are beads, photograph them at least %.0f px wide",
+                            ". At a radius of %.1f px, blur alone can cause this for beads that touch: if these are "
+                            "beads, photograph them at least %.0f px wide",
                             best.rims.radius_px, wide_enough_px);
 }
 
@@ -336,15 +337,15 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
     enlarge(candidate, frames.reduction);
     if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
       candidate.why_not =
-          formatted("the circles seen have a radius of %.1f px, not one within 25 %% of the %.1f px given",
+          formatted("the circles seen have a radius of %.1f px, which is not within 25 %% of the given %.1f px",
                     candidate.rims.radius_px, *options.radius_px);
     candidate.credible = candidate.why_not.empty();
     candidate.gain_px *= frames.reduction;
     if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
       candidate.credible = false;
       candidate.why_not = formatted(
-          "circles of %.1f px radius are seen, too small to distinguish from specks (at least %.0f px are needed): "
-          "photograph the beads with more pixels, or give their radius",
+          "circles of %.1f px radius are seen, too small to be distinguished from specks (at least %.0f px is needed). "
+          "Photograph the beads with more pixels, or give their radius",
           candidate.rims.radius_px, speck_px);
     }
     survey.candidates.push_back(std::move(candidate));

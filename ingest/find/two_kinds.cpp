@@ -169,7 +169,7 @@ class KindsLearner {
     share_camera(large.calibration, small.calibration);
     const double ratio = large.calibration.radius_px / small.calibration.radius_px;
     if (std::abs(ratio / asked_.ratio - 1) > same_ratio)
-      return {{}, formatted("the radii found are as %.3g to 1", ratio)};
+      return {{}, formatted("the ratio of the radii found is %.3g, not that of the two diameters given", ratio)};
     return {TwoKinds{std::move(large.calibration), std::move(small.calibration)}, {}};
   }
 
@@ -207,7 +207,7 @@ class KindsLearner {
     CalibrationResult result = learn_finder(pointers, find_);
     if (result.found && std::abs(result.calibration.rim_radius_px / radius_px - 1) > same_kind) {
       result.found = false;
-      result.why_not = formatted("the beads found instead have a radius of %.3g px instead of %.3g px",
+      result.why_not = formatted("the beads found have a radius of %.3g px, not %.3g px",
                                  result.calibration.rim_radius_px * find_.recorded_px, radius_px * find_.recorded_px);
     }
     return result;
@@ -224,7 +224,7 @@ class KindsLearner {
   }
 
   static LearnedKinds refused(const char* which, const CalibrationResult& result) {
-    return {{}, formatted("of the %s ones: %s", which, result.why_not.c_str())};
+    return {{}, formatted("of the %s beads: %s", which, result.why_not.c_str())};
   }
 
   const KindsAsked asked_;
@@ -336,9 +336,9 @@ LearnedKinds learn_two_kinds(const std::vector<const GrayFrame*>& frames, const 
   const KindsFound found = find_two_kinds(*frames.back(), *learned.kinds, options);
   const std::size_t fewer = std::min(found.large.disks.size(), found.small.disks.size());
   if (fewer < fewest_of_a_kind)
-    learned.why_not = formatted("only %zu beads of one kind are seen", fewer);
+    learned.why_not = formatted("only %zu beads of one kind were found", fewer);
   else if (found.undecided > most_undecided)
-    learned.why_not = formatted("the kind of %.0f %% of the beads cannot be determined", 100 * found.undecided);
+    learned.why_not = formatted("for %.0f %% of the beads the kind cannot be determined", 100 * found.undecided);
   else if (found.unexplained > most_left_unexplained)
     learned.why_not =
         formatted("beads of both kinds explain only %.0f %% of what looks like beads", 100 * (1 - found.unexplained));

@@ -11,7 +11,7 @@ namespace shakebed::ingest {
 
 OutputError::OutputError(const std::filesystem::path& path, const std::string& why)
     : std::runtime_error(path.string() + ": cannot be written: " + why +
-                         "; choose another output folder or make room") {}
+                         "; choose another output folder or free disk space") {}
 
 void write_file_atomically(const std::filesystem::path& path, const std::string& contents) {
   namespace fs = std::filesystem;

@@ -240,7 +240,7 @@ FrameSource FrameSource::open(const std::vector<std::string>& paths, const Frame
   state->options = options;
   state->options.stride = std::max<std::size_t>(1, options.stride);
   if (paths.empty())
-    throw InputError("(no path)", "no frames given", "the list of paths is empty", "name files or a folder");
+    throw InputError("(no path)", "no frames given", "the list of paths is empty", "give files or a folder");
   for (const std::string& given : paths) {
     std::vector<fs::path> found;
     std::error_code error;
@@ -250,7 +250,7 @@ FrameSource FrameSource::open(const std::vector<std::string>& paths, const Frame
       std::sort(found.begin(), found.end(),
                 [](const fs::path& a, const fs::path& b) { return natural_less(a.string(), b.string()); });
       if (found.empty())
-        throw InputError(given, "no picture or film in this folder", "no file with a known ending",
+        throw InputError(given, "no picture or film in this folder", "it contains no file with a known ending",
                          "known endings: .png .tif .tiff .jpg .bmp .pgm .mp4 .avi .mov .mkv");
     } else if (fs::exists(given, error)) {
       if (kind_of(given) == Kind::unknown)

@@ -185,7 +185,7 @@ void copy_floats(const cv::Mat& picture, const std::string& path, GreyRule& rule
     ++finite;
   }
   if (finite == 0)
-    throw InputError(path, "no finite level in the picture", "every pixel is NaN or infinite", "export it again");
+    throw InputError(path, "no finite grey level in the picture", "every pixel is NaN or infinite", "export it again");
   if (rule.depth_scale == 0) {
     const double reach = std::max(std::abs(static_cast<double>(lowest)), std::abs(static_cast<double>(highest)));
     rule.depth_scale = reach <= 1.0 && reach > 0 ? 255.0 : reach <= 255.0 ? 1.0 : 255.0 / reach;
@@ -217,12 +217,12 @@ bool has_colour(const cv::Mat& picture) {
 }
 
 GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
-  if (given.empty()) throw InputError(path, "no picture", "it decodes to nothing", "save it again");
+  if (given.empty()) throw InputError(path, "no picture", "decoding gives no pixels", "save it again");
   const auto reduction = static_cast<std::size_t>(options.reduction);
   if (given.total() / (reduction * reduction) > options.largest_frame_pixels)
     throw InputError(
         path, "frame of " + std::to_string(given.cols) + " x " + std::to_string(given.rows) + " px is too large",
-        "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to bound memory",
+        "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to limit the memory used",
         "crop it or reduce it");
   const cv::Mat picture = one_component(of_usual_kind(averaged(given, options.reduction)), options, rule);
   GrayFrame frame;

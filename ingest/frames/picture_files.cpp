@@ -84,11 +84,12 @@ void refuse_if_enormous(const std::string& path, std::ifstream& file, std::uintm
   if (width * height > options.largest_decoded_pixels)
     throw InputError(
         path, "frame of " + std::to_string(width) + " x " + std::to_string(height) + " px is too large",
-        "more than " + std::to_string(options.largest_decoded_pixels) + " pixels are refused to bound memory",
+        "more than " + std::to_string(options.largest_decoded_pixels) + " pixels are refused to limit the memory used",
         "crop it or reduce it");
   if (width * height > options.largest_frame_pixels && width * height / most_pixels_per_byte > bytes)
     throw_unreadable(path, "it states " + std::to_string(width) + " x " + std::to_string(height) +
-                               " px, more than its " + std::to_string(bytes) + " bytes can hold: damaged or truncated");
+                               " px, too many for a file of " + std::to_string(bytes) +
+                               " bytes: it is damaged or truncated");
 }
 
 }  // namespace
@@ -108,7 +109,7 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   std::error_code error;
   const auto bytes = fs::file_size(path, error);
   if (error) throw InputError(path, "no such file", error.message(), "check the path");
-  if (bytes == 0) throw InputError(path, "the file is empty", "it holds 0 bytes", "copy it again from the camera");
+  if (bytes == 0) throw InputError(path, "the file is empty", "it has 0 bytes", "copy it again from the camera");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path, "the file cannot be opened", "no permission to read it", "check its permissions");
   refuse_if_enormous(path, file, bytes, options);
@@ -124,7 +125,7 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
     file.seekg(-tail_size, std::ios::end);
     file.read(tail.data(), tail_size);
     if (tail.find("\xff\xd9") == std::string::npos)
-      throw_unreadable(path, "its end-of-image mark is missing: truncated");
+      throw_unreadable(path, "it is truncated: its end-of-image marker is missing");
   }
   cv::Mat picture;
   constexpr int flags = cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR;
@@ -141,7 +142,8 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   } catch (const std::bad_alloc&) {
     throw InputError(path, "not enough memory for the picture", "it is too large", "crop or reduce it");
   }
-  if (picture.empty()) throw_unreadable(path, "it is truncated, damaged or not a picture of the kind its name says");
+  if (picture.empty())
+    throw_unreadable(path, "it is truncated, damaged or not a picture of the type that its name states");
   return picture;
 }
 
@@ -156,8 +158,8 @@ cv::Mat decode_picture(const fs::path& path, std::size_t page, const FrameSource
   Film film(path.string(), options);
   auto picture = film.picture(page);
   if (!picture)
-    throw InputError(path.string(), "no frame " + std::to_string(page), "the film ends before it",
-                     "ask for an earlier one");
+    throw InputError(path.string(), "no frame " + std::to_string(page), "the film ends before this frame",
+                     "choose an earlier frame");
   return *picture;
 }
 

@@ -47,7 +47,7 @@ class Film {
     cv::Mat picture;
     if (!capture_.read(picture) || picture.empty()) {
       if (next_ == 0)
-        throw InputError(path_, "the film holds no frame", "none could be decoded", "export it as mp4 or avi");
+        throw InputError(path_, "the film contains no frame", "none could be decoded", "export it as mp4 or avi");
       return std::nullopt;
     }
     ++next_;
@@ -61,7 +61,7 @@ class Film {
     if (!std::filesystem::exists(path_, error))
       throw InputError(path_, "no such file", "it does not exist", "check the path");
     if (std::filesystem::file_size(path_, error) == 0)
-      throw InputError(path_, "the file is empty", "it holds 0 bytes", "copy it again from the camera");
+      throw InputError(path_, "the file is empty", "it has 0 bytes", "copy it again from the camera");
     try {
       capture_.open(path_, cv::CAP_FFMPEG);
     } catch (const cv::Exception&) {}

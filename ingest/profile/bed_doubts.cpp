@@ -131,30 +131,30 @@ std::vector<std::string> doubts_of_bed(const Measurement& found, double bead_dia
   std::vector<std::string> doubts;
   const Contacts& contacts = found.contacts;
   if (contacts.missing())
-    doubts.push_back(formatted(
-        "Hardly any of the disks found touch: nearest centres are typically %.2f diameters apart. Either they are no "
-        "beads, "
-        "but holes or printed dots. Or the outline seen is smaller than the bead, and scale, heights and density are "
-        "wrong: if nearest beads touch, give --scale \"%.4g mm/px\".",
-        contacts.nearest_px * found.calibration.scale_m_per_px / bead_diameter_m,
-        1e3 * bead_diameter_m / contacts.touching_px));
+    doubts.push_back(
+        formatted("Hardly any of the disks found touch: nearest centres are typically %.2f diameters apart. They may "
+                  "not be beads, but holes or printed dots. Or the outline seen is smaller than the bead, and scale, "
+                  "heights and density are wrong. If neighbouring beads touch, give --scale \"%.4g mm/px\".",
+                  contacts.nearest_px * found.calibration.scale_m_per_px / bead_diameter_m,
+                  1e3 * bead_diameter_m / contacts.touching_px));
   if (contacts.overlapping(bead_diameter_m / found.calibration.scale_m_per_px))
     doubts.push_back(formatted(
         "The disks found overlap: nearest centres are typically %.2f diameters apart. The outline seen is larger than "
-        "the bead, by a shadow or a halo, or beads lie behind one another. If nearest beads touch, give --scale "
+        "the bead (a shadow or a halo), or beads lie behind one another. If neighbouring beads touch, give --scale "
         "\"%.4g mm/px\".",
         contacts.nearest_px * found.calibration.scale_m_per_px / bead_diameter_m,
         1e3 * bead_diameter_m / contacts.touching_px));
   if (found.beside_bed > 0)
-    doubts.push_back(formatted(
-        "%zu disks beside the bed, beyond an empty stretch, are left out. To search the bed alone, give --roi "
-        "%d,%d,%d,%d.",
-        found.beside_bed, found.bed_region.left, found.bed_region.top, found.bed_region.width,
-        found.bed_region.height));
+    doubts.push_back(
+        formatted("%zu disks beside the bed, separated from it by an empty region, were left out. To search only the "
+                  "bed, give --roi "
+                  "%d,%d,%d,%d.",
+                  found.beside_bed, found.bed_region.left, found.bed_region.top, found.bed_region.width,
+                  found.bed_region.height));
   if (found.floor_sag > 0)
     doubts.push_back(formatted(
-        "No level floor is seen: the lowest disks lie on an arc that sags by %.1f diameters. A view from above tells "
-        "no heights and no temperature; in a side view, give the floor's row (--floor).",
+        "No level floor is seen: the lowest disks lie on an arc that sags by %.1f diameters. A photograph from above "
+        "gives neither heights nor a temperature. In a photograph from the side, give the row of the floor (--floor).",
         found.floor_sag));
   return doubts;
 }

@@ -98,9 +98,9 @@ class GeometryFinder {
     refined_.radius_std_error_px = std::hypot(refined_.radius_std_error_px, 0.25 * apart);
     if (apart < worth_a_word * touching.px) return;
     warnings_.push_back(formatted(
-        "Nearest beads are %.4g px apart, but the circles seen are %.4g px wide: the outline is larger than the bead, "
-        "by a "
-        "shadow or a halo, or beads are of several sizes. The error of the scale includes half of the difference.",
+        "Nearest beads are %.4g px apart, but the circles seen are %.4g px wide. The outline is larger than the bead "
+        "(a "
+        "shadow or a halo), or beads are of several sizes. The error of the scale includes half of the difference.",
         touching.px * refined_.recorded_px, 2 * refined_.radius_px * refined_.recorded_px));
   }
 
@@ -118,9 +118,10 @@ class GeometryFinder {
     bed_.scale_relative_std_error = bed_.scale_given ? 0 : refined_.radius_std_error_px / refined_.radius_px;
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
     if (bed_.scale_given && std::abs(2 * refined_.radius_px / diameter_px_ - 1) > fair_scale)
-      warnings_.push_back(formatted("The scale given makes a bead %.4g px wide, but the frames show %.4g px.",
-                                    diameter_px_ * refined_.recorded_px,
-                                    2 * refined_.radius_px * refined_.recorded_px));
+      warnings_.push_back(
+          formatted("By the scale given, a bead is %.4g px wide, but the beads found are %.4g px wide. Check the scale "
+                    "and the diameter.",
+                    diameter_px_ * refined_.recorded_px, 2 * refined_.radius_px * refined_.recorded_px));
   }
 
   void set_floor() {
@@ -164,10 +165,12 @@ class GeometryFinder {
       bed_.left_wall_px = frame.left;
       bed_.right_wall_px = frame.right;
       bed_.width = (frame.right - frame.left) / diameter_px_;
-      warnings_.emplace_back("The side walls could not be determined from the disks: the whole frame's width is used.");
+      warnings_.emplace_back(
+          "The side walls could not be determined from the disks: the width of the whole frame is used. Give the walls "
+          "(--left-wall, --right-wall).");
     }
     if (bed_.walls_are_frame_sides)
-      warnings_.emplace_back("The bed extends beyond the frame: the profile is that of the visible part.");
+      warnings_.emplace_back("The bed extends beyond the sides of the frame: the profile is that of the visible part.");
   }
 
   // Where beads go on beyond the frame, only centres a radius inside are counted, so that each of them is seen whole.

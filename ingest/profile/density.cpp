@@ -38,7 +38,8 @@ DensityProfile average_profile(const std::vector<std::vector<double>>& densities
   if (frames == 0 || bins.count == 0) return profile;
   const double n = static_cast<double>(frames);
   for (const auto& frame : densities) {
-    if (frame.size() != bins.count) throw std::invalid_argument("average_profile: a frame has another number of bins");
+    if (frame.size() != bins.count)
+      throw std::invalid_argument("average_profile: the frames have different numbers of bins");
     for (std::size_t bin = 0; bin < bins.count; ++bin) profile.number_density[bin] += frame[bin] / n;
   }
   for (std::size_t bin = 0; bin < bins.count; ++bin)

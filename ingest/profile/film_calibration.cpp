@@ -86,8 +86,8 @@ class FilmLearner {
     if (enlargement_ > 1) {
       char text[200];
       std::snprintf(text, sizeof text,
-                    "The pictures were enlarged %.2f times by repeating pixels. They were smoothed. The errors of the "
-                    "centres are those of the smaller picture.",
+                    "The pictures had been enlarged %.2f times by repeating pixels, so they were smoothed. The errors "
+                    "of the centres are those of the smaller picture.",
                     enlargement_);
       film_.warnings.emplace_back(text);
     }
@@ -157,7 +157,7 @@ class FilmLearner {
       throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
                        "check the files");
     throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
-                     "check that the beads are in view, or give their radius and polarity");
+                     "check that beads are visible, or give their radius and polarity");
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
@@ -265,7 +265,7 @@ class FilmLearner {
     const FinderCalibration& first = calibrated_.calibration;
     if (find_.seen) {
       film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
-      if (!film_.second) warn_of_no_second("no rims of that radius are seen.");
+      if (!film_.second) warn_of_no_second("no rims of this radius were found.");
       return;
     }
     const double expected = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
@@ -278,15 +278,16 @@ class FilmLearner {
     if (is_second(result, expected))
       film_.second = std::move(result.calibration);
     else
-      warn_of_no_second(result.found ? "the beads found instead have a radius of " +
+      warn_of_no_second(result.found ? "the beads found have a radius of " +
                                            std::to_string(result.calibration.radius_px * find_.recorded_px) +
-                                           " px instead of " + std::to_string(expected * find_.recorded_px) + " px."
+                                           " px, not " + std::to_string(expected * find_.recorded_px) + " px."
                                      : result.why_not + ".");
   }
 
   void warn_of_no_second(const std::string& why) {
-    film_.warnings.push_back("No beads of the second diameter were found: " + why +
-                             (kinds_why_not_.empty() ? "" : " Both kinds together: " + kinds_why_not_ + "."));
+    film_.warnings.push_back(
+        "No beads of the second diameter were found: " + why +
+        (kinds_why_not_.empty() ? "" : " The search for both kinds together failed, too: " + kinds_why_not_ + "."));
   }
 
   static bool is_second(const CalibrationResult& one, double expected) {
@@ -321,8 +322,8 @@ class FilmLearner {
     if (!(options.pixel_aspect && options.lens_radial)) {
       char text[200];
       std::snprintf(text, sizeof text,
-                    "The beads are not circles of one size. Pixels are therefore taken as %.4f times as wide as high, "
-                    "and the lens as shifting the corners by %+.4f half diagonals.",
+                    "The beads do not appear as circles of one size. This is corrected: pixels are taken as %.4f times "
+                    "as wide as high, and the lens shifts the corners by %+.4f half diagonals.",
                     lens_.pixel_aspect, lens_.radial);
       film_.warnings.emplace_back(text);
     }

@@ -49,7 +49,7 @@ FrameFindings FrameExaminer::examine(FrameSource::Item& item) const {
   if (frame.width != film_.recorded_width || frame.height != film_.recorded_height) {
     report.status = FrameStatus::size_changed;
     report.why = "the frame is " + std::to_string(frame.width) + " x " + std::to_string(frame.height) +
-                 " px, the first one " + std::to_string(film_.recorded_width) + " x " +
+                 " px, but the first one is " + std::to_string(film_.recorded_width) + " x " +
                  std::to_string(film_.recorded_height);
     return findings;
   }

@@ -48,7 +48,7 @@ PixelPlace LensMap::to_recorded(PixelPlace seen) const {
 
 GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
   if (recorded.width != recorded_width_ || recorded.height != recorded_height_)
-    throw std::invalid_argument("lens: the frame has another size");
+    throw std::invalid_argument("lens: the frame differs in size from the map of the lens");
   GrayFrame frame;
   frame.width = width_;
   frame.height = height_;

@@ -173,16 +173,19 @@ class BedMeasurer {
                                                                       : 0.5 * options_.kernel.width;
     result_.column_known = static_cast<double>(cut_above_) <= most_cut_above * static_cast<double>(result_.disk_total);
     if (options_.highest) {
-      warn("Beads are cut by the upper border of the frame: above %.1f D the profile lacks beads.", seen - reach);
+      warn(
+          "Beads are cut by the upper border of the frame: above %.1f D beads are missing from the profile. Show the "
+          "whole bed, or lower the highest height of the profile.",
+          seen - reach);
       return;
     }
     const double bins = std::floor((seen - reach - bins_.lowest) / bins_.width);
     bins_.count = std::min(bins_.count, static_cast<std::size_t>(std::max(fewest_bins, bins)));
     warn(
-        "Beads are cut by the upper border of the frame: the profile ends at %.1f D, below those that are not seen.%s "
-        "Show the whole bed.",
+        "Beads are cut by the upper border of the frame: the profile ends at %.1f D, below the beads that are not "
+        "visible.%s Show the whole bed.",
         bins_.lowest + static_cast<double>(bins_.count) * bins_.width,
-        result_.column_known ? "" : " How many there are is unknown, and so is N D/W.");
+        result_.column_known ? "" : " Their number is unknown, and so is the column number N D/W.");
   }
 
   void place_held() {
@@ -247,8 +250,9 @@ class BedMeasurer {
     constexpr double farthest = 2;  // heights of the picture
     const double height = film_.finder.height, row = options_.floor_px.value_or(0);
     if (row >= -height && row <= farthest * height) return;
-    throw std::invalid_argument(formatted("the floor given is at row %.6g, but the picture has %.0f rows",
-                                          row * film_.finder.recorded_px, height * film_.finder.recorded_px));
+    throw std::invalid_argument(
+        formatted("the floor given is at row %.6g, but the picture has %.0f rows: check the row of the floor",
+                  row * film_.finder.recorded_px, height * film_.finder.recorded_px));
   }
 
   // The lowest bottoms of all frames show where the floor is lowest while it carries the bed. Its mean lies between
@@ -258,10 +262,10 @@ class BedMeasurer {
     const double range = bottom_range(held_, bed_.floor_slope, diameter_px_, film_.finder.width);
     if (options_.floor_amplitude_m && held_.size() >= fewest_for_range &&
         *options_.floor_amplitude_m > bed_.scale_m_per_px * std::max(range, moving_bottom * diameter_px_)) {
-      result_.warnings.push_back(formatted(
-          "The amplitude given is %.2f D, but the lowest beads move by %.2f D only: it is not used here. Check it, "
-          "and the diameter.",
-          *options_.floor_amplitude_m / bed_.scale_m_per_px / diameter_px_, range / diameter_px_));
+      result_.warnings.push_back(
+          formatted("The amplitude given is %.2f D, but the lowest beads move by only %.2f D: the amplitude is not "
+                    "used. Check the amplitude and the diameter.",
+                    *options_.floor_amplitude_m / bed_.scale_m_per_px / diameter_px_, range / diameter_px_));
     } else if (options_.floor_amplitude_m) {
       const double half = 0.5 * *options_.floor_amplitude_m / bed_.scale_m_per_px;
       bed_.floor_px -= half;
@@ -273,9 +277,9 @@ class BedMeasurer {
     if (range < moving_bottom * diameter_px_) return;
     bed_.floor_std_error_px = std::hypot(bed_.floor_std_error_px, 0.5 * range);
     result_.warnings.push_back(formatted(
-        "The lowest beads move by %.2f D between the frames. If the floor moves, heights are above its lowest "
-        "position, and may be larger by up to %.2f D than those above its mean. Give its amplitude (--amplitude) or "
-        "the row of its mean position (--floor), or a film with its frame rate (--frame-rate).",
+        "The lowest beads move by %.2f D between the frames. If the floor moves, heights are measured from its lowest "
+        "position. They may be up to %.2f D larger than heights above its mean position. Give the amplitude of the "
+        "floor (--amplitude), the row of its mean position (--floor), or a film with its frame rate (--frame-rate).",
         range / diameter_px_, 0.5 * range / diameter_px_));
   }
 
@@ -370,8 +374,8 @@ class BedMeasurer {
     result_.coverage_disagreement = coverage_->disagreement(*result_.coverage_profile);
     if (result_.coverage_disagreement > coverage_differs)
       warn(
-          "Density from covered area differs from density from centres by %.3f in n D^2 (rms where it exceeds 0.1): "
-          "beads of another kind, walls, dirt or missed beads.",
+          "The density from covered area differs from the density from centres by %.3f in n D^2 (rms where it exceeds "
+          "0.1; n: disks per area). Possible causes are beads of another kind, walls, dirt or missed beads.",
           result_.coverage_disagreement);
   }
 
@@ -401,8 +405,10 @@ class BedMeasurer {
     }
     if (lit > 0) bed_.flicker = std::sqrt(std::max(0.0, gain_squares / lit - gain / lit * gain / lit));
     if (bed_.flicker > light_flickers)
-      warn("The light flickers: contrast varies by %.1f %% from frame to frame, which is taken out frame by frame.",
-           100 * bed_.flicker);
+      warn(
+          "The light flickers: the standard deviation of the contrast between frames is %.1f %%. It is corrected in "
+          "each frame.",
+          100 * bed_.flicker);
   }
 
   static std::pair<double, double> mean_and_scatter(const std::vector<double>& counts) {
@@ -428,25 +434,24 @@ class BedMeasurer {
       of_other_size += report.status == FrameStatus::size_changed;
     }
     if (of_other_size > 0)
-      result_.warnings.push_back(
-          std::to_string(of_other_size) + " of " + std::to_string(result_.frames.size()) +
-          " frames have another size in pixels than the first one, and are left out: heights and scale of two views "
-          "are not the same. Measure each size on its own.");
+      result_.warnings.push_back(std::to_string(of_other_size) + " of " + std::to_string(result_.frames.size()) +
+                                 " frames differ from the first one in size, in pixels, and were left out, because "
+                                 "heights and scale differ between views. Measure the frames of each size separately.");
     if (bad)
       result_.warnings.push_back(std::to_string(bad) + " of " + std::to_string(result_.frames.size()) +
-                                 " frames gave nothing; the first: " + example);
+                                 " frames could not be used. Reason for the first: " + example);
     if (result_.disk_count_mean > 0 && result_.disk_count_std > number_varies * result_.disk_count_mean)
       warn(
-          "The number of disks found varies by %.1f from frame to frame around %.1f: beads leave the view, or "
-          "are missed.",
+          "The number of disks found varies by %.1f (standard deviation) around its mean %.1f: beads leave the view, "
+          "or are missed.",
           result_.disk_count_std, result_.disk_count_mean);
     result_.floor_out_of_view = good_ > 0 && cut_below_ > good_ && !bed_.floor_given;
     result_.surface_out_of_view = good_ > 0 && cut_above_ > good_;
     if (result_.floor_out_of_view)
       result_.warnings.emplace_back("Beads are cut by the lower border of the frame: the floor is not in view.");
     if (std::abs(bed_.floor_tilt_degrees) > floor_tilts)
-      warn("The floor is tilted by %.2f +- %.2f degrees; heights are measured across it.", bed_.floor_tilt_degrees,
-           bed_.floor_tilt_std_error_degrees);
+      warn("The floor is tilted by %.2f +- %.2f degrees. Heights are measured perpendicular to it.",
+           bed_.floor_tilt_degrees, bed_.floor_tilt_std_error_degrees);
   }
 
   [[gnu::format(printf, 2, 3)]] void warn(const char* format, ...) {
@@ -491,21 +496,24 @@ std::vector<std::string> MeasureOptions::validate() const {
   };
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   require(positive(bead_diameter_m),
-          formatted("bead_diameter_m is %g; the diameter of a bead is needed, in m", bead_diameter_m));
-  require(positive(scale_m_per_px.value_or(1)), "scale_m_per_px must be above 0");
+          formatted("bead_diameter_m is %g; give the diameter of a bead in m, above 0", bead_diameter_m));
+  require(positive(scale_m_per_px.value_or(1)),
+          formatted("scale_m_per_px is %g; it must be above 0", scale_m_per_px.value_or(1)));
   constexpr double least_bead = 1, widest_bead = 1e5;  // px
   const double bead = bead_diameter_m / scale_m_per_px.value_or(0.01 * bead_diameter_m);
   require(bead >= least_bead && bead <= widest_bead,
           formatted("with the length of a pixel given (scale), a bead is %.3g px wide: check its unit", bead));
-  require(positive(second_diameter_m.value_or(1)), "second_diameter_m must be above 0");
+  require(positive(second_diameter_m.value_or(1)),
+          formatted("second_diameter_m is %g; it must be above 0", second_diameter_m.value_or(1)));
   require(positive(bin_width), formatted("bin_width is %g; it must be above 0", bin_width));
   require(kernel.kind != KernelKind::none && positive(kernel.width),
-          "the kernel must have a shape and a finite width above 0: density is measured through a window");
+          "the density is measured through a kernel: give a kernel other than none, with a finite width above 0");
   require(!left_wall_px || !right_wall_px || *left_wall_px < *right_wall_px,
           "the left wall must lie left of the right wall");
   require(!floor_amplitude_m || positive(*floor_amplitude_m),
           formatted("floor_amplitude_m is %g; it must be above 0", floor_amplitude_m.value_or(0)));
-  require(!shaking_frequency_hz || frame_rate_hz, "phases need the frame rate beside the shaking frequency");
+  require(!shaking_frequency_hz || frame_rate_hz,
+          "profiles by phase need the shaking frequency and the frame rate: give frame_rate_hz, too");
   require(geometry_frames > 0, "geometry_frames must be above 0");
   require(phase_bins > 0, "phase_bins must be above 0");
   return problems;

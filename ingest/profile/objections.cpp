@@ -30,17 +30,18 @@ std::vector<Objection> objections_to(const Measurement& found) {
                tilt = std::abs(found.calibration.floor_tilt_degrees);
   if (found.floor_out_of_view && found.surface_out_of_view)
     object(
-        "Beads extend beyond the lower and the upper border: neither floor nor surface is in view, as in a photograph "
-        "from above.",
+        "Beads extend beyond the lower and the upper border of the frame: neither the floor nor the surface of the bed "
+        "is visible, as in a photograph from above.",
         "Photograph the bed from the side, with its floor and its surface.");
   else if (found.floor_out_of_view)
-    object("The lower border cuts beads: the floor is not in view, so heights have no origin.",
+    object("The lower border of the frame cuts beads: the floor is not visible, so heights have no origin.",
            "Show the floor in the picture, or give its row (\"floor\", --floor).");
   if (const auto& above = found.above_mirror_image)
     object(formatted("The lowest disks found mirror those above row %d: they are the image of the bed in a polished "
-                     "floor, and count as beads.",
+                     "floor, but were counted as beads.",
                      above->top + above->height),
-           formatted("Leave the image out: --roi %d,%d,%d,%d.", above->left, above->top, above->width, above->height));
+           formatted("To leave this image out, give --roi %d,%d,%d,%d.", above->left, above->top, above->width,
+                     above->height));
   if (found.calibration.outline_in_doubt)
     object(
         "The beads are lit from one side, and hardly any rim is seen on the other: the outline seen may be smaller "
@@ -55,12 +56,12 @@ std::vector<Objection> objections_to(const Measurement& found) {
            "Look at the circles in the film, and give --radius, --polarity, --channel or --roi.");
   if (found.coverage_profile && found.coverage_disagreement > most_area_off)
     object(formatted("The density of the disks found differs from that of the covered area by %.2f per D^2: beads are "
-                     "missed, or the diameter is not theirs.",
+                     "missed, or the diameter is wrong.",
                      found.coverage_disagreement),
-           "Look at the circles in the film; give --radius, or take photographs with less noise.");
+           "Look at the circles in the film. Check the diameter, give --radius, or take photographs with less noise.");
   if (tilt > most_tilted)
     object(formatted("The floor found is tilted by %.0f degrees.", tilt),
-           "Level the camera, or give the floor (\"floor\", --floor) if another line was taken for it.");
+           "Level the camera, or give the floor (\"floor\", --floor) if the program found a wrong line.");
   return out;
 }
 

@@ -71,7 +71,7 @@ const char* unusable(const ImageView& image) {
   const bool finite = image.type == PixelType::f32   ? all_finite<float>(image)
                       : image.type == PixelType::f64 ? all_finite<double>(image)
                                                      : true;
-  return finite ? nullptr : "the image holds levels that are not finite numbers";
+  return finite ? nullptr : "the image contains levels that are not finite numbers; replace them";
 }
 
 SurveyOptions survey_options(const FindOptions& options) {
@@ -127,9 +127,9 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
     out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
   };
   const double missed = out.measurement.finder.expected_missed, wrong = out.measurement.expected_wrong;
-  judge(doubt_of_missed(missed), "%.0f %% of the beads may be missed: look at the picture before the numbers are used",
+  judge(doubt_of_missed(missed), "%.0f %% of the beads may be missed: look at the picture before you use the numbers",
         missed);
-  judge(doubt_of(wrong), "%.1f %% of the disks found may be wrong: look at them before the numbers are used", wrong);
+  judge(doubt_of(wrong), "%.1f %% of the disks found may be wrong: look at them before you use the numbers", wrong);
   const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
   if (out.measurement.contacts.far_apart(diameter_px)) {
     out.status = FindStatus::doubtful;
@@ -201,8 +201,8 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
   const double given = bead_diameter_m / scale_m_per_px, seen = 2 * radius_px;
   if (given <= most * seen && seen <= most * given) return {};
   return formatted(
-      "with the length of a pixel given (scale), a bead of %g mm is %.3g px wide. The circles seen are %.3g px wide: "
-      "by their width a pixel is %.4g mm. Check the unit of scale, and the diameter",
+      "with the length of a pixel given (scale), a bead of %g mm is %.3g px wide, but the circles found are %.3g px "
+      "wide. If they are the beads, a pixel is %.4g mm. Check the unit of scale and the diameter",
       1e3 * bead_diameter_m, given, seen, 1e3 * bead_diameter_m / seen);
 }
 
@@ -217,8 +217,8 @@ int reduction_for(int width, int height, double radius_px) {
 std::string why_reduced(int width, int height, int reduction) {
   if (static_cast<double>(width) * height <= static_cast<double>(FrameSourceOptions().largest_frame_pixels)) return {};
   return formatted(
-      "The picture has %d x %d px. It was averaged over squares of %d x %d px to bound memory. All lengths in pixels "
-      "are those of the picture itself.",
+      "The picture has %d x %d px. It was averaged over squares of %d x %d px to limit the memory used. All lengths in "
+      "pixels refer to the original picture.",
       width, height, reduction, reduction);
 }
 
@@ -301,7 +301,7 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
 }
 
 BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions& options) {
-  if (images.empty()) return refused(FindStatus::bad_input, "there are no frames");
+  if (images.empty()) return refused(FindStatus::bad_input, "no images were given; give at least one");
   if (const auto problems = options.validate(); !problems.empty())
     return refused(FindStatus::bad_input, problems.front());
   for (std::size_t k = 0; k < images.size(); ++k)

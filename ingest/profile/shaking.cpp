@@ -29,7 +29,7 @@ void Shaking::begin(const std::vector<FrameFindings>& frames, double diameter_px
   in_film_ = find_frequency(bottoms);
   if (in_film_.known && in_film_.amplitude < resting * diameter_px) {
     in_film_.known = false;
-    in_film_.why_not = "the lowest beads move by less than two hundredths of a diameter";
+    in_film_.why_not = "the lowest beads move by less than 2 % of a diameter";
   }
   if (in_film_.known && !options_.shaking_frequency_hz) require_film(frames);
   bed.frequency_given = options_.shaking_frequency_hz.has_value();
@@ -46,9 +46,8 @@ void Shaking::require_film(const std::vector<FrameFindings>& frames) {
   if (followed >= enough_followed) return;
   in_film_.known = false;
   in_film_.why_not = formatted(
-      "only %.0f %% of the beads are found again in the next picture, as in pictures at unrelated times or in too slow "
-      "a "
-      "film. A period seen in them may be by chance",
+      "only %.0f %% of the beads are found again in the next picture, as in pictures at unrelated times or in a film "
+      "with too low a frame rate. A period in them may be due to chance",
       100 * followed);
 }
 
@@ -70,7 +69,7 @@ void Shaking::find_floor_in_motion(BedCalibration& bed) {
   const FloorMotion motion = find_floor_motion(first_bottoms_, diameter_px_, *turns_per_frame_);
   if (!motion.known) {
     warnings_.emplace_back(
-        "The floor's motion could not be determined: beads touch it in too small a part of the shaker's period.");
+        "The motion of the floor could not be determined: beads touch the floor in too small a part of its period.");
   } else if (motion.amplitude > resting * diameter_px_) {
     bed.floor_px = motion.middle;
     bed.floor_std_error_px = motion.middle_std_error;
@@ -109,8 +108,8 @@ void Shaking::take_found(BedCalibration& bed) {
   }
   char text[400];
   std::snprintf(text, sizeof text,
-                "The shaking frequency was not given. The lowest beads move at %.6g +- %.2g Hz, which is used. A "
-                "shaker faster than half the frame rate appears slower: %.6g Hz would look the same.",
+                "The shaking frequency was not given. The lowest beads move at %.6g +- %.2g Hz, and this frequency is "
+                "used. A frequency above half the frame rate appears lower: %.6g Hz would look the same.",
                 bed.shaking_frequency_hz, bed.shaking_frequency_std_error_hz, rate - bed.shaking_frequency_hz);
   warnings_.emplace_back(text);
 }

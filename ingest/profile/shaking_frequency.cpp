@@ -185,7 +185,7 @@ FoundFrequency line_near(const Series& series, double frequency) {
   FoundFrequency found;
   const LineFit fit = fit_line(series, frequency);
   if (!fit.good || std::abs(fit.frequency - frequency) > 1.5 / series.length) {
-    found.why_not = "the line of the periodogram disappears in the fit";
+    found.why_not = "a fit does not confirm the strongest line of the periodogram";
     return found;
   }
   found.known = true;
@@ -205,7 +205,8 @@ FoundFrequency line_near(const Series& series, double frequency) {
 FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
   FoundFrequency found;
   if (places.size() < fewest_frames) {
-    found.why_not = "it takes " + std::to_string(fewest_frames) + " frames or more";
+    found.why_not = "there are only " + std::to_string(places.size()) + " usable frames, but at least " +
+                    std::to_string(fewest_frames) + " are needed";
     return found;
   }
   constexpr std::size_t most_frames = 2048;  // the rest refines it
@@ -232,10 +233,11 @@ FoundFrequency find_frequency(const std::vector<PlaceInFrame>& places) {
   }
   if (!(highest > 0)) {
     char text[200];
-    std::snprintf(text, sizeof text,
-                  "the strongest line, at %.4f cycles per frame, arises by chance with a probability of %.2g",
-                  likeliest_at, likeliest);
-    found.why_not = likeliest < clearly_chance ? text : "the height of the lowest beads has no period";
+    std::snprintf(
+        text, sizeof text,
+        "noise alone gives a line as strong as the strongest one, at %.4f cycles per frame, with a probability of %.2g",
+        likeliest_at, likeliest);
+    found.why_not = likeliest < clearly_chance ? text : "the height of the lowest beads shows no period";
     found.false_alarm = likeliest;
     return found;
   }

@@ -329,7 +329,7 @@ class StepStatistics {
     if (!result_.enough_are_followed()) {
       result_.warnings.push_back(
           formatted("Only %.0f %% of the disks could be followed from frame to frame: velocities are not reliable and "
-                    "do not enter the answer. Use a higher frame rate.",
+                    "are not used in the answer. Use a higher frame rate.",
                     100 * result_.linked_share));
       return;
     }
@@ -337,7 +337,7 @@ class StepStatistics {
     if (!result_.usable()) {
       result_.warnings.push_back(
           formatted("Disks collide between frames: the T of velocities would have to be corrected by a factor of %.2g. "
-                    "Velocities are not reliable and do not enter the answer. Use a higher frame rate.",
+                    "Velocities are not reliable and are not used in the answer. Use a higher frame rate.",
                     factor));
       return;
     }
@@ -348,8 +348,8 @@ class StepStatistics {
                     result_.mean_step));
     if (factor > large_correction)
       result_.warnings.push_back(
-          formatted("Disks collide between frames: the T of velocities is corrected by a factor of %.3g, which its "
-                    "error allows for. Use a higher frame rate.",
+          formatted("Disks collide between frames: the T of velocities is corrected by a factor of %.3g. Its error "
+                    "includes the uncertainty of this correction. Use a higher frame rate.",
                     factor));
   }
 
@@ -399,7 +399,7 @@ VelocityMeasurement VelocityMeter::result() {
   if (measured_.empty() || 2 * frames_ > stretch_frames_) measure_stretch();
   if (measured_.empty()) {
     VelocityMeasurement nothing;
-    nothing.warnings.emplace_back("No two frames with disks follow one another: there are no velocities.");
+    nothing.warnings.emplace_back("No two successive frames contain disks, so there are no velocities.");
     return nothing;
   }
   if (measured_.size() == 1) return measured_.front();

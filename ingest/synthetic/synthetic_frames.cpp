@@ -422,7 +422,8 @@ GrayFrame render_frame(const std::vector<RenderedDisk>& disks, const Camera& cam
 
 std::vector<RenderedDisk> make_synthetic_bed(const SyntheticBed& bed) {
   if (!(bed.radius_px > 0) || !(bed.right_wall_px - bed.left_wall_px >= 2 * bed.radius_px))
-    throw std::invalid_argument("synthetic bed: the walls must leave room for one disk of positive radius");
+    throw std::invalid_argument(
+        "synthetic bed: the distance of the walls must be larger than a disk of positive radius");
   const double radius = bed.radius_px, diameter = 2 * radius;
   RandomStream random(bed.seed, 0xbed, 0);
   std::vector<RenderedDisk> disks;

@@ -58,7 +58,7 @@ void Fields::finish() {
       suggestion = fmt::format("Did you mean \"{}\"?", nearest);
       meant = pointer_join(pointer_, nearest);
     } else {
-      for (const std::string& name : known_) suggestion += (suggestion.empty() ? "Known here: " : ", ") + name;
+      for (const std::string& name : known_) suggestion += (suggestion.empty() ? "Choose from: " : ", ") + name;
     }
     source_.problems->push_back({member.value.from_command_line ? "--set" : source_.file,
                                  member.value.from_command_line ? Position{} : member.at,
@@ -105,8 +105,8 @@ void Fields::either(std::string_view one, std::string_view other, const std::str
   if (mode_ != Mode::decode || has(one) != has(other)) return;
   const bool both = has(one);
   problem("/" + std::string(both ? other : one),
-          both ? fmt::format("both \"{}\" and \"{}\" are given, and each follows from the other", one, other)
-               : fmt::format("\"{}\" is missing, and so is \"{}\": one of them is needed", one, other),
+          both ? fmt::format("both \"{}\" and \"{}\" are given, but each follows from the other", one, other)
+               : fmt::format("neither \"{}\" nor \"{}\" is given: one of them is needed", one, other),
           suggestion);
 }
 
@@ -457,8 +457,8 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
     if (found.empty()) {
       std::error_code error;
       complain(item, where,
-               fs::is_directory(path, error) ? fmt::format("the folder \"{}\" holds no file", item.text)
-               : has_wildcards(path)         ? fmt::format("no file is named like \"{}\"", item.text)
+               fs::is_directory(path, error) ? fmt::format("the folder \"{}\" contains no file", item.text)
+               : has_wildcards(path)         ? fmt::format("no file matches \"{}\"", item.text)
                                              : fmt::format("there is no file \"{}\"", item.text),
                fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
     }

@@ -302,7 +302,7 @@ void Fields::choice(std::string_view key, E& value, const std::vector<Choice<E>>
     if (!about.required) out["default"] = names[current];
   } else if (mode_ == Mode::encode) {
     (*out_)[std::string(key)] = names[current];
-  } else if (const JsonNode* node = take(key, about, "one of its names")) {
+  } else if (const JsonNode* node = take(key, about, "a name")) {
     if (const auto chosen = read_choice(*node, key, names)) value = choices[*chosen].value;
   }
 }

@@ -68,7 +68,7 @@ std::size_t csv_column(const std::vector<std::string>& header, const std::string
   if (found == header.end()) {
     const std::string nearest = nearest_name(name, header);
     throw InputError(fmt::format("{}: has no column \"{}\"; {}", file, name,
-                                 nearest.empty() ? fmt::format("there are {}", fmt::join(header, ", "))
+                                 nearest.empty() ? fmt::format("choose from: {}", fmt::join(header, ", "))
                                                  : fmt::format("did you mean \"{}\"?", nearest)));
   }
   return static_cast<std::size_t>(found - header.begin());

@@ -109,7 +109,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 
 namespace {
 void require(bool done) {
-  if (!done) throw StageError("SHA-256 cannot be computed: the cryptography library refuses");
+  if (!done) throw StageError("SHA-256 cannot be computed: the cryptography library reports an error");
 }
 }  // namespace
 
@@ -177,10 +177,11 @@ std::string decompress(std::string_view bytes, const std::string& name) {
   while (input.pos < input.size) {
     ZSTD_outBuffer output{chunk.data(), chunk.size(), 0};
     state = ZSTD_decompressStream(context.get(), &output, &input);
-    if (ZSTD_isError(state)) throw InputError(fmt::format("{}: is not zstd: {}", name, ZSTD_getErrorName(state)));
+    if (ZSTD_isError(state))
+      throw InputError(fmt::format("{}: this is not a file compressed with zstd: {}", name, ZSTD_getErrorName(state)));
     out.append(chunk.data(), output.pos);
   }
-  if (state != 0) throw InputError(name + ": ends in the middle of its compressed data");
+  if (state != 0) throw InputError(name + ": the compressed data are truncated");
   return out;
 }
 

@@ -75,7 +75,7 @@ class TreeBuilder {
     const auto [earlier, fresh] = level.seen.emplace(name, level.key_at);
     level.repeated = !fresh;
     if (!fresh)
-      problem(start, fmt::format("the key \"{}\" stands here twice, first in line {}", name, earlier->second.line),
+      problem(start, fmt::format("the key \"{}\" is given twice, first in line {}", name, earlier->second.line),
               "Remove one of the two");
     return true;
   }
@@ -85,18 +85,18 @@ class TreeBuilder {
     const std::size_t start = token_start();
     const char first = start < text_.size() ? text_[start] : '\0';
     if (said.find("number overflow") != std::string::npos)
-      return problem(start, fmt::format("{} is beyond the largest double (1.8e308)", literal(start)),
+      return problem(start, fmt::format("{} is beyond the largest possible number (1.8e308)", literal(start)),
                      "Check its exponent");
     if (said.find("invalid string") != std::string::npos) return string_problem(start, said);
     if (first == '-' && (text_.substr(start + 1, 8) == "Infinity" || text_.substr(start + 1, 3) == "NaN"))
       return problem(start, fmt::format("{} is not a number", word(start)), finite_advice);
     if (const std::size_t what = said.find("invalid number; "); what != std::string::npos)
-      return problem(start, "a number that is not whole: " + clause(said, what + 16), "");
+      return problem(start, "an incomplete number: " + clause(said, what + 16), "");
     if (number_end_ == start && start > 0 && std::isdigit(static_cast<unsigned char>(first)))
-      return problem(start, "a number with a leading zero", "Write it without");
-    if (first == '\'') return problem(start, "a string in single quotes", "JSON strings stand in double quotes");
+      return problem(start, "a number with a leading zero", "Write it without the leading zero");
+    if (first == '\'') return problem(start, "a string in single quotes", "Write strings in double quotes");
     if (first == '/' || first == '#')
-      return problem(start, "a comment", "JSON has none; write \"$comment\": \"...\" inside an object instead");
+      return problem(start, "a comment", "JSON has no comments; write \"$comment\": \"...\" inside an object instead");
     if (std::isalpha(static_cast<unsigned char>(first)) && value_may_stand_here(start)) return word_problem(start);
     return structure_problem(start);
   }
@@ -176,7 +176,7 @@ class TreeBuilder {
     const std::size_t start = token_start();
     if (levels_.size() >= deepest_nesting)
       return problem(start, fmt::format("nested deeper than {} levels", deepest_nesting),
-                     "No recipe needs that; look for a bracket that is never closed");
+                     "Look for a bracket that is not closed; no recipe needs so many levels");
     levels_.push_back({add(kind, start, 1)});
     return true;
   }
@@ -216,7 +216,8 @@ class TreeBuilder {
       return problem(fault, fmt::format("{} is not UTF-8", found(fault)), "Save the file as UTF-8");
     if (says("surrogate")) return problem(fault, "half of a surrogate pair", "");
     if (says("4 hex digits")) return problem(fault, "\\u needs four hexadecimal digits", "");
-    return problem(fault, fmt::format("\\ before {} means nothing", found(fault)), "Write \\\\ for a backslash");
+    return problem(fault, fmt::format("\\ before {} is not a valid escape sequence", found(fault)),
+                   "Write \\\\ for a backslash");
   }
   bool word_problem(std::size_t start) {
     const std::string_view text = word(start);
@@ -236,7 +237,7 @@ class TreeBuilder {
     const bool comma = between(start).find(',') != std::string_view::npos;
     const std::string_view advice = closes && comma ? "Remove the comma before it" : "";
     if (levels_.empty() && root_)
-      return problem(start, "more text after the end of the document: " + what, "One file holds one JSON value");
+      return problem(start, "more text after the end of the document: " + what, "A file must contain one JSON value");
     if (levels_.empty() && start >= text_.size())
       return problem(start, "the document is empty", "A recipe is a JSON object with \"name\" and \"stages\"");
     if (value_may_stand_here(start)) return problem(start, "expected a value, found " + what, advice);
@@ -271,7 +272,7 @@ namespace {
 std::string read_text(const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error))
-    throw InputError(path.string() + ": is a directory, a file is needed");
+    throw InputError(path.string() + ": this is a directory; give a file");
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail_to_read(path.string());
   return {std::istreambuf_iterator<char>(stream), {}};

@@ -18,7 +18,8 @@ namespace shakebed::pipelines {
 
 ProcessResult run_process(const std::vector<std::string>& arguments, const std::filesystem::path& directory) {
   int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) throw StageError(fmt::format("a pipe cannot be made: {}", std::strerror(errno)));
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    throw StageError(fmt::format("a pipe to another program cannot be created: {}", std::strerror(errno)));
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);

@@ -65,8 +65,11 @@ class Reader {
       else
         read_row(line);
     }
-    if (header_.empty()) throw InputError(path_.string() + ": holds no header line");
-    if (rows_.empty()) throw InputError(path_.string() + ": holds no row below its header");
+    if (header_.empty())
+      throw InputError(path_.string() +
+                       ": there is no header line. Write the names of the columns in the first line, for example "
+                       "height,number_density");
+    if (rows_.empty()) throw InputError(path_.string() + ": there are no rows below the header line");
     std::stable_sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) { return a.height < b.height; });
     complete_errors();
     read_notes();
@@ -137,15 +140,18 @@ class Reader {
     std::vector<std::string> others;
     for (std::size_t k = 1; k < found.size(); ++k) others.push_back(header_[found[k]]);
     if (!others.empty())
-      profile_.notes.push_back(fmt::format("{}: the density is column \"{}\"; {} is not read", path_.string(),
-                                           header_[found[0]], fmt::join(others, ", ")));
+      profile_.notes.push_back(
+          fmt::format("{}: the {} is read from column \"{}\", and these columns are ignored: {}. To use another "
+                      "column, name it \"{}\".",
+                      path_.string(), name == "nu" ? "area fraction" : "density", header_[found[0]],
+                      fmt::join(others, ", "), name == "nu" ? "area_fraction" : "number_density"));
     return static_cast<std::ptrdiff_t>(found[0]);
   }
 
   void read_row(const std::string& line) {
     const std::vector<std::string> cells = split(line);
     if (cells.size() != header_.size())
-      throw fail(fmt::format("{} cells, the header has {}", cells.size(), header_.size()));
+      throw fail(fmt::format("this row has {} cells, but the header has {}", cells.size(), header_.size()));
     const auto given = [&](std::ptrdiff_t column) {
       return column >= 0 && !cells[static_cast<std::size_t>(column)].empty();
     };
@@ -165,10 +171,10 @@ class Reader {
     row.error = given(error_) ? number(error_) : 0;
     row.samples = given(samples_) ? number(samples_) : 0;
     if (row.density < 0)
-      throw fail(
-          "a negative density. A density from which a background was taken must be raised to 0, or its rows left out");
-    if (!std::isfinite(row.density)) throw fail("a density beyond a double");
-    if (row.error < 0) throw fail("a negative standard error");
+      throw fail(fmt::format("the density {} is negative. Set negative densities to 0, or leave their rows out",
+                             number_text(row.density)));
+    if (!std::isfinite(row.density)) throw fail("the density is beyond the largest possible number");
+    if (row.error < 0) throw fail(fmt::format("the standard error {} is negative", number_text(row.error)));
     rows_.push_back(row);
   }
 
@@ -198,9 +204,8 @@ class Reader {
     const std::size_t count = missing.size();
     if (count > rows_to_name) missing.resize(rows_to_name);
     profile_.notes.push_back(
-        fmt::format("{}: {} of {} rows have no standard error or one of 0 (line{} {}{}). Each takes the error of the "
-                    "nearest height "
-                    "that has one.",
+        fmt::format("{}: {} of {} rows have no standard error or one of 0 (line{} {}{}). The error of the nearest "
+                    "height that has one is used for each.",
                     path_.string(), count, rows_.size(), count == 1 ? "" : "s", fmt::join(missing, ", "),
                     count > rows_to_name ? ", ..." : ""));
   }
@@ -266,15 +271,15 @@ class Reader {
 
 std::vector<StatedColumn> profile_columns(const std::string& origin) {
   return {{"height", "D", "height above " + origin},
-          {"number_density", "1/D^2", "disks per area, in units of 1/D^2"},
+          {"number_density", "1/D^2", "number density: disks per area, in units of 1/D^2"},
           {"std_error", "1/D^2", "standard error of number_density"},
           {"area_fraction", "1", "fraction of the area covered by disks"},
-          {"samples", "1", "disk positions seen at this height"}};
+          {"samples", "1", "number of disk positions at this height"}};
 }
 
 std::vector<StatedColumn> covariance_columns() {
-  return {{"height_i", "D", "first height"},
-          {"height_j", "D", "second height, not below the first"},
+  return {{"height_i", "D", "first of the two heights"},
+          {"height_j", "D", "second of the two heights, not below the first"},
           {"covariance", "1/D^4", "covariance of the densities at the two heights"}};
 }
 
@@ -313,7 +318,7 @@ ProfileCovariance read_covariance_csv(const std::filesystem::path& path, const P
     std::optional<double> numbers[3];
     for (std::size_t k = 0; k < 3 && k < cells.size(); ++k) numbers[k] = number_in(cells[k]);
     if (cells.size() != 3 || !numbers[0] || !numbers[1] || !numbers[2])
-      throw InputError(fmt::format("{}:{}: expected height_i,height_j,covariance", path.string(), line));
+      throw InputError(fmt::format("{}:{}: expected three numbers: height_i,height_j,covariance", path.string(), line));
     const auto i = index_of(*numbers[0]), j = index_of(*numbers[1]);
     if (i && j) out.values[*i * n + *j] = out.values[*j * n + *i] = *numbers[2];
   });
@@ -325,7 +330,8 @@ ProfileCovariance read_covariance_csv(const std::filesystem::path& path, const P
 
 void write_covariance_csv(const std::filesystem::path& path, const std::vector<double>& heights,
                           const std::vector<double>& covariance, std::size_t independent_samples) {
-  Table table("covariance of number_density in profile.csv; pairs that are not listed: 0", covariance_columns());
+  Table table("covariance of number_density in profile.csv; it is 0 for pairs that are not listed",
+              covariance_columns());
   table.note("independent_samples", independent_samples);
   const std::size_t n = heights.size();
   for (std::size_t i = 0; i < n; ++i)

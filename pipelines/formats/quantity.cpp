@@ -212,7 +212,7 @@ std::string example_of(const Dimension& d) {
 
 Quantity parse_quantity(std::string_view whole, const Dimension* wanted) {
   const std::string_view text = without_spaces(whole);
-  if (text.empty()) throw std::invalid_argument("an empty string is no quantity");
+  if (text.empty()) throw std::invalid_argument("the string is empty");
   // The number: what from_chars takes, checked for words that it takes too.
   const std::size_t start = text.front() == '+' ? 1 : 0;
   double plain = 0;
@@ -244,7 +244,8 @@ Quantity parse_quantity(std::string_view whole, const Dimension* wanted) {
   }
   const std::string shifted = number.substr(0, e) + "e" + std::to_string(exponent);
   double value = std::strtod(shifted.c_str(), nullptr) * unit.factor;
-  if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("\"{}\" is beyond the largest double", whole));
+  if (!std::isfinite(value))
+    throw std::invalid_argument(fmt::format("\"{}\" is beyond the largest possible number", whole));
   return {value, unit.dimension, !unit_text.empty()};
 }
 
@@ -253,7 +254,7 @@ double parse_quantity(std::string_view text, const Dimension& wanted) {
   if (!quantity.has_unit) return quantity.value;
   if (quantity.dimension != wanted) {
     throw std::invalid_argument(
-        fmt::format("\"{}\" is {}, but {} is wanted", text, name_of(quantity.dimension), name_of(wanted)));
+        fmt::format("\"{}\" is {}, but {} is needed", text, name_of(quantity.dimension), name_of(wanted)));
   }
   return quantity.value;
 }

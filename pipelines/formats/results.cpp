@@ -125,7 +125,7 @@ std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, 
     tokens = split_pointer(pointer);
   } catch (const UsageError&) {}
   if (tokens.size() < 2 || tokens[0].empty())
-    return Misfit{fmt::format("\"{}\" is no pointer to a result", pointer),
+    return Misfit{fmt::format("\"{}\" is not a pointer to a result", pointer),
                   "Write /<stage id>/<name in its result>, for example \"/fit/temperature\""};
   std::vector<std::string> ids;
   for (const StatedStage& stage : stages) ids.push_back(stage.id);
@@ -134,7 +134,7 @@ std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, 
     const std::string nearest = nearest_name(tokens[0], ids);
     return Misfit{
         fmt::format("\"{}\": {} names no stage \"{}\"", pointer, called, tokens[0]),
-        nearest.empty() ? fmt::format("It names {}", listed(ids)) : fmt::format("Did you mean \"{}\"?", nearest)};
+        nearest.empty() ? fmt::format("Choose from: {}", listed(ids)) : fmt::format("Did you mean \"{}\"?", nearest)};
   }
   if (stage->results == nullptr) return std::nullopt;
   const std::vector<std::string> inside(tokens.begin() + 1, tokens.end());
@@ -147,14 +147,14 @@ std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, 
                   fmt::format("It is given when {}", found->given.condition)};
   std::vector<std::string> names = below(*stage->results, inside);
   if (!names.empty())
-    return Misfit{fmt::format("\"{}\" leads to several results, not to one", pointer),
-                  fmt::format("Below it are {}", listed(names))};
+    return Misfit{fmt::format("\"{}\" refers to several results, not to one", pointer),
+                  fmt::format("Choose from: {}", listed(names))};
   for (const StatedResult& result : stage->results->all()) {
     if (result.given.possible) names.push_back(filled(result.pointer, inside));
   }
   const std::string nearest = nearest_name(path, names);
   return Misfit{fmt::format("{} gives no result \"{}\"", gives, path),
-                nearest.empty() ? fmt::format("It gives {}; \"shakebed reference {}\" says what they are",
+                nearest.empty() ? fmt::format("Choose from: {}. \"shakebed reference {}\" describes them",
                                               listed(names), stage->kind)
                                 : fmt::format("Did you mean \"{}\"?", pointer_join("", stage->id) + nearest)};
 }
@@ -173,7 +173,7 @@ std::optional<Misfit> misfit_of_table(const StatedStage& stage, const std::strin
   const std::string nearest = nearest_name(file, names);
   return Misfit{
       fmt::format("\"{}\" ({}) writes no table \"{}\"", stage.id, stage.kind, file),
-      nearest.empty() ? fmt::format("It writes {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
+      nearest.empty() ? fmt::format("Choose from: {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
 }
 
 std::optional<Misfit> misfit_of_column(const StatedTable& table, const std::string& column) {
@@ -183,7 +183,7 @@ std::optional<Misfit> misfit_of_column(const StatedTable& table, const std::stri
   const std::string nearest = nearest_name(column, names);
   return Misfit{
       fmt::format("{} has no column \"{}\"", table.file, column),
-      nearest.empty() ? fmt::format("It has {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
+      nearest.empty() ? fmt::format("Choose from: {}", listed(names)) : fmt::format("Did you mean \"{}\"?", nearest)};
 }
 
 }  // namespace shakebed::pipelines

@@ -144,14 +144,15 @@ bool TrajectoryReader::more() {
       if (size == 0) {
         if (std::ferror(file_) != 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
         at_end_ = true;
-        if (d.state != 0) fail("the compressed data end in the middle");
+        if (d.state != 0) fail("the compressed data are truncated");
         return false;
       }
       d.input = {d.in.data(), size, 0};
     }
     ZSTD_outBuffer output{d.out.data(), d.out.size(), 0};
     d.state = ZSTD_decompressStream(d.context, &output, &d.input);
-    if (ZSTD_isError(d.state)) fail(fmt::format("is not zstd: {}", ZSTD_getErrorName(d.state)));
+    if (ZSTD_isError(d.state))
+      fail(fmt::format("this is not a file compressed with zstd: {}", ZSTD_getErrorName(d.state)));
     if (output.pos > 0) {
       buffer_.append(d.out.data(), output.pos);
       return true;
@@ -171,7 +172,7 @@ bool TrajectoryReader::line(std::string_view& out) {
       return true;
     }
     const std::size_t held = buffer_.size() - position_;
-    if (held > longest_line) fail(fmt::format("a line of more than {} bytes: this is no trajectory", longest_line));
+    if (held > longest_line) fail(fmt::format("a line of more than {} bytes: this is not a trajectory", longest_line));
     if (!more()) {
       if (buffer_.size() == position_) return false;
       out = std::string_view(buffer_).substr(position_);
@@ -252,7 +253,9 @@ bool TrajectoryReader::read_count(std::size_t& count) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
   if (error != std::errc() || end != word.data() + word.size())
     fail(fmt::format("expected the number of disks, found \"{}\"", text));
-  if (count > most_disks) fail("more than a thousand million disks");
+  if (count > most_disks)
+    fail(fmt::format("{} disks in one frame, but at most {} can be read. Check the number of disks in this line.",
+                     count, most_disks));
   return true;
 }
 
@@ -272,7 +275,7 @@ void TrajectoryReader::read_moment(std::string_view comment, TrajectoryFrame& fr
   if (lattice.empty()) return;
   for (int i = 0; i < 9; ++i) {
     double value = 0;
-    if (!to_double(next_word(lattice), value)) fail("Lattice must hold nine numbers");
+    if (!to_double(next_word(lattice), value)) fail("Lattice must contain nine numbers");
     if (i == 0 && frame.width == 0) frame.width = value;
     if (i == 8) frame.height = value;
   }
@@ -293,7 +296,9 @@ TrajectoryReader::Columns TrajectoryReader::read_columns(std::string_view commen
   for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {
     int size = 0;
     std::from_chars(parts[i + 2].data(), parts[i + 2].data() + parts[i + 2].size(), size);
-    if (size < 1 || size > 100) fail("Properties names a column count that is not 1 to 100");
+    if (size < 1 || size > 100)
+      fail(fmt::format("Properties gives \"{}\" columns for \"{}\"; their number must be 1 to 100", parts[i + 2],
+                       parts[i]));
     if (parts[i] == "pos")
       columns.position = columns.all, columns.position_size = size;
     else if (parts[i] == "velo")
@@ -305,7 +310,7 @@ TrajectoryReader::Columns TrajectoryReader::read_columns(std::string_view commen
     columns.all += size;
   }
   if (columns.position < 0 || columns.position_size < 2 || columns.position_size > 3)
-    fail("Properties must name pos:R:2 or pos:R:3");
+    fail("Properties must contain pos:R:2 or pos:R:3");
   return columns;
 }
 
@@ -323,7 +328,7 @@ void TrajectoryReader::read_disks(std::size_t count, const Columns& columns, Tra
     if (!line(text)) fail(fmt::format("the file ends after {} of {} disks", i, count));
     for (int column = 0; column < columns.all; ++column) {
       const std::string_view word = next_word(text);
-      if (word.empty()) fail(fmt::format("{} columns, {} are announced", column, columns.all));
+      if (word.empty()) fail(fmt::format("this line has {} columns, but Properties announces {}", column, columns.all));
       if (columns.hold_number(column) && !to_double(word, row[static_cast<std::size_t>(column)]))
         fail(fmt::format("\"{}\" is not a number", word));
     }

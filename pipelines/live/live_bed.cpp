@@ -47,7 +47,7 @@ double least(double low, double high, const Function& value) {
 }
 
 sim::Scene scene_of(const Settings& s) {
-  if (!(s.count >= 1 && s.count <= most_disks)) throw std::invalid_argument("this page shakes 1 to 5000 disks");
+  if (!(s.count >= 1 && s.count <= most_disks)) throw std::invalid_argument("the number of disks must be 1 to 5000");
   if (!(s.diameter > 0 && s.width > 0 && s.gamma > 0 && s.frequency > 0))
     throw std::invalid_argument("diameter, width, Gamma and frequency must be above 0");
   const ReducedScales unit = ReducedScales::of(s.diameter, usual_gravity);

@@ -69,7 +69,7 @@ Json no_licence() {
   return Json{{"@id", "#licence"},
               {"@type", "CreativeWork"},
               {"name", "No licence is stated"},
-              {"description", "The program states no licence for results: whoever publishes them does."}};
+              {"description", "The program states no licence for results. Whoever publishes them should state one."}};
 }
 
 Json root_of(const Plan& plan, Json parts, Json actions) {
@@ -127,10 +127,10 @@ class Crate {
       add_file(name, Json{{"description", description}});
       parts_.push_back(reference(name));
     };
-    page("report.html", "everything on one page, without a network");
-    page("summary.md", "the same in short");
-    page("summary.json", "the numbers of every stage; it begins with the answer");
-    page("resolved.json", "the recipe with every option written out; a recipe itself");
+    page("report.html", "all results on one page, which needs no network");
+    page("summary.md", "short summary of the results");
+    page("summary.json", "numbers of every stage, beginning with the answer");
+    page("resolved.json", "recipe with every option written out; it can be run itself");
     // It is written after this file.
     add_file("manifest.json",
              Json{{"description", "versions, seeds, times, and the SHA-256 of every input and output"}});
@@ -179,10 +179,11 @@ class Crate {
           path, fmt::format("#input-{}-{}", inputs_.size() + 1, uri_of(fs::path(path).filename().string())));
       const std::string& id = known->second;
       if (fresh)
-        graph_.push_back(Json{{"@id", id},
-                              {"@type", "CreativeWork"},
-                              {"name", fs::path(path).filename().string()},
-                              {"description", "a file from outside; its path and SHA-256 are in manifest.json"}});
+        graph_.push_back(
+            Json{{"@id", id},
+                 {"@type", "CreativeWork"},
+                 {"name", fs::path(path).filename().string()},
+                 {"description", "input file from another folder; its path and SHA-256 are in manifest.json"}});
       objects.push_back(reference(id));
     }
     return objects;
@@ -205,11 +206,11 @@ Json crate_json(const Plan& plan, const SweepOutcome& sweep) {
     graph.push_back(std::move(entity));
   };
   for (const auto& [name, description] :
-       {std::pair("sweep.csv", "one row per point: its values and the gathered numbers, in SI"),
-        std::pair("sweep.csv-metadata.json", "the columns of sweep.csv, as CSV on the Web says it"),
+       {std::pair("sweep.csv", "one row per point: its values and the collected numbers, in SI units"),
+        std::pair("sweep.csv-metadata.json", "description of the columns of sweep.csv (CSV on the Web)"),
         std::pair("resolved.json", "the recipe with every option written out"),
         std::pair("report.html", "figures, maps and the table of points on one page"),
-        std::pair("summary.md", "the same in short")}) {
+        std::pair("summary.md", "short summary of the results")}) {
     if (fs::exists(sweep.out / name)) add(file_json(name, Json{{"description", description}}));
   }
   if (fs::is_directory(sweep.out / "figures")) {

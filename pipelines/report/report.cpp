@@ -156,7 +156,7 @@ class Report {
                                                                   : "stopped";
     std::string out = fmt::format("<p class=\"{}\">{}</p>\n", fine ? "soft" : "bad", text);
     if (!outcome_.error.empty())
-      out += fmt::format("<div class=\"banner\"><strong>What stopped it</strong>{}</div>\n", html(outcome_.error));
+      out += fmt::format("<div class=\"banner\"><strong>Why the run stopped</strong>{}</div>\n", html(outcome_.error));
     return out;
   }
 
@@ -184,10 +184,10 @@ class Report {
   std::string warnings() const {
     if (outcome_.warnings.empty()) return "";
     constexpr std::array groups = {
-        std::pair(WarningEffect::answer, "They change the answer or its error"),
-        std::pair(WarningEffect::measurement, "They change what was measured"),
-        std::pair(WarningEffect::recipe, "About the recipe: the bed may not be the one you mean"),
-        std::pair(WarningEffect::rest, "They do not change the answer")};
+        std::pair(WarningEffect::answer, "Warnings that concern the answer or its error"),
+        std::pair(WarningEffect::measurement, "Warnings that concern the measurement"),
+        std::pair(WarningEffect::recipe, "Warnings about the recipe: the bed may not be the one that you want"),
+        std::pair(WarningEffect::rest, "Warnings that do not concern the answer")};
     std::vector<Shown> all;
     for (const std::string& warning : outcome_.warnings) all.push_back(shown_warning(warning));
     std::string out = fmt::format("<section class=\"warnings\" aria-label=\"warnings\">\n<h2>{} warning{}</h2>\n",
@@ -231,8 +231,8 @@ class Report {
     for (const Row& row : rows) {
       if (&row != &rows.front() && !row.beside_answer) continue;
       own += fmt::format(
-          "<div><dt>{0}</dt><dd>{1} <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>the same in "
-          "print</dt><dd>{2} <span class=\"tag published\">published</span> <span class=\"verdict "
+          "<div><dt>{0}</dt><dd>{1} <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>published "
+          "value</dt><dd>{2} <span class=\"tag published\">published</span> <span class=\"verdict "
           "{3}\">{4}</span></dd></div>\n",
           prose(row.label), html(row.ours), html(row.published), row.agrees ? "good" : "bad", html(row.verdict));
     }
@@ -255,7 +255,7 @@ class Report {
     if (rows.empty()) return "";
     const std::vector<std::string> head{"number", "ours", "published", "verdict", "where"};
     std::string out =
-        "<h2>Our numbers beside the published ones</h2>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>number"
+        "<h2>Comparison with published numbers</h2>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>number"
         "</th><th class=\"computed\">ours <span class=\"tag computed\">computed</span></th><th "
         "class=\"published\">theirs "
         "<span class=\"tag published\">published</span></th><th>verdict</th><th>where</th></tr>\n";
@@ -314,7 +314,7 @@ class Report {
         "class=\"files\">\n" +
         inside + "</ul></details>\n";
     if (!beside.empty())
-      out += "<details><summary>Large files, beside this page</summary><ul class=\"files\">\n" + beside +
+      out += "<details><summary>Large files, in the folder of this page</summary><ul class=\"files\">\n" + beside +
              "</ul></details>\n";
     return out;
   }
@@ -324,8 +324,9 @@ class Report {
     const Json audit = audit_json();
     const std::vector<std::string> head{"number", "printed", "recomputed", "difference", "status", "explanation"};
     std::string out = fmt::format(
-        "<h2>The paper's numbers, recomputed</h2>\n<p class=\"soft\">{}: what it prints, and the same from its own "
-        "formulas.</p>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>number</th><th "
+        "<h2>The paper's numbers, recomputed</h2>\n<p class=\"soft\">{}: the printed numbers, and the same numbers "
+        "recomputed from the formulas of the paper.</p>\n<div class=\"scroll\"><table "
+        "class=\"stack\">\n<tr><th>number</th><th "
         "class=\"published\">printed "
         "<span class=\"tag published\">published</span></th><th class=\"computed\">recomputed <span class=\"tag "
         "computed\">computed</span></th><th>difference</th><th>status</th><th>explanation</th></tr>\n",
@@ -350,8 +351,8 @@ class Report {
   std::string assumed() const {
     if (plan_.report.assumed.empty()) return "";
     std::string out =
-        "<h2>Assumed inputs</h2>\n<p class=\"soft\">The source does not give these; other values give other "
-        "results.</p>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>input</th><th class=\"assumed\">value "
+        "<h2>Assumed inputs</h2>\n<p class=\"soft\">The source does not give these values, and the results depend on "
+        "them.</p>\n<div class=\"scroll\"><table class=\"stack\">\n<tr><th>input</th><th class=\"assumed\">value "
         "<span "
         "class=\"tag assumed\">assumed</span></th><th>why</th></tr>\n";
     for (const AssumedInput& input : plan_.report.assumed) {
@@ -480,7 +481,7 @@ std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
   const Report report(plan, outcome);
   out += report.markdown_of_stages();
   if (const auto rows = report.published_rows(); !rows.empty()) {
-    out += "\n## Beside the published numbers\n\n| number | ours | published | verdict |\n|---|---|---|---|\n";
+    out += "\n## Comparison with published numbers\n\n| number | ours | published | verdict |\n|---|---|---|---|\n";
     for (const auto& row : rows) {
       out += fmt::format("| {} | {} | {} | {} |\n", markdown(row.label), markdown(row.ours), markdown(row.published),
                          markdown(row.verdict));

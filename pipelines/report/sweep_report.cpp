@@ -286,7 +286,7 @@ class SweepFigures {
     if (fresh) {
       const int color = static_cast<int>(group->second);
       picture.series.push_back({label, Series::Style::points, color, {}, {}, {}});
-      picture.series.push_back({label + ", not one temperature", Series::Style::points, color, {}, {}, {}, true});
+      picture.series.push_back({label + ", no single temperature", Series::Style::points, color, {}, {}, {}, true});
     }
     return &picture.series[2 * group->second + (hollow(point, k) ? 1 : 0)];
   }
@@ -351,7 +351,7 @@ class SweepPage {
     if (!sweep_.verdicts.empty()) {
       out += fmt::format("<p><strong>{}.</strong>", escape_markup(verdicts_text(sweep_.verdicts)));
       if (sweep_.verdicts.size() > 1 || !is_one_temperature(sweep_.verdicts.begin()->first))
-        out += " The temperature of a point that has not one temperature is drawn hollow (○ in maps).";
+        out += " Hollow symbols (○ in maps) are points without a single temperature.";
       out += "</p>\n";
     }
     return out + "</section>\n";
@@ -434,7 +434,7 @@ class SweepPage {
     for (std::size_t i = 0; i < points && i < most_html_rows; ++i) out += row(i, head);
     out += "</table></div>\n";
     if (points > most_html_rows)
-      out += fmt::format("<p>The first {} of them; all are in sweep.csv.</p>\n", most_html_rows);
+      out += fmt::format("<p>Only the first {} points are shown; sweep.csv has all.</p>\n", most_html_rows);
     return out;
   }
 
@@ -466,7 +466,8 @@ std::string markdown_of(const Plan& plan, const SweepOutcome& sweep) {
       out += "|\n";
     }
   }
-  if (points > most_markdown_rows) out += fmt::format("\nThe first {}; all are in sweep.csv.\n", most_markdown_rows);
+  if (points > most_markdown_rows)
+    out += fmt::format("\nOnly the first {} points are shown; sweep.csv has all.\n", most_markdown_rows);
   return out;
 }
 

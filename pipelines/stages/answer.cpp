@@ -147,7 +147,7 @@ AnswerScale answer_scale(const Json& answer) {
 
 std::string verdict_text(const Json& answer) {
   const bool number = find_pointer(answer, "/temperature/value") != nullptr;
-  return number ? answer.value("verdict", "") : "no temperature can be read";
+  return number ? answer.value("verdict", "") : "no temperature can be determined";
 }
 
 std::string answer_text(const Json& answer) {

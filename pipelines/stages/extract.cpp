@@ -12,36 +12,37 @@ namespace {
 // The photographs, and where in them the bed is.
 void describe_geometry(Fields& fields, ExtractOptions& o) {
   fields.input_files("images", o.images,
-                     {.help = "photographs or films; left out, the frames of the render stage in \"from\"",
+                     {.help = "photographs or films; default: the frames of the render stage in \"from\"",
                       .example = "\"photos/*.tif\""});
   fields.boolean(
       "use_geometry", o.use_geometry,
       {.help =
            "whether scale, floor and walls of rendered frames are taken from the render stage instead of being found"});
   fields.quantity("scale", o.scale, dimension::length_per_pixel,
-                  {.help = "length of a pixel; left out, found from the diameter", .range = positive});
-  fields.number("floor", o.floor,
-                {.help = "row of the floor's surface at the left edge, in pixels from the top; left out, found"});
+                  {.help = "length of a pixel; default: found from the diameter", .range = positive});
+  fields.number(
+      "floor", o.floor,
+      {.help = "row of the floor's surface at the left edge, in pixels from the top; default: found from the beads"});
   fields.quantity(
       "floor_amplitude", o.floor_amplitude, dimension::length,
-      {.help = "amplitude of the shaken floor. Where no film shows its motion, its mean is taken to be half of "
-               "this above the lowest position seen, with an error of the same size",
+      {.help = "amplitude of the shaken floor. If no film shows the motion of the floor, its mean position is "
+               "estimated as half the amplitude above the lowest position seen, with an error of the same size",
        .range = positive});
-  fields.number(
-      "floor_slope", o.floor_slope,
-      {.help = "slope of the floor, in pixels down per pixel to the right; left out, found", .range = from_to(-1, 1)});
+  fields.number("floor_slope", o.floor_slope,
+                {.help = "slope of the floor, in pixels down per pixel to the right; default: found from the beads",
+                 .range = from_to(-1, 1)});
   fields.number("left_wall", o.left_wall,
-                {.help = "column of the inner face of the left wall, in pixels; left out, found"});
+                {.help = "column of the inner face of the left wall, in pixels; default: found from the beads"});
   fields.number("right_wall", o.right_wall,
-                {.help = "column of the inner face of the right wall, in pixels; left out, found"});
+                {.help = "column of the inner face of the right wall, in pixels; default: found from the beads"});
   fields.numbers("roi", o.roi,
                  {.help = "region of interest, in pixels: left, top, width, height; empty: the whole frame"});
   fields.number("pixel_aspect", o.pixel_aspect,
-                {.help = "width of a pixel over its height; left out, found from the rims of the beads",
+                {.help = "ratio of the width of a pixel to its height; default: found from the rims of the beads",
                  .range = from_to(0.5, 2)});
   fields.number("lens", o.lens_radial,
                 {.help = "distortion of the lens: true outward shift of the corners of the frame, in half diagonals "
-                         "(barrel: positive); left out, found from the rims of the beads",
+                         "(barrel: positive); default: found from the rims of the beads",
                  .range = from_to(-0.3, 0.3)});
 }
 
@@ -62,11 +63,11 @@ void describe_beads(Fields& fields, ExtractOptions& o) {
                 {.help = "part of a colour picture that is used. Saturation: largest minus smallest of red, green and "
                          "blue. Background_distance: distance from the most frequent colour"});
   fields.choice("shape", o.shape, {{BeadShape::round, "round"}, {BeadShape::any, "any"}},
-                {.help = "outlines that are taken for beads: round ones, or any. With any the program measures oval "
-                         "and rough outlines too, and warns"});
-  fields.number(
-      "radius", o.radius,
-      {.help = "first estimate of the radius of a bead, in pixels; left out, found", .range = from_to(1, 1e4)});
+                {.help = "outlines that are accepted as beads: round, or any. With any, oval and rough outlines are "
+                         "measured too, with a warning"});
+  fields.number("radius", o.radius,
+                {.help = "first estimate of the radius of a bead, in pixels; default: found in the frames",
+                 .range = from_to(1, 1e4)});
   fields.boolean("keep_half_hidden", o.keep_half_hidden, {.help = "whether beads that are partly covered are counted"});
 }
 
@@ -75,12 +76,12 @@ void describe_profile(Fields& fields, ExtractOptions& o) {
                         {.help = "kernel through which the density is measured"});
   fields.number("spacing", o.spacing,
                 {.help = "distance between the heights of the profile, in D", .range = from_to(1e-3, 10)});
-  fields.number("lowest", o.lowest, {.help = "lowest height of the profile, in D; left out, 0"});
+  fields.number("lowest", o.lowest, {.help = "lowest height of the profile, in D; default: 0"});
   fields.number("highest", o.highest,
-                {.help = "highest height of the profile, in D; left out, just above the highest bead"});
+                {.help = "highest height of the profile, in D; default: just above the highest bead"});
   fields.quantity(
       "frequency", o.frequency, dimension::frequency,
-      {.help = "frequency of the shaking, for profiles by phase (needs frame_rate); left out, found in the film",
+      {.help = "frequency of the shaking, for profiles by phase (needs frame_rate); default: found in the film",
        .range = positive});
   fields.quantity(
       "frame_rate", o.frame_rate, dimension::frequency,
@@ -94,23 +95,27 @@ void describe_frames(Fields& fields, ExtractOptions& o) {
   fields.integer(
       "stride", o.stride,
       {.help = "step between the frames that are used: 1 for all, 2 for every second one", .range = at_least(1)});
-  fields.integer("overlays", o.overlays,
-                 {.help = "number of frames that are drawn together with the disks found", .range = from_to(0, 1000)});
+  fields.integer(
+      "overlays", o.overlays,
+      {.help = "number of frames of which a picture with the disks found is written", .range = from_to(0, 1000)});
 }
 
 void check(Fields& fields, const ExtractOptions& o) {
   const bool from_render = fields.has_upstream("render");
   fields.require(from_render != fields.has("images"), from_render ? "images" : "",
-                 from_render ? "frames come both from the render stage in \"from\" and from \"images\""
+                 from_render ? "two sources of frames are given: the render stage in \"from\" and \"images\""
                              : "there are no frames: neither \"images\" nor a render stage in \"from\"",
                  "Give one of the two");
   fields.require(o.roi.empty() || o.roi.size() == 4, "roi", "expected four numbers: left, top, width, height");
   if (o.roi.size() == 4)
     fields.require(o.roi[2] >= 8 && o.roi[3] >= 8, "roi", "width and height must be at least 8 pixels");
-  fields.require(o.left_wall.has_value() == o.right_wall.has_value(), "left_wall", "both walls or none must be given");
+  fields.require(o.left_wall.has_value() == o.right_wall.has_value(), "left_wall",
+                 "one wall is missing: give both \"left_wall\" and \"right_wall\", or neither");
   if (o.left_wall && o.right_wall)
     fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
-  fields.require(!o.frequency || o.frame_rate, "frequency", "profiles by phase also need frame_rate");
+  fields.require(!o.frequency || o.frame_rate, "frequency",
+                 "the frequency is used for profiles by phase, which also need \"frame_rate\": give both, or leave "
+                 "\"frequency\" out");
 }
 
 class Extract : public Stage {
@@ -139,18 +144,18 @@ class Extract : public Stage {
 
  private:
   void describe_bed(Fields& fields) {
-    fields.quantity("diameter", diameter_, dimension::length,
-                    {.help = "diameter of a bead; required for photographs of your own, else that of the simulated bed",
-                     .range = positive,
-                     .example = "\"2.99 mm\""});
+    fields.quantity(
+        "diameter", diameter_, dimension::length,
+        {.help = "diameter of a bead; required for your own photographs; default for a simulated bed: its own",
+         .range = positive,
+         .example = "\"2.99 mm\""});
     fields.quantity(
         "second_diameter", options_.second_diameter, dimension::length,
-        {.help = "diameter of a second kind of beads, larger or smaller; left out, such beads count as rejected",
+        {.help = "diameter of a second kind of beads, larger or smaller; default: such beads count as rejected",
          .range = positive});
     fields.quantity(
         "gravity", gravity_, dimension::acceleration,
-        {.help = "acceleration of gravity, for temperatures; left out, that of the simulated bed, else 9.81 "
-                 "m/s^2",
+        {.help = "acceleration of gravity, for temperatures; default: that of the simulated bed, or 9.81 m/s^2",
          .range = positive});
   }
 
@@ -166,7 +171,8 @@ class Extract : public Stage {
       if (!gravity_) gravity_ = bed.gravity;
     }
     if (!gravity_) gravity_ = standard_gravity;
-    fields.require(diameter_.has_value(), "diameter", "\"diameter\" is missing: the diameter of a bead gives the scale",
+    fields.require(diameter_.has_value(), "diameter",
+                   "\"diameter\" is missing: the scale follows from the diameter of a bead",
                    "Write \"diameter\": \"2.99 mm\"");
     if (const auto impossible = impossible_bead(diameter_.value_or(1e-3)))
       fields.require(false, "diameter", impossible->what, impossible->suggestion);

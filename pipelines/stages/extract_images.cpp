@@ -48,11 +48,13 @@ fs::path refusal_folder(const RunContext& context) { return context.output_direc
   const std::vector<std::string> proposals = proposed_options(survey);
   message +=
       proposals.empty()
-          ? ". No circles stand out, so there is no radius to propose. Photographs are needed of round beads, from "
-            "the side, sharp, each at least 8 pixels wide and brighter or darker than what is behind it. If yours "
-            "is one, give the region of the beads (--roi) and their radius in pixels (--radius)"
-          : fmt::format(". If the beads are those of one of its pictures, crop to them with --roi, or give {}",
-                        fmt::join(proposals, " or "));
+          ? ". No circles stand out, so no radius can be proposed. The program needs sharp photographs of round beads, "
+            "taken from the side. Each bead must be at least 8 pixels wide and brighter or darker than the background. "
+            "If this is such a photograph, give the region of the beads (--roi) and their radius in pixels (--radius)"
+          : fmt::format(
+                ". If one of the pictures in preview.html marks your beads, limit the search to them with --roi, or "
+                "give {}",
+                fmt::join(proposals, " or "));
   throw StageError(message);
 }
 
@@ -86,13 +88,13 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
         !why.empty())
       throw StageError(fmt::format("{}: {}", look->path, why));
   if (chosen->not_round)
-    context.warning(
-        fmt::format("{}: the outlines are not those of disks ({}); they are measured because of shape "
-                    "\"any\". Positions hold if these are your beads; radii and densities hold for disks",
-                    look->path, chosen->why_not_round));
+    context.warning(fmt::format(
+        "{}: the outlines are not those of disks ({}). They are measured because shape is \"any\". If these are your "
+        "beads, their positions are valid, but radii and densities are not: these hold for disks only",
+        look->path, chosen->why_not_round));
   if (!chosen->why_drawn.empty())
     context.warning(
-        fmt::format("{}: {}; the circles are measured because of shape \"any\".", look->path, chosen->why_drawn));
+        fmt::format("{}: {}. The circles are measured because shape is \"any\".", look->path, chosen->why_drawn));
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px, chosen->one_sided};
@@ -109,9 +111,9 @@ void judge_contacts(const ExtractOptions& options, const ingest::Measurement& fo
   const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
   if (options.shape == BeadShape::round && found.contacts.far_apart(diameter_px))
     throw StageError(fmt::format(
-        "Hardly any of the {} disks found touch, and nearest centres are typically {:.1f} diameters apart: holes and "
-        "printed dots look so, beads of a bed do not. Look at fit-images --preview. If they are your beads, give "
-        "--shape any, or --radius if a bead is larger than the circle",
+        "Hardly any of the {} disks found touch: nearest centres are typically {:.1f} diameters apart. They may be "
+        "holes or printed dots, because beads of a bed touch. Look at the pictures of fit-images --preview. If they "
+        "are your beads, give --shape any, or --radius if a bead is larger than its circle",
         found.disk_total, found.contacts.nearest_px / diameter_px));
 }
 
@@ -120,15 +122,16 @@ void judge_missed(const ExtractOptions& options, RunContext& context, double mis
   const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
   if (doubt == ingest::Doubt::little) return;
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(fmt::format(
-        "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
-        "Look at fit-images --preview, and give --radius, --polarity, --channel or --roi. Beads that touch and are "
-        "narrower than 24 px need more pixels. To measure the disks found all the same, give --shape any",
-        100 * missed));
-  context.warning(fmt::format(
-      "About {:.0f} % of the beads may be missed: beside the disks found, edges fill places in which a bead fits. "
-      "Look at the overlays before you use the density.",
-      100 * missed));
+    throw StageError(
+        fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
+                    "where a bead fits. Look at the pictures of fit-images --preview, and give --radius, --polarity, "
+                    "--channel or --roi. Beads that touch and are narrower than 24 px need more pixels. To measure the "
+                    "disks found nevertheless, give --shape any",
+                    100 * missed));
+  context.warning(
+      fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
+                  "a bead fits. Look at the overlays (pictures with the disks found) before you use the density.",
+                  100 * missed));
 }
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
@@ -138,13 +141,13 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
   const ingest::Doubt doubt = ingest::doubt_of(wrong);
   if (doubt == ingest::Doubt::too_many)
     throw StageError(
-        fmt::format("{:.0f} % of the {} disks found may be wrong: too many to measure anything. Look at "
+        fmt::format("{:.0f} % of the {} disks found may be wrong: too many for a measurement. Look at the pictures of "
                     "fit-images --preview, and give --radius, --polarity, --channel or --roi",
                     100 * wrong, found.disk_total));
   if (doubt == ingest::Doubt::some)
     context.warning(
-        fmt::format("{:.1f} % of the disks found may be wrong: look at the overlays before you use the "
-                    "numbers.",
+        fmt::format("{:.1f} % of the disks found may be wrong. Look at the overlays (pictures with the disks found) "
+                    "before you use the numbers.",
                     100 * wrong));
   judge_contacts(options, found);
   judge_missed(options, context, missed);
@@ -155,11 +158,12 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
                                        found.disk_count_mean, *options.bead_number);
   if (std::abs(ratio - 1) > far_off)
     throw StageError(text +
-                     ": something else was found. Look at fit-images --preview, and give --radius, --polarity, "
-                     "--channel or --roi; or correct --bead-number");
+                     ". Other objects were probably found instead of the beads. Look at the pictures of fit-images "
+                     "--preview, and give --radius, --polarity, --channel or --roi; or correct --bead-number");
   if (std::abs(ratio - 1) > 1e-3)
-    context.warning(text + (ratio < 1 ? ": some are missed or out of view (count.svg, overlays)."
-                                      : ": something else is taken for a bead (overlays), or there are more."));
+    context.warning(text + (ratio < 1
+                                ? ": some beads are missed or out of view (see count.svg and the overlays)."
+                                : ": another object is taken for a bead (see the overlays), or there are more beads."));
 }
 
 // What the options ask of the measurement.
@@ -196,7 +200,7 @@ std::vector<std::string> named_pictures(const InputFiles& images) {
     if (named.contains(name_of(path)) || ingest::FrameSource::is_frame_file(path)) paths.push_back(path);
   if (paths.empty())
     throw InputError(
-        fmt::format("{}: holds neither a picture nor a film; name files ending in .png, .tif, .jpg, .bmp, "
+        fmt::format("{}: no picture or film was found. Give files that end in .png, .tif, .jpg, .bmp, "
                     ".pgm, .mp4, .avi, .mov or .mkv",
                     images.texts.front()));
   return paths;
@@ -223,7 +227,7 @@ class Extraction {
       context_.check_interrupted();
       const double done = done_;
       time_.reached(finding, done);
-      context_.progress(done > 0 ? time_.fraction() : 0, done > 0 ? "finding disks" : "looking for beads");
+      context_.progress(done > 0 ? time_.fraction() : 0, done > 0 ? "finding disks" : "searching for beads");
     });
     measure_.threads = static_cast<unsigned>(context_.jobs());
     film_.source.stride = options_.stride;
@@ -280,17 +284,17 @@ class Extraction {
     const auto geometry = said ? FrameGeometry::from_sides_text(said->text) : std::nullopt;
     if (!geometry) return;
     if (geometry->width != said->width || geometry->height != said->height) {
-      context_.warning(fmt::format(
-          "{}: a simulated bed with periodic sides, in a picture that was cut or scaled: where the sides are is not "
-          "known. The width found may be 1 D too large, and the density too low by as much. Give the sides "
-          "(--left-wall, --right-wall)",
-          first.front().path));
+      context_.warning(
+          fmt::format("{}: this is a simulated bed with periodic sides, in a picture that was cut or scaled, so the "
+                      "positions of the sides are unknown. The width found may be up to 1 D too large, and the density "
+                      "too low by the same factor. Give the sides (--left-wall, --right-wall)",
+                      first.front().path));
       return;
     }
     use_periodic_sides(*geometry);
     context_.warning(
-        fmt::format("{}: a simulated bed with periodic sides. The width is that of its box, as the file says, from "
-                    "column {:g} to {:g}: beads that stand out of it belong to it",
+        fmt::format("{}: this is a simulated bed with periodic sides. The width used is that of its box, from column "
+                    "{:g} to {:g}, as stated in the file. Beads that extend beyond it are counted",
                     first.front().path, geometry->left_wall, geometry->right_wall));
   }
 
@@ -327,41 +331,40 @@ class Extraction {
     }
     if (bad > most_bad_frames_named)
       context_.warning(
-          fmt::format("and {} more frames that could not be used, listed in frames.csv", bad - most_bad_frames_named));
+          fmt::format("{} more frames could not be used; frames.csv lists them", bad - most_bad_frames_named));
     if (options_.frame_rate && !(bed.shaking_frequency_hz > 0))
       context_.warning(
-          "No frequency of a shaking is seen (" + bed.why_no_frequency +
-          "): there are no profiles by phase. Give frequency (--frequency) if this is a film of a shaken bed.");
+          "No frequency of the shaking was found (" + bed.why_no_frequency +
+          "), so there are no profiles by phase. Give frequency (--frequency) if this is a film of a shaken bed.");
     if (bed.shaking_frequency_hz > 0 && !options_.frame_rate)
-      context_.warning(
-          fmt::format("Times are by the film's own {:g} frames/s; if it was recorded faster, give frame_rate "
-                      "(--frame-rate): the shaking's frequency grows with it, its phases stay.",
-                      *measure_.frame_rate_hz * static_cast<double>(options_.stride)));
+      context_.warning(fmt::format(
+          "Times follow from the frame rate of the film file, {:g} frames/s. If the film was recorded faster, give "
+          "frame_rate (--frame-rate): the frequency of the shaking is then higher, and its phases stay the same.",
+          *measure_.frame_rate_hz * static_cast<double>(options_.stride)));
   }
 
   // The fit takes them into its answer.
   void add_objections(const ingest::Measurement& found, Json& result) const {
     std::vector<ingest::Objection> all = ingest::objections_to(found);
     if (!round_)
-      all.push_back({"The outlines are not those of disks, and the theory is one of disks.",
-                     "Use positions and numbers of beads only."});
+      all.push_back({"The outlines are not those of disks, but the theory describes disks.",
+                     "Use only the positions and the number of the beads."});
     const double seen = 2 * found.calibration.radius_px, given = options_.diameter / found.calibration.scale_m_per_px;
     if (found.calibration.scale_given && std::max(seen / given, given / seen) > 1 + most_off_scale)
-      all.push_back({fmt::format("By the scale and the diameter given, a bead is {:.4g} px wide. The beads found are "
-                                 "{:.4g} px wide: one of the two is wrong, and with it every length.",
+      all.push_back({fmt::format("By the scale and the diameter given, a bead is {:.4g} px wide, but the beads found "
+                                 "are {:.4g} px wide. The scale or the diameter is wrong, and with it every length.",
                                  given, seen),
-                     "Leave the scale out: it follows from the diameter. Or correct the one that is wrong."});
+                     "Leave the scale out (it then follows from the diameter), or correct the wrong one of the two."});
     if (measure_.second_diameter_m && !found.second_finder) {
       const double ratio = *measure_.second_diameter_m / measure_.bead_diameter_m;
-      all.push_back(
-          {fmt::format("Beads of a second diameter were asked for, and none were found. So the beads seen may be "
-                       "of either kind, and every length wrong by up to {:.0f} %.",
-                       100 * (std::max(ratio, 1 / ratio) - 1)),
-           "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
-           "of the first kind (--radius)."});
+      all.push_back({fmt::format("A second diameter was given, but beads of only one size were found. It is unknown "
+                                 "which of the two they are, so every length may be wrong by up to {:.0f} %.",
+                                 100 * (std::max(ratio, 1 / ratio) - 1)),
+                     "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
+                     "of the first kind (--radius)."});
     }
     if (found.second_finder)
-      all.push_back({"The bed holds beads of two diameters, and the theory is one of equal disks.",
+      all.push_back({"The bed contains beads of two diameters, but the theory describes equal disks.",
                      "Use the profiles and numbers of both kinds."});
     for (const ingest::Objection& one : all)
       result["objections"].push_back(Json{{"why", one.why}, {"advice", one.advice}});

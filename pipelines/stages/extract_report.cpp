@@ -43,20 +43,21 @@ std::string pictures_html(const fs::path& directory) {
   if (!fs::exists(directory / "film.json")) {
     for (const fs::path& path : overlays_of(directory))
       picture(path, "png",
-              fmt::format(
-                  "Disks found in frame {}: green circles; orange, those cut or half hidden; blue, floor and walls.",
-                  path.stem().string().substr(8)));
+              fmt::format("Disks found in frame {}. Green: disks found; orange: disks cut by the border or partly "
+                          "covered; blue: floor and walls.",
+                          path.stem().string().substr(8)));
   }
   picture(directory / "residual.webp", "webp",
-          "What beads and light do not explain of the first frame drawn: grey where nothing is left.");
-  picture(directory / "bead.png", "png", "The bead as learned from the frames.");
+          "Difference between the first drawn frame and the model of beads and light; grey: no difference.");
+  picture(directory / "bead.png", "png", "Mean picture of a bead, learned from the frames.");
   return out;
 }
 
 std::string curves_html(const fs::path& directory, int& pictures) {
   std::string out;
   for (const auto& [name, caption] :
-       {std::pair{"count.svg", "Disks against time: beads do not vanish, so a dip is a miss."},
+       {std::pair{"count.svg",
+                  "Number of disks found against time. Beads do not disappear, so a dip means that some were missed."},
         std::pair{"quality.svg", "Quality of the disks found."}}) {
     if (const fs::path path = directory / name; fs::exists(path)) out += figure_html(path, ++pictures, caption);
   }
@@ -72,8 +73,9 @@ std::string numbers_html(const Json& result) {
   }
   if (result.contains("truth")) {
     for (const auto& [key, value] : result["truth"].items())
-      out += fmt::format("<tr><td>{} (against the rendered truth)</td><td class=\"number\">{}</td></tr>\n", words(key),
-                         shown(value));
+      out +=
+          fmt::format("<tr><td>{} (compared with the rendered true positions)</td><td class=\"number\">{}</td></tr>\n",
+                      words(key), shown(value));
   }
   return out + "</table></div>\n";
 }
@@ -95,35 +97,39 @@ StagePages extract_pages() {
            "Give both sides (\"left_wall\", \"right_wall\"), or use the pictures as they were rendered."},
           {"with periodic sides", rest, "Nothing: the width of the box is used."},
           {"may be wrong", measurement,
-           "Look through the film with the colours by quality: what is marked and is no bead?"},
+           "Look through the film with the colours by quality for marked objects that are not beads."},
           {"beads may be missed", measurement,
-           "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone."},
-          {"do not touch", measurement,
-           "Look through the film: are the circles as large as your beads? Give the length of a pixel (\"scale\")."},
+           "Look through the film for beads without a circle; give a region (\"roi\") that contains only the bed."},
+          {"of the disks found touch", measurement,
+           "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
+           "(\"scale\")."},
           {"disks found overlap", measurement,
-           "Look through the film: are the circles as large as your beads? Give the length of a pixel (\"scale\")."},
-          {"beside the bed", measurement, "Look through the film: does the region that is named hold all beads?"},
+           "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
+           "(\"scale\")."},
+          {"beside the bed", measurement, "Check in the film that the proposed region contains all beads of the bed."},
           {"No level floor", measurement, "Photograph the bed from the side, or give the floor's row (\"floor\")."},
           {"missed or out of view", measurement,
-           "Look through the film for beads without a circle; give a region (\"roi\") that holds the bed alone, or "
-           "more even light."},
+           "Look through the film for beads without a circle; give a region (\"roi\") that contains only the bed, or "
+           "use more uniform light."},
           {"is taken for a bead", measurement,
-           "Look through the film for circles that are no beads; give a region (\"roi\") that holds the bed alone."},
+           "Look through the film for circles that are not beads; give a region (\"roi\") that contains only the bed."},
           {"outlines are not those", measurement,
-           "Check in the film that the circles are your beads; densities hold for disks alone."},
+           "Check in the film that the circles are your beads. Densities are valid only for disks."},
           {"as in a plot", measurement, "Check in the film that the circles are your beads."},
           {"as in a drawing", measurement, "Check in the film that the circles are your beads."},
           {"covered area", measurement, "Look through the film for beads that were missed or found twice."},
           {"varies by", measurement, "Use a wider view, or a region (\"roi\") that beads do not leave."},
-          {"lower border", measurement, "Give the floor's row (\"floor\"): heights begin there."},
-          {"tilted", measurement, "Level the camera; heights are corrected for it."},
-          {"flickers", rest, "Nothing: it was taken out frame by frame. A steadier light gives smaller errors."},
+          {"lower border", measurement, "Give the row of the floor (\"floor\"): heights are measured from it."},
+          {"tilted", measurement, "Level the camera. The heights are corrected for the tilt."},
+          {"flickers", rest, "Nothing: it was corrected frame by frame. A steadier light gives smaller errors."},
           {"no profiles by phase", rest,
-           "Give \"frequency\" if the pictures are a film of a shaken bed; record faster if they are."},
+           "If the pictures are a film of a shaken bed, give \"frequency\", or record at a higher frame rate."},
           {"frame_rate", rest, "Give \"frame_rate\" if the film was recorded faster than it plays."},
-          {"collide between frames", measurement, "Record faster, so that disks hardly collide between frames."},
-          {"velocities", measurement, "Record faster: disks must move less than half a diameter between frames."},
-          {"T is too low", measurement, "Record faster, so that fast disks are followed too."},
+          {"collide between frames", measurement,
+           "Record at a higher frame rate, so that disks rarely collide between frames."},
+          {"velocities", measurement,
+           "Record at a higher frame rate: disks must move less than half a diameter between frames."},
+          {"T is too low", measurement, "Record at a higher frame rate, so that fast disks are followed too."},
           {"", measurement, "Look through the film and the figures of the frames below."}}};
 }
 

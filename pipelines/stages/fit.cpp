@@ -40,20 +40,23 @@ const std::string simulation_model = "simulation";
 constexpr double tail_density = 0.6;
 
 void describe_window(Fields& f, WindowChoice& w) {
-  f.number("low", w.low, {.help = "lowest height that is used, in D; left out, found by the rule below"});
-  f.number("high", w.high, {.help = "highest height that is used, in D; left out, found by the rule below"});
+  f.number("low", w.low,
+           {.help = "lowest height that is used, in D; default: found from floor_exclusion and plateau_fraction"});
+  f.number("high", w.high,
+           {.help = "highest height that is used, in D; default: found from lowest_fraction and lowest_significance"});
   f.number("floor_exclusion", w.floor_exclusion,
-           {.help = "rule: no heights below this distance from the base, in D", .range = non_negative});
-  f.number("plateau_fraction", w.plateau_fraction,
-           {.help = "rule: the window begins where the smoothed density first reaches this fraction of its maximum",
-            .range = zero_to_one});
-  f.number("lowest_fraction", w.lowest_fraction,
-           {.help = "rule: the window ends where the density falls below this fraction of its maximum",
-            .range = zero_to_one});
-  f.number("lowest_significance", w.lowest_significance,
-           {.help = "rule: the window also ends where the density falls below this number of its standard errors",
+           {.help = "smallest distance of a used height from the base (lower edge of the bed), in D",
             .range = non_negative});
-  f.require(!w.low || !w.high || *w.low < *w.high, "low", "the window ends below where it begins");
+  f.number(
+      "plateau_fraction", w.plateau_fraction,
+      {.help = "fraction of the maximum of the smoothed density at which the window begins", .range = zero_to_one});
+  f.number("lowest_fraction", w.lowest_fraction,
+           {.help = "fraction of the maximum density below which the window ends", .range = zero_to_one});
+  f.number(
+      "lowest_significance", w.lowest_significance,
+      {.help = "number of standard errors of the density below which the window ends, too", .range = non_negative});
+  f.require(!w.low || !w.high || *w.low < *w.high, "low",
+            "the highest height of the window, \"high\", must be above the lowest, \"low\"");
 }
 
 // What goes into a fit.
@@ -95,8 +98,8 @@ class Fit : public Stage {
  private:
   void describe_model(Fields& fields) {
     fields.input_files("profile", profile_,
-                       {.help = "your own profile: a CSV file with height [D] and number_density [1/D^2]; left out, "
-                                "that of the stage in \"from\"",
+                       {.help = "CSV file of your own profile, with columns height [D] and number_density [1/D^2]; "
+                                "default: the profile of the stage in \"from\"",
                         .example = "\"profile.csv\""});
     fields.text("model", options_.model,
                 {.help = "model: enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle or simulation. "
@@ -107,40 +110,41 @@ class Fit : public Stage {
         "plateau_density", options_.plateau_density,
         {.help = "density phi_0 of the solid in 1/D^2: 2/sqrt(3) in equilibrium, 1.10 for the published experiment",
          .range = {.low = 0, .high = fit::close_packing_density * (1 + 1e-12), .above_low = true}});
-    fields.boolean(
-        "plateau_density_free", options_.plateau_density_free,
-        {.help =
-             "whether phi_0 is fitted too. T is then too low; this fit is also in \"models\" of fit.json by default"});
+    fields.boolean("plateau_density_free", options_.plateau_density_free,
+                   {.help = "whether phi_0 is fitted too. T is then too low. By default \"models\" of fit.json "
+                            "contains this fit, too"});
     fields.number("temperature", options_.fixed_temperature,
-                  {.help = "fixed value of T, in m g D; left out, T is fitted", .range = positive});
+                  {.help = "fixed value of T, in m g D; default: T is fitted", .range = positive});
     fields.boolean(
         "temperature_measured", temperature_measured_,
         {.help = "whether T is fixed at the kinetic temperature (T_x + T_z)/2 of the simulated bed in \"from\""});
-    fields.number("shift", options_.fixed_shift,
-                  {.help = "fixed value of the shift, in D; left out, the shift is fitted"});
+    fields.number(
+        "shift", options_.fixed_shift,
+        {.help = "fixed value of the shift (height at which the fluid begins), in D; default: the shift is fitted"});
     fields.number("column_number", options_.column_number,
-                  {.help = "column number N D/W; left out, that of the measurement", .range = positive});
+                  {.help = "column number N D/W; default: that of the measurement", .range = positive});
     fields.boolean("constrain_column", options_.constrain_column,
                    {.help = "whether the shift follows from T by the sum rule: the area under the model is N D/W"});
-    fields.number("base", options_.base, {.help = "lower edge of the bed in D"});
+    fields.number("base", options_.base, {.help = "height of the lower edge of the bed, in D"});
     fields.quantity(
         "diameter", diameter_, dimension::length,
-        {.help = "diameter D, for T/(m g) as a length; left out, that of the measurement", .range = positive});
+        {.help = "diameter D, for T/(m g) as a length; default: that of the measurement", .range = positive});
   }
 
   // The window and the errors of the data.
   void describe_data(Fields& fields) {
     fields.object<Kernel>("kernel", kernel_, describe_kernel,
                           {.help = "kernel through which the profile was measured; the model is smoothed with it "
-                                   "before they are compared. Left out, the kernel named in the profile"});
+                                   "before the comparison. Default: the kernel named in the profile"});
     fields.object<WindowChoice>("window", window_, describe_window, {.help = "range of heights that is fitted"});
-    fields.choice("errors", errors_,
-                  {{ErrorSource::automatic, "automatic"},
-                   {ErrorSource::diagonal, "diagonal"},
-                   {ErrorSource::covariance, "covariance"}},
-                  {.help = "errors of the fit. Covariance: with the correlations between heights, which simulate and "
-                           "extract measure. Diagonal: standard errors alone; the error of T is then too small. "
-                           "Automatic: covariance where there is one"});
+    fields.choice(
+        "errors", errors_,
+        {{ErrorSource::automatic, "automatic"},
+         {ErrorSource::diagonal, "diagonal"},
+         {ErrorSource::covariance, "covariance"}},
+        {.help = "errors that the fit uses. Covariance: with the correlations between heights, which simulate and "
+                 "extract measure. Diagonal: standard errors alone; the error of T is then too small. "
+                 "Automatic: covariance where there is one"});
   }
 
   // How it is fitted, and what else is to be found.
@@ -173,7 +177,8 @@ class Fit : public Stage {
     fields.require(bootstrap_ == 0 || fields.has_upstream("extract") || fields.has_upstream("simulate"), "bootstrap",
                    "there are no frames to resample: no extract or simulate stage in \"from\"");
     fields.require(bootstrap_ == 0 || options_.model != simulation_model, "bootstrap",
-                   "the model simulation has its own errors, from the library's repeats");
+                   "the error of the model simulation comes from its library, not from resampled frames",
+                   "Leave \"bootstrap\" out or choose another model");
   }
 
   void check_inputs(Fields& fields) const {
@@ -183,13 +188,14 @@ class Fit : public Stage {
                    "only the model simulation reads more than two stages");
     const bool upstream = !fields.upstream().empty();
     fields.require(!temperature_measured_ || fields.has_upstream("simulate"), "temperature_measured",
-                   "no simulate stage in \"from\" has measured a temperature");
+                   "no simulate stage in \"from\" gives a measured temperature");
     fields.require(!temperature_measured_ || !options_.fixed_temperature, "temperature_measured",
-                   "T is held at \"temperature\" already");
+                   "T is already fixed by \"temperature\"; give one of the two");
     fields.require(upstream || fields.has("profile"), "",
                    "there is no profile: neither \"profile\" nor a stage in \"from\"", "Give one of the two");
     fields.require(profile_.paths.size() <= 1, "profile",
-                   fmt::format("names {} files, one profile is fitted at a time", profile_.paths.size()));
+                   fmt::format("this names {} files, but the stage fits one profile", profile_.paths.size()),
+                   "Give the path of one CSV file");
   }
 
   void check_model(Fields& fields) const {
@@ -202,7 +208,7 @@ class Fit : public Stage {
     }
     const std::string nearest = nearest_name(model, names);
     fields.require(known, "model", fmt::format("there is no model \"{}\"", model),
-                   nearest.empty() ? fmt::format("There are {}", fmt::join(names, ", "))
+                   nearest.empty() ? fmt::format("Choose from: {}", fmt::join(names, ", "))
                                    : fmt::format("Did you mean \"{}\"?", nearest));
   }
 
@@ -329,7 +335,7 @@ Matched match(const FitTask& task, const std::vector<LibraryBed>& beds, const Wi
 // The profile of each frame by itself, in the order of time: from disks.csv or from a trajectory.
 fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& heights, const Kernel& kernel) {
   if (kernel.kind == KernelKind::none)
-    throw InputError("\"bootstrap\": the profile was measured without a kernel, and a bootstrap needs one");
+    throw InputError("\"bootstrap\": the profile was measured without a kernel, but the bootstrap needs a kernel");
   if (heights.size() < 3) throw InputError("\"bootstrap\": the profile has fewer than three heights");
   const double spacing = (heights.back() - heights.front()) / static_cast<double>(heights.size() - 1);
   const HeightGrid grid{heights.front(), spacing, heights.size()};
@@ -344,7 +350,7 @@ fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& hei
   if (source.stage == "simulate") {
     const std::string name = source.has("trajectory.extxyz") ? "trajectory.extxyz" : "trajectory.extxyz.zst";
     if (!source.has(name))
-      throw InputError("\"bootstrap\": " + source.id + " kept no frames; give it \"frames\": {\"count\": ...}");
+      throw InputError("\"bootstrap\": " + source.id + " stored no frames; add \"frames\": {\"count\": 640} to it");
     TrajectoryReader reader(source.file(name));
     TrajectoryFrame frame;
     while (reader.read(frame)) add(frame.z, frame.width);
@@ -353,7 +359,9 @@ fit::ProfileFrames frames_of(const Input& source, const std::vector<double>& hei
   const Json extracted = source.result();
   const Json* width = find_pointer(extracted, "/width/value");
   if (width == nullptr || !width->is_number())
-    throw InputError("\"bootstrap\": the width of the bed is not known from the frames");
+    throw InputError(
+        "\"bootstrap\": the frames do not give the width of the bed; give \"left_wall\" and \"right_wall\" to the "
+        "extract stage");
   const std::filesystem::path path = source.file("disks.csv");
   std::vector<double> z;
   std::string current;
@@ -477,8 +485,8 @@ std::vector<LibraryBed> Fit::read_library(const RunContext& context, const FitTa
     beds.push_back(library_bed(input));
     if (beds.back().kernel != task.options.kernel)
       throw InputError(
-          fmt::format("{}: its profile was measured through the kernel {}, the one to be fitted through {}. Measure "
-                      "both through the same kernel.",
+          fmt::format("{}: its profile was measured through the kernel {}, but the profile to be fitted through {}. "
+                      "Measure both through the same kernel.",
                       input.id, to_string(beds.back().kernel), to_string(task.options.kernel)));
   }
   return beds;

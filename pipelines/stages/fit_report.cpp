@@ -108,15 +108,15 @@ std::string answer_markdown(const FinishedStage& stage) {
 std::string banner_html(const FinishedStage& stage, int&) {
   if (stage.result.value("describes_data", true) || stage.result.contains("answer")) return "";
   return fmt::format(
-      "<div class=\"banner\"><strong>The profile is not one this model describes</strong>{} ({}): {}. Read no "
-      "temperature from it without that.</div>\n",
+      "<div class=\"banner\"><strong>The model does not describe the profile</strong>{} ({}): {}. Do not quote a "
+      "temperature from this fit.</div>\n",
       escape_markup(stage.files.id), escape_markup(stage.result.value("model", "")),
       escape_markup(stage.result.value("why_not", "")));
 }
 
 std::string models_html(const Json& models) {
   std::string out =
-      "<details><summary>Other models, and φ₀ free, beside it</summary><div "
+      "<details><summary>Fits of other models, and with φ₀ free</summary><div "
       "class=\"scroll\"><table>\n<tr><th>model</th><th>φ₀</th><th>T / mgD</th><th>shift / "
       "D</th><th>χ²/dof</th><th>status</th></tr>\n";
   for (const Json& model : models) {
@@ -189,34 +189,36 @@ std::string numbers_text(const FinishedStage& stage) {
 
 std::vector<WarningAdvice> fit_warnings() {
   using enum WarningEffect;
-  return {
-      {"alone does not describe", rest, "Quote the answer, which does not rest on this model, and not its T."},
-      {"does not describe", answer,
-       "Do not quote T from this fit. Look at the residuals, and try another model or window."},
-      {"model does not fit", answer,
-       "Look at the residuals in the figure: where the fit misses, the model is wrong or a bias was measured. "
-       "Quote T with the answer's whole uncertainty, not with the fit's own error."},
-      {"changes with the window", answer,
-       "Quote the answer: it compares windows and models, and says whether the bed has one temperature. For one, shake "
-       "faster with a smaller amplitude, or take less dissipative beads."},
-      {"outlier", answer, "Look at this height in the figure; set \"robust\" if it is an outlier."},
-      {"positive definite", answer, "Measure longer: the correlations between heights are poorly known."},
-      {"ignores correlations", answer,
-       "Measure longer, or in more independent runs, to use the correlations between heights."},
-      {"window rule", answer, "Give \"window\" yourself, or measure the profile at finer heights."},
-      {"sum rule", answer, "The plateau density may be off: try it free, and compare the models below."},
-      {"no solid", answer, "T is above T_c in this model: quote T, and no height of the solid."},
-      {"plateau density", answer,
-       "Give \"plateau_density\", or begin the window lower so that it holds part of the plateau."},
-      {"heights span", answer, "Heights must be in disk diameters, not in metres."},
-      {"close packing", answer, "Check the diameter D and that the density is n D^2."},
-      {"standard error", answer, "Give a column std_error: the error of T follows from it."},
-      {"repeat the height", answer, "Remove the doubled rows if they are not measurements of their own."},
-      {"through which kernel", answer,
-       "Name the kernel (\"kernel\": \"gaussian:0.5\", say): without it T is too high by the kernel's width."},
-      {"library", answer, "Run beds nearer to this one for the library."},
-      {"ascending order", rest, "Nothing: the bins were sorted."},
-      {"", answer, "See the figure of the profile and the table of models."}};
+  return {{"alone does not describe", rest,
+           "Quote the answer, which does not depend on this model. Do not quote the T of this model."},
+          {"does not describe", answer,
+           "Do not quote T from this fit. Look at the residuals, and try another model or window."},
+          {"model does not fit", answer,
+           "Look at the residuals in the figure. Where they are large, the model is wrong or the measured density is "
+           "biased. Quote T with the whole uncertainty of the answer, not with the error of the fit."},
+          {"changes with the window", answer,
+           "Quote the answer: it compares windows and models, and states whether the bed has one temperature. To get "
+           "one, shake faster with a smaller amplitude, or use less dissipative beads."},
+          {"most of chi2", answer, "Look at this height in the figure. If it is an outlier, set \"robust\"."},
+          {"positive definite", answer, "Measure longer: the correlations between heights are poorly known."},
+          {"ignores correlations", answer,
+           "To use the correlations between heights, measure longer or in more independent runs."},
+          {"window rule", answer, "Give \"window\", or measure the profile at more closely spaced heights."},
+          {"sum rule", answer,
+           "The plateau density may be wrong: fit it too (\"plateau_density_free\"), and compare the models below."},
+          {"no solid", answer, "T is above T_c in this model: quote T, but no height of the solid."},
+          {"plateau density", answer,
+           "Give \"plateau_density\", or lower the window so that it contains part of the plateau."},
+          {"heights span", answer, "Give the heights in disk diameters, not in metres."},
+          {"close packing", answer, "Check the diameter D, and that the density is n D^2 (n: disks per area)."},
+          {"standard error", answer, "Give a column std_error: the error of T follows from it."},
+          {"the height of another bin", answer, "Remove the repeated rows if they are not independent measurements."},
+          {"through which kernel", answer,
+           "Give the kernel, for example \"kernel\": \"gaussian:0.5\". Without it the width of the kernel makes T too "
+           "high."},
+          {"library", answer, "Simulate beds for the library that are more similar to this one."},
+          {"ascending order", rest, "Nothing: the bins were sorted."},
+          {"", answer, "See the figure of the profile and the table of models."}};
 }
 
 }  // namespace

@@ -9,15 +9,15 @@ class FitStatement {
 
   void state() {
     list_.text("/status", "whether the fit succeeded");
-    list_.text("/message", "reason, if it failed", given_when("the fit does not succeed"));
-    list_.text("/model", "the model fitted");
+    list_.text("/message", "reason for which the fit failed", given_when("the fit fails"));
+    list_.text("/model", "model that was fitted");
     estimates();
     quality();
     window();
     comparisons();
     list_.truth("/describes_data", "whether the model fits");
     list_.text("/why_not", "why the model does not fit", given_when("the model does not fit"));
-    list_.text("/warnings/#", "warning about the fit", given_when("something is odd"));
+    list_.text("/warnings/#", "warning about the fit", given_when("the fit has a warning"));
     answer();
     extras();
     tables();
@@ -29,22 +29,22 @@ class FitStatement {
     list_.quantity("/temperature", "m g D", "fitted temperature", fitted_);
     list_.quantity("/temperature_over_mg", "m", "fitted temperature as T/(m g)", known);
     list_.quantity("/statistical_error", "m g D",
-                   "standard error of T by the measured errors alone, without the model's misfit", fitted_);
-    list_.quantity("/shift", "D", "height at which the fluid begins", fitted_);
+                   "standard error of T from the measured errors alone, without the misfit of the model", fitted_);
+    list_.quantity("/shift", "D", "shift: height at which the fluid begins, above the lower edge of the bed", fitted_);
     list_.quantity("/solid_height", "D", "height of the solid, zeta_F", fitted_);
     list_.quantity("/plateau_density", "1/D^2", "density of the solid, phi_0", fitted_);
     list_.quantity("/column_number", "1", "column number N D/W: disks per diameter of width", fitted_);
     const Given critical = both(fitted_, given_when("T_c is known from N D/W"));
     list_.quantity("/critical_temperature", "m g D", "temperature at which the solid vanishes, T_c", critical);
     list_.quantity("/critical_temperature_over_mg", "m", "T_c as a length, T_c/(m g)", both(critical, known));
-    list_.quantity("/reduced_temperature", "1", "T/T_c", critical);
+    list_.quantity("/reduced_temperature", "1", "reduced temperature T/T_c", critical);
     list_.quantity("/solid_height_by_sum_rule", "D", "height of the solid from the number of disks (sum rule)",
                    critical);
     list_.text("/critical_temperature_status", "why T_c is not known", given_when("T_c is not known"));
     interval("/temperature_interval", fitted_);
     interval("/next_bed_interval", fitted_);
-    list_.text("/parameters/#", "name of a fitted parameter", fitted_);
-    list_.number("/covariance/#/#", "1", "covariance of the parameters, in their order", fitted_);
+    list_.text("/parameters/#", "name of a parameter of the fit", fitted_);
+    list_.number("/covariance/#/#", "1", "covariance of the fitted parameters, in the order of /parameters", fitted_);
   }
 
   void interval(const std::string& pointer, const Given& given) {
@@ -75,8 +75,8 @@ class FitStatement {
     list_.quantity("/window/high", "D", "highest height of the fit");
     list_.number("/window/bins", "1", "number of heights in the fit");
     list_.text("/window/rule", "rule that chose the window");
-    list_.text("/kernel/kind", "kernel through which the density was measured");
-    list_.number("/kernel/width", "D", "its width");
+    list_.text("/kernel/kind", "kind of the kernel through which the density was measured");
+    list_.number("/kernel/width", "D", "width of the kernel");
     const Given several = given_when("several windows are compared"),
                 good = given_when("the fit of the window succeeds");
     const std::string row = "/temperature_by_window/#/";
@@ -85,9 +85,9 @@ class FitStatement {
     list_.number(row + "bins", "1", "heights in the window", several);
     list_.text(row + "status", "whether the fit of the window succeeded", several);
     list_.number(row + "temperature", "m g D", "temperature of the window", good);
-    list_.number(row + "temperature_std_error", "m g D", "its standard error", good);
+    list_.number(row + "temperature_std_error", "m g D", "standard error of the temperature of the window", good);
     list_.number(row + "shift", "D", "shift of the window", good);
-    list_.number(row + "chi2_per_dof", "1", "chi2 over the degrees of freedom of the window", good, true);
+    list_.number(row + "chi2_per_dof", "1", "chi-square per degree of freedom in the window", good, true);
   }
 
   void comparisons() {
@@ -96,10 +96,10 @@ class FitStatement {
     list_.text(row + "model", "name of another model", several);
     list_.truth(row + "plateau_density_free", "whether phi_0 was fitted too", several);
     list_.text(row + "status", "ok, or why the fit of the model failed", several);
-    list_.quantity(row + "temperature", "m g D", "its temperature", good);
-    list_.quantity(row + "shift", "D", "its shift", good);
-    list_.quantity(row + "plateau_density", "1/D^2", "its density of the solid", good);
-    list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", good, true);
+    list_.quantity(row + "temperature", "m g D", "fitted temperature of this model", good);
+    list_.quantity(row + "shift", "D", "fitted shift of this model", good);
+    list_.quantity(row + "plateau_density", "1/D^2", "density of the solid of this model, phi_0", good);
+    list_.number(row + "chi2_per_dof", "1", "chi-square per degree of freedom of this model", good, true);
     list_.number(row + "aic", "1", "information criterion of Akaike of this model", good, true);
     list_.number(row + "bic", "1", "Bayesian information criterion of this model", good, true);
   }
@@ -108,8 +108,8 @@ class FitStatement {
     const Given asked = given_if(fit_.answer, "\"answer\" is true and the model is not \"simulation\""),
                 found = both(asked, given_when("there is an answer"));
     list_.text("/answer/verdict", "one temperature, model does not fit, or no single temperature", asked);
-    list_.text("/answer/why", "the reason of the verdict", asked);
-    list_.text("/answer/advice", "what to do", asked);
+    list_.text("/answer/why", "reason for the verdict", asked);
+    list_.text("/answer/advice", "advice: what to do next", asked);
     list_.text("/answer/status", "ok, or why there is no answer", asked);
     const auto temperature = [&](const std::string& name, const std::string& meaning, const Given& given) {
       list_.quantity("/answer/" + name, "m g D", meaning, given);
@@ -126,51 +126,62 @@ class FitStatement {
     list_.quantity("/answer/interval/low", "m g D", "lower end of the interval of T", found);
     list_.quantity("/answer/interval/high", "m g D", "upper end of the interval of T", found);
     list_.number("/answer/interval/confidence", "1",
-                 "confidence level of the interval; none where it is the range of all readings", found, true);
+                 "confidence level of the interval; null where it is the range of all fits and kinetic temperatures",
+                 found, true);
     list_.quantity("/answer/next_bed_interval/low", "m g D",
                    "lower end of the interval in which the mean T of further beds lies, by the same model and window",
                    found);
-    list_.quantity("/answer/next_bed_interval/high", "m g D", "upper end of that interval", found);
-    list_.number("/answer/next_bed_interval/confidence", "1", "confidence level of the interval", found);
-    list_.quantity("/answer/statistical_error", "m g D", "statistical error of T, by the measured errors alone", found);
+    list_.quantity("/answer/next_bed_interval/high", "m g D",
+                   "upper end of the interval in which the mean T of further beds lies", found);
+    list_.number("/answer/next_bed_interval/confidence", "1", "confidence level of the interval for further beds",
+                 found);
+    list_.quantity("/answer/statistical_error", "m g D", "statistical error of T, from the measured errors alone",
+                   found);
     list_.quantity("/answer/misfit_error", "m g D", "systematic error of T from the misfit of the model", found);
-    list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of the known bias", found);
-    list_.quantity("/answer/wall_uncertainty", "m g D", "part of the standard error from hard side walls", found);
+    list_.quantity("/answer/bias_uncertainty", "m g D", "uncertainty of T from the uncertainty of the known bias",
+                   found);
+    list_.quantity("/answer/wall_uncertainty", "m g D", "uncertainty of T from hard side walls", found);
     list_.quantity("/answer/contact_duration_uncertainty", "m g D",
                    "uncertainty of T from the contact duration t_c of the simulation", found);
-    list_.quantity("/answer/spread", "m g D", "spread between models and windows", found);
+    list_.quantity("/answer/spread", "m g D", "spread of T between models and windows", found);
     list_.number("/answer/bias", "1", "known relative bias of model and window, which was subtracted", found);
     list_.text("/answer/thermometer", "model and window that gave T", found);
     list_.text("/answer/model", "model that gave T", found);
     list_.quantity("/answer/solid_height", "D", "height of the solid at this T", found, true);
     const std::string row = "/answer/readings/#/";
-    list_.text(row + "thermometer", "a model and window", found);
-    list_.text(row + "model", "its model", found);
+    list_.text(row + "thermometer", "name of a model and window", found);
+    list_.text(row + "model", "model of this fit", found);
     list_.text(row + "status", "ok, or why the fit of the model failed", found);
     list_.truth(row + "admissible", "whether this fit is used to check the answer", found);
     list_.quantity(row + "temperature", "m g D", "temperature of this fit, corrected for the known bias", found);
     list_.number(row + "bias", "1", "known relative bias of this model and window", found);
     list_.number(row + "bias_uncertainty", "1", "uncertainty of this relative bias", found);
-    list_.number(row + "chi2_per_dof", "1", "its chi2 over the degrees of freedom", found, true);
+    list_.number(row + "chi2_per_dof", "1", "chi-square per degree of freedom of this fit", found, true);
   }
 
   void extras() {
     const Given matched = given_if(fit_.matched, "the model is \"simulation\"");
-    list_.text("/library/#/stage", "a simulated bed of the library", matched);
-    list_.quantity("/library/#/temperature", "m g D", "its temperature", matched);
+    list_.text("/library/#/stage", "simulate stage of a bed in the library", matched);
+    list_.quantity("/library/#/temperature", "m g D", "temperature of this bed of the library", matched);
     list_.quantity("/interpolation_error", "m g D", "error of the interpolation between the beds", matched);
-    list_.number("/library_scatter", "1", "relative scatter of the library's own beds", matched, true);
+    list_.number("/library_scatter", "1",
+                 "relative scatter of T when each bed of the library is fitted with the others", matched, true);
     const Given asked = given_if(fit_.bootstrap, "\"bootstrap\" is above 0");
     const Given found = both(asked, given_when("the bootstrap succeeds"));
     list_.text("/bootstrap/status", "whether the bootstrap succeeded", asked);
-    list_.text("/bootstrap/message", "reason, if it failed", both(asked, given_when("it does not succeed")));
-    list_.number("/bootstrap/resamples", "1", "resamples of the frames", asked);
-    list_.number("/bootstrap/succeeded", "1", "resamples whose fit succeeded", asked);
-    list_.number("/bootstrap/window_frames", "1", "frames in a block", asked);
-    list_.quantity("/bootstrap/temperature", "m g D", "mean and standard deviation of T over the resamples", found);
-    list_.quantity("/bootstrap/shift", "D", "mean and standard deviation of the shift over the resamples", found);
+    list_.text("/bootstrap/message", "reason for which the bootstrap failed",
+               both(asked, given_when("the bootstrap fails")));
+    list_.number("/bootstrap/resamples", "1", "number of resamples of the frames", asked);
+    list_.number("/bootstrap/succeeded", "1", "number of resamples whose fit succeeded", asked);
+    list_.number("/bootstrap/window_frames", "1", "number of successive frames in a resampled block", asked);
+    list_.quantity("/bootstrap/temperature", "m g D",
+                   "T of the fit to all frames, with the standard deviation over the resamples as its error", found);
+    list_.quantity("/bootstrap/shift", "D",
+                   "shift of the fit to all frames, with the standard deviation over the resamples as its error",
+                   found);
     for (const char* end : {"low", "high"})
-      list_.number(std::string("/bootstrap/temperature_interval/") + end, "m g D", "end of the interval of T", found);
+      list_.number(std::string("/bootstrap/temperature_interval/") + end, "m g D",
+                   std::string(end) + " end of the interval of T, from the resamples", found);
     list_.number("/bootstrap/temperature_interval/confidence", "1", "confidence level of the interval", found);
   }
 

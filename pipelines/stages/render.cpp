@@ -14,17 +14,18 @@ class Render : public Stage {
     RenderOptions& o = options_;
     fields.quantity("scale", o.scale, dimension::length_per_pixel,
                     {.help = "length of a pixel", .range = positive, .example = "\"0.15 mm/px\""});
-    fields.number("blur", o.blur, {.help = "optical blur: standard deviation in pixels", .range = from_to(0, 50)});
+    fields.number("blur", o.blur,
+                  {.help = "standard deviation of the optical blur, in pixels", .range = from_to(0, 50)});
     fields.number("noise", o.noise,
-                  {.help = "noise: standard deviation in grey levels of 255", .range = from_to(0, 127)});
+                  {.help = "standard deviation of the noise, in grey levels (white: 255)", .range = from_to(0, 127)});
     fields.quantity("exposure", o.exposure, dimension::time,
-                    {.help = "exposure time: disks are smeared along their velocity", .range = non_negative});
+                    {.help = "exposure time; disks are blurred along their velocity", .range = non_negative});
     fields.number("background_level", o.background_level,
                   {.help = "grey level of the background", .range = from_to(0, 255)});
     fields.number("bead_level", o.bead_level, {.help = "grey level of a bead", .range = from_to(0, 255)});
-    fields.choice("shading", o.shading,
-                  {{Shading::flat, "flat"}, {Shading::shaded, "shaded"}, {Shading::highlight, "highlight"}},
-                  {.help = "flat: one level; shaded: like a sphere; highlight: with a bright spot"});
+    fields.choice(
+        "shading", o.shading, {{Shading::flat, "flat"}, {Shading::shaded, "shaded"}, {Shading::highlight, "highlight"}},
+        {.help = "shading of a bead. Flat: one grey level. Shaded: like a sphere. Highlight: with a bright spot"});
     fields.number("shading_depth", o.shading_depth,
                   {.help = "difference of the grey levels of centre and rim, relative to the contrast of the bead",
                    .range = from_to(-2, 2)});
@@ -36,17 +37,17 @@ class Render : public Stage {
     fields.integer("margin", o.margin,
                    {.help = "width of the margin around the box, in pixels", .range = from_to(0, 2000)});
     fields.quantity("height", o.height, dimension::length,
-                    {.help = "height of the view above the floor's mean position; up to the highest disk if left out",
+                    {.help = "height of the view above the floor's mean position; default: up to the highest disk",
                      .range = positive});
     fields.integer("frames", o.frames, {.help = "largest number of frames that are drawn; 0: all"});
-    fields.require(o.bead_level != o.background_level, "bead_level", "beads as bright as the background cannot be seen",
-                   "Choose another level");
+    fields.require(o.bead_level != o.background_level, "bead_level",
+                   "beads cannot be seen, because \"bead_level\" equals \"background_level\"", "Choose another level");
     if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->keeps_frames)
-      fields.problem("/from", "the simulated bed keeps no frames, so there is nothing to photograph",
+      fields.problem("/from", "the simulated bed stores no frames, so there is nothing to photograph",
                      fmt::format("Add \"frames\": {{\"count\": 640}} to {}", known->place));
   }
   void results(ResultList& list) const override {
-    list.number("/frames", "1", "frames drawn");
+    list.number("/frames", "1", "number of frames drawn");
     list.quantity("/width", "px", "width of a frame");
     list.quantity("/height", "px", "height of a frame");
     list.quantity("/scale", "m/px", "length of a pixel");
@@ -55,9 +56,9 @@ class Render : public Stage {
                 "true centres at the middle of the exposure",
                 {{"frame", "1", "number of the frame, from 0"},
                  {"disk", "1", "number of the disk, from 0"},
-                 {"x_px", "px", "centre, from the centre of the top-left pixel to the right"},
-                 {"y_px", "px", "centre, from the centre of the top-left pixel downwards"},
-                 {"radius_px", "px", "radius"}}});
+                 {"x_px", "px", "position of the centre, counted from the centre of the top-left pixel to the right"},
+                 {"y_px", "px", "position of the centre, counted from the centre of the top-left pixel downwards"},
+                 {"radius_px", "px", "radius of the disk"}}});
   }
   void run(RunContext& context) const override { images_module().render(options_, context); }
 

@@ -30,10 +30,11 @@ BedDescription bed_for_camera(const Input& input) {
   BedDescription bed = BedDescription::read(input.file("bed.json"));
   if (bed.reduced)
     throw InputError(
-        "the bed is in reduced units and has no size: a camera needs metres. Give the simulate stage a diameter in SI "
-        "units");
+        "the bed is in reduced units, but the pictures need its size in metres. Give the disks of the simulate stage a "
+        "diameter in SI units");
   if (!(bed.gravity.value_or(0) > 0))
-    throw InputError("the bed has no gravity, so no floor and no time scale for a camera");
+    throw InputError(
+        "the bed has no gravity, but the pictures need it for the floor and the unit of time. Give the bed gravity");
   return bed;
 }
 
@@ -59,18 +60,17 @@ class FrameDrawer {
   void draw() {
     if (geometry_.periodic)
       context_.warning(fmt::format(
-          "the bed has periodic sides, so the pictures show no walls. Beads stand out of the box by up to half a "
-          "diameter at either side. Taken for a bed between walls, it would be up to 1 D too wide, and its density up "
-          "to {:.1f} % too low. The pictures' files say so, and extract and fit-images then count the beads of the "
-          "box. "
-          "Where this is lost, as in pictures of another format or size, give the box: --left-wall {:g} --right-wall "
+          "the bed has periodic sides, so the pictures show no walls. Beads extend beyond the box by up to half a "
+          "diameter on either side. If walls were assumed, the width would be up to 1 D too large, and the density up "
+          "to {:.1f} % too low. The picture files state the sides, and extract and fit-images use them. In pictures of "
+          "another format or size this information is lost: then give the sides, --left-wall {:g} --right-wall "
           "{:g}",
           100 / (extent_.width + 1), geometry_.left_wall, geometry_.right_wall));
     std::filesystem::create_directory(context_.output("frames"));
     begin_truth();
     draw_on_all_threads();
     truth_.close();
-    if (!truth_) throw StageError("truth.csv could not be written: is the disk full?");
+    if (!truth_) throw StageError("truth.csv could not be written. Check that the disk is not full");
     write_file(context_.output("geometry.json"), dump(geometry_.to_json()));
     write_file(context_.output("bed.json"), dump(bed_.to_json()));
     Json result;
@@ -99,7 +99,7 @@ class FrameDrawer {
     }
     if (extent.frames == 0)
       throw InputError(trajectory_.string() +
-                       ": holds no frame. Ask the simulate stage for some: \"frames\": {\"count\": 640}");
+                       ": contains no frame. Add \"frames\": {\"count\": 640} to the simulate stage");
     if (options_.height) extent.highest = *options_.height / bed_.diameter;
     return extent;
   }

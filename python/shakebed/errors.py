@@ -86,7 +86,7 @@ def check_options(function: str, options: Iterable[str], known: frozenset[str]) 
 
             near = difflib.get_close_matches(name, known, 1)
             meant = f"did you mean {near[0]!r}? " if near else ""
-            raise TypeError(f"{function}() has no option {name!r}; {meant}it has {', '.join(sorted(known))}")
+            raise TypeError(f"{function}() has no option {name!r}; {meant}its options: {', '.join(sorted(known))}")
 
 
 def recipe_error(message: str, problems: list[dict[str, Any]], code: int = 3) -> Error:

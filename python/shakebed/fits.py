@@ -213,9 +213,9 @@ def fit_profile(
         fixed_temperature, fixed_shift : float
             Fixed values of T [m g D] and of the shift [D].
         window : (float, float)
-            Lowest and highest height of the fit [D]; None leaves an end to the rule.
+            Lowest and highest height of the fit [D]; None: the rule chooses this end.
         base : float
-            Lower edge of the bed [D].
+            Height of the lower edge of the bed [D].
         robust : bool
             Whether outliers count linearly (Huber's loss).
         model_error : bool
@@ -280,9 +280,9 @@ def find_answer(
     diameter : str or float, optional
         Diameter D of a disk ("2.99 mm", or a number in m). With it T/(m g) is given as a length.
     width_between_walls : float, optional
-        Width of a bed between hard side walls [D]. Near them the bed is thinner. The answer corrects for this, and
-        states what is left as part of the error. By default it is that of the `Profile`, if it knows its walls; 0: no
-        correction.
+        Width of a bed between hard side walls [D]. Near the walls the density is lower. The answer corrects for
+        this, and its error includes the remaining uncertainty. Default: the width of the `Profile`, if its walls are known;
+        0: no correction.
 
     Returns
     -------
@@ -430,5 +430,5 @@ def gamma_to_temperature(
         if not (value > 0 and math.isfinite(value)):
             raise UsageError(f"{name} is {value}; it must be above 0")
     if not 0 <= restitution <= 0.99:
-        raise UsageError("restitution must be from 0 to 0.99")
+        raise UsageError(f"restitution is {restitution}; it must be from 0 to 0.99")
     return _core.gamma_to_temperature(gamma, f, g, length, height, plateau_density, restitution, equation_of_state)

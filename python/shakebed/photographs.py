@@ -57,7 +57,7 @@ class Disks:
 
     @property
     def quality(self) -> Array:
-        """Quality from 0 to 1, shape (disks,); 1 is a bead that looks like all others."""
+        """Quality from 0 to 1, shape (disks,); 1: a bead that looks like all the others."""
         return self._columns["quality"]
 
     @property
@@ -82,7 +82,7 @@ class Disks:
 
     @property
     def expected_wrong(self) -> float:
-        """Expected share of found disks that are no beads."""
+        """Expected share of the disks found that are not beads."""
         return self._found.expected_wrong
 
     @property
@@ -124,9 +124,9 @@ def find_disks(image: NDArray[Any], **options: Any) -> Disks:
         Grey levels: uint8, uint16, float32 or float64 (0 to 255). It is read in place, not copied first.
     **options
         polarity : {"dark", "bright"}
-            Whether beads are darker or brighter than the background; left out, found.
+            Whether beads are darker or brighter than the background; default: found in the image.
         radius : float
-            Radius of a bead, within 25 % [px]; left out, found.
+            Radius of a bead, within 25 % [px]; default: found in the image.
         roi : (int, int, int, int)
             Region of interest: left, top, width, height [px].
         keep_half_hidden : bool
@@ -157,8 +157,8 @@ def find_disks(image: NDArray[Any], **options: Any) -> Disks:
 def _refuse_unit_range(images: Sequence[NDArray[Any]]) -> None:
     """Raise UsageError for floating-point images with levels from 0 to 1, as other packages have them."""
     if all(image.dtype.kind == "f" and image.max() <= 1 for image in images):
-        raise UsageError("levels of floating-point images run from 0 to 255, and the highest here is not above 1: "
-                         "multiply them by 255")
+        raise UsageError("levels of floating-point images must run from 0 to 255, but the highest level is not above 1: "
+                         "multiply the image by 255")
 
 
 class MeasuredBed:
@@ -175,8 +175,8 @@ class MeasuredBed:
     def answer(self) -> dict[str, Any]:
         """One temperature from all thermometers, as `find_answer` gives it.
 
-        It is read from the profile and the mean number of disks. What the photographs show against it, such as a
-        floor that is not in view, is taken into account.
+        It follows from the profile and the mean number of disks. Reasons against it in the photographs, such as a floor
+        that is not visible, are taken into account.
         """
         profile = self.profile
         answer = _core.find_answer(profile.height, profile.number_density, profile.std_error, profile.covariance,
@@ -220,7 +220,7 @@ class MeasuredBed:
 
     @property
     def floor_reference(self) -> str:
-        """Position of the floor that heights are above: "given", "mean of its motion", "mean by its
+        """Position of the floor from which heights are measured: "given", "mean of its motion", "mean by its
         amplitude" or "lowest seen"."""
         return self._bed.floor_reference
 
@@ -291,12 +291,12 @@ def measure_bed(
         floor, left_wall, right_wall : float
             Row of the floor and columns of the walls [px].
         floor_amplitude : float
-            Amplitude of the shaken floor [m]. Where no film shows its motion, its mean is taken to be half of this
-            above the lowest position seen, with an error of the same size.
+            Amplitude of the shaken floor [m]. If no film shows the motion of the floor, its mean position is
+            estimated as half the amplitude above the lowest position seen, with an error of the same size.
         floor_slope : float
             Slope of the floor, in pixels down per pixel to the right.
         pixel_aspect : float
-            Width of a pixel over its height.
+            Ratio of the width of a pixel to its height.
         lens_radial : float
             Distortion of the lens: outward shift of the corners, in half diagonals.
         kernel : str

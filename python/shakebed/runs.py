@@ -1,4 +1,4 @@
-"""Running recipes by the program, and reading results folders."""
+"""Running recipes with the program, and reading results folders."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class StageResults:
         """One CSV file, by its name without .csv."""
         path = self.folder / f"{name}.csv"
         if not path.is_file():
-            raise input_error(f"{path}: there is no such table; there are "
+            raise input_error(f"{path}: there is no such table; choose from: "
                               f"{', '.join(sorted(p.stem for p in self.folder.glob('*.csv')))}", str(path))
         return Table(path)
 
@@ -132,7 +132,7 @@ class StageResults:
         for name in ("trajectory.extxyz.zst", "trajectory.extxyz"):
             if (self.folder / name).is_file():
                 return read_trajectory(self.folder / name)
-        raise input_error(f"{self.folder}: there is no trajectory; the recipe must ask for \"frames\"",
+        raise input_error(f"{self.folder}: there is no trajectory; add \"frames\" to the simulate stage of the recipe",
                           str(self.folder))
 
     def __repr__(self) -> str:
@@ -166,10 +166,10 @@ class Results:
             content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             return content
         except OSError as error:
-            raise input_error(f"{path}: cannot be read: {error.strerror}; is it a results folder?",
+            raise input_error(f"{path}: cannot be read: {error.strerror}; check that this is a results folder",
                               str(path)) from None
         except ValueError as error:
-            raise input_error(f"{path}: is no JSON: {error}", str(path)) from None
+            raise input_error(f"{path}: this is not JSON: {error}", str(path)) from None
 
     @property
     def sweep(self) -> Optional[Table]:
@@ -190,7 +190,7 @@ class Results:
 
     def __getitem__(self, stage: str) -> StageResults:
         if stage not in self.stages:
-            raise KeyError(f"there is no stage {stage!r} in {self.folder}; there are {', '.join(self.stages)}")
+            raise KeyError(f"there is no stage {stage!r} in {self.folder}; choose from: {', '.join(self.stages)}")
         return self.stages[stage]
 
     def __repr__(self) -> str:
@@ -218,7 +218,7 @@ def load(out: Union[str, "os.PathLike[str]"]) -> Results:
     -------
     Results
         results["fit"]["temperature"] is a Quantity, results["bed"].table("profile")["height"] an array, and
-        results["bed"].trajectory() holds the frames.
+        results["bed"].trajectory() contains the frames.
 
     Raises
     ------

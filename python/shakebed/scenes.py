@@ -169,7 +169,7 @@ def density_profile(
     """
     z, ends = _joined_frames(heights)
     if not np.isfinite(z).all():
-        raise UsageError("heights holds numbers that are not finite")
+        raise UsageError("heights contains numbers that are not finite")
     if sides not in (None, "hard", "periodic"):
         raise UsageError(f'sides is {sides!r}; it must be "hard" or "periodic", or be left out if unknown')
     width, spacing = _number_in_diameters(width, "width"), _number_in_diameters(spacing, "spacing")
@@ -179,13 +179,14 @@ def density_profile(
     low = 0.0 if lowest is None else _number_in_diameters(lowest, "lowest")
     high = float(z.max()) + 1 if highest is None else _number_in_diameters(highest, "highest")
     if not high > low:
-        raise UsageError(f"highest is {high}, not above lowest, {low}")
+        raise UsageError(f"highest is {high}; it must be above lowest, {low}")
     points = int(np.floor((high - low) / spacing)) + 1
     if points > _most_heights:
-        raise UsageError(f"spacing {spacing} makes {points} heights; take at most {_most_heights}")
+        raise UsageError(f"spacing is {spacing}, which gives {points} heights; at most {_most_heights} are possible: "
+                         "give a larger spacing")
     if len(ends) > 1 and _frames_are_equal(z, ends):
-        warnings.warn("All frames are the same: they say nothing about the error of the density. Its std_error of 0 "
-                      "is not an error estimate.", BedWarning, stacklevel=2)
+        warnings.warn("All frames are equal, so the error of the density is unknown. The std_error of 0 is not an "
+                      "estimate of it.", BedWarning, stacklevel=2)
     return profile_from(_core.density_profile(z, ends, width, kernel, low, spacing, points),
                         width if sides == "hard" else None)
 
@@ -202,9 +203,10 @@ def _joined_frames(heights: Any) -> tuple[Array, Any]:
     frames = [np.asarray(frame, float) for frame in heights]
     wrong = [frame.shape for frame in frames if frame.ndim != 1]
     if wrong:
-        raise UsageError(f"a frame of heights has shape {wrong[0]}; it must be (disks,), that of heights (frames, disks)")
+        raise UsageError(f"a frame of heights has shape {wrong[0]}; it must be (disks,), "
+                         "and that of heights (frames, disks)")
     if not any(frame.size for frame in frames):
-        raise UsageError(f"heights has {len(frames)} frames and no disk")
+        raise UsageError(f"heights has {len(frames)} frames but no disks")
     return np.concatenate(frames), np.cumsum([frame.size for frame in frames])
 
 
@@ -225,7 +227,7 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
     """The recipe of a scene: a dict, JSON text or a file, of a stage or of a whole recipe."""
     file, directory, text = "scene", os.getcwd(), None
     if not isinstance(scene, (dict, str, os.PathLike)):
-        raise UsageError(f"a scene is a dict, JSON text or a file, not {type(scene).__name__}")
+        raise UsageError(f"a scene must be a dict, JSON text or a file, not {type(scene).__name__}")
     if not isinstance(scene, dict):
         text = os.fspath(scene)
         if not text.lstrip().startswith("{"):
@@ -242,7 +244,7 @@ def _document(scene: Scene, seed: Optional[int]) -> _Document:
     else:
         content = scene
     if not isinstance(content, dict):
-        raise UsageError("a scene is an object, the options of a stage \"simulate\", or a whole recipe")
+        raise UsageError("a scene must be a JSON object: the options of a stage \"simulate\", or a whole recipe")
     if "stages" in content and seed is None:
         return _Document(text if text is not None else as_json(content), file, directory, False, text is not None)
     if "stages" in content:
@@ -321,8 +323,8 @@ class Bed:
     def answer(self) -> dict[str, Any]:
         """One temperature from all thermometers, as `find_answer` gives it.
 
-        It is read from the profile, N D/W and the kinetic temperatures. A recipe also simulates longer contacts and
-        adds what they change.
+        It follows from the profile, N D/W and the kinetic temperatures. A recipe also simulates a longer contact
+        duration and adds its effect to the uncertainty.
         """
         from .fits import find_answer
 
@@ -331,7 +333,7 @@ class Bed:
                            temperature_z=seen.get("temperature_z"), diameter=self.length_unit if in_metres else None)
 
     def trajectory(self) -> Trajectory:
-        """The frames that the scene keeps (option "frames"), not copied."""
+        """The frames that the scene stores (option "frames"), not copied."""
         bed = self._bed
         return Trajectory(bed.trajectory(), bed.times(), bed.phases(), bed.floor(), bed.floor_velocities())
 
@@ -340,7 +342,7 @@ class Bed:
         """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
-        dissipated_on_plates is the part of dissipated that friction with plates took.
+        dissipated_on_plates is the part of dissipated that is due to friction with plates.
         """
         return self._bed.energy()
 
@@ -452,7 +454,7 @@ def simulate(scene: Scene, *, seed: Optional[int] = None, progress: Progress = N
 
 
 class Simulation:
-    """A bed that is stepped by hand.
+    """A bed that is simulated step by step.
 
     Parameters
     ----------
@@ -542,7 +544,7 @@ class Simulation:
         """Energy balance [m g D].
 
         kinetic + potential + compressed + dissipated + step_error - floor_work - bath_work = initial.
-        dissipated_on_plates is the part of dissipated that friction with plates took.
+        dissipated_on_plates is the part of dissipated that is due to friction with plates.
         """
         return self._stepper.energy()
 

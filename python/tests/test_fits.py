@@ -136,7 +136,7 @@ def test_frames_may_have_different_numbers_of_disks():
     found = shakebed.density_profile([[1.0], [2.0, 2.0, 2.0]] * 20, 10, kernel="top_hat:1", spacing=1, highest=3)
     assert found.number_density == pytest.approx([0, 0.5 / 10, 1.5 / 10, 0])
     assert repr(found) == ("<shakebed.Profile: n D^2 at 4 heights, 0 to 3 D, of 40 frames, kernel top_hat:1>")
-    with pytest.warns(shakebed.BedWarning, match="All frames are the same"):
+    with pytest.warns(shakebed.BedWarning, match="All frames are equal"):
         same = shakebed.density_profile(np.tile([[1.0, 2.0]], (40, 1)), 10, kernel="top_hat:1", spacing=1, highest=3)
     assert same.number_density == pytest.approx([0, 0.1, 0.1, 0])
 

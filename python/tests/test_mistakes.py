@@ -59,7 +59,7 @@ def test_scenes_take_numbers_of_numpy_and_paths(short, tmp_path):
     with pytest.raises(shakebed.UsageError, match="cannot be part of a recipe"):
         shakebed.simulate(dict(short, seed=1 + 2j))
     for nothing in (None, [1, 2], 3):
-        with pytest.raises(shakebed.UsageError, match="a scene is"):
+        with pytest.raises(shakebed.UsageError, match="a scene must be"):
             shakebed.simulate(nothing)
 
 
@@ -74,7 +74,7 @@ def test_quantities_are_not_calculated_with_as_tuples():
 def test_images_that_are_not_grey_levels_of_0_to_255_are_named():
     image, _ = drawn_image()
     for wrong, words in (
-        (image / 255.0, "multiply them by 255"),
+        (image / 255.0, "multiply the image by 255"),
         (np.zeros((0, 5), np.uint8), "empty"),
         (np.dstack([image] * 3), "dimensions"),
         (np.ma.masked_greater(image, 199), "masked"),
@@ -100,7 +100,7 @@ def test_frames_may_come_one_by_one_but_not_alone():
         shakebed.measure_bed(image, "3 mm")
     with pytest.raises(shakebed.UsageError, match="files or images"):
         shakebed.measure_bed(None, "3 mm")
-    with pytest.raises(shakebed.UsageError, match="multiply them by 255"):
+    with pytest.raises(shakebed.UsageError, match="multiply the image by 255"):
         shakebed.measure_bed([image / 255.0], "3 mm")
     with pytest.raises(shakebed.UsageError, match="whole number"):
         shakebed.measure_bed([image], "3 mm", threads=-1)
@@ -118,7 +118,7 @@ def test_profiles_that_cannot_be_fitted_say_where():
     ):
         fit = shakebed.fit_profile(*arguments)
         assert not fit.ok and words in fit.message, fit.message
-    for covariance, words in ((beyond, "correlation beyond 1"), (-np.diag(ERROR**2), "variance is negative"),
+    for covariance, words in ((beyond, "correlation outside -1 to 1"), (-np.diag(ERROR**2), "negative variance"),
                               (np.triu(np.ones((40, 40))), "not symmetric")):
         fit = shakebed.fit_profile(HEIGHT, DENSITY, covariance=covariance)
         assert not fit.ok and words in fit.message, fit.message
@@ -143,7 +143,7 @@ def test_arguments_of_a_fit_are_named():
         shakebed.gamma_to_temperature(gamma="four", frequency=20, diameter="3 mm", initial_height=10)
     with pytest.raises(shakebed.UsageError, match="plateau_density is 5"):
         shakebed.gamma_to_temperature(gamma=4, frequency=20, diameter="3 mm", initial_height=10, plateau_density=5)
-    with pytest.raises(shakebed.UsageError, match="heights; take at most"):
+    with pytest.raises(shakebed.UsageError, match="heights; at most"):
         shakebed.density_profile(np.random.default_rng(1).uniform(0, 10, (3, 3)), 10, spacing=1e-9)
 
 

@@ -80,7 +80,7 @@ def test_stepping_goes_through_the_same_states(scene):
         assert np.array_equal(bed.positions, frames.array[k, :, 0:2])
         assert np.array_equal(bed.velocities, frames.array[k, :, 2:4])
     assert abs(bed.energy["imbalance"]) < 1e-9
-    with pytest.raises(ValueError, match="cannot go to"):
+    with pytest.raises(ValueError, match="cannot advance to"):
         bed.advance_to(0)
 
 

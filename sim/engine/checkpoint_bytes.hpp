@@ -20,7 +20,7 @@ void put(std::vector<std::uint8_t>& out, const T& value) {
 }
 template <class T>
 void take(const std::uint8_t*& at, const std::uint8_t* end, T& value) {
-  if (static_cast<std::size_t>(end - at) < sizeof value) throw std::invalid_argument("the checkpoint is cut short");
+  if (static_cast<std::size_t>(end - at) < sizeof value) throw std::invalid_argument("the checkpoint is truncated");
   std::memcpy(&value, at, sizeof value);
   at += sizeof value;
 }
@@ -37,7 +37,7 @@ inline std::uint64_t checksum(const std::uint8_t* at, const std::uint8_t* end) {
 inline std::vector<std::uint8_t> put_later(std::vector<std::uint8_t> checkpoint, std::uint64_t intervals) {
   std::uint64_t done = 0, sum = 0;
   constexpr std::size_t place = sizeof magic + sizeof(std::uint32_t) + sizeof done;  // of the intervals done
-  if (checkpoint.size() < place + sizeof done + sizeof sum) throw std::invalid_argument("the checkpoint is cut short");
+  if (checkpoint.size() < place + sizeof done + sizeof sum) throw std::invalid_argument("the checkpoint is truncated");
   std::memcpy(&done, &checkpoint[place], sizeof done);
   done += intervals;
   std::memcpy(&checkpoint[place], &done, sizeof done);

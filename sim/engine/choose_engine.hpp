@@ -50,7 +50,7 @@ class ChooseEngine {
     if (is_cell()) {
       if constexpr (Offered::cells)
         return std::make_unique<Engine<CellBox, RoughRule, TwoSizes>>(scene_, floor_, disks_);
-      throw std::invalid_argument("/box: this program holds no engine for sloped sides and free lids");
+      throw std::invalid_argument("/box: this program was built without the engine for sloped sides and free lids");
     }
     const bool periodic_sides = std::holds_alternative<PeriodicSides>(scene_.box.sides);
     if (std::holds_alternative<UniformGravity>(scene_.gravity))
@@ -59,7 +59,7 @@ class ChooseEngine {
       if (std::holds_alternative<PeriodicTop>(scene_.box.top)) return with_rule<PeriodicSpace>();
       return with_rule<WeightlessBox>();
     }
-    throw std::invalid_argument("/gravity: this program holds no engine for weightless scenes");
+    throw std::invalid_argument("/gravity: this program was built without the engine for scenes without gravity");
   }
 
  private:
@@ -83,7 +83,7 @@ class ChooseEngine {
     for (const Species& s : scene_.disks.species) equal = equal && s.diameter == 1 && s.mass == 1;
     if (equal) return std::make_unique<Engine<Space, Rule, EqualSizes>>(scene_, floor_, disks_);
     if constexpr (Offered::two_sizes) return std::make_unique<Engine<Space, Rule, TwoSizes>>(scene_, floor_, disks_);
-    throw std::invalid_argument("/disks: this program holds no engine for two sizes of disks");
+    throw std::invalid_argument("/disks: this program was built without the engine for two sizes of disks");
   }
 
   const Scene& scene_;

@@ -265,8 +265,8 @@ bool Engine<Space, Rule, Sizes>::locked() {
       throw std::runtime_error("inelastic collapse at time " + std::to_string(base_ + now_) + ": " +
                                std::to_string(most_crawls * events) + " contacts within " +
                                std::to_string(most_crawls * crawl) +
-                               ", and no end of them. Disks that dissipate and rest on one another need a contact "
-                               "duration (1e-4 of the time unit does)");
+                               " time units, without an end. Disks that dissipate energy and rest on one another need "
+                               "a contact duration: 1e-4 of the time unit is enough");
   }
   return passed < 1e-12;
 }

@@ -21,7 +21,7 @@ void Engine<Space, Rule, Sizes>::watch(Watcher* watcher) {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::set_bath_temperature(double temperature) {
   if (!(temperature > 0) || !std::isfinite(temperature))
-    throw std::invalid_argument("a bath's temperature must be positive");
+    throw std::invalid_argument("the temperature of a bath must be above 0");
   if (auto* langevin = std::get_if<LangevinBath>(&bath_)) {
     langevin->temperature = temperature;
   } else if (auto* andersen = std::get_if<AndersenBath>(&bath_)) {
@@ -29,7 +29,7 @@ void Engine<Space, Rule, Sizes>::set_bath_temperature(double temperature) {
   } else if (auto* thermal = std::get_if<ThermalFloor>(&bath_)) {
     thermal->temperature = temperature;
   } else {
-    throw std::invalid_argument("the scene has no bath that holds a temperature");
+    throw std::invalid_argument("the scene has no bath with a temperature");
   }
 }
 

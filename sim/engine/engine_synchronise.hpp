@@ -245,23 +245,22 @@ void Engine<Space, Rule, Sizes>::restore(const std::vector<std::uint8_t>& bytes)
   end -= std::min<std::ptrdiff_t>(end - at, sizeof written);
   std::memcpy(&written, end, static_cast<std::size_t>(bytes.data() + bytes.size() - end));
   if (written != checkpoint_bytes::checksum(bytes.data(), end))
-    throw std::invalid_argument("the checkpoint is damaged: its checksum is another");
+    throw std::invalid_argument("the checkpoint is damaged: its checksum does not match its content");
   if (count != count_)
-    throw std::invalid_argument("the checkpoint is of another scene: it holds another number of disks");
+    throw std::invalid_argument("the checkpoint belongs to another scene: it has " + std::to_string(count) +
+                                " disks, this scene has " + std::to_string(count_));
   visit_state(*this, [&](auto& value) { checkpoint_bytes::take(at, end, value); });
   std::array<std::uint64_t, 4> random_state{};
   checkpoint_bytes::take(at, end, random_state);
   if (at != end)
-    throw std::invalid_argument(
-        "the checkpoint is of another scene: it holds "
-        "more than this one needs");
+    throw std::invalid_argument("the checkpoint belongs to another scene: it contains more data than this scene needs");
   const auto missing = [this](std::uint32_t label) { return label >= count_; };
   const auto hangs_on_nothing = [&](const PressedBed::Stretch& one) {
     return missing(one.disk) || one.other >= count_ + PressedBed::walls;
   };
   if (std::any_of(labels_.begin(), labels_.end(), missing) ||
       std::any_of(stretches_.begin(), stretches_.end(), hangs_on_nothing))
-    throw std::invalid_argument("the checkpoint is damaged: it names disks that do not exist");
+    throw std::invalid_argument("the checkpoint is damaged: it refers to disks that do not exist");
   random_.set_state(random_state);
   unusual_ = disk_surface_.varies() || resting_ > 0;
   for (std::uint32_t i = 0; i < count_; ++i) disks_[i].own_time = 0;

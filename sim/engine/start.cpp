@@ -53,7 +53,7 @@ Room room_of(const Scene& scene) {
 [[noreturn]] void no_room(const Room& room) {
   std::ostringstream out;
   out << room.count << " disks of up to " << room.diameter << " D do not fit into a box " << room.width
-      << " D wide and " << room.height << " D high";
+      << " D wide and " << room.height << " D high. Give fewer disks or a larger box";
   throw std::runtime_error(out.str());
 }
 
@@ -159,7 +159,8 @@ std::vector<Point> random_insertion(const Room& room, const RandomStart& start, 
     }
     if (!placed)
       throw std::runtime_error(
-          "random insertion found no place for a disk after 20,000 attempts; start hexagonal, or give more room");
+          "random insertion found no place for a disk after 20,000 attempts; choose the hexagonal start, or give a "
+          "larger box");
   }
   return points;
 }
@@ -171,7 +172,7 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
   for (std::size_t i = 0; i < disks.size(); ++i) {
     const Placed& p = disks[i];
     if (p.species >= scene.disks.species.size())
-      throw std::runtime_error("disk " + std::to_string(i) + " of the start is of a species that is not described");
+      throw std::runtime_error("disk " + std::to_string(i) + " of the start has a species that is not defined");
     const double r = scene.disks.species[p.species].diameter / 2;
     const double spread = room.slope > 0 ? (p.z - room.floor) * std::tan(room.slope) : 0;
     const double from_wall = r / std::cos(room.slope) - spread;

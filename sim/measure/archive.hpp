@@ -79,7 +79,7 @@ class ArchiveReader {
       at_ += sizeof value;
     }
   }
-  [[noreturn]] static void cut_short() { throw std::invalid_argument("the checkpoint is cut short"); }
+  [[noreturn]] static void cut_short() { throw std::invalid_argument("the checkpoint is truncated"); }
   const std::uint8_t *at_, *end_;
 };
 

@@ -58,10 +58,10 @@ class Run {
     std::vector<std::uint8_t> engine;
     visit(in, engine);
     for (RunObserver* one : observers_) one->load(in);
-    if (!in.at_end()) throw std::invalid_argument("the state holds more than this run needs");
+    if (!in.at_end()) throw std::invalid_argument("the state contains more data than this run needs");
     simulation_->restore(engine);
     if (step_ > schedule_.bath.size() || look_ > schedule_.looks())
-      throw std::invalid_argument("the state is of another schedule");
+      throw std::invalid_argument("the state belongs to another schedule");
     // The reservoir's temperature is no part of a checkpoint.
     if (step_ > 0) simulation_->set_bath_temperature(schedule_.bath[step_ - 1].temperature);
     if (look_ > 0)
@@ -113,11 +113,13 @@ class Run {
 void check(const MeasurementSchedule& schedule) {
   const bool counts = schedule.periods > 0 && schedule.phases > 0 && schedule.period > 0 &&
                       std::isfinite(schedule.period) && schedule.settle >= 0 && std::isfinite(schedule.end());
-  if (!counts) throw std::invalid_argument("a schedule needs a period, and at least one period and one look in it");
+  if (!counts)
+    throw std::invalid_argument(
+        "a schedule needs a period above 0, at least one period, and at least one sample in each period");
   double before = 0;
   for (const BathStep& step : schedule.bath) {
     if (step.until < before || step.until > schedule.settle * (1 + 1e-12))
-      throw std::invalid_argument("the reservoir's steps are not in the order of time before the first look");
+      throw std::invalid_argument("the steps of the bath must be in the order of time and lie before the first sample");
     before = step.until;
   }
 }

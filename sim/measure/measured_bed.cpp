@@ -119,16 +119,18 @@ std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& o
     case Problem::spacing:
       return formatted("spacing is %g; it must be above 0", options.spacing);
     case Problem::kernel:
-      return "kernel must have a shape and a finite width: density is measured through a window";
+      return "the density is measured through a kernel: give a kernel other than none, with a finite width above 0";
     case Problem::shorter_than_a_period:
-      return formatted("duration is %g, shorter than one period of the floor, %g", options.duration, floor_period);
+      return formatted("duration is %g, shorter than one period of the floor, %g; measure at least one period",
+                       options.duration, floor_period);
     case Problem::too_many_periods:
-      return formatted("the floor would shake %g times; measure at most %g periods", options.duration / floor_period,
-                       most_periods);
+      return formatted("duration is %g periods of the floor; at most %g periods can be measured",
+                       options.duration / floor_period, most_periods);
     case Problem::too_many_frames:
-      return formatted("%llu frames do not fit into %llu samples; measure longer or keep fewer frames",
-                       static_cast<unsigned long long>(options.frames),
-                       static_cast<unsigned long long>(plan_looks(floor_period, options).schedule.looks()));
+      return formatted(
+          "%llu frames are to be stored, but the bed is sampled only %llu times; measure longer or store fewer frames",
+          static_cast<unsigned long long>(options.frames),
+          static_cast<unsigned long long>(plan_looks(floor_period, options).schedule.looks()));
   }
   return "";
 }

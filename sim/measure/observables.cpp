@@ -32,12 +32,12 @@ std::string precision_lost(const Simulation& simulation) {
   const double turned_over = std::abs(ledger.initial) + std::abs(ledger.kinetic) + std::abs(ledger.potential) +
                              ledger.dissipated + std::abs(ledger.floor_work) + std::abs(ledger.bath_work);
   if (!std::isfinite(turned_over)) {
-    out << "a position, a velocity or an energy is no longer a number";
+    out << "a position, a velocity or an energy is no longer a finite number";
     return out.str();
   }
   if (std::abs(ledger.imbalance()) > 1e-6 * turned_over) {
-    out << "the energy ledger misses " << std::abs(ledger.imbalance()) << " of the " << turned_over
-        << " turned over (1e-6 of it is allowed)";
+    out << "the energy balance has an error of " << std::abs(ledger.imbalance()) << " in a total of " << turned_over
+        << " (allowed: 1e-6 of the total)";
     return out.str();
   }
   const double overlap = simulation.largest_overlap();

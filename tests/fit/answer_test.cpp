@@ -164,7 +164,7 @@ TEST(Answer, IsARangeWhereProfileAndVelocitiesDisagree) {
   const Answer answer = find_answer(input);
   ASSERT_TRUE(answer.ok());
   EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
-  EXPECT_THAT(answer.why, testing::HasSubstr("that of the disks' velocities"));
+  EXPECT_THAT(answer.why, testing::HasSubstr("but the disks' velocities give"));
   EXPECT_EQ(answer.interval.low, 0.30);
   EXPECT_GT(answer.interval.high, 0.45);
 }
@@ -186,7 +186,8 @@ TEST(Answer, OfAColdSurfaceIsAnUpperLimit) {
   const Answer confirmed = find_answer(input);
   EXPECT_EQ(confirmed.verdict, Verdict::one_temperature) << confirmed.why;
   EXPECT_NEAR(confirmed.temperature, 0.07, 3 * confirmed.std_error);
-  EXPECT_THAT(find_answer(column(0.3)).why, testing::HasSubstr("only velocities show whether T_x differs"));
+  EXPECT_THAT(find_answer(column(0.3)).why,
+              testing::HasSubstr("Only velocities show whether T_x (horizontal motion) differs"));
 }
 
 TEST(Answer, OfABedAtRestIsNotReadOffItsProfile) {
@@ -258,7 +259,7 @@ TEST(Answer, OfAShakenBedWithoutVelocitiesIsARange) {
   input.shaken = true;
   const Answer shaken = find_answer(input);
   EXPECT_EQ(shaken.verdict, Verdict::no_single_temperature);
-  EXPECT_THAT(shaken.why, testing::HasSubstr("T_x and T_z may lie outside this range."));
+  EXPECT_THAT(shaken.why, testing::HasSubstr("T_x (horizontal) and T_z (vertical) may lie outside this range."));
   EXPECT_EQ(shaken.interval.low, find_answer(column(1.0)).interval.low);
   input.temperature_x = input.temperature_z = Estimate{1.0, 0.01, false};
   EXPECT_EQ(find_answer(input).verdict, Verdict::one_temperature);
@@ -308,7 +309,7 @@ TEST(Answer, SaysWhereTheModelDoesNotFit) {
   const Answer answer = find_answer(input);
   ASSERT_TRUE(answer.ok());
   EXPECT_EQ(answer.verdict, Verdict::model_does_not_fit) << answer.why;
-  EXPECT_THAT(answer.why, testing::HasSubstr("misses the densities"));
+  EXPECT_THAT(answer.why, testing::HasSubstr("deviates from the densities"));
   const Answer fits = find_answer(column(2.0));
   EXPECT_EQ(fits.verdict, Verdict::one_temperature);
   EXPECT_GT(answer.std_error, fits.std_error);

@@ -465,7 +465,7 @@ TEST(FitHardCases, AnOutlierIsNamedAndTheRobustOptionBoundsIt) {
   FitOptions options = full_options();
   const FitResult plain = fit_profile(data, options);
   EXPECT_FALSE(any_number_is_not_finite(plain));
-  EXPECT_THAT(plain.warnings, testing::Contains(testing::HasSubstr("an outlier?")));
+  EXPECT_THAT(plain.warnings, testing::Contains(testing::HasSubstr("an outlier")));
   options.robust = true;
   const FitResult robust = fit_profile(data, options);
   ASSERT_EQ(robust.status, FitStatus::ok);
@@ -584,7 +584,7 @@ TEST(FitHardCases, UnsortedAndDuplicateHeightsGiveTheSameFit) {
   EXPECT_NEAR(doubled.temperature.value / reference.temperature.value, 1.0, 1e-8);
   EXPECT_NEAR(doubled.temperature.std_error / reference.temperature.std_error, 1.0, 1e-6);
   EXPECT_NEAR(doubled.area, reference.area, 1e-9);
-  EXPECT_THAT(doubled.warnings, testing::Contains(testing::HasSubstr("repeat the height")));
+  EXPECT_THAT(doubled.warnings, testing::Contains(testing::HasSubstr("the height of another bin")));
 }
 
 TEST(FitHardCases, MissingZeroAndTinyErrorsMeanNoErrors) {
@@ -690,7 +690,7 @@ TEST(FitHardCases, ASingularCovarianceIsShrunkAndSaid) {
     for (std::size_t j = 0; j < n; ++j) data.covariance[i * n + j] = data.std_error[i] * data.std_error[j];  // rank 1
   }
   const FitResult fit = fit_profile(data, full_options());
-  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("shrunk")));
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("its correlations were reduced")));
   EXPECT_FALSE(any_number_is_not_finite(fit));
 }
 

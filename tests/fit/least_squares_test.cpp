@@ -31,7 +31,7 @@ TEST(MeasuredProfile, KnowsItsSpacingAndSaysWhichHeightsAreRepeated) {
   ASSERT_EQ(measure_profile(profile, measured, result), FitStatus::ok) << result.message;
   EXPECT_EQ(measured.spacing, 1);
   ASSERT_EQ(result.warnings.size(), 1U);
-  EXPECT_EQ(result.warnings[0], "1 bins repeat the height of another; each counts as a measurement of its own");
+  EXPECT_EQ(result.warnings[0], "1 bin repeats the height of another bin; each counts as an independent measurement");
 }
 
 // Five heights of which one is left out and the last lies beyond the window: those that remain keep their own

@@ -244,7 +244,8 @@ TEST(MeasureBed, BadFramesAreReportedAndTheOthersUsed) {
   EXPECT_FALSE(measured.frames[1].why.empty());
   EXPECT_EQ(measured.frames[4].status, FrameStatus::size_changed);
   EXPECT_EQ(measured.frames[2].status, FrameStatus::good);
-  EXPECT_THAT(measured.warnings, testing::Contains(testing::HasSubstr("1 of 5 frames have another size in pixels")));
+  EXPECT_THAT(measured.warnings,
+              testing::Contains(testing::HasSubstr("1 of 5 frames differ from the first one in size")));
 }
 
 TEST(MeasureBed, AFilmWithoutBeadsIsAnErrorThatSaysWhy) {
@@ -349,7 +350,7 @@ TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
 TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   const auto warned = [](const Measurement& measured) {
     return std::any_of(measured.warnings.begin(), measured.warnings.end(), [](const std::string& warning) {
-      return warning.find("above its lowest position") != std::string::npos;
+      return warning.find("from its lowest position") != std::string::npos;
     });
   };
   MeasureOptions options = options_of();
@@ -532,7 +533,7 @@ TEST(MeasureBed, AFloorSeenAtOnePhaseOnlyIsNotSaidToMove) {
   EXPECT_EQ(measured.calibration.floor_amplitude_px, 0);
   bool told = false;
   for (const std::string& warning : measured.warnings)
-    told = told || warning.find("floor's motion") != std::string::npos;
+    told = told || warning.find("motion of the floor") != std::string::npos;
   EXPECT_TRUE(told);
 }
 

@@ -176,8 +176,9 @@ TEST(PackedBed, ARefusedShapeNamesItsLimit) {
   Roundness roundness;
   roundness.outlines = 20;
   roundness.on_circle = 0.962;
-  EXPECT_EQ(roundness.why_not(),
-            "the outlines are not round: only 96.2 % of a typical one lies on its circle (97 % are needed)");
+  EXPECT_EQ(
+      roundness.why_not(),
+      "the outlines are not round: only 96.2 % of a typical outline lies on its circle (at least 97 % is needed)");
 }
 
 }  // namespace

@@ -102,11 +102,11 @@ TEST(Photographs, AnImageThatCannotBeUsedIsNamed) {
   GrayFrame frame = drawn(1);
   EXPECT_EQ(find_disks(ImageView{}).status, FindStatus::bad_input);
   frame.pixels[1234] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(find_disks(view_of(frame)).message, "the image holds levels that are not finite numbers");
+  EXPECT_EQ(find_disks(view_of(frame)).message, "the image contains levels that are not finite numbers; replace them");
   const GrayFrame good = drawn(2);
   const BedFound bed = measure_bed(std::vector{view_of(good), view_of(frame)}, {.bead_diameter_m = 3e-3});
   EXPECT_EQ(bed.status, FindStatus::bad_input);
-  EXPECT_EQ(bed.message, "frame 1: the image holds levels that are not finite numbers");
+  EXPECT_EQ(bed.message, "frame 1: the image contains levels that are not finite numbers; replace them");
 }
 
 TEST(Photographs, ImagesInMemoryAreMeasuredAsTheirFiles) {

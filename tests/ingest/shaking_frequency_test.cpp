@@ -111,7 +111,7 @@ TEST(ShakingFrequency, RestHasNone) {
   std::vector<PlaceInFrame> places;
   for (std::size_t k = 0; k < 100; ++k) places.push_back({k, 233.0});
   EXPECT_FALSE(find_frequency(places).known);
-  EXPECT_EQ(find_frequency(places).why_not, "the height of the lowest beads has no period");
+  EXPECT_EQ(find_frequency(places).why_not, "the height of the lowest beads shows no period");
   EXPECT_FALSE(find_frequency({}).known);
   EXPECT_FALSE(find_frequency(moving(10, 0.2, 1, 0, 1)).known);
 }

@@ -260,7 +260,7 @@ TEST(PhotographsOfABed, NeedFramesBeforeAnythingRuns) {
   };
   const ProgramResult without = validated("");
   EXPECT_EQ(without.exit_code, 3) << without.err;
-  EXPECT_NE(without.err.find("/stages/1/from: the simulated bed keeps no frames"), std::string::npos) << without.err;
+  EXPECT_NE(without.err.find("/stages/1/from: the simulated bed stores no frames"), std::string::npos) << without.err;
   EXPECT_EQ(validated(R"(, "frames": {"count": 10})").exit_code, 0);
 }
 

@@ -366,9 +366,9 @@ TEST(ExtractObjections, NameWhatThePhotographsShow) {
   const auto has = [](const std::string& text, const char* words) { return text.find(words) != std::string::npos; };
   ingest::Measurement found = good;
   found.floor_out_of_view = true;
-  EXPECT_TRUE(has(only(found), "the floor is not in view"));
+  EXPECT_TRUE(has(only(found), "the floor is not visible"));
   found.surface_out_of_view = true;
-  EXPECT_TRUE(has(only(found), "neither floor nor surface is in view"));
+  EXPECT_TRUE(has(only(found), "neither the floor nor the surface of the bed is visible"));
   found = good, found.surface_out_of_view = true;
   EXPECT_TRUE(objections_to(found).empty()) << "disks may fly out of the picture";
   found = good, found.disk_total = 29;

@@ -128,9 +128,8 @@ TEST_F(FitStage, SaysWhatALibraryLacks) {
   result = run(bed("a", 0.5, 2) + bed("b", 0.7, 3, R"(, "profile": { "kernel": { "kind": "top_hat", "width": 1 } })") +
                measured + R"({ "stage": "fit", "from": ["measured", "a", "b"], "model": "simulation" })");
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_THAT(
-      result.err,
-      HasSubstr("b: its profile was measured through the kernel top_hat:1, the one to be fitted through gaussian:0.5"));
+  EXPECT_THAT(result.err, HasSubstr("b: its profile was measured through the kernel top_hat:1, but the profile to be "
+                                    "fitted through gaussian:0.5"));
   // No library, and one where there is no use for it.
   write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.1\n");
   result = run(R"({ "stage": "fit", "profile": "p.csv", "model": "simulation" })");
@@ -220,7 +219,7 @@ void ResampledFit::expect_resampled(int beds) {
   // Without frames there is nothing to resample.
   const ProgramResult result = run(bed("measured", 20, 1) + fit_stage("fit", "measured"));
   EXPECT_EQ(result.exit_code, 4);
-  EXPECT_THAT(result.err, HasSubstr("kept no frames"));
+  EXPECT_THAT(result.err, HasSubstr("stored no frames"));
 }
 TEST_F(ResampledFit, IsOfTheFrames) { expect_resampled(1); }
 TEST_F(ResampledFit, OfEightBedsHasTheErrorOfTheCovariance) { expect_resampled(8); }
@@ -256,7 +255,7 @@ class AnswerOfAProfile : public FitStage {
     shown = shown.substr(0, shown.find('<'));
     ASSERT_FALSE(shown.empty());
     shown[0] = static_cast<char>(std::tolower(shown[0]));
-    const std::string said = answer.contains("temperature") ? verdict : "no temperature can be read";
+    const std::string said = answer.contains("temperature") ? verdict : "no temperature can be determined";
     EXPECT_EQ(shown, said);
     EXPECT_EQ(page_.find("class=\"banner\""), std::string::npos) << "the answer is the one statement";
     for (const char* file : {"o/summary.md"}) EXPECT_THAT(read_text(folder_ / file), HasSubstr(said.substr(1)));

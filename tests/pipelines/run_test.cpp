@@ -367,7 +367,7 @@ TEST_F(Pipeline, AStageThatFailsKeepsWhatWasFinishedBefore) {
   EXPECT_TRUE(fs::is_regular_file(folder_ / "o/fit/fit.json"));
   EXPECT_FALSE(fs::exists(folder_ / "o/other"));
   EXPECT_EQ(read_json(folder_ / "o/manifest.json")["exit_code"], 4);
-  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("What stopped it"));
+  EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("Why the run stopped"));
   EXPECT_THAT(read_text(folder_ / "o/summary.md"), HasSubstr("**Stopped**"));
   // Put right, only what is left runs.
   write_text(folder_ / "bad.csv", read_text(folder_ / "o/bed/profile.csv"));
@@ -385,8 +385,8 @@ TEST(FirstMinutes, FoldersAndPatternsWithoutFilesAreSaidInWords) {
   };
   const ProgramResult empty = fit("photos"), none = fit("photos/*.png"), missing = fit("photo");
   for (const ProgramResult* result : {&empty, &none, &missing}) EXPECT_EQ(result->exit_code, 4) << result->err;
-  EXPECT_THAT(empty.err, HasSubstr("holds no file"));
-  EXPECT_THAT(none.err, HasSubstr("no file is named like"));
+  EXPECT_THAT(empty.err, HasSubstr("contains no file"));
+  EXPECT_THAT(none.err, HasSubstr("no file matches"));
   EXPECT_THAT(missing.err, HasSubstr("there is no file"));
   EXPECT_FALSE(fs::exists(folder / "o"));
 }
@@ -521,7 +521,7 @@ TEST(Commands, FitProfileSaysWhichOfSeveralDensitiesItRead) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json fit = Json::parse(result.out);
   EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_bin"));
-  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("phi_window is not read"));
+  EXPECT_THAT(fit["warnings"].dump(), HasSubstr("these columns are ignored: phi_window."));
 }
 
 TEST(Commands, InitWritesARecipeThatIsGood) {

@@ -449,7 +449,7 @@ TEST(PlatesInSi, NeedSomethingThatPresses) {
   EXPECT_TRUE(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2 })").empty());
   EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "pressing": "3 m/s^2" })"), testing::SizeIs(1));
   EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2, "contact_radius": "2.1 mm" })"),
-              testing::ElementsAre(testing::HasSubstr("/box/plates/contact_radius: the contact of a disk")));
+              testing::ElementsAre(testing::HasSubstr("/box/plates/contact_radius: the radius of the contact")));
   EXPECT_THAT(problems(R"("tilt": "10 deg", "plates": { "friction": 0.2, "contact_radius": "0 mm" })"),
               testing::SizeIs(1));
   const std::string flat = R"({ "gravity": 0, "disks": { "count": 12 }, "box": { "width": 12, "sides": "periodic",

@@ -57,7 +57,7 @@ TEST(MeasuredBed, WhatCannotBeMeasuredIsNamed) {
   scene.box.floor = SinusoidalFloor{.amplitude = 1, .frequency = 0.5};
   const std::vector<std::string> said = MeasureOptions{.duration = 1}.validate(scene);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said.front(), "duration is 1, shorter than one period of the floor, 2");
+  EXPECT_EQ(said.front(), "duration is 1, shorter than one period of the floor, 2; measure at least one period");
 }
 
 TEST(MeasuredBed, HeightsReachBelowTheFloorAndAboveTheLoosestBed) {

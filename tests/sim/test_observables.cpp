@@ -383,10 +383,10 @@ TEST(PrecisionLost, NamesWhatIsWrongAndNothingElse) {
   EXPECT_NE(precision_lost(run).find("ledger"), std::string::npos);
   run.ledger = sound;
   run.ledger.potential = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(precision_lost(run).find("no longer a number"), std::string::npos);
+  EXPECT_NE(precision_lost(run).find("no longer a finite number"), std::string::npos);
   run.ledger = sound;
   run.ledger.kinetic = std::numeric_limits<double>::infinity();
-  EXPECT_NE(precision_lost(run).find("no longer a number"), std::string::npos);
+  EXPECT_NE(precision_lost(run).find("no longer a finite number"), std::string::npos);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ export class Chart {
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const points = (this.data ?? []).flat().filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
     if (points.length < 2) {
-      this.svg.innerHTML = `<text x="${width / 2}" y="${height / 2}" text-anchor="middle">forms when the bed has settled</text>`;
+      this.svg.innerHTML = `<text x="${width / 2}" y="${height / 2}" text-anchor="middle">shown when the bed has settled</text>`;
       return;
     }
     const xs = points.map(([x]) => x), ys = points.map(([, y]) => y);

@@ -133,7 +133,7 @@ worker.addEventListener("message", ({ data }) => {
     tellState("Paused: measured over 20,000 periods.");
   } else if (data.kind === "problem") {
     problem = true;
-    tellState(`No such bed: ${data.text}`);
+    tellState(`This bed cannot be simulated: ${data.text}`);
   }
 });
 

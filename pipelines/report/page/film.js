@@ -187,7 +187,7 @@
         const [x, z] = disk.step.map(way => this.speed(way));
         lines.push(`velocity ${[x, z].map(v => shakebed.minus(Number(v[0].toPrecision(2)))).join(", ")} ${x[1]}`);
       }
-      if (marks) lines.push(marks.false.includes(this.disk) ? "false: no bead is there" : "a bead is there");
+      if (marks) lines.push(marks.false.includes(this.disk) ? "false: there is no bead" : "there is a bead");
       this.says.replaceChildren(...lines.flatMap((line, k) => (k ? [document.createElement("br"), line] : [line])));
       this.says.style.left = `${Math.max(0, Math.min(width - this.says.offsetWidth, x + (x > width / 2 ? -this.says.offsetWidth - 12 : 12)))}px`;
       this.says.style.top = `${Math.max(0, y - 20)}px`;
