@@ -313,7 +313,7 @@ TEST_F(Pipeline, VerifyNoticesEveryChangedFile) {
   std::filesystem::create_directory(folder_ / "photographs");
   const ProgramResult none = run({"status", "photographs"});
   EXPECT_EQ(none.exit_code, 4);
-  EXPECT_THAT(none.err, HasSubstr("photographs: holds no results"));
+  EXPECT_THAT(none.err, HasSubstr("photographs: this folder contains no results"));
 }
 
 TEST_F(Pipeline, ARunningPipelineHoldsTheFolderAndADeadOneDoesNot) {
