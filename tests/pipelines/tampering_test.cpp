@@ -62,7 +62,7 @@ TEST_F(Tampering, OfTheSameLengthIsNoticedInEveryTableAndResult) {
     change_a_digit(path);
     fs::last_write_time(path, written);
     ASSERT_EQ(fs::file_size(path), before.size());
-    EXPECT_THAT(dry_run(), HasSubstr(std::string(stage) + ": runs: its output " + name + " was changed since"));
+    EXPECT_THAT(dry_run(), HasSubstr(std::string(stage) + ": runs: its output " + name + " was changed after the run"));
     const ProgramResult verified = run({"verify", "o"});
     EXPECT_EQ(verified.exit_code, 6);
     EXPECT_THAT(verified.err, HasSubstr(std::string(stage) + "/" + name + ": changed"));
@@ -112,11 +112,11 @@ const std::vector<std::pair<std::string, std::function<void(StageRecord&)>>> cha
     {"model changed \"fermi\" → \"feron\"", [](StageRecord& r) { r.options["model"] = "feron"; }},
     {"window/low changed 2 → 3", [](StageRecord& r) { r.options["window"]["low"] = 3; }},
     {"window/high is new: 9", [](StageRecord& r) { r.options["window"]["high"] = 9; }},
-    {"model is gone (was \"fermi\")", [](StageRecord& r) { r.options.erase("model"); }},
+    {"model was removed (it was \"fermi\")", [](StageRecord& r) { r.options.erase("model"); }},
     {"input bed/profile.csv changed", [](StageRecord& r) { r.inputs[0].fast = "aaab"; }},
     {"input bed/bed.json changed", [](StageRecord& r) { r.inputs[1].fast = "bbba"; }},
     {"input bed/other.csv is new", [](StageRecord& r) { r.inputs[0].file = "bed/other.csv"; }},
-    {"some of its inputs are gone", [](StageRecord& r) { r.inputs.pop_back(); }},
+    {"some of its inputs were removed", [](StageRecord& r) { r.inputs.pop_back(); }},
 };
 
 TEST(ReasonsToRun, NameEachThingThatChanged) {
