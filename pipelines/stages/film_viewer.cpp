@@ -55,7 +55,7 @@ void read_columns(const std::filesystem::path& path, const std::set<std::size_t>
     for (std::size_t k = 0; k < read.size(); ++k) {
       const std::optional<double> value = columns[k] < cells.size() ? number_in(cells[columns[k]]) : std::nullopt;
       if (!value)
-        throw InputError(fmt::format("{}: a row of frame {} has a cell that is no number", path.string(), frame));
+        throw InputError(fmt::format("{}: a row of frame {} has a cell that is not a number", path.string(), frame));
       (disks.*read[k].to).push_back(*value);
     }
   }
