@@ -84,7 +84,7 @@ const Mistake mistakes[] = {
      "Did you mean"},
     {"SweepWithoutValues", "\"name\": \"small\"",
      "\"name\": \"small\", \"sweep\": {\"over\": {\"/stages/bed/seed\": []}}", 3, "/sweep/over/~1stages~1bed~1seed",
-     "no values"},
+     "the list of values is empty"},
 };
 
 class MalformedRecipe : public testing::TestWithParam<Mistake> {};
