@@ -123,7 +123,7 @@ TEST_F(SimulateStage, GoesOnFromAnotherOne) {
   other.replace(other.find("\"count\": 60"), 11, "\"count\": 61");
   const ProgramResult refused = simulate(langevin, other);
   EXPECT_EQ(refused.exit_code, 4);
-  EXPECT_THAT(refused.err, HasSubstr("its last frame has 60 disks, the bed 61"));
+  EXPECT_THAT(refused.err, HasSubstr("the last frame has 60 disks, but the bed has 61"));
 }
 
 // The sine as a table in a file is the sine: the spline through 64 points is as good as it (5e-7 of its amplitude), but
