@@ -46,7 +46,7 @@ class BedStatement {
     temperature("spin_temperature", "temperature of the rotation: I <spin^2>, with the moment of inertia I of a disk");
     list_.quantity("/drift_temperature_x", energy_,
                    "drift: T_x in the second half of the measurement minus T_x in the first half");
-    list_.quantity("/collision_rate", rate_, "contacts of a disk with other disks, per unit of time");
+    list_.quantity("/collision_rate", rate_, "number of contacts of a disk with other disks per unit of time");
   }
 
   void heights() {
@@ -148,10 +148,10 @@ class BedStatement {
     const Given judged = given_if(bed_.judged, "the floor shakes and there is gravity");
     list_.text("/judgement/verdict", "\"holds\", or the most serious doubt about the numbers", judged);
     list_.text("/judgement/why", "all doubts about the numbers, the most serious first", judged);
-    list_.text("/judgement/advice", "what to do", judged);
+    list_.text("/judgement/advice", "advice: what to do about this", judged);
     const Given mixed = given_if(bed_.two_species, "the disks are of two kinds");
     list_.text("/objections/#/why", "reason why a fit of the profile gives no reliable temperature", mixed);
-    list_.text("/objections/#/advice", "what to do", mixed);
+    list_.text("/objections/#/advice", "advice: what to do about this", mixed);
   }
 
   void profiles() {
@@ -167,11 +167,13 @@ class BedStatement {
     list_.table({"layers.csv",
                  "layers of 1 D above the floor's mean position, lab frame, all phases together",
                  {layer_height_,
-                  {"temperature_x", energy_, "m <v_x^2>"},
-                  {"temperature_z", energy_, "m <(v_z - mean of v_z)^2>, with the mean of the phase"},
+                  {"temperature_x", energy_, "horizontal temperature, m <v_x^2>"},
+                  {"temperature_z", energy_,
+                   "vertical temperature, m <(v_z - mean of v_z)^2>, with the mean of v_z at each phase"},
                   {"mean_velocity_z", velocity_, "mean vertical velocity"},
                   {"share", "1", "fraction of all disks in the layer"},
-                  {"spin_temperature", energy_, "I <spin^2>"}}});
+                  {"spin_temperature", energy_,
+                   "temperature of the rotation, I <spin^2>, with the moment of inertia I of a disk"}}});
     order_tables();
     velocity_tables();
     list_.table({"displacement.csv",
@@ -215,7 +217,7 @@ class BedStatement {
 
   // Moments of the velocities in cells of height, or of height and phase.
   std::vector<StatedColumn> moments(const std::string& without) const {
-    return {{"number_density", "1/D^2", "disks per area"},
+    return {{"number_density", "1/D^2", "number density: disks per area"},
             {"mean_velocity_x", velocity_, "mean horizontal velocity"},
             {"mean_velocity_z", velocity_, "mean vertical velocity"},
             {"temperature_x", energy_, "horizontal temperature without the mean velocity of " + without},
@@ -226,7 +228,8 @@ class BedStatement {
     const Given velocities = observed(bed_.observe.velocities, "velocities");
     std::vector<StatedColumn> layers = moments("the layer");
     layers.insert(layers.begin(), layer_height_);
-    layers.push_back({"spin_temperature", energy_, "I <spin^2>"});
+    layers.push_back({"spin_temperature", energy_,
+                      "temperature of the rotation, I <spin^2>, with the moment of inertia I of a disk"});
     layers.push_back({"a2", "1", "fourth cumulant of the velocities, 0 for a Maxwellian"});
     layers.push_back({"samples", "1", "disks seen in the layer"});
     list_.table({"velocities.csv", "layers of 1 D above the floor's mean position, lab frame, all phases together",
@@ -234,7 +237,7 @@ class BedStatement {
     list_.table({"velocity_histogram.csv",
                  "distribution of the velocities in units of sqrt(T/m); the first and the last class also count all "
                  "velocities beyond them",
-                 {{"velocity", "sqrt(T/m)", "middle of the class"},
+                 {{"velocity", "sqrt(T/m)", "velocity at the middle of the class"},
                   {"density_x", "1/sqrt(T/m)", "probability density of v_x"},
                   {"density_z", "1/sqrt(T/m)", "probability density of v_z without the bed's mean"},
                   {"maxwellian", "1/sqrt(T/m)", "standard normal density"}},
@@ -249,7 +252,7 @@ class BedStatement {
     std::vector<StatedColumn> columns = moments("the layer at the phase");
     columns.insert(columns.begin(),
                    {{"phase", "1", "phase in periods, 0 where the floor rises through its mean position"},
-                    {"height", "D", "middle of the layer " + frame}});
+                    {"height", "D", "height of the middle of the layer " + frame}});
     columns.push_back({"samples", "1", "disks seen in the layer at the phase"});
     list_.table({file, "layers of 1 D by phase of the shaking, " + frame, columns, given});
   }
@@ -257,14 +260,14 @@ class BedStatement {
   void pressure_table() {
     std::vector<StatedColumn> columns{layer_height_};
     for (const StatedColumn& row : std::initializer_list<StatedColumn>{
-             {"number_density", "1/D^2", "disks per area"},
-             {"temperature_x", energy_, "m <v_x^2>"},
-             {"temperature_z", energy_, "m <v_z^2> without the mean"},
+             {"number_density", "1/D^2", "number density: disks per area"},
+             {"temperature_x", energy_, "horizontal temperature, m <v_x^2>"},
+             {"temperature_z", energy_, "vertical temperature, m <(v_z - mean of v_z)^2>"},
              {"mean_velocity_z", velocity_, "mean vertical velocity"},
              {"pressure_zz", pressure_, "vertical flux of vertical momentum, kinetic part and contacts"},
              {"pressure_xx", pressure_, "horizontal flux of horizontal momentum, kinetic part and contacts"},
              {"weight_above", pressure_, "weight of the disks above, per width"},
-             {"collision_rate", rate_ + "/D^2", "contacts between disks per area and time"}}) {
+             {"collision_rate", rate_ + "/D^2", "number of contacts between disks per area and time"}}) {
       columns.push_back(row);
       columns.push_back({row.name + "_error", row.unit, "standard error of " + row.name});
     }
@@ -276,12 +279,16 @@ class BedStatement {
     std::vector<StatedColumn> columns{layer_height_};
     for (const std::string name : {"first", "second"}) {
       columns.push_back({"number_density_" + name, "1/D^2", "disks of the " + name + " species per area"});
-      columns.push_back({"temperature_x_" + name, energy_, "m <v_x^2> without the mean of species and layer"});
-      columns.push_back({"temperature_z_" + name, energy_, "m <v_z^2> without the mean of species and layer"});
+      columns.push_back(
+          {"temperature_x_" + name, energy_,
+           "horizontal temperature, m <(v_x - mean of v_x)^2>, with the mean of the species in the layer"});
+      columns.push_back({"temperature_z_" + name, energy_,
+                         "vertical temperature, m <(v_z - mean of v_z)^2>, with the mean of the species in the layer"});
       columns.push_back({"samples_" + name, "1", "disks of the " + name + " species seen in the layer"});
     }
     columns.push_back(
-        {"ratio", "1", "temperature of the second species over that of the first, both directions together"});
+        {"ratio", "1",
+         "ratio of the temperature of the second species to that of the first, with both directions together"});
     list_.table(
         {"species.csv",
          "temperatures of the two species in layers of 1 D above the floor's mean position, all phases together",
@@ -291,19 +298,19 @@ class BedStatement {
   void replicas() {
     const Given several = given_if(bed_.replicas > 1, "\"replicas\" is above 1");
     list_.number("/replicas", "1", "number of beds over which the results are averaged", several);
-    std::vector<StatedColumn> columns{{"replica", "1", "number of the bed"}};
+    std::vector<StatedColumn> columns{{"replica", "1", "number of the bed, from 0"}};
     for (const StatedResult& one : list_.all()) {
       if (one.kind == ResultKind::quantity && one.given.possible)
         columns.push_back({one.pointer.substr(1), one.unit, one.meaning});
     }
-    list_.table({"replicas.csv", "the numbers of each bed", columns, several});
+    list_.table({"replicas.csv", "results of each bed", columns, several});
   }
 
   ResultList& list_;
   const BedOutput& bed_;
   Given heavy_;
   std::string energy_, velocity_, time_, rate_, pressure_, length_;
-  StatedColumn layer_height_{"height", "D", "middle of the layer above the floor's mean position"};
+  StatedColumn layer_height_{"height", "D", "height of the middle of the layer above the floor's mean position"};
 };
 
 }  // namespace

@@ -14,7 +14,8 @@ namespace {
 class Critical : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.text("temperature", temperature_, {.help = "column of the study that holds the temperature, in any unit"});
+    fields.text("temperature", temperature_,
+                {.help = "column of the study that contains the temperature, in any unit"});
     fields.text("unit", unit_, {.help = "unit of the temperature, for messages and tables"});
     fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; empty: not used"});
     fields.numbers(

@@ -234,7 +234,7 @@ std::string film_viewer(const FinishedStage& stage) {
   if (film.at("follows").get<bool>()) choices += "<option value=\"speed\">speed</option>";
   if (film.contains("marks")) choices += "<option value=\"truth\">missed and false</option>";
   choices += "<option value=\"none\">picture alone</option>";
-  const std::string thinned = of == 1 ? std::string("The one good frame")
+  const std::string thinned = of == 1 ? std::string("The only good frame")
                               : shown == of
                                   ? fmt::format("All {} good frames", of)
                                   : fmt::format("{} of {} good frames (one in {}), so that the page stays small", shown,

@@ -73,10 +73,9 @@ std::string given_besides(const ExtractOptions& options) {
 
 std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t number, const std::string& command) {
   return fmt::format(
-      "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} "
-      "%; the "
-      "beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" "
-      "alt=\"the beads found\"></p>\n",
+      "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of false beads {:.1f} "
+      "%; the beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" alt=\"the "
+      "beads found\"></p>\n",
       number, candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark", candidate.rims.radius_px,
       ingest::name_of(candidate.channel), candidate.disks.size(), 100 * candidate.expected_wrong,
       100 * candidate.explained_share,
