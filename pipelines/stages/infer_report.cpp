@@ -85,10 +85,10 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
   std::string views;
   for (const Json& view : result.at("photographs"))
     if (view.at("prior").get<double>() > 0)
-      views += fmt::format("{}{}: {} (before: {})", views.empty() ? "" : "; ",
+      views += fmt::format("{}{}: {} (prior: {})", views.empty() ? "" : "; ",
                            view.at("show") == "average" ? "the average" : "phase " + view.at("show").get<std::string>(),
                            percent(view.at("posterior").get<double>()), percent(view.at("prior").get<double>()));
-  out += "<p>The photographs show " + views + ".</p>\n" + beds_table(result);
+  out += "<p>Probability that the photographs show: " + views + ".</p>\n" + beds_table(result);
   const Json& first = result.at("narrowing")[0];
   out += fmt::format(
       "<p>Of all further measurements, that of {} would narrow the parameters most: it would remove {} of their "
@@ -214,7 +214,7 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
 }
 
 StagePages infer_pages() {
-  return {.sections = {{ReportPlace::claims, "What the measured numbers say of the bed", inference_html}},
+  return {.sections = {{ReportPlace::claims, "What the measured numbers say about the bed", inference_html}},
           .markdown = nullptr,
           .terminal = inference_terminal};
 }

@@ -486,7 +486,8 @@ void state_inference(ResultList& list, const InferOptions& options) {
   list.number("/narrowing/#/reduction", "1",
               "mean share of the variance of the parameters that this measurement would remove");
   for (const auto& [name, ignored] : options.parameters)
-    list.number(pointer_join("/narrowing/#/parameters", name), "1", "the same for this parameter",
+    list.number(pointer_join("/narrowing/#/parameters", name), "1",
+                "share of the variance of this parameter that the measurement would remove",
                 given_when("the measurement is not the parameter itself"));
   for (const Observable& observable : observables()) {
     const std::string at = "/surrogate/" + std::string(observable.name);
@@ -504,8 +505,10 @@ void state_inference(ResultList& list, const InferOptions& options) {
   list.number("/calibration/within_95", "1", "share of the 95 % intervals that contain the true value", calibrated);
   for (const auto& [name, ignored] : options.parameters) {
     const std::string at = pointer_join("/calibration/parameters", name);
-    list.number(at + "/within_68", "1", "the same for this parameter", calibrated);
-    list.number(at + "/within_95", "1", "the same for this parameter", calibrated);
+    list.number(at + "/within_68", "1", "share of the 68 % intervals of this parameter that contain the true value",
+                calibrated);
+    list.number(at + "/within_95", "1", "share of the 95 % intervals of this parameter that contain the true value",
+                calibrated);
     list.number(at + "/rank_chi2_p", "1", "probability that uniformly distributed ranks are at least as uneven",
                 calibrated);
   }

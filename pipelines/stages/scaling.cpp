@@ -105,10 +105,9 @@ void describe_fit(Fields& fields, ScalingFit& fit) {
       {.help = "column y that is fitted; its standard errors are in the column of the same name with _error at the end",
        .required = true});
   fields.texts("powers", fit.powers, {.help = "columns x_1, x_2, ... whose exponents are fitted", .required = true});
-  fields.texts(
-      "each", fit.each,
-      {.help =
-           "columns that divide the points into groups; each group has its own amplitude, all share the exponents"});
+  fields.texts("each", fit.each,
+               {.help = "columns that divide the points into groups; each group has its own amplitude, and all groups "
+                        "share the exponents"});
   fields.texts("series", fit.series, {.help = "series of the study that are used; left out, all"});
   fields.map<ColumnLimits>("within", fit.within,
                            [](Fields& f, ColumnLimits& limits) {
