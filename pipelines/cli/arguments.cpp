@@ -12,7 +12,7 @@ namespace shakebed::pipelines {
 
 void print(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-    throw StageError("stdout cannot be written");
+    throw StageError("the result cannot be written to stdout; check that the disk is not full");
 }
 
 void require_positive(const char* name, double value) {
@@ -40,10 +40,12 @@ double diameters_argument(const std::string& name, const std::string& text, std:
   try {
     const Quantity quantity = parse_quantity(text, &dimension::length);
     if (!quantity.has_unit) return quantity.value;
-    if (quantity.dimension != dimension::length) throw UsageError(fmt::format("{}: \"{}\" is no length", name, text));
+    if (quantity.dimension != dimension::length)
+      throw UsageError(fmt::format(
+          "{}: \"{}\" is not a length; write for example \"30 mm\", or a plain number of diameters", name, text));
     if (!diameter)
-      throw UsageError(
-          fmt::format("{}: a length needs --diameter beside it, or write a plain number of diameters", name));
+      throw UsageError(fmt::format(
+          "{}: a length needs --diameter as well; give --diameter, or write a plain number of diameters", name));
     return quantity.value / *diameter;
   } catch (const std::invalid_argument& problem) {
     throw UsageError(fmt::format("{}: {}", name, problem.what()));

@@ -8,7 +8,7 @@
 namespace shakebed::pipelines {
 
 void add_audit(Program& program) {
-  program.add({"audit", "the paper's printed numbers against recomputed ones",
+  program.add({"audit", "compare the numbers printed by Quinn and Hong (2000) with recomputed ones",
                "  shakebed audit\n  shakebed audit --json", false},
               [](const Call& call) {
                 print(call.json ? dump(audit_json()) : audit_text());

@@ -39,7 +39,7 @@ int bench(const Call& call) {
 }  // namespace
 
 void add_bench(Program& program) {
-  program.add_prefix({"bench", "speed against error, stage by stage, on this machine", ""}, bench);
+  program.add_prefix({"bench", "measure the speed and the error of each stage on this machine", ""}, bench);
 }
 
 }  // namespace shakebed::pipelines

@@ -25,6 +25,7 @@ struct CleanArguments {
 // "30d", "12h", "90min" [s].
 double age_argument(std::string text) {
   if (text.empty()) return 0;
+  const std::string given = text;
   double unit = 0;
   if (text.ends_with("d"))
     unit = 86400;
@@ -32,7 +33,9 @@ double age_argument(std::string text) {
     unit = 3600;
   else if (text.ends_with("min"))
     unit = 60, text.resize(text.size() - 2);
-  if (unit == 0) throw UsageError("--older-than: write a number of days, hours or minutes: 30d, 12h, 90min");
+  if (unit == 0)
+    throw UsageError(fmt::format(
+        "--older-than: \"{}\" is not an age; write a number of days, hours or minutes: 30d, 12h, 90min", given));
   text.pop_back();
   return unit * quantity_argument("--older-than", text, dimension::none);
 }
@@ -93,11 +96,12 @@ void add_clean(Program& program) {
                    "  shakebed clean results --older-than 30d --dry-run\n  shakebed clean results/bed", false},
                   [given](const Call& call) { return clean(call, *given); });
   command
-      .add_option("folder", given->folder, "results folder, or a folder that holds results folders (default: results)")
+      .add_option("folder", given->folder,
+                  "results folder, or a folder that contains results folders (default: results)")
       ->type_name("DIR");
   command.add_option("--older-than", given->older_than, "remove only results older than this: 30d, 12h, 90min")
       ->type_name("AGE");
-  command.add_flag("--dry-run", given->dry_run, "say what would be removed, and remove nothing");
+  command.add_flag("--dry-run", given->dry_run, "show what would be removed, and remove nothing");
 }
 
 }  // namespace shakebed::pipelines

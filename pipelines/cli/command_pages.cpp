@@ -16,9 +16,8 @@ namespace {
 
 constexpr const char* exit_status =
     ".SH EXIT STATUS\n.TP\n0\nsuccess\n.TP\n2\nwrong usage of the command line\n.TP\n3\na mistake in the "
-    "recipe\n.TP\n4\n"
-    "an input file that is missing or not what it should be\n.TP\n5\na stage that could not do its work\n.TP\n6\n"
-    "a check that failed\n.TP\n130\ninterrupted\n";
+    "recipe\n.TP\n4\nan input file that is missing or cannot be read\n.TP\n5\na stage that failed\n.TP\n6\na check "
+    "that failed\n.TP\n130\ninterrupted\n";
 
 struct Command {
   std::string name;  // "run", "submit slurm"

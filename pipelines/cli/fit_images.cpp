@@ -141,10 +141,11 @@ Json recipe_of(const ImageArguments& image) {
   recipe["stages"] = Json::array({extract_stage(image), fit});
   recipe["stages"].push_back(Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}});
   if (image.frequency && image.amplitude) recipe["stages"].push_back(map_stage(image));
-  recipe["report"] = Json{{"title", "A bed in photographs"},
-                          {"text",
-                           "Disks were found in the frames given, the scale follows from the bead's diameter, the "
-                           "profile is that of the disks' centres above the floor."}};
+  recipe["report"] =
+      Json{{"title", "A bed in photographs"},
+           {"text",
+            "The disks were found in the given frames. The scale follows from the diameter of the beads. The profile "
+            "is the density of the disks' centres against the height above the floor."}};
   return recipe;
 }
 
@@ -229,14 +230,15 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       .add_option("--shape", image.shape,
                   "round: only round outlines are beads (default); any: measure other outlines too, with a warning")
       ->check(CLI::IsMember(shapes));
-  command.add_flag("--preview", image.preview,
-                   "only draw the disks found in the first frame, with the command for each alternative");
+  command.add_flag(
+      "--preview", image.preview,
+      "draw only the disks found in the first frame, with the command for each alternative; nothing else runs");
   command.add_option("--second-diameter", image.second_diameter,
                      "diameter of a second kind of beads, larger or smaller than the first, with its unit");
   command.add_option("--pixel-aspect", image.pixel_aspect, "width of a pixel over its height (default: found)");
-  command.add_option(
-      "--lens", image.lens,
-      "distortion of the lens: outward shift of the corners in half diagonals, barrel positive (default: found)");
+  command.add_option("--lens", image.lens,
+                     "distortion of the lens: true outward shift of the frame's corners in units of half the diagonal, "
+                     "positive for a barrel (default: found)");
   command.add_option("--bead-number", image.bead_number,
                      "number of beads in view; missed and doubled beads are then reported");
 }
@@ -249,13 +251,15 @@ void add_bed_options(CLI::App& command, ImageArguments& image) {
   command.add_option("--frequency", image.frequency,
                      "frequency of the shaking: \"20 Hz\" (default: found in a film). With --amplitude, T is also "
                      "predicted from Gamma");
-  command.add_option("--amplitude", image.amplitude,
-                     "amplitude of the shaking: \"2.5 mm\". Places the floor's mean, and with --frequency gives Gamma");
+  command.add_option(
+      "--amplitude", image.amplitude,
+      "amplitude of the shaking: \"2.5 mm\". It gives the mean position of the floor and, with --frequency, Gamma");
   command.add_option(
       "--frame-rate", image.frame_rate,
       "frame rate of a film: \"500 Hz\". Velocities are then measured, and profiles by phase if the bed is shaken");
   command.add_option("--kernel", image.kernel,
-                     "kernel of the density: gaussian:0.5 (default), top_hat:1, disk_chord:1");
+                     "kernel that smooths the density, with its width in D: gaussian:0.5 (standard deviation; "
+                     "default), top_hat:1 (full width) or disk_chord:1 (diameter of the disk)");
   command.add_option(
       "--initial-height", image.initial_height,
       "height mu of the bed at rest, in D or as a length (default: from the number of beads between the walls)");

@@ -67,7 +67,7 @@ int fit_profile(const Call& call, const ProfileArguments& given) {
     write_file_atomically(std::filesystem::path(*call.out) / "fit.json", dump(json));
   }
   print(call.json ? dump(json)
-                  : fmt::format("{} {}\n\n{} alone:\n{}", answer_text(json["answer"]),
+                  : fmt::format("{} {}\n\nfit of the model {} alone:\n{}", answer_text(json["answer"]),
                                 json["answer"].value("advice", ""), result.model, fit_text(json)));
   return result.ok() ? exit_ok : exit_stage_failed;
 }
@@ -76,10 +76,11 @@ int fit_profile(const Call& call, const ProfileArguments& given) {
 
 void add_fit_profile(Program& program) {
   const auto given = std::make_shared<ProfileArguments>();
-  CLI::App& command = program.add({"fit-profile", "a density profile from anywhere → fit",
-                                   "  shakebed fit-profile profile.csv --plateau-density 1.10 --diameter \"2.99 mm\"\n"
-                                   "  shakebed fit-profile profile.csv --model hydrostatic:best-of --json"},
-                                  [given](const Call& call) { return fit_profile(call, *given); });
+  CLI::App& command = program.add(
+      {"fit-profile", "fit a density profile from a CSV file: temperature, critical temperature, solid height",
+       "  shakebed fit-profile profile.csv --plateau-density 1.10 --diameter \"2.99 mm\"\n"
+       "  shakebed fit-profile profile.csv --model hydrostatic:best-of --json"},
+      [given](const Call& call) { return fit_profile(call, *given); });
   command
       .add_option("file", given->file,
                   "CSV file with the columns height [D], number_density [1/D^2] and, if known, std_error [1/D^2]")
@@ -88,13 +89,13 @@ void add_fit_profile(Program& program) {
   command.add_option("--model", given->model,
                      "model of the fit: enskog-rectangle (default), hydrostatic:<equation of state>, fermi, rectangle");
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
-  command.add_flag("--plateau-density-free", given->plateau_density_free, "fit phi_0 too");
+  command.add_flag("--plateau-density-free", given->plateau_density_free, "fit the density phi_0 of the solid as well");
   command.add_option("--diameter", given->diameter, "diameter D with its unit, for T/(m g) as a length");
   command.add_option("--column-number", given->column_number,
-                     "column number N D/W, for T_c (default: as the file says)");
+                     "column number N D/W, for T_c (default: as stated in the file)");
   command.add_option("--kernel", given->kernel,
-                     "kernel through which the profile was measured: none, gaussian:0.5, top_hat:1, disk_chord:1 "
-                     "(default: as the file says)");
+                     "kernel that smoothed the profile, with its width in D: none, gaussian:0.5, top_hat:1 or "
+                     "disk_chord:1 (default: as stated in the file)");
   command.add_option("--window", given->window, "heights of the fit: LOW,HIGH in D (default: found)")
       ->delimiter(',')
       ->expected(2);

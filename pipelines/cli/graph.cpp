@@ -32,10 +32,10 @@ int graph(const Call& call, const GraphArguments& given) {
 void add_graph(Program& program) {
   const auto given = std::make_shared<GraphArguments>();
   CLI::App& command = program.add(
-      {"graph", "the stages and their arrows",
+      {"graph", "draw the stages of a recipe and the arrows between them",
        "  shakebed graph bed.json | dot -Tsvg > bed.svg\n  shakebed graph bed.json --format mermaid", false},
       [given](const Call& call) { return graph(call, *given); });
-  command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
+  command.add_option("recipe", given->recipe, "recipe whose stages are drawn")->required()->type_name("FILE.json");
   command.add_option("--format", given->format, "output format: dot (default) or mermaid")
       ->check(CLI::IsMember({"dot", "mermaid"}));
 }

@@ -21,7 +21,8 @@ void add_init(Program& program) {
         if (std::filesystem::exists(*file, error))
           throw UsageError(fmt::format("{} exists; remove it first, or name another file", *file));
         const EmbeddedFile* starter = find_embedded("recipes/starter.json");
-        if (starter == nullptr) throw StageError("the starter recipe is missing from this build");
+        if (starter == nullptr)
+          throw StageError("the starter recipe is missing from this build; build and install shakebed again");
         write_file_atomically(*file, starter->text);
         print(call.json ? dump(Json{{"file", *file}})
                         : fmt::format("wrote {0}\nnext: shakebed validate {0}\n      shakebed run {0}\n", *file));

@@ -27,7 +27,7 @@ fs::path built_page() {
     if (fs::is_regular_file(place, error)) return place;
   }
   throw StageError(
-      "the page is not built: it holds the simulation as WebAssembly, which needs emscripten. Install it (Debian: "
+      "the page is not built: it contains the simulation as WebAssembly, which needs emscripten. Install it (Debian: "
       "emscripten), then build with: cmake --preset release && cmake --build --preset release --target shakebed_live");
 }
 
@@ -57,7 +57,7 @@ void add_live(Program& program) {
   CLI::App& command = program.add({"live", "write a page that simulates a bed live in the browser",
                                    "  shakebed live\n  shakebed live --out bed.html"},
                                   live);
-  command.get_option("--out")->description("the page (default bed.html)")->type_name("FILE.html");
+  command.get_option("--out")->description("file of the page (default: bed.html)")->type_name("FILE.html");
 }
 
 }  // namespace shakebed::pipelines

@@ -31,10 +31,12 @@ MapQuestion question_of(const MapArguments& given) {
   require_positive("--frequency", question.frequency), require_positive("--gravity", question.gravity);
   question.initial_height = diameters_argument("--initial-height", given.initial_height, question.diameter);
   require_positive("--initial-height", question.initial_height);
-  if (given.restitution < 0 || given.restitution > 0.99) throw UsageError("--restitution: must be from 0 to 0.99");
+  if (given.restitution < 0 || given.restitution > 0.99)
+    throw UsageError(fmt::format("--restitution: must be from 0 to 0.99, got {}", number_text(given.restitution)));
   question.restitution = given.restitution;
   if (given.gamma.has_value() == given.amplitude.has_value())
-    throw UsageError("give --gamma or --amplitude, one of the two");
+    throw UsageError(given.gamma ? "--gamma and --amplitude are equivalent: give one of them"
+                                 : "neither --gamma nor --amplitude is given: give one of them");
   if (given.gamma) {
     question.gamma = *given.gamma;
   } else {
@@ -58,7 +60,7 @@ MapQuestion question_of(const MapArguments& given) {
 void add_map(Program& program) {
   const auto given = std::make_shared<MapArguments>();
   CLI::App& command =
-      program.add({"map", "Gamma → temperature, by every formula that the paper allows",
+      program.add({"map", "predict the temperature from Gamma, by every formula that Quinn and Hong (2000) allow",
                    "  shakebed map --gamma 4 --frequency \"20 Hz\" --diameter \"2.99 mm\" --initial-height 10.2 "
                    "--plateau-density 1.10",
                    false},

@@ -49,9 +49,9 @@ std::vector<ShippedFigure> chosen_figures(const std::string& asked) {
     names.push_back(figure.name);
   }
   const std::string nearest = nearest_name(wanted, names);
-  throw UsageError(fmt::format("there is no shipped figure \"{}\"; {}", wanted,
-                               nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
-                                               : fmt::format("did you mean \"{}\"?", nearest)));
+  throw UsageError(fmt::format(
+      "there is no recipe \"{}\"; {}", wanted,
+      nearest.empty() ? "`shakebed reproduce --list` shows the names" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
 Plan plan_of(const ShippedFigure& figure, const RunArguments& run) {
@@ -140,7 +140,7 @@ void add_reproduce(Program& program) {
   command.add_flag("--list", given->list, "list the recipes with their recorded verdicts, and run nothing");
   command
       .add_flag("--results", given->results,
-                "print the page of recorded results, or that of one recipe, and run nothing")
+                "print the recorded results of all recipes, or of one recipe, and run nothing")
       ->excludes("--list");
   add_preset(command, given->run);
   add_run_options(command, given->run);

@@ -72,7 +72,7 @@ int rerun(const Call& call, const RerunArguments& given) {
   options.command_line = call.command_line;
   std::error_code error;
   if (fs::equivalent(options.out, before, error))
-    throw UsageError("--out: a rerun must not write into the folder that it repeats; name another folder");
+    throw UsageError("--out: a rerun cannot write into the results folder that it repeats; name another folder");
   Console console(level_of(call));
   install_interrupt_handler();
   if (plan.sweep) return rerun_sweep(plan, options, before, console);
@@ -85,7 +85,7 @@ int rerun(const Call& call, const RerunArguments& given) {
   for (const std::string& name : different)
     if (!call.json) std::fputs(fmt::format("differs: {}\n", name).c_str(), stderr);
   print(call.json           ? dump(Json{{"files", files}, {"different", different}, {"out", options.out.string()}})
-        : different.empty() ? fmt::format("identical: all {} files of the stages have the bytes that {} states\n",
+        : different.empty() ? fmt::format("identical: all {} files of the stages have the fingerprints stated in {}\n",
                                           files, (before / "manifest.json").string())
                             : fmt::format("{} of {} files differ\n", different.size(), files));
   return different.empty() ? exit_ok : exit_check_failed;
@@ -95,10 +95,10 @@ int rerun(const Call& call, const RerunArguments& given) {
 
 void add_rerun(Program& program) {
   const auto given = std::make_shared<RerunArguments>();
-  CLI::App& command = program.add(
-      {"rerun", "run what made a results folder once more and compare", "  shakebed rerun results/bed --out again"},
-      [given](const Call& call) { return rerun(call, *given); });
-  command.add_option("folder", given->folder, "the results folder")->required()->type_name("DIR");
+  CLI::App& command = program.add({"rerun", "repeat the run that wrote a results folder, and compare the files",
+                                   "  shakebed rerun results/bed --out again"},
+                                  [given](const Call& call) { return rerun(call, *given); });
+  command.add_option("folder", given->folder, "results folder of the earlier run")->required()->type_name("DIR");
   command.add_option("--jobs,-j", given->jobs, "number of threads (default: all processors)")
       ->check(CLI::PositiveNumber);
 }

@@ -16,7 +16,7 @@ void add(Program& program, const CommandText& text, bool dry) {
     given->run.dry_run = given->run.dry_run || dry;
     return run_plan_command(call, given->run, read_recipe(given->recipe, changes_of(given->run)));
   });
-  command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
+  command.add_option("recipe", given->recipe, "recipe that is run")->required()->type_name("FILE.json");
   add_preset(command, given->run);
   if (!dry) add_budget(command, given->run);
   add_run_options(command, given->run);
@@ -26,7 +26,7 @@ void add(Program& program, const CommandText& text, bool dry) {
 
 void add_run(Program& program) {
   add(program,
-      {"run", "run a pipeline",
+      {"run", "run a recipe",
        "  shakebed run bed.json\n  shakebed run bed.json --set /stages/bed/floor/amplitude=\"3 mm\" --out o\n"
        "  shakebed run bed.json --budget \"1 %\"\n  shakebed run bed.json --dry-run\n  shakebed run sweep.json --jobs "
        "8 --shard 2/4"},
@@ -34,7 +34,8 @@ void add_run(Program& program) {
 }
 
 void add_explain(Program& program) {
-  add(program, {"explain", "what a run would do, one sentence per stage", "  shakebed explain bed.json --out o"}, true);
+  add(program, {"explain", "show what a run would do, one sentence per stage", "  shakebed explain bed.json --out o"},
+      true);
 }
 
 }  // namespace shakebed::pipelines

@@ -125,8 +125,8 @@ void add_budget(CLI::App& command, RunArguments& run) {
   command
       .add_option(
           "--budget", run.budget,
-          "error of T_x, \"1 %\", or wall time, \"30 s\". A short pilot then chooses measured time, number and contact "
-          "duration of the simulated beds. With --dry-run only the pilot runs")
+          "wanted error of T_x (\"1 %\") or wanted wall time (\"30 s\"). A short pilot run then chooses the measured "
+          "time, the number and the contact duration of the simulated beds. With --dry-run only the pilot runs")
       ->type_name("ERROR|TIME");
 }
 
@@ -141,17 +141,18 @@ void add_run_options(CLI::App& command, RunArguments& run) {
   command.add_option("--only", run.only, "run only this stage")->type_name("STAGE");
   command.add_option("--from", run.from, "run this stage and those that depend on it")->type_name("STAGE");
   command.add_option("--until", run.until, "run this stage and those it needs")->type_name("STAGE");
-  command.add_flag("--force", run.force, "run stages that are up to date, too");
-  command.add_flag("--dry-run", run.dry_run, "say what would run, and why, without running it");
+  command.add_flag("--force", run.force, "run also the stages that are up to date");
+  command.add_flag("--dry-run", run.dry_run, "show what would run, and why; run nothing");
   command.add_option("--jobs,-j", run.jobs, "number of threads (default: all processors)")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
   command.add_option("--shard", run.shard, "run only the points K, K + N, K + 2N, ... of a sweep (K from 1 to N)")
       ->type_name("K/N");
-  command.add_flag("--gather", run.gather, "run nothing, collect the results of the shards of a sweep");
+  command.add_flag("--gather", run.gather, "collect the results of the shards of a sweep, and run nothing");
   command
       .add_option("--data", run.data,
-                  "your own points (CSV file with height, number_density), drawn into the figures and compared")
+                  "your own points: CSV file with the columns height [D] and number_density [1/D^2]. They are drawn "
+                  "into the figures and compared with the curves")
       ->type_name("FILE.csv");
 }
 
@@ -181,8 +182,8 @@ int run_plan_command(const Call& call, const RunArguments& run, const Plan& give
     const Budget budget = parse_budget(*run.budget);
     if (given.sweep)
       throw UsageError(
-          "--budget: this recipe has a \"sweep\", whose points need different times. Choose at one point, "
-          "with --set and without the sweep, and write the times into the recipe");
+          "--budget: this recipe has a \"sweep\", and its points need different times. Remove the sweep and run one "
+          "point with --budget. Then write the chosen times into the recipe");
     install_interrupt_handler();
     budgeted = choose_by_budget(given, budget, options, console);
     options.budget = budgeted->record;

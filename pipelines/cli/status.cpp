@@ -94,7 +94,7 @@ std::string last_run(const Json& json) {
     case exit_check_failed:
       return fmt::format("finished {}; a check failed", when);
     case exit_interrupted:
-      return fmt::format("interrupted {}. The same command, started again, continues", when);
+      return fmt::format("interrupted {}. Start the same command again to continue", when);
     default:
       return fmt::format("failed {} with exit code {}", when, code);
   }
@@ -120,29 +120,33 @@ int status(const Call& call, const fs::path& out) {
   }
   json["begun"] = begun_in(out);
   for (const Json& id : json["begun"])
-    text += fmt::format("  {:<16} begun, not finished: its state is kept\n", id.get<std::string>());
+    text += fmt::format("  {:<16} started, not finished: its state is kept\n", id.get<std::string>());
   const Json sweep = sweep_status(out);
   const bool nothing = json["stages"].empty() && json["begun"].empty() && sweep.is_null();
   if (nothing && !json.contains("exit_code") && !json["running"].get<bool>() && !fs::exists(out / "slurm", error))
-    throw InputError(fmt::format(
-        "{}: holds no results: no stage has begun in it. Name the folder that a run was given with --out, as in {}",
-        out.string(), "results/bed"));
+    throw InputError(
+        fmt::format("{}: this folder contains no results, and no stage was started in it. Give the folder that --out "
+                    "named, for example {}",
+                    out.string(), "results/bed"));
   if (nothing) text += "  no finished stage\n";
   if (!sweep.is_null()) {
     json["sweep"] = sweep;
     text += fmt::format("  sweep: {} of {} points done, {} failed\n", sweep["done"].get<std::uint64_t>(),
                         sweep["points"].get<std::uint64_t>(), sweep["failed"].get<std::uint64_t>());
     if (const auto left = sweep["left_over"].get<std::uint64_t>(); left > 0)
-      text +=
-          fmt::format("  {} folders of points that are no longer in the sweep: kept for when they are again\n", left);
+      text += fmt::format(
+          "  {} folders of points that are no longer in the sweep: they are kept and used again if the sweep gets "
+          "these points back\n",
+          left);
   }
   if (const fs::path submitted = out / "slurm" / "submitted.json"; fs::is_regular_file(submitted, error)) {
     json["submitted"] = read_json(submitted);
     const std::string job = json["submitted"].value("job", ""), gather = json["submitted"].value("gather_job", "");
-    text +=
-        fmt::format("  last submitted to Slurm: {}{}job {} gathers (squeue --jobs {} shows whether they have ended)\n",
-                    job.empty() ? "" : "array job " + job, job.empty() ? "" : ", ", gather,
-                    job.empty() ? gather : job + "," + gather);
+    text += fmt::format(
+        "  last submitted to Slurm: {}{}job {}, which gathers the results (squeue --jobs {} shows whether they have "
+        "ended)\n",
+        job.empty() ? "" : "array job " + job, job.empty() ? "" : ", ", gather,
+        job.empty() ? gather : job + "," + gather);
   }
   print(call.json ? dump(json) : text);
   return exit_ok;
@@ -152,9 +156,10 @@ int status(const Call& call, const fs::path& out) {
 
 void add_status(Program& program) {
   const auto folder = std::make_shared<std::string>();
-  CLI::App& command = program.add({"status", "what a results folder holds", "  shakebed status results/bed", false},
-                                  [folder](const Call& call) { return status(call, *folder); });
-  command.add_option("folder", *folder, "the results folder")->required()->type_name("DIR");
+  CLI::App& command =
+      program.add({"status", "show what a results folder contains", "  shakebed status results/bed", false},
+                  [folder](const Call& call) { return status(call, *folder); });
+  command.add_option("folder", *folder, "results folder of a run or sweep")->required()->type_name("DIR");
 }
 
 }  // namespace shakebed::pipelines

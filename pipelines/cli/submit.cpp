@@ -30,14 +30,14 @@ int submit(const Call& call, const SubmitArguments& given) {
 }  // namespace
 
 void add_submit(Program& program) {
-  CLI::App& group = program.add_group("submit", "hand a sweep to a cluster");
+  CLI::App& group = program.add_group("submit", "submit a sweep to a cluster");
   const auto given = std::make_shared<SubmitArguments>();
   CLI::App& slurm = program.add(
-      {"slurm", "a Slurm job array over the points of a sweep, and a job that gathers",
+      {"slurm", "submit a Slurm job array over the points of a sweep, and a job that gathers the results",
        "  shakebed submit slurm sweep.json --shards 100 --out o\n  shakebed submit slurm sweep.json "
        "--shards 100 --sbatch=--partition=short --dry-run"},
       [given](const Call& call) { return submit(call, *given); }, &group);
-  slurm.add_option("recipe", given->recipe, "a recipe with a sweep")->required()->type_name("FILE.json");
+  slurm.add_option("recipe", given->recipe, "recipe with a sweep")->required()->type_name("FILE.json");
   slurm.add_option("--shards", given->shards, "number of tasks of the job array")->check(CLI::PositiveNumber);
   slurm.add_option("--sbatch", given->options, "further option for sbatch, may be repeated: --sbatch=--time=1:00:00")
       ->type_name("OPTION");

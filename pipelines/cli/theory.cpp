@@ -29,7 +29,8 @@ TheoryQuestion question_of(const TheoryArguments& given) {
     question.temperature = diameters_argument("--temperature", *given.temperature, question.diameter);
     require_positive("--temperature", *question.temperature);
     if (!question.initial_height)
-      throw UsageError("--temperature: T/T_c also needs --initial-height or --column-number");
+      throw UsageError(
+          "--temperature: T/T_c needs the height of the bed as well; give --initial-height or --column-number");
   }
   return question;
 }
@@ -39,7 +40,7 @@ TheoryQuestion question_of(const TheoryArguments& given) {
 void add_theory(Program& program) {
   const auto given = std::make_shared<TheoryArguments>();
   CLI::App& command = program.add(
-      {"theory", "constants of the theory, T_c, solid height",
+      {"theory", "compute the constants of the theory, T_c and the solid height",
        "  shakebed theory --plateau-density 1.10\n  shakebed theory --plateau-density 1.10 --diameter \"2.99 mm\" "
        "--initial-height 10.2 --temperature \"0.36 mm\" --json",
        false},

@@ -52,11 +52,11 @@ int validate(const Call& call, const ValidateArguments& given) {
 
 void add_validate(Program& program) {
   const auto given = std::make_shared<ValidateArguments>();
-  CLI::App& command =
-      program.add({"validate", "check a recipe: all mistakes at once, then those of the points of its sweep",
-                   "  shakebed validate bed.json", false},
-                  [given](const Call& call) { return validate(call, *given); });
-  command.add_option("recipe", given->recipe, "the recipe")->required()->type_name("FILE.json");
+  CLI::App& command = program.add(
+      {"validate", "check a recipe and show all its mistakes; if it has none, check the points of its sweep",
+       "  shakebed validate bed.json", false},
+      [given](const Call& call) { return validate(call, *given); });
+  command.add_option("recipe", given->recipe, "recipe that is checked")->required()->type_name("FILE.json");
   add_preset(command, given->run);
   command
       .add_option("--set", given->run.settings, "change of the recipe: POINTER=VALUE, as in --set /stages/bed/seed=7")

@@ -188,7 +188,7 @@ Budget parse_budget(const std::string& text) {
     const double percent = std::strtod(number.c_str(), &rest);
     if (rest == number.c_str() ||
         number.find_first_not_of(' ', static_cast<std::size_t>(rest - number.c_str())) != std::string::npos)
-      refuse(fmt::format("\"{}\" is no number of per cent", text));
+      refuse(fmt::format("\"{}\" is not a number of per cent", text));
     if (!(percent >= 100 * smallest_error && percent <= 100 * largest_error))
       refuse(fmt::format("the error must be from {:g} to {:g} %, but is {}", 100 * smallest_error, 100 * largest_error,
                          text));
@@ -275,7 +275,7 @@ class StageBudget {
     }
     if (budget_.seconds > 0 && !choice.possible)
       throw StageError(
-          fmt::format("--budget {}: {} needs about {} to settle and to be measured at all, and its pilot took "
+          fmt::format("--budget {}: {} needs at least about {} to settle and to be measured, and its pilot run took "
                       "{}. Allow more time, or choose a shorter \"settle\"",
                       budget_.text, stage_.id, duration_text(choice.wall_seconds), duration_text(pilot_wall_)));
     const Scalable::Changes changes = scalable_.changes(choice.effort);
@@ -326,7 +326,7 @@ class StageBudget {
     console_.end_progress();
     if (outcome.code == exit_interrupted) throw Interrupted();
     if (outcome.code != exit_ok && outcome.code != exit_check_failed)
-      throw StageError(fmt::format("the pilot of --budget: {}", outcome.error));
+      throw StageError(fmt::format("the pilot run of --budget failed: {}", outcome.error));
     const StageCost cost = outcome.stages.front().cost.value_or(StageCost{});
     const PlannedStage& ran = pilot.stages.front();
     const EffortReading reading =
@@ -341,22 +341,24 @@ class StageBudget {
   }
 
   void say(const EffortChoice& choice, const Scalable::Changes& changes) const {
-    console_.message(fmt::format("{}: --budget \"{}\" picks {}", stage_.id, budget_.text, changes_text(changes)));
+    console_.message(fmt::format("{}: --budget \"{}\" chooses {}", stage_.id, budget_.text, changes_text(changes)));
     console_.message(fmt::format(
-        "{}: expects {} to {} (stated as {}), in {} of the processor ({:.2g} events), about {} on {} "
-        "{}; the pilot took {}",
+        "{}: expected error of {}: {} (stated error {}). Expected cost: {} of processor time ({:.2g} events), about {} "
+        "on {} {}. The pilot run took {}",
         stage_.id, scalable_.number(), per_cent(choice.error), per_cent(choice.stated_error),
         duration_text(choice.work.cpu_seconds), choice.work.events, duration_text(slowness_ * choice.wall_seconds),
         jobs_, jobs_ == 1 ? "thread" : "threads", duration_text(pilot_wall_)));
     if (budget_.error > 0 && choice.systematic >= budget_.error)
       console_.warning(
-          fmt::format("{}: {} alone makes {} uncertain by about {}, more than the {} asked for. No length of "
-                      "time reduces this; {} does",
+          fmt::format("{}: {} alone gives {} an error of about {}, more than the wanted {}. A longer measurement does "
+                      "not reduce this error; {} does",
                       stage_.id, scalable_.systematic_cause(), scalable_.number(), per_cent(choice.systematic),
                       budget_.text, scalable_.systematic_remedy()));
     else if (!choice.possible)
-      console_.warning(fmt::format("{}: beds differ so much that {} of them would not reach {}", stage_.id, most_beds,
-                                   budget_.text));
+      console_.warning(
+          fmt::format("{}: beds differ so much that even {} beds do not reach the wanted error of {}. The largest "
+                      "number of beds is used",
+                      stage_.id, most_beds, budget_.text));
   }
 
   Json record_of(const EffortChoice& choice, const Scalable::Changes& changes, const EffortReading& pilot) const {
@@ -404,8 +406,8 @@ std::vector<const PlannedStage*> scalable_stages(const Plan& plan) {
   if (!found.empty()) return found;
   const JsonNode* stages = plan.document.find("stages");
   throw ConfigError({{plan.file, stages->at, "/stages",
-                      "--budget: no stage here is a bed of its own that can be measured for longer or shorter",
-                      "Leave --budget out, or set the times and replicas of the stages yourself"}});
+                      "--budget: no stage of this recipe simulates a bed whose measured time can be chosen",
+                      "Leave --budget out, and set the times and replicas of the stages in the recipe"}});
 }
 
 }  // namespace
@@ -419,7 +421,7 @@ BudgetedPlan choose_by_budget(const Plan& plan, const Budget& budget, const RunO
   JsonNode document = plan.document;
   Json record{{"asked", budget.text}, {"stages", Json::array()}};
   for (const PlannedStage* stage : stages) {
-    console.message(fmt::format("{}: a pilot for --budget", stage->id));
+    console.message(fmt::format("{}: pilot run for --budget", stage->id));
     Json one;
     for (const auto& [pointer, value] : StageBudget(plan, *stage, share, options, console).choose(one))
       set_pointer(document, stage->pointer + pointer, to_node(value));
@@ -439,8 +441,8 @@ std::vector<std::string> reached_by_budget(const Plan& plan, const Json& record,
     const EffortReading reading =
         scalable.read(effort, input_of(plan.stages[i], outcome.out).result(), stage.cost->timings);
     const double squares = std::max(squared(few_beds_factor(effort.beds) * reading.spread), squared(reading.within));
-    lines.push_back(fmt::format("{}: {} has a stated error of {} (expected {}), in {} of the processor (expected {})",
-                                stage.id, scalable.number(), per_cent(std::sqrt(squares / effort.beds)),
+    lines.push_back(fmt::format("{}: stated error of {}: {} (expected {}). Processor time: {} (expected {})", stage.id,
+                                scalable.number(), per_cent(std::sqrt(squares / effort.beds)),
                                 per_cent(one.at("stated_error").get<double>()),
                                 duration_text(reading.settling_work.cpu_seconds + reading.measuring_work.cpu_seconds),
                                 duration_text(one.at("cpu_seconds").get<double>())));

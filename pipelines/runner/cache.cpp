@@ -71,7 +71,7 @@ StageRecord StageRecord::from_json(const Json& json, const std::string& file) {
     record.failed_checks = json.at("failed_checks").get<std::vector<std::string>>();
     return record;
   } catch (const nlohmann::json::exception&) {
-    throw InputError(file + ": is not the record of a stage");
+    throw InputError(file + ": this file is not the record of a stage; remove it, and the stage runs again");
   }
 }
 
@@ -154,12 +154,12 @@ std::vector<std::string> differences(const Json& before, const Json& after) {
     if (key.ends_with("/$comment")) continue;  // written from the options themselves
     const auto old = left.find(key);
     if (old == left.end())
-      out.push_back(fmt::format("{} is new: {}", key, value));
+      out.push_back(fmt::format("{} was added: {}", key, value));
     else if (old->second != value)
       out.push_back(fmt::format("{} changed {} → {}", key, old->second, value));
   }
   for (const auto& [key, value] : left) {
-    if (!right.contains(key)) out.push_back(fmt::format("{} is gone (was {})", key, value));
+    if (!right.contains(key)) out.push_back(fmt::format("{} was removed (it was {})", key, value));
   }
   return out;
 }
@@ -168,7 +168,7 @@ std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::opt
                                         const std::filesystem::path& stage_directory) {
   if (!found) return {"it has not run yet"};
   std::vector<std::string> reasons;
-  if (found->stage != fresh.stage) return {fmt::format("it was a {} stage before", found->stage)};
+  if (found->stage != fresh.stage) return {fmt::format("in the last run it was a {} stage", found->stage)};
   if (found->code != fresh.code) {
     const std::optional<StageCost> cost = read_cost(stage_directory);
     reasons.push_back(fmt::format("the code of {} changed{}", fresh.stage,
@@ -188,13 +188,13 @@ std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::opt
   for (const Fingerprint& file : fresh.inputs) {
     const auto old = before.find(file.file);
     if (old == before.end())
-      changed_inputs.push_back(fmt::format("input {} is new", file.file));
+      changed_inputs.push_back(fmt::format("input {} was added", file.file));
     else if (old->second != file.fast)
       changed_inputs.push_back(fmt::format("input {} changed", file.file));
     else
       ++same_inputs;
   }
-  if (same_inputs + changed_inputs.size() < before.size()) changed_inputs.push_back("some of its inputs are gone");
+  if (same_inputs + changed_inputs.size() < before.size()) changed_inputs.push_back("some of its inputs were removed");
   if (changed_inputs.size() > 3) {
     const std::size_t more = changed_inputs.size() - 2;
     changed_inputs.resize(2);
@@ -209,7 +209,7 @@ std::vector<std::string> reasons_to_run(const StageRecord& fresh, const std::opt
     if (error) {
       reasons.push_back(fmt::format("its output {} is missing", file.file));
     } else if (size != file.bytes || fast_hash_of_file(path) != file.fast) {
-      reasons.push_back(fmt::format("its output {} was changed since", file.file));
+      reasons.push_back(fmt::format("its output {} was changed after the run", file.file));
     }
     if (reasons.size() >= 3) break;
   }

@@ -53,9 +53,10 @@ std::vector<std::string> GatheredWarnings::lines() const {
     const std::size_t named = std::min(most_named, points.size());
     const std::string names =
         fmt::format("{}", fmt::join(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(named), ", "));
-    lines.push_back(points.size() == 1 ? fmt::format("{} (point {})", first, names)
-                                       : fmt::format("{} ({} points: {}{}; the numbers are those of the first)", first,
-                                                     points.size(), names, points.size() > named ? ", ..." : ""));
+    lines.push_back(points.size() == 1
+                        ? fmt::format("{} (point {})", first, names)
+                        : fmt::format("{} ({} points: {}{}; the numbers in this message are those of the first point)",
+                                      first, points.size(), names, points.size() > named ? ", ..." : ""));
   }
   return lines;
 }

@@ -156,7 +156,7 @@ class PlanBuilder {
     const JsonNode& root = plan_.document;
     const JsonNode* list = root.find("stages");
     if (list == nullptr)
-      return problem(root, "/stages", "\"stages\" is missing: an array of stages is needed",
+      return problem(root, "/stages", "\"stages\" is missing: a recipe needs an array of stages",
                      "Add \"stages\": [{\"stage\": \"simulate\", ...}]");
     if (!list->is_array())
       return problem(*list, "/stages", fmt::format("expected an array of stages, got {}", list->described()));
@@ -168,7 +168,8 @@ class PlanBuilder {
   void read_stage(const JsonNode& item, std::size_t index) {
     const std::string pointer = pointer_join("/stages", index);
     if (problems_.size() >= most_problems) {
-      problem(item, pointer, fmt::format("more than {} mistakes: the rest is not checked", most_problems));
+      problem(item, pointer,
+              fmt::format("the recipe has more than {} mistakes; the rest of it was not checked", most_problems));
       throw_problems();
     }
     if (!item.is_object())
@@ -189,7 +190,7 @@ class PlanBuilder {
       return problem(
           id != nullptr ? *id : item, id != nullptr ? pointer + "/id" : pointer,
           fmt::format("two stages would write to the folder \"{}\": this one and /stages/{}", draft.id, same->index),
-          "Give one of them an \"id\" of its own");
+          "Give one of them a different \"id\"");
     drafts_.push_back(std::move(draft));
   }
 
@@ -197,8 +198,8 @@ class PlanBuilder {
     const JsonNode* kind = item.find("stage");
     const std::vector<std::string> kinds = kinds_of_stages();
     if (kind == nullptr || !kind->is_string()) {
-      problem(kind != nullptr ? *kind : item, pointer + "/stage", "\"stage\" must name the kind of the stage",
-              fmt::format("One of {}", fmt::join(kinds, ", ")));
+      problem(kind != nullptr ? *kind : item, pointer + "/stage", "\"stage\" must be the kind of the stage",
+              fmt::format("Choose from: {}", fmt::join(kinds, ", ")));
       return nullptr;
     }
     const StageRow* row = find_stage(kind->text);
@@ -206,7 +207,7 @@ class PlanBuilder {
       const std::string nearest = nearest_name(kind->text, kinds);
       unread_.insert({kind->text, nearest});
       problem(*kind, pointer + "/stage", fmt::format("there is no stage \"{}\"", kind->text),
-              nearest.empty() ? fmt::format("There are {}", fmt::join(kinds, ", "))
+              nearest.empty() ? fmt::format("Choose from: {}", fmt::join(kinds, ", "))
                               : fmt::format("Did you mean \"{}\"?", nearest));
     }
     return row;
@@ -216,10 +217,13 @@ class PlanBuilder {
     const bool reserved =
         std::find(reserved_ids.begin(), reserved_ids.end(), id.text.substr(0, id.text.find('.'))) != reserved_ids.end();
     if (good_id(id.text) && !reserved) return;
-    problem(id, pointer + "/id",
-            reserved ? fmt::format("the id \"{}\" is one that OUT uses itself", id.text)
-                     : fmt::format("\"{}\" cannot be an id: it names a folder inside OUT", id.text),
-            "Use letters, digits, '-', '_' and '.', not starting with '.' or '-'");
+    problem(
+        id, pointer + "/id",
+        reserved
+            ? fmt::format("the id \"{}\" is reserved: the program uses this name in the results folder OUT", id.text)
+            : fmt::format("\"{}\" cannot be an id, because the id is the name of a folder in the results folder OUT",
+                          id.text),
+        "Use letters, digits, '-', '_' and '.', not starting with '.' or '-'");
   }
 
   void read_arrows(Draft& draft) {
@@ -244,8 +248,8 @@ class PlanBuilder {
     } else if (count > row.most_inputs) {
       problem(*from, pointer,
               row.most_inputs == 0
-                  ? fmt::format("{} reads no other stage's results", row.name)
-                  : fmt::format("names {} stages, {} reads at most {}", count, row.name, row.most_inputs));
+                  ? fmt::format("{} does not read the results of other stages", row.name)
+                  : fmt::format("\"from\" names {} stages, but {} reads at most {}", count, row.name, row.most_inputs));
     }
   }
 
@@ -261,18 +265,20 @@ class PlanBuilder {
       }
       const std::string nearest = nearest_name(node.text, ids);
       return problem(node, where, fmt::format("there is no stage with the id \"{}\"", node.text),
-                     nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
+                     nearest.empty() ? fmt::format("Choose from: {}", fmt::join(ids, ", "))
                                      : fmt::format("Did you mean \"{}\"?", nearest));
     }
     const auto target = static_cast<std::size_t>(found - ids.begin());
     const std::string_view kind = drafts_[target].row->name;
     if (std::find(draft.arrows.begin(), draft.arrows.end(), target) != draft.arrows.end())
-      return problem(node, where, fmt::format("names \"{}\" twice", node.text));
+      return problem(node, where, fmt::format("\"from\" names \"{}\" twice", node.text));
     if (std::find(row.accepts.begin(), row.accepts.end(), kind) == row.accepts.end())
       return problem(
           node, where,
           fmt::format("\"{}\" is a stage of kind {}, and {} does not read its results", node.text, kind, row.name),
-          row.accepts.empty() ? "" : fmt::format("It reads those of {}", fmt::join(row.accepts, ", ")));
+          row.accepts.empty()
+              ? ""
+              : fmt::format("It reads the results of these kinds of stages: {}", fmt::join(row.accepts, ", ")));
     draft.arrows.push_back(target);
   }
 
@@ -300,8 +306,9 @@ class PlanBuilder {
       if (first == nullptr) first = &drafts_[i];
     }
     problem(*first->node->find("from"), pointer_join("/stages", first->index) + "/from",
-            fmt::format("these stages read from one another in a circle: {}", fmt::join(circle, ", ")),
-            "A stage can only read what was finished before it");
+            fmt::format("these stages need one another in a circle, so none of them can run first: {}",
+                        fmt::join(circle, ", ")),
+            "Remove one of their \"from\"");
   }
 
   void read_options(std::size_t i) {
@@ -384,7 +391,7 @@ class PlanBuilder {
       return tokens.size() > 2 && one.pointer == pointer_join("/stages", tokens[1]);
     });
     if (tokens.size() < 3 || tokens[0] != "stages" || stage == plan_.stages.end())
-      return problem(node, where, fmt::format("\"{}\" leads to no stage of this recipe", pointer),
+      return problem(node, where, fmt::format("\"{}\" does not lead to a stage of this recipe", pointer),
                      "Write /stages/<id or number>/<key>");
     const Json* at = &stage->options;
     for (std::size_t k = 2; k < tokens.size(); ++k) {
@@ -397,7 +404,7 @@ class PlanBuilder {
       if (next == nullptr) {
         const std::string nearest = nearest_name(tokens[k], names);
         return problem(node, where, fmt::format("\"{}\": {} has no option \"{}\"", pointer, stage->id, tokens[k]),
-                       nearest.empty() ? fmt::format("There are {}", fmt::join(names, ", "))
+                       nearest.empty() ? fmt::format("Choose from: {}", fmt::join(names, ", "))
                                        : fmt::format("Did you mean \"{}\"?", nearest));
       }
       at = next;

@@ -93,7 +93,7 @@ void relocate(std::vector<Problem>& problems, const std::vector<Relocation>& cha
       return problem.pointer == one.first || problem.pointer.starts_with(one.first + "/");
     });
     if (change != changes.end()) {
-      problem.what += fmt::format(" (this becomes {})", problem.pointer);
+      problem.what += fmt::format(" (the preset or sweep sets {})", problem.pointer);
       problem.pointer = change->second;
     } else {
       problem.what += circumstances;
@@ -107,9 +107,8 @@ std::vector<Relocation> apply_preset(JsonNode& document, const std::string& file
   const JsonNode presets = *document.find("presets");
   if (std::find(names.begin(), names.end(), name) == names.end()) {
     const std::string nearest = nearest_name(name, names);
-    throw UsageError(fmt::format("--preset {}: {}:{}:{}: /presets: there is none of this name; there {} {}{}", name,
-                                 file, presets.at.line, presets.at.column, names.size() == 1 ? "is" : "are",
-                                 fmt::join(names, ", "),
+    throw UsageError(fmt::format("--preset {}: {}:{}:{}: /presets: there is no preset of this name; choose from: {}{}",
+                                 name, file, presets.at.line, presets.at.column, fmt::join(names, ", "),
                                  nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest)));
   }
   std::vector<Problem> problems;

@@ -31,7 +31,9 @@ void add_data(JsonNode& document, const std::string& file) {
       set_pointer(stage, pointer_join("", row->data_option), std::move(path));
     }
   }
-  if (!found) throw UsageError("--data: no stage of the recipe draws the points (a figure stage does)");
+  if (!found)
+    throw UsageError(
+        "--data: no stage of this recipe draws the points. Leave --data out, or add a figure stage to the recipe");
 }
 
 class RecipeReader {
@@ -78,7 +80,7 @@ class RecipeReader {
       });
     });
     seen_.insert(seen_.end(), fresh.begin(), fresh.end());
-    if (preset) relocate(fresh, changed, fmt::format(" (with the preset \"{}\")", *preset));
+    if (preset) relocate(fresh, changed, fmt::format(" (after the preset \"{}\" was applied)", *preset));
     problems_.insert(problems_.end(), fresh.begin(), fresh.end());
   }
 

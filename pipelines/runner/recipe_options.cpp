@@ -11,23 +11,23 @@ void describe_common(Fields& fields, CommonOptions& common, const StageRow& row)
   if (row.uses_seed) fields.integer("seed", common.seed, {.help = "seed of the random number generator"});
   const std::vector<Choice<bool>> units{{false, "SI"}, {true, "reduced"}};
   fields.choice("units", common.reduced, units,
-                {.help = "SI: quantities are strings with a unit or numbers in SI. reduced: plain numbers, lengths in "
-                         "D, masses in m, g or the starting T equal to 1"});
+                {.help = "system of units. \"SI\": strings with a unit, or plain numbers in SI. \"reduced\": plain "
+                         "numbers, with lengths in D and masses in m; g is 1 or, without gravity, the initial T is 1"});
 }
 
 namespace {
 
 void describe_published(Fields& f, PublishedNumber& number) {
   f.text("number", number.pointer,
-         {.help = "number of this recipe: /<stage id>/<name in its result>", .required = true});
+         {.help = "pointer to a number of this recipe: /<stage id>/<name in its result>", .required = true});
   f.text("label", number.label, {.help = "name of the number in the report", .required = true});
   f.text("value", number.value, {.help = "published value, with its unit", .required = true});
-  f.text("place", number.place, {.help = "place in the paper"});
+  f.text("place", number.place, {.help = "place in the paper, for instance a figure or an equation"});
   f.number("relative", number.relative,
            {.help = "relative difference up to which the numbers agree", .range = non_negative});
-  f.boolean(
-      "beside_answer", number.beside_answer,
-      {.help = "whether it stands beside the answer, at the top of the report. The first of the list always does"});
+  f.boolean("beside_answer", number.beside_answer,
+            {.help = "whether this number is shown beside the answer, at the top of the report. The first of the list "
+                     "always is"});
   if (!f.decoding()) return;
   try {
     if (!number.value.empty()) parse_quantity(number.value);
@@ -40,7 +40,7 @@ void describe_report(Fields& fields, ReportOptions& report) {
   fields.text("title", report.title, {.help = "headline of report.html"});
   fields.texts("text", report.text, {.help = "paragraphs under the headline"});
   fields.array<PublishedNumber>("published", report.published, describe_published,
-                                {.help = "published numbers to be compared with our numbers"});
+                                {.help = "published numbers with which the report compares the results"});
   fields.array<AssumedInput>("assumed", report.assumed,
                              [](Fields& f, AssumedInput& input) {
                                f.text("input", input.pointer,
@@ -63,11 +63,12 @@ void describe_top(Fields& fields, RecipeTop& top) {
       {.help = "name of the recipe; the results folder is results/<name>", .required = true, .example = "\"my-bed\""});
   fields.text("description", top.description, {.help = "purpose of the recipe"});
   fields.object<ReportOptions>("report", top.report, describe_report,
-                               {.help = "text of report.html besides the results"});
-  fields.object<SweepOptions>("sweep", top.sweep, describe_sweep, {.help = "sweep: the recipe is run at many points"});
+                               {.help = "title, text and published numbers of report.html"});
+  fields.object<SweepOptions>("sweep", top.sweep, describe_sweep,
+                              {.help = "sweep: values of options at which the recipe is run"});
   fields.any("presets", top.presets,
              {.help = "named sets of changes for --preset NAME: {\"quick\": {\"/stages/bed/measure\": \"2 s\"}}"});
-  fields.text("$preset", top.preset, {.help = "in resolved.json: the preset whose values these are"});
+  fields.text("$preset", top.preset, {.help = "name of the applied preset (written by the program in resolved.json)"});
 }
 
 }  // namespace shakebed::pipelines

@@ -169,7 +169,7 @@ std::string inputs_text(const StageRow& row) {
 std::string reference_index() {
   std::string text = "# Stages\n\n| stage | what it does |\n|---|---|\n";
   for (const StageRow& row : stage_table()) text += fmt::format("| `{}` | {} |\n", row.name, row.summary);
-  return text + "\n`shakebed reference STAGE` describes one: its options, its numbers and its tables.\n";
+  return text + "\n`shakebed reference STAGE` describes the options, the numbers and the tables of one stage.\n";
 }
 
 std::string reference_page(const StageRow& row) {
@@ -186,9 +186,8 @@ std::string recipe_reference_page() {
   OptionTable table;
   table.add_all(schema, "");
   return fmt::format(
-      "# recipe\nA recipe is a JSON file. It holds the list \"stages\", each with the options of its own page, and "
-      "these "
-      "options.\n\n## Options\n{}{}",
+      "# recipe\nA recipe is a JSON file. It contains the list \"stages\" and the options below. The options of a "
+      "stage are on its own page.\n\n## Options\n{}{}",
       options_note, table.text);
 }
 

@@ -139,7 +139,7 @@ std::vector<StageOutcome> explain(const Plan& plan, const RunOptions& options) {
     if (outcome.record && !waiting_for.empty()) {
       outcome.reasons.push_back(fmt::format("{} runs before it", fmt::join(waiting_for, ", ")));
     }
-    if (outcome.reasons.empty() && options.force) outcome.reasons.push_back("--force asks for it");
+    if (outcome.reasons.empty() && options.force) outcome.reasons.push_back("--force was given");
     outcome.state = outcome.reasons.empty() ? StageState::kept : StageState::waiting;
     stages.push_back(std::move(outcome));
   }
@@ -152,7 +152,7 @@ std::string explanation_text(const std::vector<StageOutcome>& stages) {
     if (stage.state == StageState::kept) {
       out += fmt::format("{}: up to date\n", stage.id);
     } else if (stage.state == StageState::not_selected) {
-      out += fmt::format("{}: not selected{}\n", stage.id, stage.record ? ", used as it is" : "");
+      out += fmt::format("{}: not selected{}\n", stage.id, stage.record ? ", its existing results are used" : "");
     } else {
       out += fmt::format("{}: runs: {}\n", stage.id, fmt::join(stage.reasons, "; "));
     }
@@ -163,7 +163,7 @@ std::string explanation_text(const std::vector<StageOutcome>& stages) {
 namespace {
 
 constexpr const char* interrupted_words =
-    "interrupted. What is finished is kept; the same command, started again, continues";
+    "interrupted. Finished results are kept. Start the same command again to continue";
 
 // The stages of a plan, one after another.
 class StagesRun {
@@ -197,8 +197,9 @@ class StagesRun {
     for (const std::size_t k : plan_.stages[i].from) {
       if (!outcome_.stages[k].record)
         return stop(i, StageState::failed, exit_input,
-                    fmt::format("it reads from \"{}\", which has not run here; run without --only and --from first",
-                                plan_.stages[k].id));
+                    fmt::format("this stage needs the results of \"{}\", which are not in {}. First run the recipe "
+                                "once without --only and --from",
+                                plan_.stages[k].id, options_.out.string()));
     }
     try {
       make(i, std::move(found));
@@ -249,7 +250,7 @@ class StagesRun {
     StageOutcome& result = outcome_.stages[i];
     StageWork to_do = work(i);
     result.reasons = reasons_to_run(to_do.fresh, found, options_.out / result.id);
-    if (result.reasons.empty() && options_.force) result.reasons.push_back("--force asks for it");
+    if (result.reasons.empty() && options_.force) result.reasons.push_back("--force was given");
     if (result.reasons.empty()) {
       std::error_code ignored;  // what a kill between publishing and tidying up has left
       if (has_scratch_) fs::remove_all(scratch_folder(options_.out, to_do.fresh), ignored);
@@ -378,7 +379,8 @@ RunOutcome run_pipeline(const Plan& plan, const RunOptions& options, const Pages
   try {
     fs::create_directories(options.out);
   } catch (const fs::filesystem_error& error) {
-    throw StageError(fmt::format("{}: cannot be made: {}", options.out.string(), error.code().message()));
+    throw StageError(
+        fmt::format("{}: this folder cannot be created: {}", options.out.string(), error.code().message()));
   }
   const FolderLock lock(options.out);
   remove_leftovers(options.out);

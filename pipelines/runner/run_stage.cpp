@@ -82,11 +82,12 @@ void check_inputs_stayed(const StageWork& work, const fs::path& out) {
     const fs::path path = external ? fs::path(stage.input_files[i - first_external].second) : out / was.file;
     std::error_code error;
     const auto bytes = fs::file_size(path, error);
-    if (error) throw StageError(fmt::format("{}: was deleted while it was read; run again", path.string()));
+    if (error)
+      throw StageError(fmt::format("{}: this file was deleted while the stage read it. Run again", path.string()));
     if (external && work.stamps[i - first_external] && stamp_of(path) == work.stamps[i - first_external]) continue;
     if (bytes != was.bytes || fast_hash_of_file(path) != was.fast)
-      throw StageError(
-          fmt::format("{}: changed while it was read, or differs from its record; run again", path.string()));
+      throw StageError(fmt::format(
+          "{}: this file changed while the stage read it, or it differs from its record. Run again", path.string()));
   }
 }
 
@@ -112,7 +113,7 @@ class StageRun : public RunContext {
     try {
       fs::create_directories(scratch_);
     } catch (const fs::filesystem_error& error) {
-      throw StageError(fmt::format("{}: cannot be made: {}", scratch_.string(), error.code().message()));
+      throw StageError(fmt::format("{}: this folder cannot be created: {}", scratch_.string(), error.code().message()));
     }
     return scratch_;
   }

@@ -34,9 +34,9 @@ void require_empty_queue(const fs::path& submitted) {
   const ProcessResult queue =
       run_process({"squeue", "--noheader", "--format=%i %T", "--jobs=" + job + "," + gather}, fs::current_path());
   if (queue.exit_code == 0 && queue.output.find_first_not_of(" \n") != std::string::npos)
-    throw StageError(
-        fmt::format("jobs {},{} of this sweep are still in the queue; wait for them, or end them first: scancel {} {}",
-                    job, gather, job, gather));
+    throw StageError(fmt::format(
+        "jobs {},{} of this sweep are still in the queue. Wait until they end, or cancel them: scancel {} {}", job,
+        gather, job, gather));
 }
 
 // Shards with something left to do, as Slurm writes them: "1-3,7". Points that were computed under another number are
@@ -101,10 +101,11 @@ std::string submit(const std::vector<std::string>& arguments) {
   std::string id = result.output.substr(0, result.output.find_first_of(";\n"));
   if (result.exit_code != 0 || id.empty() ||
       !std::all_of(id.begin(), id.end(), [](unsigned char c) { return std::isdigit(c); }))
-    throw StageError(fmt::format("sbatch refused (exit code {}): {}{}", result.exit_code, result.output,
-                                 std::getenv("SLURM_CONF") == nullptr
-                                     ? " If Slurm has a configuration of your own, set SLURM_CONF in this shell"
-                                     : ""));
+    throw StageError(
+        fmt::format("sbatch did not accept the job (exit code {}): {}{}", result.exit_code, result.output,
+                    std::getenv("SLURM_CONF") == nullptr
+                        ? " If your Slurm uses its own configuration file, set SLURM_CONF to its path in this shell"
+                        : ""));
   return id;
 }
 
@@ -112,9 +113,9 @@ std::string submit(const std::vector<std::string>& arguments) {
 
 int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console) {
   if (!plan.sweep)
-    throw UsageError("this recipe has no \"sweep\": there is only one point, and nothing to spread over a cluster");
+    throw UsageError("this recipe has no \"sweep\", so there is only one point. Add a sweep, or use shakebed run");
   const std::vector<SweepPoint> points = sweep_points(plan);
-  if (points.empty()) throw UsageError("the sweep has no points");
+  if (points.empty()) throw UsageError("the sweep has no points; give its options at least one value");
   const std::size_t shards = std::min<std::size_t>(static_cast<std::size_t>(options.shards), points.size());
   const fs::path folder = options.out / "slurm", submitted = folder / "submitted.json";
   if (!options.dry_run) require_empty_queue(submitted);
@@ -123,7 +124,7 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   try {
     fs::create_directories(folder);
   } catch (const fs::filesystem_error& problem) {
-    throw StageError(fmt::format("{}: cannot be made: {}", folder.string(), problem.code().message()));
+    throw StageError(fmt::format("{}: this folder cannot be created: {}", folder.string(), problem.code().message()));
   }
   write_scripts(plan, options, shards, folder);
 
@@ -160,8 +161,8 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
     fmt::print("{}", dump(record));
   } else {
     if (runs) fmt::print("job {} (array {}), then ", record["job"].get<std::string>(), tasks.text);
-    fmt::print("job {} gathers\nlogs: {}\nlook: shakebed status {}\n", record["gather_job"].get<std::string>(),
-               folder.string(), options.out.string());
+    fmt::print("job {} gathers the results\nlogs: {}\nprogress: shakebed status {}\n",
+               record["gather_job"].get<std::string>(), folder.string(), options.out.string());
   }
   return exit_ok;
 }

@@ -71,7 +71,7 @@ class SweepRun {
         shared_(options.out, options.force) {
     if (arguments.gather && arguments.shard)
       throw UsageError("--gather works on the whole sweep and excludes --shard: give one of the two");
-    if (all_.empty()) throw UsageError("the sweep has no points");
+    if (all_.empty()) throw UsageError("the sweep has no points; give its options at least one value");
   }
 
   int operator()() {
@@ -81,7 +81,8 @@ class SweepRun {
       fs::create_directories(points_dir_);
       write_file_atomically(points_dir_ / count_record, dump(Json{{"points", all_.size()}}));
     } catch (const fs::filesystem_error& error) {
-      throw StageError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.code().message()));
+      throw StageError(
+          fmt::format("{}: this folder cannot be created: {}", options_.out.string(), error.code().message()));
     }
     install_interrupt_handler();
     for (const Warning& warning : plan_.warnings) console_.warning(to_string(warning.problem));
@@ -141,7 +142,8 @@ class SweepRun {
     if (arguments_.dry_run || places.empty()) return places;
     if (move_to_own_places(places, points_dir_))
       console_.message(fmt::format(
-          "{} points have another number in this sweep than before; their folders were renamed", places.size()));
+          "the numbers of {} points changed since the last run of this sweep; the folders of these points were renamed",
+          places.size()));
     return {};
   }
 
@@ -159,7 +161,7 @@ class SweepRun {
         values += fmt::format(" {}={}", plan_.sweep->axes[a].pointer, value_text(one.point->values[a]));
       fmt::print("{}:{}: {}\n", one.point->name, values,
                  one.done      ? "up to date"
-                 : one.earlier ? "runs again: it failed or was asked for"
+                 : one.earlier ? "runs again: it failed before, or --force was given"
                                : "runs");
     }
     fmt::print("{} of {} points to run\n", mine_.size() - kept_, mine_.size());
@@ -168,7 +170,11 @@ class SweepRun {
 
   void run_points() {
     if (arguments_.gather) {
-      console_.message(fmt::format("{} points, {} up to date: gathered, none is run", mine_.size(), kept_));
+      const std::size_t missing = mine_.size() - kept_;
+      console_.message(fmt::format(
+          "{} points, {} of them up to date. --gather collects the existing results and runs no points{}", mine_.size(),
+          kept_,
+          missing == 0 ? "" : fmt::format(". Run the same command without --gather to compute the other {}", missing)));
       return;
     }
     const int workers =
@@ -274,7 +280,8 @@ class SweepRun {
     try {
       pages_.write(at, outcome);
     } catch (const Error& error) {
-      console_.warning(fmt::format("{}: its page could not be written: {}", outcome.out.string(), error.what()));
+      console_.warning(fmt::format("{}: the report page of this point could not be written: {}", outcome.out.string(),
+                                   error.what()));
     }
   }
 
@@ -361,8 +368,10 @@ class SweepRun {
   void say_failures() {
     for (const std::string& warning : warnings_.lines()) console_.warning(warning);
     for (const std::string& failure : failures_) console_.error(failure);
-    if (failed_ > failures_.size()) console_.error(fmt::format("and {} more points", failed_ - failures_.size()));
-    if (busy_ > 0) console_.warning(fmt::format("{} points are being run by another process", busy_.load()));
+    if (failed_ > failures_.size()) console_.error(fmt::format("{} more points failed", failed_ - failures_.size()));
+    if (busy_ > 0)
+      console_.warning(fmt::format(
+          "{} points were skipped because another process is running them. Run again when it has ended", busy_.load()));
   }
 
   ExitCode exit_code() const {
@@ -397,9 +406,9 @@ class SweepRun {
       arguments_.result = std::move(summary);
     } else {
       fmt::print("{} of {} points done{} in {}\n", there_, all_.size(),
-                 failed_ > 0 ? fmt::format(", {} failed: run again to retry them alone", failed_.load()) : "",
+                 failed_ > 0 ? fmt::format(", {} failed (run again to repeat only these)", failed_.load()) : "",
                  duration_text(seconds));
-      if (interrupted_) fmt::print("interrupted: the same command, started again, runs the rest\n");
+      if (interrupted_) fmt::print("interrupted. Start the same command again to run the remaining points\n");
       if (!verdicts_.empty()) fmt::print("{}\n", verdicts_text(verdicts_));
       fmt::print("table: {}\n", (options_.out / "sweep.csv").string());
     }

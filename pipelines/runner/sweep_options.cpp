@@ -23,7 +23,8 @@ class SweepReader {
       read_points();
     else
       check_axes();
-    if (sweep_.kind == SweepKind::random) fields_.require(sweep_.count > 0, "count", "a random sweep needs \"count\"");
+    if (sweep_.kind == SweepKind::random)
+      fields_.require(sweep_.count > 0, "count", "a random sweep needs \"count\", the number of points");
   }
 
  private:
@@ -38,7 +39,7 @@ class SweepReader {
       tokens = split_pointer(pointer);
     } catch (const UsageError&) {}
     if (tokens.size() < 3 || tokens[0] != "stages")
-      bad(where, fmt::format("\"{}\" is no pointer to an option of a stage", pointer),
+      bad(where, fmt::format("\"{}\" is not a pointer to an option of a stage", pointer),
           "Write /stages/<id or number>/<key>, for example \"/stages/bed/floor/gamma\"");
   }
 
@@ -62,7 +63,7 @@ class SweepReader {
         axis.values.push_back(member.value.items[i].to_json());
         axis.places.push_back(place_of(member.value.items[i], pointer_join(where, i)));
       }
-      if (axis.values.empty()) bad(where, "has no values");
+      if (axis.values.empty()) bad(where, "the list of values is empty");
     } else if (member.value.is_object()) {
       if (!read_range(member.value, where, axis)) return;
     } else {
@@ -92,7 +93,9 @@ class SweepReader {
     if (!axis.logarithmic && !(scale->is_string() && scale->text == "linear"))
       return bad(where + "/scale", "expected \"linear\" or \"logarithmic\""), false;
     if (axis.logarithmic && !(axis.low > 0 && axis.high > 0))
-      return bad(where, "a logarithmic range must lie above 0"), false;
+      return bad(where, fmt::format("both ends of a logarithmic range must be above 0, got {} and {}",
+                                    number_text(axis.low), number_text(axis.high))),
+             false;
     return true;
   }
 
@@ -101,7 +104,7 @@ class SweepReader {
     for (const JsonMember& member : range.members) {
       if (std::find(known.begin(), known.end(), member.key) == known.end())
         bad(pointer_join(where, member.key), fmt::format("unknown key \"{}\"", member.key),
-            "Known here: from, to, count, scale");
+            "Choose from: from, to, count, scale");
     }
     Quantity low, high;
     if (!read_bound(range, "from", where, low) || !read_bound(range, "to", where, high)) return false;
@@ -136,7 +139,7 @@ class SweepReader {
 
   // A list: every pointer that a point names is an axis, and the axes are read side by side.
   void read_points() {
-    if (!sweep_.axes.empty()) bad("/over", "a list sweep has \"points\", not \"over\"");
+    if (!sweep_.axes.empty()) bad("/over", "a list sweep uses \"points\" and does not accept \"over\"");
     const JsonNode* points = fields_.written("points");
     if (points == nullptr || !points->is_array() || points->items.empty())
       return bad("/points", "a list sweep needs \"points\": [{pointer: value, ...}, ...]");
@@ -171,13 +174,14 @@ class SweepReader {
     const JsonNode* over = fields_.written("over");
     if (over == nullptr || (over->is_object() && over->members.empty()))
       bad("/over", "a sweep needs at least one pointer in \"over\"");
-    if (fields_.has("points")) bad("/points", "only a list sweep has \"points\"", "Write \"kind\": \"list\"");
+    if (fields_.has("points")) bad("/points", "only a list sweep accepts \"points\"", "Write \"kind\": \"list\"");
     if (sweep_.kind != SweepKind::zip || sweep_.axes.empty()) return;
     const SweepAxis& first = sweep_.axes.front();
     for (const SweepAxis& axis : sweep_.axes) {
       if (axis.values.size() == first.values.size()) continue;
-      bad(pointer_join("/over", axis.pointer), fmt::format("has {} values, {} has {}: zip needs as many of each",
-                                                           axis.values.size(), first.pointer, first.values.size()));
+      bad(pointer_join("/over", axis.pointer),
+          fmt::format("this list has {} values, but {} has {}: in a zip sweep all lists must be of the same length",
+                      axis.values.size(), first.pointer, first.values.size()));
     }
   }
 
@@ -190,16 +194,18 @@ class SweepReader {
 void describe_sweep(Fields& fields, SweepOptions& sweep) {
   const std::vector<Choice<SweepKind>> kinds{
       {SweepKind::grid, "grid"}, {SweepKind::zip, "zip"}, {SweepKind::list, "list"}, {SweepKind::random, "random"}};
-  fields.choice("kind", sweep.kind, kinds,
-                {.help = "kind of sweep. Grid: every combination of the values. Zip: the first values together, then "
-                         "the second, and so on. List: the points in \"points\". Random: uniform in the ranges"});
+  fields.choice(
+      "kind", sweep.kind, kinds,
+      {.help =
+           "kind of sweep. Grid: every combination of the values. Zip: the first values of all options, then the "
+           "second, and so on. List: the points in \"points\". Random: uniformly distributed points in the ranges"});
   Json over = Json::object(), points = Json::array();
   fields.any("over", over,
-             {.help = "varied options: JSON pointer into the recipe → list of values, or {\"from\", \"to\", \"count\", "
-                      "\"scale\"} with the scale linear or logarithmic"});
-  fields.any("points", points, {.help = "points of a list: objects with JSON pointer → value"});
-  fields.integer("count", sweep.count, {.help = "number of random points", .range = non_negative});
-  fields.integer("seed", sweep.seed, {.help = "seed of the random points"});
+             {.help = "varied options: JSON pointer into the recipe → list of values, or range {\"from\", \"to\", "
+                      "\"count\", \"scale\"} with a linear or logarithmic scale"});
+  fields.any("points", points, {.help = "points of a list sweep: objects with JSON pointer → value"});
+  fields.integer("count", sweep.count, {.help = "number of points of a random sweep", .range = non_negative});
+  fields.integer("seed", sweep.seed, {.help = "seed from which the points of a random sweep are drawn"});
   fields.integer("replicas", sweep.replicas,
                  {.help = "number of runs of each point, each with its own seed", .range = from_to(1, 1e6)});
   fields.texts("collect", sweep.collect, {.help = "pointers of the results that are collected in sweep.csv"});

@@ -85,8 +85,11 @@ std::vector<SweepPoint> sweep_points(const Plan& plan) {
   const double total = combinations(sweep), all = total * static_cast<double>(sweep.replicas);
   if (all > most_points) {
     const JsonNode* node = plan.document.find("sweep");
-    throw ConfigError({{plan.file, node != nullptr ? node->at : Position{}, "/sweep",
-                        fmt::format("{:.3g} points are too many (at most 10,000,000)", all), ""}});
+    throw ConfigError(
+        {{plan.file, node != nullptr ? node->at : Position{}, "/sweep",
+          fmt::format("the sweep has {:.3g} points, but at most 10,000,000 are possible; give fewer values or replicas",
+                      all),
+          ""}});
   }
   std::vector<SweepPoint> points;
   points.reserve(static_cast<std::size_t>(all));

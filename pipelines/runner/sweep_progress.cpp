@@ -84,8 +84,8 @@ std::vector<std::string> SweepProgress::long_points() const {
     for (std::size_t a = 0; a < plan_.sweep->axes.size(); ++a)
       values += fmt::format("{}{} = {}", a > 0 ? ", " : "", plan_.sweep->axes[a].pointer, value_text(point.values[a]));
     out.push_back(
-        fmt::format("point {} ({}) {}. To save the time, stop with Ctrl-C and leave the value out of the "
-                    "sweep or measure for a shorter time",
+        fmt::format("point {} ({}) {}. To save this time, stop with Ctrl-C. Then remove the value from the sweep, or "
+                    "measure for a shorter time",
                     point.name, values, long_part_text(part)));
   }
   return out;

@@ -103,8 +103,8 @@ Table sweep_table(const Plan& plan, const std::vector<std::string>& collected,
   }
   if (columns.size() < rows.front().size())
     columns.push_back({std::string(verdict_column), "",
-                       "of the answer: one temperature, model does not fit, no single temperature, or temperature not "
-                       "determined"});
+                       "verdict of the answer: one temperature, model does not fit, no single temperature, or "
+                       "temperature not determined"});
   Table table("the points of the sweep", columns);
   for (std::size_t r = 1; r < rows.size(); ++r) {
     std::vector<Cell> cells{rows[r][0], count_cell(std::atoll(rows[r][1].c_str())), rows[r][2]};

@@ -157,17 +157,17 @@ std::string animation_html(const std::filesystem::path& trajectory, double perio
   const Extent extent = extent_of(frames);
   return fmt::format(
       "<figure id=\"bed-in-motion\" class=\"bed\" data-scene=\"{}\" data-positions=\"{}\">\n<div class=\"stage\"><div "
-      "class=\"views\"><div class=\"picture\"><canvas role=\"img\" aria-label=\"the bed in "
-      "motion\"></canvas>\n<div class=\"controls\"><button type=\"button\">Play</button><input "
-      "type=\"range\" min=\"0\" value=\"0\" aria-label=\"frame of the bed\"><output></output></div></div>\n<div "
-      "class=\"side\"></div></div></div>\n<div class=\"still\">{}</div>\n<figcaption>{} disks, {} frames of the "
-      "trajectory{}. Two tones by the height at the "
-      "beginning show how the bed mixes. Profile: this frame (orange) beside the mean of all (blue); dashed: the "
-      "floor.</figcaption></figure>\n",
+      "class=\"views\"><div class=\"picture\"><canvas role=\"img\" aria-label=\"the bed in motion\"></canvas>\n<div "
+      "class=\"controls\"><button type=\"button\">Play</button><input type=\"range\" min=\"0\" value=\"0\" "
+      "aria-label=\"frame of the bed\"><output></output></div></div>\n<div class=\"side\"></div></div></div>\n<div "
+      "class=\"still\">{}</div>\n<figcaption>{} disks, {} frames of the trajectory{}. The two tones mark the height of "
+      "a disk at the beginning and show how the bed mixes. Profile: this frame (orange) beside the mean of all frames "
+      "(blue). Dashed line: the floor.</figcaption></figure>\n",
       attribute_text(scene_json(frames, extent, period > 0)), base64(position_bytes(frames, extent)),
       still_picture(frames.front(), extent.low, extent.high), frames.front().size(), frames.size(),
-      strobe ? ", in the order of the floor's phase: each is from another cycle, as under a stroboscope"
-             : " as time went");
+      strobe ? ", in the order of the floor's phase. Each frame is from a different period of the floor, as under a "
+               "stroboscope"
+             : " in the order of time");
 }
 
 }  // namespace shakebed::pipelines

@@ -20,7 +20,7 @@ inline void require_same_as_bed(Fields& fields, std::string_view key, std::optio
   fields.require(same_fact(*stated, *known), key,
                  fmt::format("is {} here, but {} in {}", quantity_text(*stated, dimension),
                              quantity_text(*known, dimension), bed->place),
-                 "Remove it here, since it is read from there, or correct one of the two");
+                 "Remove it here (the value of that stage is then used), or correct one of the two values");
 }
 
 }  // namespace shakebed::pipelines

@@ -63,7 +63,7 @@ class Judge {
   // Its time steps leave an error in the ledger, which hard disks do not have.
   void say_pressed(Json& out) const {
     if (number_at(joined_, "/energy_ledger/step_error").value_or(0) == 0) return;
-    append(out["why"], "the disks were soft while the bed was pressed on the floor");
+    append(out["why"], "the disks were simulated as soft disks while the bed was pressed on the floor");
   }
 
   [[nodiscard]] Json without_objection() const {
@@ -79,7 +79,7 @@ class Judge {
   bool at_rest() {
     if (!lies_still(joined_)) return false;
     object("at rest", fmt::format("the disks hardly move: T_x and T_z are below {:g} m g D", temperature_at_rest),
-           "Shake the bed harder. At Gamma below 1 the floor never leaves it");
+           "Use a larger Gamma: below Gamma = 1 the bed never leaves the floor");
     return true;
   }
 
@@ -104,10 +104,10 @@ class Judge {
     const auto effect = number_at(joined_, "/contact_duration_effect/value");
     if (!effect || !(*effect > allowed_contact_effect) || as_real_contacts()) return;
     object("contact duration too long",
-           fmt::format("T may be too high by about {:.2g} %, or more: the contact duration t_c makes {:.2g} % of the "
-                       "contacts elastic",
+           fmt::format("T may be too high by about {:.2g} % or more, because the contact duration t_c makes {:.2g} % "
+                       "of the contacts elastic",
                        100 * *effect, 100 * number_at(joined_, "/elastic_share/value").value_or(0)),
-           "Take a shorter \"contact_duration\", see the warning");
+           "Give a shorter \"contact_duration\"; the warning proposes a value");
   }
 
   void drift() {
@@ -117,16 +117,16 @@ class Judge {
         "still changing",
         fmt::format("the bed still changes while it is measured: {} is {} by {:.0f} % in the second half of the time",
                     found->what, found->change > 0 ? "higher" : "lower", 100 * found->part),
-        "Let it settle longer");
+        "Give a longer \"settle\"");
   }
 
   void between_beds() {
     const auto found = notable_spread(joined_, beds_);
     if (!found) return;
     object("beds differ",
-           fmt::format("the {} beds differ by more than chance: {} scatters by {:.2g}, and the stated error of each "
-                       "bed is {:.2g}. It "
-                       "depends on how the bed was filled; the stated error includes this",
+           fmt::format("the {} beds differ by more than chance: the standard deviation of {} between beds is {:.2g}, "
+                       "and the stated error of each bed is {:.2g}. The result depends on how the bed was filled; the "
+                       "stated error includes this",
                        beds_, found->what, found->spread, found->within),
            "More \"replicas\" reduce the error");
   }
@@ -135,7 +135,7 @@ class Judge {
     if (beds_ > 1 || !bed_.dissipates()) return;
     object("one bed",
            "the errors are those of a single bed. Another seed or another start may differ by more, because a dense "
-           "bed keeps the effect of its filling for long",
+           "bed keeps the effect of its filling for a long time",
            "Run several \"replicas\" (4 by default)");
   }
 

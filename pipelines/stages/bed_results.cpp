@@ -41,11 +41,12 @@ class BedStatement {
   void temperatures() {
     temperature("temperature_x", "horizontal kinetic temperature T_x, without the mean velocity of the phase");
     temperature("temperature_z", "vertical kinetic temperature T_z, without the mean velocity of the phase");
-    temperature("temperature_z_local", "vertical kinetic temperature, without the mean velocity of layer and phase");
-    temperature("spin_temperature", "temperature of the rotation");
+    temperature("temperature_z_local",
+                "vertical kinetic temperature, without the mean velocity of each layer and phase");
+    temperature("spin_temperature", "temperature of the rotation: I <spin^2>, with the moment of inertia I of a disk");
     list_.quantity("/drift_temperature_x", energy_,
                    "drift: T_x in the second half of the measurement minus T_x in the first half");
-    list_.quantity("/collision_rate", rate_, "contacts of a disk with other disks, per unit of time");
+    list_.quantity("/collision_rate", rate_, "number of contacts of a disk with other disks per unit of time");
   }
 
   void heights() {
@@ -78,7 +79,7 @@ class BedStatement {
     list_.quantity("/psi6_local", "1", "mean of |psi_6| over the disks", order, true);
     list_.quantity("/psi6_global", "1", "|mean of psi_6| over the disks", order, true);
     list_.quantity("/neighbours_per_disk", "1", "mean number of neighbours of a disk", order, true);
-    list_.quantity("/vacancies", "1", "empty sites of the crystal", order, true);
+    list_.quantity("/vacancies", "1", "number of empty sites of the crystal", order, true);
     list_.quantity("/bottom_density", "1/D^2", "number density of the rows at the bottom", order, true);
     for (const int percent : {70, 80, 90})
       list_.quantity(fmt::format("/crystal_share_{}", percent), "1",
@@ -96,7 +97,7 @@ class BedStatement {
         "/temperature_second", energy_,
         "kinetic temperature (T_x + T_z)/2 of the second species, without its mean vertical velocity at each moment",
         species, true);
-    list_.quantity("/temperature_ratio", "1", "temperature_second over temperature_first", species, true);
+    list_.quantity("/temperature_ratio", "1", "ratio of temperature_second to temperature_first", species, true);
     list_.quantity("/floor_pressure", "m g/D", "pressure on the floor", observed(bed_.observe.pressure, "pressure"),
                    true);
   }
@@ -115,28 +116,30 @@ class BedStatement {
         {"bath_work", "work of the bath"},
         {"imbalance", "energy that the balance does not explain; 0 apart from rounding"}};
     for (const auto& [name, meaning] : terms) list_.number(ledger + name, energy_, meaning);
-    list_.number(ledger + "dissipated_on_plates", energy_, "of the energy lost, that lost by friction with the plates",
+    list_.number(ledger + "dissipated_on_plates", energy_,
+                 "part of the dissipated energy that is lost by friction with the plates",
                  given_if(bed_.rubs, "\"box\" names \"plates\""));
-    list_.number("/collisions", "1", "contacts of all kinds");
-    list_.number("/disk_collisions", "1", "contacts between two disks");
-    list_.number("/wall_collisions", "1", "contacts with sides and lid");
-    list_.number("/floor_collisions", "1", "contacts with the floor");
-    list_.number("/elastic_contacts", "1", "contacts made elastic by the contact duration t_c, settling included");
+    list_.number("/collisions", "1", "number of contacts of all kinds");
+    list_.number("/disk_collisions", "1", "number of contacts between two disks");
+    list_.number("/wall_collisions", "1", "number of contacts with the side walls and the lid");
+    list_.number("/floor_collisions", "1", "number of contacts with the floor");
+    list_.number("/elastic_contacts", "1",
+                 "number of contacts that the contact duration t_c made elastic, settling included");
     const Given clocked = given_if(bed_.contact_duration, "contacts have a duration t_c");
     list_.quantity("/elastic_share", "1", "share of the contacts that t_c made elastic, during the measurement",
                    clocked);
     list_.quantity("/withheld_share", "1",
-                   "energy that these contacts would have dissipated (the first of each chain), over the dissipated "
-                   "energy, during the measurement",
+                   "energy that the elastic contacts would have dissipated without t_c, over the energy dissipated "
+                   "during the measurement. Of each chain of elastic contacts only the first is counted",
                    clocked);
-    list_.quantity("/contact_duration_effect", "1", "estimate: relative amount by which T is too high because of t_c",
-                   clocked);
+    list_.quantity("/contact_duration_effect", "1",
+                   "estimated relative error of T because of t_c: T is too high by this part", clocked);
     list_.quantity("/hertz_contact_time", "s",
                    "duration of a real contact by Hertz' law, at the peak velocity of the floor or the thermal "
                    "velocity of the bath",
                    given_if(bed_.material, "\"disks\" name a \"material\""));
-    list_.number("/events", "1", "events of all kinds");
-    list_.number("/periods", "1", "periods of the floor over which the bed was measured");
+    list_.number("/events", "1", "number of events of all kinds");
+    list_.number("/periods", "1", "number of periods of the floor over which the bed was measured");
     list_.quantity("/max_overlap", "D",
                    "largest overlap of two disks at the end, from rounding or from the springs of a pressed bed");
   }
@@ -145,10 +148,10 @@ class BedStatement {
     const Given judged = given_if(bed_.judged, "the floor shakes and there is gravity");
     list_.text("/judgement/verdict", "\"holds\", or the most serious doubt about the numbers", judged);
     list_.text("/judgement/why", "all doubts about the numbers, the most serious first", judged);
-    list_.text("/judgement/advice", "what to do", judged);
+    list_.text("/judgement/advice", "advice: what to do about this", judged);
     const Given mixed = given_if(bed_.two_species, "the disks are of two kinds");
-    list_.text("/objections/#/why", "reason against a temperature from the profile", mixed);
-    list_.text("/objections/#/advice", "what to do", mixed);
+    list_.text("/objections/#/why", "reason why a fit of the profile gives no reliable temperature", mixed);
+    list_.text("/objections/#/advice", "advice: what to do about this", mixed);
   }
 
   void profiles() {
@@ -156,7 +159,7 @@ class BedStatement {
     list_.table(
         {"profile_floor_frame.csv", "density profile above the moving floor", profile_columns("the moving floor")});
     list_.table({"profile_frames.csv", "density profile at the moments of the frames only", profile_columns(),
-                 given_if(bed_.frames, "\"frames\" asks for some")});
+                 given_if(bed_.frames, "\"frames\" has a \"count\" above 0")});
     list_.table({"covariance.csv", "covariance of the densities of profile.csv", covariance_columns()});
   }
 
@@ -164,11 +167,13 @@ class BedStatement {
     list_.table({"layers.csv",
                  "layers of 1 D above the floor's mean position, lab frame, all phases together",
                  {layer_height_,
-                  {"temperature_x", energy_, "m <v_x^2>"},
-                  {"temperature_z", energy_, "m <(v_z - mean of v_z)^2>, with the mean of the phase"},
+                  {"temperature_x", energy_, "horizontal temperature, m <v_x^2>"},
+                  {"temperature_z", energy_,
+                   "vertical temperature, m <(v_z - mean of v_z)^2>, with the mean of v_z at each phase"},
                   {"mean_velocity_z", velocity_, "mean vertical velocity"},
                   {"share", "1", "fraction of all disks in the layer"},
-                  {"spin_temperature", energy_, "I <spin^2>"}}});
+                  {"spin_temperature", energy_,
+                   "temperature of the rotation, I <spin^2>, with the moment of inertia I of a disk"}}});
     order_tables();
     velocity_tables();
     list_.table({"displacement.csv",
@@ -190,7 +195,7 @@ class BedStatement {
                   {"temperature_error", energy_, "standard error of temperature"},
                   {"center_of_mass", "D", "height of the centre of mass"},
                   {"center_of_mass_error", "D", "standard error of center_of_mass"}},
-                 given_if(bed_.annealed, "there is a \"schedule\"")});
+                 given_if(bed_.annealed, "the stage has a \"schedule\"")});
   }
 
   void order_tables() {
@@ -212,7 +217,7 @@ class BedStatement {
 
   // Moments of the velocities in cells of height, or of height and phase.
   std::vector<StatedColumn> moments(const std::string& without) const {
-    return {{"number_density", "1/D^2", "disks per area"},
+    return {{"number_density", "1/D^2", "number density: disks per area"},
             {"mean_velocity_x", velocity_, "mean horizontal velocity"},
             {"mean_velocity_z", velocity_, "mean vertical velocity"},
             {"temperature_x", energy_, "horizontal temperature without the mean velocity of " + without},
@@ -223,14 +228,16 @@ class BedStatement {
     const Given velocities = observed(bed_.observe.velocities, "velocities");
     std::vector<StatedColumn> layers = moments("the layer");
     layers.insert(layers.begin(), layer_height_);
-    layers.push_back({"spin_temperature", energy_, "I <spin^2>"});
+    layers.push_back({"spin_temperature", energy_,
+                      "temperature of the rotation, I <spin^2>, with the moment of inertia I of a disk"});
     layers.push_back({"a2", "1", "fourth cumulant of the velocities, 0 for a Maxwellian"});
     layers.push_back({"samples", "1", "disks seen in the layer"});
     list_.table({"velocities.csv", "layers of 1 D above the floor's mean position, lab frame, all phases together",
                  layers, velocities});
     list_.table({"velocity_histogram.csv",
-                 "distribution of the velocities in units of sqrt(T/m); the outermost classes hold what lies beyond",
-                 {{"velocity", "sqrt(T/m)", "middle of the class"},
+                 "distribution of the velocities in units of sqrt(T/m); the first and the last class also count all "
+                 "velocities beyond them",
+                 {{"velocity", "sqrt(T/m)", "velocity at the middle of the class"},
                   {"density_x", "1/sqrt(T/m)", "probability density of v_x"},
                   {"density_z", "1/sqrt(T/m)", "probability density of v_z without the bed's mean"},
                   {"maxwellian", "1/sqrt(T/m)", "standard normal density"}},
@@ -243,8 +250,9 @@ class BedStatement {
 
   void phase_table(const std::string& file, const std::string& frame, const Given& given) {
     std::vector<StatedColumn> columns = moments("the layer at the phase");
-    columns.insert(columns.begin(), {{"phase", "1", "phase in periods, 0 where the floor rises through its mean"},
-                                     {"height", "D", "middle of the layer " + frame}});
+    columns.insert(columns.begin(),
+                   {{"phase", "1", "phase in periods, 0 where the floor rises through its mean position"},
+                    {"height", "D", "height of the middle of the layer " + frame}});
     columns.push_back({"samples", "1", "disks seen in the layer at the phase"});
     list_.table({file, "layers of 1 D by phase of the shaking, " + frame, columns, given});
   }
@@ -252,14 +260,14 @@ class BedStatement {
   void pressure_table() {
     std::vector<StatedColumn> columns{layer_height_};
     for (const StatedColumn& row : std::initializer_list<StatedColumn>{
-             {"number_density", "1/D^2", "disks per area"},
-             {"temperature_x", energy_, "m <v_x^2>"},
-             {"temperature_z", energy_, "m <v_z^2> without the mean"},
+             {"number_density", "1/D^2", "number density: disks per area"},
+             {"temperature_x", energy_, "horizontal temperature, m <v_x^2>"},
+             {"temperature_z", energy_, "vertical temperature, m <(v_z - mean of v_z)^2>"},
              {"mean_velocity_z", velocity_, "mean vertical velocity"},
              {"pressure_zz", pressure_, "vertical flux of vertical momentum, kinetic part and contacts"},
              {"pressure_xx", pressure_, "horizontal flux of horizontal momentum, kinetic part and contacts"},
              {"weight_above", pressure_, "weight of the disks above, per width"},
-             {"collision_rate", rate_ + "/D^2", "contacts between disks per area and time"}}) {
+             {"collision_rate", rate_ + "/D^2", "number of contacts between disks per area and time"}}) {
       columns.push_back(row);
       columns.push_back({row.name + "_error", row.unit, "standard error of " + row.name});
     }
@@ -271,12 +279,16 @@ class BedStatement {
     std::vector<StatedColumn> columns{layer_height_};
     for (const std::string name : {"first", "second"}) {
       columns.push_back({"number_density_" + name, "1/D^2", "disks of the " + name + " species per area"});
-      columns.push_back({"temperature_x_" + name, energy_, "m <v_x^2> without the mean of species and layer"});
-      columns.push_back({"temperature_z_" + name, energy_, "m <v_z^2> without the mean of species and layer"});
+      columns.push_back(
+          {"temperature_x_" + name, energy_,
+           "horizontal temperature, m <(v_x - mean of v_x)^2>, with the mean of the species in the layer"});
+      columns.push_back({"temperature_z_" + name, energy_,
+                         "vertical temperature, m <(v_z - mean of v_z)^2>, with the mean of the species in the layer"});
       columns.push_back({"samples_" + name, "1", "disks of the " + name + " species seen in the layer"});
     }
     columns.push_back(
-        {"ratio", "1", "temperature of the second species over that of the first, both directions together"});
+        {"ratio", "1",
+         "ratio of the temperature of the second species to that of the first, with both directions together"});
     list_.table(
         {"species.csv",
          "temperatures of the two species in layers of 1 D above the floor's mean position, all phases together",
@@ -285,20 +297,20 @@ class BedStatement {
 
   void replicas() {
     const Given several = given_if(bed_.replicas > 1, "\"replicas\" is above 1");
-    list_.number("/replicas", "1", "beds over which the numbers are means", several);
-    std::vector<StatedColumn> columns{{"replica", "1", "number of the bed"}};
+    list_.number("/replicas", "1", "number of beds over which the results are averaged", several);
+    std::vector<StatedColumn> columns{{"replica", "1", "number of the bed, from 0"}};
     for (const StatedResult& one : list_.all()) {
       if (one.kind == ResultKind::quantity && one.given.possible)
         columns.push_back({one.pointer.substr(1), one.unit, one.meaning});
     }
-    list_.table({"replicas.csv", "the numbers of each bed", columns, several});
+    list_.table({"replicas.csv", "results of each bed", columns, several});
   }
 
   ResultList& list_;
   const BedOutput& bed_;
   Given heavy_;
   std::string energy_, velocity_, time_, rate_, pressure_, length_;
-  StatedColumn layer_height_{"height", "D", "middle of the layer above the floor's mean position"};
+  StatedColumn layer_height_{"height", "D", "height of the middle of the layer above the floor's mean position"};
 };
 
 }  // namespace

@@ -128,7 +128,9 @@ Data read_data(const std::filesystem::path& path, const PointsOptions& options) 
   });
   // What is only counted may be nothing: no prediction in range, say.
   if (!any && options.look != Look::none)
-    throw InputError(fmt::format("{}: no row is one of \"{}\"", path.string(), options.name));
+    throw InputError(
+        fmt::format("{}: no row of this table belongs to the data set \"{}\"; check its \"where\" and its range of x",
+                    path.string(), options.name));
   std::stable_sort(rows.begin(), rows.end(), [](const Row& l, const Row& r) { return l.x < r.x; });
   for (const Row& row : rows) data.x.push_back(row.x), data.y.push_back(row.y), data.error.push_back(row.error);
   return data;
@@ -171,7 +173,9 @@ Json power_json(const std::vector<double>& x, const std::vector<double>& y, cons
                 {"p_value", law.p_value}};
   };
   const fit::PowerLaw law = error.empty() ? fit::PowerLaw{} : fit::fit_power_law(x, y, error, true);
-  out["status"] = law.ok ? "ok" : "needs four points with x > 0 and errors, and an exponent between 0.1 and 6";
+  out["status"] =
+      law.ok ? "ok"
+             : "not fitted: the fit needs four points with x > 0 and with errors, and an exponent between 0.1 and 6";
   out["exponent"] = law.ok ? quantity_json(law.exponent, "1", law.exponent_error) : Json();
   if (law.ok) out["law"] = described(law);
   for (const int exponent : {1, 2}) {
@@ -202,7 +206,7 @@ Used used_points(const Data& data, const PointsOptions& options) {
 void add_line_fit(const Used& used, Json& found) {
   const fit::StraightLine line =
       used.weighted ? fit::fit_straight_line(used.x, used.y, used.error) : fit::StraightLine{};
-  found["line_fit"] = line.ok ? "ok" : "needs two points with errors";
+  found["line_fit"] = line.ok ? "ok" : "not fitted: the line needs two points with errors";
   if (!line.ok) return;
   found["slope"] = quantity_json(line.slope, "1", line.slope_error);
   found["intercept"] = quantity_json(line.intercept, "1", line.intercept_error);
@@ -347,11 +351,13 @@ void check_points(Fields& fields, const PointsOptions& p) {
     std::vector<std::string> ids;
     for (const StatedStage& one : from) ids.push_back(one.id);
     const std::string nearest = nearest_name(p.from, ids);
-    fields.problem("/from",
-                   p.from.empty() ? "\"from\" of the stage names several stages: name the one whose table is meant"
-                                  : fmt::format("\"{}\" is not in the \"from\" of this stage", p.from),
-                   nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
-                                   : fmt::format("Did you mean \"{}\"?", nearest));
+    fields.problem(
+        "/from",
+        p.from.empty()
+            ? "\"from\" of the stage names several stages: give here the id of the stage whose table is drawn"
+            : fmt::format("\"{}\" is not in the \"from\" of this stage", p.from),
+        nearest.empty() ? fmt::format("Choose from: {}", fmt::join(ids, ", "))
+                        : fmt::format("Did you mean \"{}\"?", nearest));
     return;
   }
   if (stage->results == nullptr) return;
@@ -374,19 +380,20 @@ void check_points(Fields& fields, const PointsOptions& p) {
     if (std::find(found->values.begin(), found->values.end(), value) != found->values.end()) continue;
     const std::string nearest = nearest_name(value, found->values);
     fields.problem(where, fmt::format("no row of {} has \"{}\" in the column {}", p.file, value, column),
-                   nearest.empty() ? fmt::format("There are {}", fmt::join(found->values, ", "))
+                   nearest.empty() ? fmt::format("Choose from: {}", fmt::join(found->values, ", "))
                                    : fmt::format("Did you mean \"{}\"?", nearest));
   }
 }
 
 void describe_points(Fields& fields, PointsOptions& p) {
   fields.text("name", p.name, {.help = "name of this data set in chart.json", .required = true});
-  fields.text("from", p.from, {.help = "id of the stage whose table it is; may be left out when there is one"});
+  fields.text("from", p.from,
+              {.help = "id of the stage whose table is drawn; may be left out where \"from\" names one stage"});
   fields.text("file", p.file, {.help = "CSV file in that stage's folder"});
   fields.text("label", p.label, {.help = "label in the key; subscripts and powers as in T_c and D^2; empty: no label"});
   Json where = Json::object();
   for (const auto& [name, value] : p.where) where[name] = value;
-  fields.any("where", where, {.help = "rows that are used: column → text that its cell must hold"});
+  fields.any("where", where, {.help = "rows that are used: column → required content of its cell"});
   fields.text("x", p.x, {.help = "column of the x values", .required = true});
   fields.text("y", p.y, {.help = "column of the y values", .required = true});
   fields.text("error", p.error,
@@ -414,8 +421,9 @@ void describe_points(Fields& fields, PointsOptions& p) {
                  {.help = "number of neighbouring points over which the errors are averaged (root mean square); useful "
                           "where few replicas make the errors uncertain",
                   .range = from_to(1, 1000)});
-  fields.text("against", p.against,
-              {.help = "name of a curve of this chart; chi2 of the points about this curve is computed"});
+  fields.text(
+      "against", p.against,
+      {.help = "name of a curve of this chart with which the points are compared: chi2 and differences are computed"});
   fields.numbers(
       "levels", p.levels,
       {.help = "values of y; for each, the first x at which the points cross it is found (linear between points)"});
@@ -430,7 +438,7 @@ void describe_points(Fields& fields, PointsOptions& p) {
     fields.problem("/where", "expected an object: column → text");
   }
   fields.require(!p.residuals || p.look != Look::none, "residuals",
-                 "a curve that is not drawn cannot have residuals drawn");
+                 "residuals are drawn only of points that are drawn, and \"look\" is \"none\"");
   fields.require(!p.residuals || !p.against.empty(), "residuals", "residuals need a curve, and \"against\" names none");
   check_points(fields, p);
 }
@@ -442,8 +450,8 @@ void check_snapshot(Fields& fields, const SnapshotOptions& s) {
   }
   const std::string nearest = nearest_name(s.from, ids);
   fields.require(std::find(ids.begin(), ids.end(), s.from) != ids.end(), "from",
-                 fmt::format("\"{}\" is no simulate stage in the \"from\" of this stage", s.from),
-                 nearest.empty() ? fmt::format("There are {}", fmt::join(ids, ", "))
+                 fmt::format("\"{}\" is not a simulate stage in the \"from\" of this stage", s.from),
+                 nearest.empty() ? fmt::format("Choose from: {}", fmt::join(ids, ", "))
                                  : fmt::format("Did you mean \"{}\"?", nearest));
 }
 
@@ -454,7 +462,7 @@ class PointsStatement {
       : list_(list), at_(std::move(pointer)), points_(points) {}
 
   void state() {
-    list_.number(at_ + "/points", "1", "points drawn or used");
+    list_.number(at_ + "/points", "1", "number of points that are drawn or used");
     line();
     power();
     against();
@@ -466,7 +474,7 @@ class PointsStatement {
  private:
   void line() {
     const Given asked = given_if(points_.line_fit, "\"line_fit\" is true");
-    const Given found = both(asked, given_when("two points have errors"));
+    const Given found = both(asked, given_when("two or more points have errors"));
     list_.text(at_ + "/line_fit", "whether the line could be fitted", asked);
     list_.quantity(at_ + "/slope", "1", "slope of the fitted line, in the units of the axes", found);
     list_.quantity(at_ + "/intercept", "1", "y of the fitted line at x = 0", found);
@@ -493,9 +501,9 @@ class PointsStatement {
     const Given asked = given_if(!points_.against.empty(), "\"against\" names a curve");
     const Given weighted = both(asked, given_when("the points have errors"));
     const std::string at = at_ + "/against/";
-    list_.text(at + "curve", "the curve", asked);
-    list_.number(at + "points", "1", "points compared", asked);
-    list_.number(at + "chi2", "1", "sum of the squared differences over their errors", weighted, true);
+    list_.text(at + "curve", "name of the curve", asked);
+    list_.number(at + "points", "1", "number of compared points", asked);
+    list_.number(at + "chi2", "1", "chi-square: sum of squared differences over their squared errors", weighted, true);
     list_.number(at + "dof", "1", "degrees of freedom", weighted);
     list_.number(at + "chi2_per_dof", "1", "chi-square per degree of freedom", weighted);
     list_.number(at + "p_value", "1", "probability of a chi-square at least this large, if the model is right",
@@ -515,7 +523,7 @@ void Chart::results(ResultList& list) const {
   for (const ChartOptions& chart : charts_) {
     const std::string at = pointer_join("", chart.name);
     list.text(at + "/caption", "text below the chart", given_if(!chart.caption.empty(), "there is a \"caption\""));
-    list.truth(at + "/lead", "whether the report begins with it", given_if(chart.lead, "\"lead\" is true"));
+    list.truth(at + "/lead", "whether the report begins with this chart", given_if(chart.lead, "\"lead\" is true"));
     for (const PointsOptions& points : chart.points)
       PointsStatement(list, pointer_join(at, points.name), points).state();
   }
@@ -523,9 +531,9 @@ void Chart::results(ResultList& list) const {
   for (const SnapshotOptions& one : snapshots_) {
     const std::string at = pointer_join("", one.name);
     list.text(at + "/caption", "text below the picture", given_if(!one.caption.empty(), "there is a \"caption\""));
-    list.number(at + "/disks", "1", "disks");
-    list.number(at + "/empty_sites", "1", "empty sites of the crystal");
-    list.number(at + "/disks_with_psi6_above_0.8", "1", "disks whose |psi_6| is above 0.8");
+    list.number(at + "/disks", "1", "number of disks");
+    list.number(at + "/empty_sites", "1", "number of empty sites of the crystal");
+    list.number(at + "/disks_with_psi6_above_0.8", "1", "number of disks whose |psi_6| is 0.8 or more");
   }
 }
 
@@ -562,17 +570,19 @@ void Chart::describe(Fields& fields) {
             {.help = "curves with which the points are compared: polynomials times a power of x"});
         if (!f.decoding()) return;
         f.require(!chart.name.empty() && chart.name.find_first_of("/\\ ") == std::string::npos && chart.name[0] != '.',
-                  "name", "is no name of a file");
-        f.require(!chart.points.empty(), "points", "nothing is drawn");
+                  "name", fmt::format("\"{}\" cannot be the name of a file", chart.name),
+                  "Use no spaces and slashes, and no dot at the beginning");
+        f.require(!chart.points.empty(), "points", "\"points\" is empty: give at least one data set");
         for (std::size_t i = 0; i < chart.points.size(); ++i) {
           const std::string& against = chart.points[i].against;
           f.require(against.empty() || std::any_of(chart.curves.begin(), chart.curves.end(),
                                                    [&](const CurveOptions& c) { return c.name == against; }),
-                    "points/" + std::to_string(i) + "/against", "there is no curve \"" + against + "\"");
+                    "points/" + std::to_string(i) + "/against", "this chart has no curve \"" + against + "\"");
         }
       },
       {.help = "charts of columns of tables"});
-  fields.array<MapOptions>("maps", maps_, describe_map, {.help = "a number in the plane of two parameters"});
+  fields.array<MapOptions>("maps", maps_, describe_map,
+                           {.help = "maps: a column of a table as colour in the plane of two parameters"});
   fields.array<SnapshotOptions>(
       "snapshots", snapshots_,
       [](Fields& f, SnapshotOptions& s) {
@@ -620,7 +630,8 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
 Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) const {
   TrajectoryReader reader(input_named(context, options.from).file("final.extxyz"));
   TrajectoryFrame frame;
-  if (!reader.read(frame)) throw InputError(options.from + "/final.extxyz holds no frame");
+  if (!reader.read(frame))
+    throw InputError(options.from + "/final.extxyz contains no frame; run the simulate stage again");
   sim::Snapshot at;
   at.x = frame.x, at.z = frame.z;
   sim::DiskProperties disks;

@@ -39,9 +39,10 @@ void check_map(Fields& fields, const MapOptions& map) {
     return one.id == map.from || (map.from.empty() && from.size() == 1);
   });
   if (stage == from.end())
-    return fields.problem("/from", map.from.empty()
-                                       ? "\"from\" of the stage names several stages: name the one whose table is meant"
-                                       : fmt::format("\"{}\" is not in the \"from\" of this stage", map.from));
+    return fields.problem(
+        "/from", map.from.empty()
+                     ? "\"from\" of the stage names several stages: give here the id of the stage whose table is drawn"
+                     : fmt::format("\"{}\" is not in the \"from\" of this stage", map.from));
   if (stage->results == nullptr) return;
   if (const auto misfit = misfit_of_table(*stage, map.file))
     return fields.problem("/file", misfit->what, misfit->suggestion);
@@ -126,9 +127,10 @@ void describe_map(Fields& fields, MapOptions& map) {
   Json where = Json::object();
   for (const auto& [name, value] : map.where) where[name] = value;
   fields.text("name", map.name, {.help = "name of the picture and of its files", .required = true});
-  fields.text("from", map.from, {.help = "id of the stage with the table; may be left out when there is one"});
+  fields.text("from", map.from,
+              {.help = "id of the stage whose table is drawn; may be left out where \"from\" names one stage"});
   fields.text("file", map.file, {.help = "CSV file in that stage's folder"});
-  fields.any("where", where, {.help = "rows that are used: column → text that its cell must hold"});
+  fields.any("where", where, {.help = "rows that are used: column → required content of its cell"});
   fields.text("x", map.x, {.help = "column along the x axis", .required = true});
   fields.text("y", map.y, {.help = "column along the y axis", .required = true});
   fields.text("value", map.value, {.help = "column that gives the colour of a cell", .required = true});
@@ -151,23 +153,26 @@ void describe_map(Fields& fields, MapOptions& map) {
     fields.problem("/where", "expected an object: column → text");
   }
   fields.require(!map.name.empty() && map.name.find_first_of("/\\ ") == std::string::npos && map.name[0] != '.', "name",
-                 "is no name of a file");
+                 fmt::format("\"{}\" cannot be the name of a file", map.name),
+                 "Use no spaces and slashes, and no dot at the beginning");
   if (fields.has("x") && fields.has("y") && fields.has("value")) check_map(fields, map);
 }
 
 void state_map(ResultList& list, const MapOptions& map) {
   const std::string at = pointer_join("", map.name);
   list.text(at + "/caption", "text below the map", given_if(!map.caption.empty(), "there is a \"caption\""));
-  list.truth(at + "/lead", "whether the report begins with it", given_if(map.lead, "\"lead\" is true"));
-  list.number(at + "/cells", "1", "settings drawn");
+  list.truth(at + "/lead", "whether the report begins with this map", given_if(map.lead, "\"lead\" is true"));
+  list.number(at + "/cells", "1", "number of drawn cells");
   for (const MapMark& mark : map.marks)
-    list.number(pointer_join(at + "/marked", mark.label), "1", "settings with this mark");
+    list.number(pointer_join(at + "/marked", mark.label), "1", "number of cells with this mark");
 }
 
 Json draw_map(const RunContext& context, const MapOptions& map) {
   const StudyTable table = read_study_table(input_named(context, map.from).file(map.file));
   const std::vector<MapPoint> points = points_of(map, table);
-  if (points.empty()) throw InputError(fmt::format("{}: no row is drawn in the map \"{}\"", table.file, map.name));
+  if (points.empty())
+    throw InputError(
+        fmt::format("{}: the map \"{}\" draws no row of this table; check its \"where\"", table.file, map.name));
   Json out{{"cells", points.size()}};
   if (!map.caption.empty()) out["caption"] = map.caption;
   if (map.lead) out["lead"] = true;

@@ -31,14 +31,15 @@ bool has_unit(const Json& json) {
 
 void describe_expectation(Fields& fields, Expectation& e) {
   fields.any("value", e.value, {.help = "expected value: a number, a quantity with its unit, a string, true or false"});
-  fields.number("relative", e.relative, {.help = "tolerance as a part of the expected value", .range = non_negative});
+  fields.number("relative", e.relative,
+                {.help = "tolerance as a fraction of the expected value", .range = non_negative});
   fields.any("absolute", e.absolute,
              {.help = "tolerance: with its unit where the value has one, else in the unit of the result"});
   fields.number("std_errors", e.std_errors,
                 {.help = "tolerance in standard errors of the result", .range = non_negative});
   fields.any("least", e.least, {.help = "lower bound of the result, in place of or together with a value"});
   fields.any("most", e.most, {.help = "upper bound of the result, in place of or together with a value"});
-  fields.text("note", e.note, {.help = "where the expectation comes from"});
+  fields.text("note", e.note, {.help = "source of the expected value"});
   if (!fields.decoding()) return;
   const auto quantity = [&](const char* key, const Json& json) {
     if (json.is_null() || json.is_number() || !json.is_string()) {
@@ -53,7 +54,7 @@ void describe_expectation(Fields& fields, Expectation& e) {
   };
   quantity("absolute", e.absolute), quantity("least", e.least), quantity("most", e.most);
   fields.require(!e.value.is_null() || !e.least.is_null() || !e.most.is_null(), "",
-                 "nothing is expected: neither \"value\" nor \"least\" nor \"most\"",
+                 "this expectation is empty: it has neither \"value\" nor \"least\" nor \"most\"",
                  "Write {\"value\": \"0.36 mm\", \"relative\": 0.1}");
   fields.require(!e.value.is_object() && !e.value.is_array(), "value",
                  "expected a number, a quantity, a string, true or false");
@@ -62,7 +63,7 @@ void describe_expectation(Fields& fields, Expectation& e) {
   const bool plain = !e.absolute.is_null() && !has_unit(e.absolute);
   fields.require(!plain || !has_unit(e.value), "absolute", "the expected value has a unit, and this tolerance has none",
                  "Write it with its unit, as the value: \"0.1 mm\"");
-  fields.require(!tolerance || is_quantity, "value", "a tolerance is given, but the expected value is no number");
+  fields.require(!tolerance || is_quantity, "value", "a tolerance is given, but the expected value is not a number");
   fields.require(!e.value.is_number_float() || tolerance, "value", "a number needs a tolerance",
                  "Add \"relative\", \"absolute\" or \"std_errors\"");
 }
@@ -112,7 +113,7 @@ double in_unit_of(const Json& expected, const Found& found, const std::string& w
   }
   if (unit.dimension != quantity.dimension) {
     throw std::invalid_argument(
-        fmt::format("the result is in \"{}\", {} is {}", found.unit, what, name_of(quantity.dimension)));
+        fmt::format("the result is in \"{}\", but {} is {}", found.unit, what, name_of(quantity.dimension)));
   }
   return quantity.value / unit.value;
 }
@@ -139,7 +140,9 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
     verdict.found = text_of(*found.json);
     const bool bounds = !e.least.is_null() || !e.most.is_null();
     verdict.passed = !bounds && *found.json == e.value;
-    if (!verdict.passed) verdict.why = bounds ? "the result is no number" : "the result is another";
+    if (!verdict.passed)
+      verdict.why = bounds ? "the result is not a number and cannot be compared with bounds"
+                           : "the result differs from the expected one";
     return verdict;
   }
   verdict.found =
@@ -148,7 +151,7 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
   try {
     verdict.passed = std::isfinite(found.value);
     if (!e.value.is_null()) {
-      if (e.value.is_boolean()) throw std::invalid_argument("the result is a number");
+      if (e.value.is_boolean()) throw std::invalid_argument("the result is a number, but true or false is expected");
       const double expected = in_unit_of(e.value, found, "the expected value");
       double tolerance = 0;
       if (e.relative) tolerance = std::max(tolerance, *e.relative * std::abs(expected));
@@ -160,15 +163,16 @@ Verdict judge(const std::string& pointer, const Expectation& e, const Json* json
       const double difference = std::abs(found.value - expected);
       if (!(difference <= tolerance)) {
         verdict.passed = false;
-        verdict.why = fmt::format("off by {:.4g}, tolerance {:.4g}", difference, tolerance);
+        verdict.why = fmt::format("the difference of {:.4g} is above the tolerance of {:.4g}", difference, tolerance);
         if (expected != 0)
-          verdict.why += fmt::format(" ({:.3g} % of the expected value)", 100 * difference / std::abs(expected));
+          verdict.why +=
+              fmt::format(". The difference is {:.3g} % of the expected value", 100 * difference / std::abs(expected));
       }
     }
     if (!e.least.is_null() && !(found.value >= in_unit_of(e.least, found, "the lower bound")))
-      verdict.passed = false, verdict.why = "below the lower bound";
+      verdict.passed = false, verdict.why = "the result is below the lower bound";
     if (!e.most.is_null() && !(found.value <= in_unit_of(e.most, found, "the upper bound")))
-      verdict.passed = false, verdict.why = "above the upper bound";
+      verdict.passed = false, verdict.why = "the result is above the upper bound";
   } catch (const std::invalid_argument& problem) {
     verdict.passed = false;
     verdict.why = problem.what();
@@ -188,18 +192,19 @@ class Check : public Stage {
       if (const StatedResult* stated = fields.check_result(where, pointer))
         check_unit(fields, where, expectation, *stated);
     }
-    fields.require(!expect_.empty() || !fields.has("expect"), "expect", "nothing is expected");
+    fields.require(!expect_.empty() || !fields.has("expect"), "expect",
+                   "\"expect\" is empty: give at least one expectation");
   }
 
   void results(ResultList& list) const override {
     list.truth("/passed", "whether every result is as expected");
     list.number("/failures", "1", "number of results that are not as expected");
-    list.text("/checks/#/pointer", "a result");
+    list.text("/checks/#/pointer", "pointer to the result");
     list.text("/checks/#/expected", "expected value");
-    list.text("/checks/#/found", "what was found");
-    list.truth("/checks/#/passed", "whether the two agree");
-    list.text("/checks/#/why", "reason why they do not agree", given_when("they do not agree"));
-    list.text("/checks/#/note", "where the expectation comes from", given_when("the expectation has a \"note\""));
+    list.text("/checks/#/found", "value of the result");
+    list.truth("/checks/#/passed", "whether the result agrees with the expected value");
+    list.text("/checks/#/why", "reason why the result does not agree", given_when("the result does not agree"));
+    list.text("/checks/#/note", "source of the expected value", given_when("the expectation has a \"note\""));
   }
 
   void run(RunContext& context) const override {
@@ -263,7 +268,7 @@ class Check : public Stage {
     for (const auto& [key, json] : all) {
       if (!json->is_string()) continue;
       try {
-        in_unit_of(*json, {.json = json, .unit = stated.unit}, "what is expected");
+        in_unit_of(*json, {.json = json, .unit = stated.unit}, "the expected value");
       } catch (const std::invalid_argument& problem) {
         fields.problem(where + "/" + key, problem.what());
       }
@@ -277,7 +282,7 @@ class Check : public Stage {
 
 StageRow check_stage() {
   return {.name = "check",
-          .summary = "compares results with expected values; exit code 6 when one is off",
+          .summary = "compares results with expected values; exit code 6 when one does not agree",
           .accepts = {"simulate", "infer", "study", "render", "extract", "fit", "map", "figure", "chart", "claims"},
           .fewest_inputs = 1,
           .most_inputs = 64,

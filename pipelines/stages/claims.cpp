@@ -48,7 +48,7 @@ struct Measured {
 Measured read_number(const std::string& pointer, const std::vector<Input>& inputs) {
   const auto input = std::find_if(inputs.begin(), inputs.end(),
                                   [id = split_pointer(pointer).front()](const Input& one) { return one.id == id; });
-  if (input == inputs.end()) throw InputError(fmt::format("{}: \"from\" names no such stage", pointer));
+  if (input == inputs.end()) throw InputError(fmt::format("{}: the stage of this pointer is not in \"from\"", pointer));
   const Json result = input->result();
   const Json* found =
       find_pointer(result, std::string_view(pointer).substr(1 + escape_pointer_token(input->id).size()));
@@ -158,7 +158,8 @@ void take_published(Fields& fields, Claim& claim) {
   };
   fields.require(same(claim.value, number.value) && same(claim.least, number.least) && same(claim.most, number.most) &&
                      (claim.tolerance == 0 || claim.tolerance == number.tolerance),
-                 "published", "the recipe's own value or bounds are not those published", "Leave them out");
+                 "published", "the value or the bounds in the recipe differ from the published ones",
+                 "Leave them out: the published ones are then used");
   claim.value = number.value, claim.least = number.least, claim.most = number.most;
   claim.tolerance = number.tolerance, claim.unread = number.from_memory;
   if (claim.place.empty()) claim.place = number.place;
@@ -184,8 +185,8 @@ void describe_claim(Fields& f, Claim& c) {
   if (!f.decoding()) return;
   if (!c.published.empty()) take_published(f, c);
   f.require(c.value || c.least || c.most || !c.published.empty(), "",
-            "nothing is claimed: neither a published number, nor value, least or most");
-  f.require(!c.value || (!c.least && !c.most), "value", "a value and bounds exclude one another");
+            "this claim has no number: give \"published\", \"value\", \"least\" or \"most\"");
+  f.require(!c.value || (!c.least && !c.most), "value", "a claim has either a value or bounds, not both");
   if (f.has("number")) f.check_result("/number", c.pointer);
   if (!c.over.empty()) f.check_result("/over", c.over);
 }
@@ -198,35 +199,37 @@ class Claims : public Stage {
                    .range = positive});
     fields.array<Claim>("claims", claims_, describe_claim,
                         {.help = "claims of the paper, one by one", .required = true});
-    if (fields.decoding()) fields.require(!claims_.empty() || !fields.has("claims"), "claims", "there are none");
+    if (fields.decoding())
+      fields.require(!claims_.empty() || !fields.has("claims"), "claims",
+                     "\"claims\" is empty: give at least one claim");
   }
 
   void results(ResultList& list) const override {
     const std::string row = "/claims/#/";
     list.text("/verdict_is", "what the verdicts mean");
-    list.text(row + "claim", "what is claimed");
+    list.text(row + "claim", "statement of the paper");
     list.text(row + "claimed", "the claim as a number or an interval");
     list.text(row + "measured", "the measured number with its error");
     list.text(row + "verdict", "holds, open, does not hold, no verdict, or not measured");
     list.number(row + "value", "1", "the measured number, in its own unit", {}, true);
-    list.number(row + "std_error", "1", "its standard error", given_when("the number has an error"));
-    list.text(row + "number", "where the number is");
-    const Given written = given_when("the claim says so");
-    list.text(row + "place", "where the claim stands", written);
-    list.text(row + "measured_as", "what the number is", written);
+    list.number(row + "std_error", "1", "standard error of the measured number", given_when("the number has an error"));
+    list.text(row + "number", "pointer to the measured number");
+    const Given written = given_when("the claim states it");
+    list.text(row + "place", "place of the claim in the paper", written);
+    list.text(row + "measured_as", "definition of the measured number, in words", written);
     list.text(row + "over", "pointer to the number by which it is divided", written);
     list.text(row + "note", "remarks on the claim", written);
-    list.text(row + "published", "the published number: paper and name", written);
-    list.truth(row + "main", "whether the report begins with it", written);
+    list.text(row + "published", "published number, as <paper>/<name>", written);
+    list.truth(row + "main", "whether the report begins with this claim", written);
     list.table({"claims.csv",
-                "the claims and what was measured",
-                {{"claim", "", "what is claimed"},
-                 {"measured_as", "", "what the number is"},
+                "claims, measured numbers and verdicts",
+                {{"claim", "", "statement of the paper"},
+                 {"measured_as", "", "definition of the measured number, in words"},
                  {"claimed", "", "the claim as a number or an interval"},
                  {"measured", "1", "the measured number, in its own unit"},
-                 {"std_error", "1", "its standard error, in that unit"},
+                 {"std_error", "1", "standard error of the measured number, in the same unit"},
                  {"verdict", "", "holds, open, does not hold, no verdict, or not measured"},
-                 {"place", "", "where the claim stands"}}});
+                 {"place", "", "place of the claim in the paper"}}});
   }
 
   void run(RunContext& context) const override {
@@ -253,7 +256,7 @@ class Claims : public Stage {
         standard_errors_ == interval_95
             ? "the interval of 95 % of the measured number (1.96 standard errors)"
             : fmt::format("the interval of {:g} standard errors of the measured number", standard_errors_);
-    rule += " lies within what is claimed (holds), outside of it (does not hold), or in both (open)";
+    rule += " lies within the claimed range (holds), outside of it (does not hold), or partly within it (open)";
     if (std::any_of(claims_.begin(), claims_.end(), [](const Claim& claim) { return claim.unread; }))
       rule += "; a published number that was not read in print gives no verdict";
     return rule;
@@ -267,7 +270,7 @@ class Claims : public Stage {
 
 StageRow claims_stage() {
   return {.name = "claims",
-          .summary = "sets a paper's claims beside what was measured, with verdicts",
+          .summary = "compares the claims of a paper with measured numbers, and gives a verdict on each",
           .accepts = {"chart", "critical", "scaling", "study", "simulate", "fit", "map", "extract"},
           .fewest_inputs = 1,
           .most_inputs = 64,

@@ -14,7 +14,8 @@ namespace {
 class Critical : public Stage {
  public:
   void describe(Fields& fields) override {
-    fields.text("temperature", temperature_, {.help = "column of the study that holds the temperature, in any unit"});
+    fields.text("temperature", temperature_,
+                {.help = "column of the study that contains the temperature, in any unit"});
     fields.text("unit", unit_, {.help = "unit of the temperature, for messages and tables"});
     fields.text("density", density_, {.help = "column of the density at the bottom, in 1/D^2; empty: not used"});
     fields.numbers(
@@ -24,12 +25,13 @@ class Critical : public Stage {
     fields.numbers("orders", orders_,
                    {.help = "thresholds: T_c' is the temperature at which the bond order falls below each"});
     if (!fields.decoding()) return;
-    fields.require(!density_.empty() || !order_.empty(), "density", "neither a density nor an order is named");
+    fields.require(!density_.empty() || !order_.empty(), "density",
+                   "neither \"density\" nor \"order\" names a column: give one of them");
     for (const double d : densities_)
       fields.require(d > 0 && d <= fit::close_packing_density * (1 + 1e-12), "densities",
-                     fmt::format("a threshold lies between 0 and close packing, 1.1547, not {}", d));
+                     fmt::format("a threshold must be above 0 and at most 1.1547 (close packing), got {}", d));
     for (const double p : orders_)
-      fields.require(p > 0 && p < 1, "orders", fmt::format("a threshold of psi_6 lies between 0 and 1, not {}", p));
+      fields.require(p > 0 && p < 1, "orders", fmt::format("a threshold of psi_6 must be between 0 and 1, got {}", p));
   }
 
   void results(ResultList& list) const override {
@@ -41,8 +43,8 @@ class Critical : public Stage {
     if (table != nullptr && !table->columns.empty() && !table->columns.front().values.empty())
       series = table->columns.front().values;
     const auto state = [&](const std::string& name, const std::string& column, const std::string& meaning) {
-      const Given looked = given_if(!column.empty(), "its column is named");
-      list.text("/" + name + "/column", "column of the study", looked);
+      const Given looked = given_if(!column.empty(), "the option names a column");
+      list.text("/" + name + "/column", "column of the study that is used", looked);
       for (const std::string& one : series) {
         const std::string row = pointer_join("/" + name + "/series", one) + "/#/";
         list.number(row + "threshold", "1", "threshold of the column", looked);
@@ -52,15 +54,17 @@ class Critical : public Stage {
     };
     state("T_c", density_, "temperature at which the density at the bottom falls below the threshold");
     state("T_c_prime", order_, "temperature at which the bond order falls below the threshold");
-    list.table(
-        {"critical.csv",
-         "temperatures at which a quantity crosses thresholds",
-         {{"series", "", "series of the study"},
-          {"quantity", "", "T_c: by the density of the bottom row; T_c_prime: by the order", {"T_c", "T_c_prime"}},
-          {"threshold", "1", "threshold of the quantity"},
-          {"temperature", unit_, "temperature of the crossing"},
-          {"std_error", unit_, "standard error of the temperature"},
-          {"status", "", "ok, or why there is no crossing"}}});
+    list.table({"critical.csv",
+                "temperatures at which a quantity crosses thresholds",
+                {{"series", "", "series of the study"},
+                 {"quantity",
+                  "",
+                  "quantity: T_c (from the density at the bottom) or T_c_prime (from the bond order)",
+                  {"T_c", "T_c_prime"}},
+                 {"threshold", "1", "threshold of the quantity"},
+                 {"temperature", unit_, "temperature of the crossing"},
+                 {"std_error", unit_, "standard error of the temperature"},
+                 {"status", "", "ok, or why there is no crossing"}}});
   }
 
   void run(RunContext& context) const override {
@@ -99,7 +103,9 @@ class Critical : public Stage {
     look("T_c_prime", order_, orders_);
     if (found < asked)
       context.warning(
-          fmt::format("{} of {} thresholds are not crossed within the study's temperatures", asked - found, asked));
+          fmt::format("{} of {} thresholds are not crossed within the study's temperatures, and their T_c is missing. "
+                      "Add lower or higher temperatures to the study",
+                      asked - found, asked));
     write_file(context.output("critical.json"), dump(out));
     crossings.write(context.output("critical.csv"));
   }
@@ -125,7 +131,7 @@ class Critical : public Stage {
 
 StageRow critical_stage() {
   return {.name = "critical",
-          .summary = "measures T_c and T_c' from a study over temperature, against the threshold",
+          .summary = "measures T_c and T_c' from a study over temperature, for several thresholds",
           .accepts = {"study"},
           .fewest_inputs = 1,
           .most_inputs = 1,

@@ -118,8 +118,7 @@ std::string DisksOnTheWay::quality_figure() const {
              "font-family=\"sans-serif\" font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" "
              "fill=\"none\" stroke=\"#888\"/>\n<text x=\"{0}\" y=\"{4}\">0</text>\n<text x=\"{5}\" y=\"{4}\" "
              "text-anchor=\"end\">1</text>\n<text x=\"{6}\" y=\"{7}\" text-anchor=\"middle\">quality of the disks: 1 "
-             "is a "
-             "bead like all the others (heights: logarithm of the number)</text>\n",
+             "for a bead that looks like the others (height of a bar: logarithm of the number of disks)</text>\n",
              left, top, wide, high, top + high + 20, left + wide, left + wide / 2, top + high + 42) +
          bars + "</svg>\n";
 }

@@ -409,7 +409,7 @@ Curve read_columns(const std::filesystem::path& path, const std::string& x, cons
     const auto number = [&](const std::string& name) {
       const std::size_t index = csv_column(header, name, path.string());
       if (index >= cells.size())
-        throw InputError(fmt::format("{}:{}: has no cell in column \"{}\"", path.string(), line, name));
+        throw InputError(fmt::format("{}:{}: this row has no cell in column \"{}\"", path.string(), line, name));
       return std::strtod(cells[index].c_str(), nullptr);
     };
     curve.x.push_back(number(x)), curve.y.push_back(number(y));
@@ -444,11 +444,10 @@ class Figure : public Stage {
   void describe(Fields& fields) override {
     fields.choice("reference", reference_,
                   {{Reference::none, "none"}, {Reference::clement_rajchenbach, "clement-rajchenbach-1991"}},
-                  {.help = "published fit that is drawn too, from its printed parameters"});
-    fields.input_files(
-        "data", data_,
-        {.help =
-             "your own points: a CSV file with height [D] and number_density [1/D^2]; they are drawn and compared"});
+                  {.help = "published fit that is drawn as well, from its printed parameters"});
+    fields.input_files("data", data_,
+                       {.help = "your own points: CSV file with the columns height [D] and number_density [1/D^2]. "
+                                "They are drawn and compared with the curves"});
     fields.text("title", title_, {.help = "title above the figure"});
     fields.number("highest", highest_,
                   {.help = "upper end of the axis of heights, in D; left out, from the data", .range = positive});
@@ -461,11 +460,11 @@ class Figure : public Stage {
                   both_drawn);
     list.quantity("/frames_against_simulation_same_moments", "1/D^2",
                   "rms difference of the frames from the simulation at the moments of the frames", both_drawn);
-    const Given compared = given_when("two profiles are drawn"), overlap = given_when("the two overlap");
+    const Given compared = given_when("two profiles are drawn"), overlap = given_when("the two profiles overlap");
     const std::string row = "/comparisons/#/";
-    list.text(row + "of", "a profile", compared);
-    list.text(row + "with", "profile with which it is compared", compared);
-    list.number(row + "points", "1", "number of heights at which both are known", compared);
+    list.text(row + "of", "name of a profile", compared);
+    list.text(row + "with", "name of the profile with which it is compared", compared);
+    list.number(row + "points", "1", "number of heights at which both profiles are known", compared);
     list.quantity(row + "rms_difference", "1/D^2", "rms difference", overlap);
     list.quantity(row + "mean_difference", "1/D^2", "mean difference", overlap);
     list.quantity(row + "largest_difference", "1/D^2", "largest difference", overlap);
@@ -597,7 +596,7 @@ class ProfilePicture {
   static std::string label_of_fit(const Json& result) {
     const std::string name = "our fit, " + result.value("model", "") + " alone";
     const bool unreadable = result.contains("answer") && !result.at("answer").contains("temperature");
-    if (!result.value("describes_data", true)) return name + " (does not describe it)";
+    if (!result.value("describes_data", true)) return name + " (does not describe the profile)";
     if (unreadable) return name + " (its T is not that of the bed)";
     const Json* t = find_pointer(result, "/temperature_over_mg/value");
     const Json* reduced = find_pointer(result, "/temperature/value");

@@ -42,9 +42,9 @@ std::string pictures_html(const FinishedStage& stage, int& pictures, bool leadin
     const Json* own = find_pointer(stage.result, "/" + escape_pointer_token(name) + "/caption");
     const std::string caption =
         own != nullptr && own->is_string() ? own->get<std::string>()
-        : name == "profile" ? "Density against height. Error bars: one standard error, correlated frames "
-                              "allowed for."
-        : name == "windows" ? "The fitted temperature against the lower edge of the window it is fitted in."
+        : name == "profile"
+            ? "Density against height. Error bars: one standard error, including the correlation between frames."
+        : name == "windows" ? "Fitted temperature against the lower edge of the window of the fit."
                             : words(name);
     out += figure_html(path, ++pictures, prose(caption));
   }

@@ -55,7 +55,7 @@ void read_columns(const std::filesystem::path& path, const std::set<std::size_t>
     for (std::size_t k = 0; k < read.size(); ++k) {
       const std::optional<double> value = columns[k] < cells.size() ? number_in(cells[columns[k]]) : std::nullopt;
       if (!value)
-        throw InputError(fmt::format("{}: a row of frame {} has a cell that is no number", path.string(), frame));
+        throw InputError(fmt::format("{}: a row of frame {} has a cell that is not a number", path.string(), frame));
       (disks.*read[k].to).push_back(*value);
     }
   }
@@ -234,7 +234,7 @@ std::string film_viewer(const FinishedStage& stage) {
   if (film.at("follows").get<bool>()) choices += "<option value=\"speed\">speed</option>";
   if (film.contains("marks")) choices += "<option value=\"truth\">missed and false</option>";
   choices += "<option value=\"none\">picture alone</option>";
-  const std::string thinned = of == 1 ? std::string("The one good frame")
+  const std::string thinned = of == 1 ? std::string("The only good frame")
                               : shown == of
                                   ? fmt::format("All {} good frames", of)
                                   : fmt::format("{} of {} good frames (one in {}), so that the page stays small", shown,

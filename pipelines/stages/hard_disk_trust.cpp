@@ -82,7 +82,7 @@ HardDiskTrust trust_in_hard_disks(const HardDiskScene& scene) {
     trust.why = fmt::format("{} soft spheres that touch for 10 us in the nearest bed of the study ({})",
                             trust.agrees ? "hard disks agree with" : "hard disks differ from", of_bed(*bed));
     if (!trust.agrees)
-      trust.advice = "Allow for this difference beside the stated errors, or use soft spheres (docs/soft-spheres.md)";
+      trust.advice = "Add this difference to the stated errors, or use soft spheres (docs/soft-spheres.md)";
   }
   if (scene.friction >= least_friction && scene.restitution >= rough_restitution &&
       scene.tangential_restitution < 0.5) {
@@ -91,9 +91,10 @@ HardDiskTrust trust_in_hard_disks(const HardDiskScene& scene) {
         "with friction {:g} and no tangential restitution T is 10 to 25 % lower than that of elastic beads, whose "
         "contacts give back tangential energy",
         scene.friction);
-    trust.advice =
-        fmt::format("State \"tangential_restitution\" of disks and floor: {:.2f} is that of a linear spring at this e",
-                    std::pow(scene.restitution, 1.75));
+    trust.advice = fmt::format(
+        "Give \"tangential_restitution\" of the disks and of the floor: {:.2f} is the value of a linear spring at this "
+        "e",
+        std::pow(scene.restitution, 1.75));
   }
   return trust;
 }

@@ -50,7 +50,7 @@ const ImagesModule& images_module() {
       keep_memory_of_pictures();
       return found;
     }
-    throw StageError(fmt::format("{} is missing: it belongs beside the program; install both together", name));
+    throw StageError(fmt::format("{} is missing. It must lie beside the program: install both together", name));
   }();
   return *module;
 }

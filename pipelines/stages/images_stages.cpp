@@ -32,11 +32,10 @@ Previewed preview_images(const PreviewRequest& request) {
     if (const std::string why = ingest::why_not_scale(request.options.diameter, *scale, best.rims.radius_px);
         !why.empty())
       return {false, fmt::format("{}: {}", look->path, why)};
-  return {true, fmt::format(
-                    "a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in channel {}; "
-                    "expected share of wrong ones {:.1f} %. The run may find more",
-                    best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                    best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong)};
+  return {true, fmt::format("a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in "
+                            "channel {}; expected share of false beads {:.1f} %. The run may find more",
+                            best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
+                            best.rims.radius_px, ingest::name_of(best.channel), 100 * best.expected_wrong)};
 }
 
 // ingest's own errors become ours.

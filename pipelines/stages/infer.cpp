@@ -120,8 +120,9 @@ void Infer::describe_targets(Fields& fields) {
                          "pointer to a number of a stage in \"from\", in place of a value: /fit/temperature_over_mg"});
                 if (!g.decoding()) return;
                 g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
-                g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value", "it must be above 0");
-                g.require(target.std_error >= 0, "std_error", "an error is not negative");
+                g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value",
+                          "the measured value must be above 0");
+                g.require(target.std_error >= 0, "std_error", "a standard error cannot be negative");
                 if (!target.at.empty()) g.check_result("/at", target.at);
               },
               {.help = observable.meaning});
@@ -150,11 +151,13 @@ void Infer::describe_search(Fields& fields) {
       {.help = "number of further rounds, with beds in the region of the posterior", .range = from_to(0, 20)});
   fields.integer("each", options_.each, {.help = "number of beds in each further round", .range = from_to(1, 10'000)});
   fields.integer("best", options_.best,
-                 {.help = "number of the most probable beds that are run again", .range = from_to(0, 20)});
-  fields.integer("best_replicas", options_.replicas,
-                 {.help = "number of runs of each of these, each with its own seed", .range = from_to(2, 1000)});
+                 {.help = "number of the most probable beds that are run again as a test", .range = from_to(0, 20)});
+  fields.integer(
+      "best_replicas", options_.replicas,
+      {.help = "number of runs of each of the most probable beds, each with its own seed", .range = from_to(2, 1000)});
   fields.quantity("best_measure", options_.best_measure, dimension::time,
-                  {.help = "measuring time of these runs; 0: that of the other beds", .range = non_negative});
+                  {.help = "measuring time of the runs of the most probable beds; 0: the option \"measure\"",
+                   .range = non_negative});
   fields.integer("draws", options_.draws,
                  {.help = "number of draws from the posterior in posterior.csv", .range = from_to(100, 100'000)});
   fields.integer(
@@ -165,27 +168,29 @@ void Infer::describe_search(Fields& fields) {
       "map_curve", options_.curve,
       [](Fields& f, MapCurve& curve) {
         f.number("reduced_temperature", curve.reduced_temperature,
-                 {.help = "T/T_c", .required = true, .range = positive});
+                 {.help = "reduced temperature T/T_c of the curve", .required = true, .range = positive});
         f.text("reading", curve.reading,
-               {.help = "name of a formula of the stage map (map.csv, column name)",
+               {.help = "name of a formula of the stage map (column \"name\" of map.csv)",
                 .required = true,
                 .example = "\"eq6/relative_max/printed\""});
         f.text("label", curve.label, {.help = "name of the curve in the picture"});
       },
       {.help = "curve of Gamma against frequency at which a formula of the stage map gives this T/T_c"});
   fields.text("stored", options_.stored,
-              {.help = "name of a beds.json of an earlier run in reference-data, which is used in place of new beds"});
+              {.help = "name of a file in reference-data with the beds of an earlier run (its beds.json). These beds "
+                       "are used and no new ones are run"});
 }
 
 void Infer::describe(Fields& fields) {
   options_.written.describe(fields);
   fields.quantity("settle", options_.bed.settle, dimension::time,
-                  {.help = "time before the measurement begins", .range = non_negative});
+                  {.help = "time that each bed moves before its measurement begins", .range = non_negative});
   fields.quantity("measure", options_.bed.measure, dimension::time,
                   {.help = "time over which each bed is measured", .required = true, .range = positive});
-  fields.integer(
-      "phases", options_.bed.phases,
-      {.help = "number of moments in each period over which the average is taken", .range = from_to(1, 4096)});
+  fields.integer("phases", options_.bed.phases,
+                 {.help = "number of equally spaced moments in each period of the shaking at which the bed is "
+                          "measured; its profile is the average over them",
+                  .range = from_to(1, 4096)});
   fields.number("kernel_width", options_.bed.kernel_width,
                 {.help = "standard deviation of the Gaussian kernel of the profile, in D", .range = from_to(0.01, 10)});
   fields.number("plateau_density", options_.bed.plateau_density,
@@ -210,27 +215,33 @@ void Infer::check(Fields& fields) {
   bed.views = views_of(options_.moments, options_.average, options_.phase);
   fields.require(
       options_.written.period() > 0 && bed.measure >= options_.written.period() * options_.written.time_unit(),
-      "measure", "the bed must be shaken, and measured over at least one period of the floor");
-  fields.require(!options_.parameters.empty() && options_.parameters.size() <= 12, "parameters",
-                 "from 1 to 12 parameters can be inferred");
+      "measure", "the floor must shake, and \"measure\" must be at least one period of the floor");
+  fields.require(
+      !options_.parameters.empty() && options_.parameters.size() <= 12, "parameters",
+      fmt::format("the stage infers from 1 to 12 parameters, but the recipe names {}", options_.parameters.size()));
   fields.require(options_.moments == 0 || bed.phases % options_.moments == 0, "moments",
-                 fmt::format("{} phases do not fall on {} equally spaced moments", bed.phases, options_.moments));
+                 fmt::format("\"phases\" ({}) must be a multiple of \"moments\" ({})", bed.phases, options_.moments));
   fields.require(
       !options_.phase || std::abs(*options_.phase * bed.phases - std::round(*options_.phase * bed.phases)) < 1e-9,
-      "phase", fmt::format("it is none of the {} phases at which the bed is sampled", bed.phases));
+      "phase",
+      fmt::format("this phase is not one of the {} phases at which the bed is measured; give a multiple of 1/{}",
+                  bed.phases, bed.phases));
   fields.require(
       std::any_of(options_.targets.begin(), options_.targets.end(), [](const auto& t) { return t.has_value(); }),
-      "targets", "nothing was measured", "Give \"temperature_over_mg\" with its error");
+      "targets", "no target has a value: at least one measured number is needed",
+      "Give \"temperature_over_mg\" with its error");
   const std::size_t fewest = fit::Surrogate::fewest_runs(options_.dimensions());
-  fields.require(options_.first >= fewest, "first",
-                 fmt::format("{} parameters need at least {} beds", options_.dimensions(), fewest));
+  fields.require(
+      options_.first >= fewest, "first",
+      fmt::format("{} unknown parameters need at least {} beds in the first round", options_.dimensions(), fewest));
   for (const auto& [name, parameter] : options_.parameters) {
     for (const std::string& pointer : parameter.set) {
       const std::string where = "/parameters/" + escape_pointer_token(name) + "/set";
       try {
         const auto tokens = split_pointer(pointer);
         if (tokens.empty() || std::find(scene_keys.begin(), scene_keys.end(), tokens.front()) == scene_keys.end())
-          fields.problem(where, "\"" + pointer + "\" is no option of the scene", "Write for example \"/floor/gamma\"");
+          fields.problem(where, "\"" + pointer + "\" is not an option of the scene",
+                         "Write for example \"/floor/gamma\"");
       } catch (const UsageError& error) {
         fields.problem(where, error.what());
       }
@@ -303,16 +314,20 @@ std::vector<ScaledTarget> Infer::scaled_targets(const RunContext& context) const
       const Json result = input->result();
       const Json* found = find_pointer(result, target.at.substr(1 + escape_pointer_token(id).size()));
       if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
-        throw InputError(fmt::format("{} has no number", target.at));
+        throw InputError(
+            fmt::format("{}: the result at this pointer is not a number, so it cannot be a target", target.at));
       target.value = (*found)["value"].get<double>();
       if (found->contains("std_error")) {
         const Json& error = (*found)["std_error"];
-        if (!error.is_number()) throw InputError(fmt::format("{} has no standard error: it is no target", target.at));
+        if (!error.is_number())
+          throw InputError(fmt::format("{}: this number has no standard error, so it cannot be a target", target.at));
         target.std_error = std::hypot(target.std_error, error.get<double>());
       }
     }
     const bool logarithmic = observables()[k].logarithmic;
-    if (logarithmic && !(target.value > 0)) throw InputError(fmt::format("{} is not above 0", observables()[k].name));
+    if (logarithmic && !(target.value > 0))
+      throw InputError(
+          fmt::format("{}: the target must be above 0, but is {}", observables()[k].name, number_text(target.value)));
     out.push_back({k, to_scale(k, target.value), logarithmic ? target.std_error / target.value : target.std_error});
   }
   return out;
@@ -327,11 +342,11 @@ std::vector<double> numbers_in(const Json& list) {
 
 std::vector<RunBed> Infer::stored_beds() const {
   const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
-  if (file == nullptr) throw InputError("there are no stored beds \"" + options_.stored + "\"");
+  if (file == nullptr) throw InputError("there is no file of stored beds named \"" + options_.stored + "\"");
   const Json json = Json::parse(file->text);
   if (dump_canonical(json.at("made_from")) != made_from())
     throw InputError("the beds of \"" + options_.stored +
-                     "\" are of another scene, other parameters or another measurement");
+                     "\" were made with a different scene, different parameters or a different measurement");
   std::vector<RunBed> beds;
   for (const Json& one : json.at("beds")) {
     RunBed bed{one.at("round").get<std::uint32_t>(), one.at("values").get<std::vector<double>>(), {}};
@@ -477,7 +492,7 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
                          : trials.back());
   const std::size_t first = ahead.next(trials);
   ahead.leave_out((options_.best - beds.size()) * options_.replicas);
-  const std::string what = fmt::format("{} of the best beds", all);
+  const std::string what = fmt::format("{} runs of the most probable beds", all);
   for_each_index(all, context.jobs(), [&](std::size_t i) {
     context.check_interrupted();
     BestBed& bed = beds[i / options_.replicas];
@@ -539,12 +554,15 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
       row.high_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.975);
       rows.push_back(row);
     }
-    context.progress(ahead.time.fraction(), "inferring the beds of the calibration");
+    context.progress(ahead.time.fraction(), "inference of the beds of the calibration");
   }
-  if (rows.empty()) throw StageError("no bed of the calibration gave all target numbers");
+  if (rows.empty())
+    throw StageError(
+        "no bed of the calibration gave all target numbers, so the intervals cannot be tested. Measure longer "
+        "(\"measure\"), or set \"calibration\" to 0");
   if (incomplete > 0)
     context.warning(fmt::format(
-        "{} of the {} beds of the calibration did not give all target numbers: they are left out of the calibration",
+        "{} of the {} beds of the calibration did not give all target numbers and are left out of the calibration",
         incomplete, beds.size()));
   return rows;
 }
@@ -602,7 +620,9 @@ void Infer::run(RunContext& context) const {
   for (const std::string& sentence : missing_numbers(options_, found, surrogate)) context.warning(sentence);
   found.posterior = sampled(context, options_, surrogate, found.targets);
   if (!(found.posterior.effective > 0))
-    throw StageError("all simulated beds are too far from the targets to give a posterior");
+    throw StageError(
+        "all simulated beds are too far from the targets to give a posterior. Check the targets, or give wider ranges "
+        "of the parameters");
   std::vector<double> inside = found.posterior.points;
   for (double& one : inside) one = std::clamp(one, 0.0, 1.0);
   found.fit = surrogate.fit(inside, found.targets);

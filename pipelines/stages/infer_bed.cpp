@@ -62,13 +62,14 @@ void UnknownParameter::describe(Fields& f) {
   low = from.value_or(0), high = to.value_or(0);
   f.require(!set.empty(), "set", "a parameter needs a pointer into the scene");
   if (is_choice()) {
-    f.require(values.size() >= 2 && !from && !to && !mean, "values", "a list has two values or more, and no range");
+    f.require(values.size() >= 2 && !from && !to && !mean, "values",
+              "\"values\" needs two values or more, and excludes \"low\", \"high\" and \"mean\"");
     return;
   }
   f.require(from && to && low < high, "low", "a parameter needs \"low\" below \"high\", or \"values\"");
-  f.require(!logarithmic || low > 0, "low", "a logarithmic scale begins above 0");
+  f.require(!logarithmic || low > 0, "low", "a logarithmic scale needs \"low\" above 0");
   f.require(mean.has_value() == std_error.has_value() && !(mean && logarithmic), "mean",
-            "a normal prior has \"mean\" and \"std_error\", and a linear scale");
+            "a normal prior needs both \"mean\" and \"std_error\", and a linear scale");
 }
 
 double UnknownParameter::value(double place) const {
@@ -131,9 +132,9 @@ std::optional<double> UnknownParameter::in_scene(const JsonNode& scene) const {
 const std::vector<Observable>& observables() {
   static const std::vector<Observable> all = {
       {"temperature_over_mg", true, "m", "temperature of the fitted profile, T/(m g)", true},
-      {"shift", false, "D", "height at which the fitted tail reaches the plateau density", false},
-      {"solid_height_by_sum_rule", false, "D", "height of the solid that belongs to the fitted T by the column number",
-       false},
+      {"shift", false, "D", "height at which the fitted curve of the fluid reaches the plateau density", false},
+      {"solid_height_by_sum_rule", false, "D",
+       "height of the solid that follows from the fitted T and the column number N D/W", false},
       {"density", false, "1/D^2", "greatest density of the profile", true},
       {"temperature_x_over_mg", true, "m", "kinetic temperature T_x/(m g), horizontal", true},
       {"temperature_z_over_mg", true, "m", "kinetic temperature T_z/(m g), vertical, without the bed's mean velocity",

@@ -16,7 +16,8 @@ namespace {
 
 std::string percent(double share) { return fmt::format("{:.0f} %", 100 * share); }
 
-const std::vector<std::string> columns_of_posterior{"parameter", "prior", "median", "68 %", "95 %", "why this prior"};
+const std::vector<std::string> columns_of_posterior{"parameter", "prior", "median",
+                                                    "68 %",      "95 %",  "reason for this prior"};
 
 std::string parameter_rows(const Json& parameters) {
   std::string out;
@@ -67,12 +68,11 @@ std::string beds_table(const Json& result) {
     out += bed_row(fmt::format("bed {}, run again", ++number), bed.at("values"), bed.at("targets"),
                    bed.at("photographs").get<std::string>());
   if (result.at("assumed").is_object())
-    out += bed_row("as written in the recipe", result.at("assumed").at("values"), result.at("assumed").at("targets"),
-                   "average");
+    out += bed_row("scene as written in the recipe", result.at("assumed").at("values"),
+                   result.at("assumed").at("targets"), "average");
   return out +
-         "</table></div>\n<p>In brackets: the difference from what was measured in errors, that of one bed's scatter "
-         "and of "
-         "the measurement together.</p>\n";
+         "</table></div>\n<p>In brackets: the difference from the measured number, in standard errors. The error "
+         "includes the scatter of one bed and that of the measurement.</p>\n";
 }
 
 std::string inference_html(const FinishedStage& stage, int& pictures) {
@@ -85,19 +85,19 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
   std::string views;
   for (const Json& view : result.at("photographs"))
     if (view.at("prior").get<double>() > 0)
-      views += fmt::format("{}{}: {} (before: {})", views.empty() ? "" : "; ",
+      views += fmt::format("{}{}: {} (prior: {})", views.empty() ? "" : "; ",
                            view.at("show") == "average" ? "the average" : "phase " + view.at("show").get<std::string>(),
                            percent(view.at("posterior").get<double>()), percent(view.at("prior").get<double>()));
-  out += "<p>The photographs show " + views + ".</p>\n" + beds_table(result);
+  out += "<p>Probability that the photographs show: " + views + ".</p>\n" + beds_table(result);
   const Json& first = result.at("narrowing")[0];
   out += fmt::format(
-      "<p>Of further measurements, {} would narrow the parameters most: {} of their variance on average would "
-      "go.</p>\n",
+      "<p>Of all further measurements, that of {} would narrow the parameters most: it would remove {} of their "
+      "variance on average.</p>\n",
       escape_markup(words(first.at("measurement").get<std::string>())), percent(first.at("reduction").get<double>()));
   return out +
          figure_html(stage.files.directory / "pairs.svg", ++pictures,
-                     "The posterior: each parameter by itself and in pairs; points are draws. Crosses: the beds that "
-                     "were run again; circle: the scene as written.");
+                     "The posterior of each parameter and of each pair of parameters. Points: draws from the "
+                     "posterior. Crosses: the most probable beds, which were run again. Circle: the scene as written.");
 }
 
 std::string inference_terminal(const FinishedStage& stage) {
@@ -214,7 +214,7 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
 }
 
 StagePages infer_pages() {
-  return {.sections = {{ReportPlace::claims, "What the measured numbers say of the bed", inference_html}},
+  return {.sections = {{ReportPlace::claims, "What the measured numbers say about the bed", inference_html}},
           .markdown = nullptr,
           .terminal = inference_terminal};
 }

@@ -35,7 +35,7 @@ std::vector<StatedColumn> parameter_columns(const InferOptions& options) {
   std::vector<StatedColumn> out;
   for (const auto& [name, parameter] : options.parameters)
     out.push_back({column_of(name, parameter), unit_of(parameter),
-                   parameter.is_choice() ? "place in its list of values" : "parameter of the bed"});
+                   parameter.is_choice() ? "number of the value in its list, from 0" : "parameter of the bed"});
   return out;
 }
 std::vector<StatedColumn> observable_columns(const InferOptions& options) {
@@ -145,16 +145,18 @@ class Report {
     out["beds_run_again_that_agree"] = agree;
     std::string& statement = out["statement"].get_ref<std::string&>();
     statement = some ? fmt::format(
-                           "By the surrogate, some beds within these ranges give all {} numbers: the nearest has chi2 "
-                           "= {:.2g}, which chance exceeds in {:.0f} % of all cases.",
-                           dof, least, 100 * chance)
+                           "According to the surrogate, some beds within these ranges agree with all {} numbers: the "
+                           "nearest has chi2 = {:.2g}, p = {:.2g} (chance of a larger chi2).",
+                           dof, least, chance)
                      : fmt::format(
-                           "By the surrogate, no bed within these ranges gives all {} numbers: the nearest has chi2 = "
-                           "{:.3g}, {:.1f} standard deviations off.",
+                           "According to the surrogate, no bed within these ranges agrees with all {} numbers: the "
+                           "nearest has chi2 = {:.3g}, which is {:.1f} standard deviations off.",
                            dof, least, deviations);
     if (!best_beds.empty())
-      statement += fmt::format(" Most probable beds that were run again: {}; within {:g} errors of every number: {}.",
-                               best_beds.size(), enough_deviations, agree);
+      statement += fmt::format(
+          " Of the {} most probable beds, which were run again, {} agree with every number within {:g} standard "
+          "errors.",
+          best_beds.size(), agree, enough_deviations);
     return out;
   }
 
@@ -264,7 +266,8 @@ class Report {
           surrogate_.scatter(o) * surrogate_.scatter(o), d);
     }
     for (std::size_t k = 0; k < d; ++k)
-      add(options_.parameters[k].first, "the parameter itself; its effect on the others", values_[k], 0, k);
+      add(options_.parameters[k].first, "the parameter itself; given is its effect on the other parameters", values_[k],
+          0, k);
     std::stable_sort(rows.begin(), rows.end(), [](const auto& l, const auto& r) { return l.first < r.first; });
     Json out = Json::array();
     for (auto& [ignored, row] : rows) out.push_back(std::move(row));
@@ -382,9 +385,10 @@ void state_targets(ResultList& list, const InferOptions& options, const std::str
     const Observable& observable = observables()[o];
     const std::string unit = unit_of(options, observable), at = below + "/targets/" + std::string(observable.name);
     list.quantity(at, unit, std::string(observable.meaning) + "; the error is the scatter of one bed", given, true);
-    list.number(at + "/measured", unit, "the target", given);
-    list.number(at + "/measured_error", unit, "its standard error", given);
-    list.number(at + "/difference_in_errors", "1", "difference over the error of both", given, true);
+    list.number(at + "/measured", unit, "measured number (the target)", given);
+    list.number(at + "/measured_error", unit, "standard error of the measured number", given);
+    list.number(at + "/difference_in_errors", "1", "difference from the measured number, over the error of both", given,
+                true);
   }
 }
 
@@ -395,7 +399,7 @@ void state_tables(ResultList& list, const InferOptions& options) {
   };
   const std::vector<StatedColumn> numbers = observable_columns(options), parameters = parameter_columns(options);
   const StatedColumn view{"photographs", "", "whether the photographs show the average over the shaking or one phase"};
-  list.table({"beds.csv", "every bed that was run",
+  list.table({"beds.csv", "all beds that were run",
               with(with({{"bed", "1", "number of the bed"},
                          {"round", "1",
                           "number of the round; 0: spread over the prior, later: in the region of the posterior"},
@@ -415,7 +419,7 @@ void state_tables(ResultList& list, const InferOptions& options) {
               with(with({{"bed", "1", "number of the bed"}, {"replica", "1", "number of the run"}, view}, parameters),
                    numbers)});
   list.table({"calibration.csv",
-              "beds with known parameters, inferred",
+              "inference of beds with known parameters",
               {{"bed", "1", "number of the bed"},
                {"parameter", "", "name of the parameter", names},
                {"truth", "1", "true value, in the unit of the parameter"},
@@ -446,18 +450,18 @@ void state_inference(ResultList& list, const InferOptions& options) {
                                        {"/prior_high", "greatest value of the prior"}})
       list.number(at + key, unit, meaning);
     list.number(at + "/width_over_prior", "1", "standard deviation of the posterior over that of the prior");
-    list.text(at + "/why", "why this prior");
+    list.text(at + "/why", "reason for this prior");
   }
-  list.text("/photographs/#/show", "the average over the shaking, or a phase of it");
-  list.number("/photographs/#/prior", "1", "prior probability");
-  list.number("/photographs/#/posterior", "1", "posterior probability");
+  list.text("/photographs/#/show", "what the photographs show: the average over the shaking, or one phase of it");
+  list.number("/photographs/#/prior", "1", "prior probability that the photographs show this");
+  list.number("/photographs/#/posterior", "1", "posterior probability that the photographs show this");
   list.number("/agreement/least_chi2", "1",
               "chi-square of the nearest bed; errors include that of the surrogate and the scatter between beds");
-  list.number("/agreement/numbers", "1", "number of measured numbers");
+  list.number("/agreement/numbers", "1", "number of targets");
   list.number("/agreement/chance", "1",
               "probability of a chi-square at least this large, if the nearest bed is the true one");
-  list.number("/agreement/deviations", "1", "that probability as a number of standard deviations");
-  list.number("/agreement/predictive_p", "1", "mean of that probability over the posterior");
+  list.number("/agreement/deviations", "1", "probability of chi-square as a number of standard deviations");
+  list.number("/agreement/predictive_p", "1", "probability of chi-square, averaged over the posterior");
   list.truth("/agreement/some_bed_agrees", "whether the nearest bed is within three standard deviations");
   list.number("/agreement/beds_run_again_that_agree", "1",
               "number of the beds run again that lie within three standard errors of every target");
@@ -468,7 +472,7 @@ void state_inference(ResultList& list, const InferOptions& options) {
                 "value of the parameter in the scene as written", inside);
   state_targets(list, options, "/assumed", inside);
   list.number("/assumed/chi2", "1", "chi-square of the targets, if the photographs show the average", inside);
-  list.number("/assumed/deviations", "1", "that probability as a number of standard deviations", inside);
+  list.number("/assumed/deviations", "1", "probability of chi-square as a number of standard deviations", inside);
   const Given best = given_if(options.best > 0, "\"best\" is above 0");
   list.text("/best/#/photographs", "whether the photographs show the average over the shaking or one phase", best);
   for (const auto& [name, parameter] : options.parameters)
@@ -477,30 +481,34 @@ void state_inference(ResultList& list, const InferOptions& options) {
   state_targets(list, options, "/best/#", best);
   list.number("/best/#/largest_difference_in_errors", "1", "largest difference from a target, in standard errors", best,
               true);
-  list.text("/narrowing/#/measurement", "a further measurement");
-  list.text("/narrowing/#/meaning", "what it is");
+  list.text("/narrowing/#/measurement", "name of a further measurement");
+  list.text("/narrowing/#/meaning", "meaning of the further measurement");
   list.number("/narrowing/#/reduction", "1",
               "mean share of the variance of the parameters that this measurement would remove");
   for (const auto& [name, ignored] : options.parameters)
-    list.number(pointer_join("/narrowing/#/parameters", name), "1", "the same for this parameter",
+    list.number(pointer_join("/narrowing/#/parameters", name), "1",
+                "share of the variance of this parameter that the measurement would remove",
                 given_when("the measurement is not the parameter itself"));
   for (const Observable& observable : observables()) {
     const std::string at = "/surrogate/" + std::string(observable.name);
-    list.number(at + "/beds", "1", "number of beds for which this number is known");
+    list.number(at + "/beds", "1", "number of beds in which this number could be measured");
     list.number(at + "/scatter", "1", "standard deviation between beds with the same parameters");
     list.text(at + "/scatter_is", "whether the scatter is relative or in the unit of the number");
     list.number(at + "/within_1", "1",
                 "share of the beds within one standard deviation of the prediction from the others");
-    list.number(at + "/within_2", "1", "share within two standard deviations");
+    list.number(at + "/within_2", "1",
+                "share of the beds within two standard deviations of the prediction from the others");
   }
   const Given calibrated = given_if(options.calibration > 0, "\"calibration\" is above 0");
-  list.number("/calibration/beds", "1", "beds with known parameters", calibrated);
+  list.number("/calibration/beds", "1", "number of beds with known parameters", calibrated);
   list.number("/calibration/within_68", "1", "share of the 68 % intervals that contain the true value", calibrated);
   list.number("/calibration/within_95", "1", "share of the 95 % intervals that contain the true value", calibrated);
   for (const auto& [name, ignored] : options.parameters) {
     const std::string at = pointer_join("/calibration/parameters", name);
-    list.number(at + "/within_68", "1", "the same for this parameter", calibrated);
-    list.number(at + "/within_95", "1", "the same for this parameter", calibrated);
+    list.number(at + "/within_68", "1", "share of the 68 % intervals of this parameter that contain the true value",
+                calibrated);
+    list.number(at + "/within_95", "1", "share of the 95 % intervals of this parameter that contain the true value",
+                calibrated);
     list.number(at + "/rank_chi2_p", "1", "probability that uniformly distributed ranks are at least as uneven",
                 calibrated);
   }

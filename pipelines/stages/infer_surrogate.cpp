@@ -38,7 +38,7 @@ fit::Surrogate trained(const InferOptions& options, const std::vector<RunBed>& b
     return fit::Surrogate::train(set);
   } catch (const std::invalid_argument& error) {
     throw StageError(std::string(observables()[observable].name) + ": " + error.what() +
-                     " (beds whose fit fails do not count)");
+                     " (beds whose fit failed are not counted)");
   }
 }
 
@@ -73,7 +73,10 @@ BedSurrogate::BedSurrogate(const InferOptions& options, const std::vector<RunBed
   }
   double sum = 0;
   for (const double one : prior_) sum += one;
-  if (!(sum > 0)) throw StageError("at the phase of the photographs too few fits succeed");
+  if (!(sum > 0))
+    throw StageError(
+        "at the phase of the photographs the fit of the profile fails for too many simulated beds. Measure longer "
+        "(\"measure\"), or give another \"phase\"");
   for (double& one : prior_) one /= sum;
   std::vector<std::size_t> moments;
   for (std::size_t v = 1; v < views.size(); ++v)

@@ -27,7 +27,7 @@ class Map : public Stage {
                   {.help = "peak acceleration of the floor over g, Gamma; left out, that of the simulated bed",
                    .range = positive});
     fields.number("gamma_std_error", gamma_std_error_,
-                  {.help = "standard error of gamma, stated beside it", .range = non_negative});
+                  {.help = "standard error of gamma; the results state it", .range = non_negative});
     fields.quantity("frequency", frequency_, dimension::frequency,
                     {.help = "frequency of the shaking; left out, that of the simulated bed", .range = positive});
     fields.quantity("diameter", diameter_, dimension::length,
@@ -56,19 +56,20 @@ class Map : public Stage {
     fields.object<TableColumns>(
         "columns", columns_,
         [](Fields& f, TableColumns& c) {
-          f.text("temperature", c.temperature, {.help = "column of T, in m g D"});
+          f.text("temperature", c.temperature, {.help = "column of the temperature T, in m g D"});
           f.texts(
               "axes", c.axes,
               {.help = "parameters of the table, among gamma, frequency (Hz), restitution, friction and initial_height "
                        "(D). Each is a column, or is named in the series (\"restitution=0.9 friction=0.2\")"});
         },
-        {.help = "columns of the table"});
-    fields.number(
-        "bead_restitution", bead_restitution_,
-        {.help = "coefficient of restitution of the beads, for the table; left out, that of the simulated bed",
-         .range = zero_to_one});
+        {.help = "columns of the table of simulated beds"});
+    fields.number("bead_restitution", bead_restitution_,
+                  {.help = "coefficient of restitution of the beads, for the interpolation in the table; left out, "
+                           "that of the simulated bed",
+                   .range = zero_to_one});
     fields.number("bead_friction", bead_friction_,
-                  {.help = "friction coefficient of the beads, for the table; left out, that of the simulated bed",
+                  {.help = "friction coefficient of the beads, for the interpolation in the table; left out, that of "
+                           "the simulated bed",
                    .range = non_negative});
     if (!fields.decoding()) return;
     if (fit::find_equation_of_state(equation_) == nullptr) {
@@ -78,13 +79,15 @@ class Map : public Stage {
         fields.problem("/equation", error.what());
       }
     }
-    fields.require(table_.paths.size() <= 1, "table", "one table is read at a time");
+    fields.require(table_.paths.size() <= 1, "table",
+                   fmt::format("this names {} files, but the stage reads one table", table_.paths.size()),
+                   "Give the path of one CSV file");
     const std::vector<std::string> known{"gamma", "frequency", "restitution", "friction", "initial_height"};
     for (const std::string& axis : columns_.axes) {
       const std::string nearest = nearest_name(axis, known);
       fields.require(std::find(known.begin(), known.end(), axis) != known.end(), "columns/axes",
                      fmt::format("there is no axis \"{}\"", axis),
-                     nearest.empty() ? fmt::format("There are {}", fmt::join(known, ", "))
+                     nearest.empty() ? fmt::format("Choose from: {}", fmt::join(known, ", "))
                                      : fmt::format("Did you mean \"{}\"?", nearest));
     }
     require_bed_facts(fields);
@@ -117,7 +120,7 @@ class Map : public Stage {
     const Beads beads = take_bed(context, question);
     take_options(question);
     if (!(question.gamma > 0) || !(question.frequency > 0))
-      throw InputError("the floor of this bed does not shake: there is no Gamma to map");
+      throw InputError("the floor of this bed does not shake, so there is no Gamma. Give \"gamma\" and \"frequency\"");
     if (const auto odd = gamma_ ? odd_gamma(*gamma_) : std::nullopt)
       context.warning(
           fmt::format("Gamma = {:.3g}. {}. Check the amplitude, which is half the way between the floor's lowest and "
@@ -164,7 +167,7 @@ class Map : public Stage {
     if (!beads.restitution) beads.restitution = bed.restitution;
     if (!beads.friction) beads.friction = bed.friction;
     if (bed.reduced && !(diameter_ && frequency_))
-      throw InputError("the bed is in reduced units: give diameter and frequency here");
+      throw InputError("the bed is in reduced units, so the map needs \"diameter\" and \"frequency\" in this stage");
     question.gamma = bed.gamma();
     question.frequency = bed.frequency.value_or(0), question.diameter = bed.diameter;
     if (!bed.reduced && bed.gravity) question.gravity = *bed.gravity;
@@ -232,8 +235,9 @@ class Map : public Stage {
                                  "\"from\" names a study or \"table\" is given");
     const Given found = both(asked, given_when("the table of simulated beds gives a temperature"));
     list.text("/simulated/status", "ok, or why the table of simulated beds gives no temperature", asked);
-    list.text("/simulated/message", "why it does not", both(asked, given_when("it does not")));
-    list.number("/simulated/beds", "1", "beds in the table", asked);
+    list.text("/simulated/message", "reason why the table gives no temperature",
+              both(asked, given_when("the table gives no temperature")));
+    list.number("/simulated/beds", "1", "number of beds in the table", asked);
     for (const std::string& axis : columns_.axes)
       list.number("/simulated/at/" + axis, axis == "frequency" ? "Hz" : "1", "value of this parameter for the bed",
                   asked);
@@ -257,7 +261,8 @@ class Map : public Stage {
     }
     const bool simulated = known != nullptr && known->bed.mass.has_value();
     const auto need = [&](const char* key, bool there) {
-      fields.require(there, key, fmt::format("\"{}\" is missing, and no stage in \"from\" states it", key));
+      fields.require(there, key,
+                     fmt::format("\"{}\" is missing, and no stage in \"from\" states it; give it here", key));
     };
     need("gamma", gamma_ || simulated);
     need("frequency", frequency_ || simulated);
@@ -293,7 +298,8 @@ class Map : public Stage {
                                                                   : std::optional(question.initial_height);
       if (!value)
         throw InputError(fmt::format(
-            "the table varies the {} of the beads, but no bed in \"from\" gives it: give bead_{}", axis, axis));
+            "the {} of the beads is an axis of the table, but no bed in \"from\" states it: give \"bead_{}\"", axis,
+            axis));
       here.push_back(*value);
     }
     return here;
@@ -309,8 +315,9 @@ class Map : public Stage {
       for (const std::string& axis : columns_.axes) {
         const auto value = table.has(axis) ? table.number(r, table.column(axis)) : in_series(table.series(r), axis);
         if (!value)
-          throw InputError(fmt::format("{}: row {} has no {}: neither a column nor in its series \"{}\"", table.file,
-                                       r + 1, axis, table.series(r)));
+          throw InputError(
+              fmt::format("{}: row {} states no {}: there is no such column, and the series \"{}\" does not name it",
+                          table.file, r + 1, axis, table.series(r)));
         point.position.push_back(*value);
       }
       points.push_back(std::move(point));
@@ -325,8 +332,8 @@ class Map : public Stage {
       for (const fit::MapPoint& point : points) levels.insert(point.position[a]);
       if (levels.size() < 3 && !levels.contains(here[a]))
         context.warning(
-            fmt::format("the table has only {} values of {}: the interpolation's error does not include the curvature "
-                        "of T between them",
+            fmt::format("the table has only {} values of {}, so the error of the interpolation does not include the "
+                        "curvature of T between them. Add beds at other values",
                         levels.size(), columns_.axes[a]));
     }
   }
@@ -379,7 +386,7 @@ class Map : public Stage {
 
 StageRow map_stage() {
   return {.name = "map",
-          .summary = "maps Gamma to T/T_c by every formula that the paper allows",
+          .summary = "maps Gamma to T/T_c by every formula that Quinn and Hong (2000) allow",
           .accepts = {"fit", "simulate", "extract", "study"},
           .fewest_inputs = 0,
           .most_inputs = 4,

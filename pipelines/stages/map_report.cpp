@@ -33,8 +33,8 @@ std::string readings_html(const FinishedStage& stage, int&) {
   const Json& map = stage.result;
   if (!map.contains("readings")) return "";
   std::string out = fmt::format(
-      "<h2>Γ → T/T_c ({})</h2>\n<p class=\"soft\">Γ = {}. The paper's relation allows several formulas; none is "
-      "preferred. A formula that does not apply at this Γ is marked.</p>\n",
+      "<h2>Γ → T/T_c ({})</h2>\n<p class=\"soft\">Γ = {}. The relation of Quinn and Hong (2000) allows several "
+      "formulas, and none of them is preferred. A formula that does not apply at this Γ is marked.</p>\n",
       escape_markup(stage.files.id), map.contains("gamma") ? shown(map["gamma"]) : "?");
   if (map.contains("measured_reduced_temperature"))
     out += fmt::format("<p>Measured T/T_c = <strong>{}</strong></p>\n", shown(map["measured_reduced_temperature"]));
@@ -68,7 +68,7 @@ std::string gamma_terminal(const FinishedStage& stage) {
   }
   std::string text = fmt::format("{}: Gamma = {}", stage.files.id, shown(map["gamma"]));
   text += formulas == 0
-              ? ", where no formula for T applies"
+              ? ", at which no formula for T applies"
               : fmt::format(". From it {} {} T/T_c", formulas, formulas == 1 ? "formula gives" : "formulas give");
   if (formulas == 1) text += fmt::format(" = {:.3g}", least);
   if (formulas > 1) text += fmt::format(" from {:.3g} to {:.3g}", least, most);
@@ -83,7 +83,7 @@ StagePages map_pages() {
       .warnings =
           {{"Gamma = ", WarningEffect::answer, "Check amplitude and frequency: every T of the map follows from them."},
            {"formulas", WarningEffect::rest, "Use the formulas that are marked as in range in the table of the map."},
-           {"", WarningEffect::rest, "Run beds nearer to this one, and give them as the table of simulated beds."}},
+           {"", WarningEffect::rest, "Simulate beds with parameters nearer to this one, and give them as \"table\"."}},
       .terminal = gamma_terminal};
 }
 

@@ -26,21 +26,23 @@ void BedMeasureOptions::describe(Fields& fields) {
   fields.object<sim::MeasureOptions>(
       "frames", measure_,
       [](Fields& f, sim::MeasureOptions& frames) {
-        f.integer("count", frames.frames, {.help = "number of frames of the trajectory that are kept; 0: none"});
-        f.integer("phases", frames.phases,
-                  {.help = "number of moments in each period at which the bed is sampled; the frames take them in turn",
-                   .range = from_to(1, 4096)});
+        f.integer("count", frames.frames, {.help = "number of frames of the trajectory that are stored; 0: none"});
+        f.integer(
+            "phases", frames.phases,
+            {.help =
+                 "number of moments in each period at which the bed is sampled; the frames use these moments in turn",
+             .range = from_to(1, 4096)});
       },
-      {.help = "trajectory that is kept"});
+      {.help = "frames of the trajectory that are stored"});
   fields.object<sim::MeasureOptions>(
       "profile", measure_,
       [](Fields& f, sim::MeasureOptions& profile) {
         f.number("spacing", profile.spacing,
-                 {.help = "distance between the heights of the profile, in D", .range = from_to(1e-3, 10)});
+                 {.help = "distance between neighbouring heights of the profile, in D", .range = from_to(1e-3, 10)});
         f.object<Kernel>("kernel", profile.kernel, describe_measuring_kernel,
                          {.help = "kernel through which the density is measured"});
       },
-      {.help = "density profile"});
+      {.help = "options of the density profile"});
 }
 
 sim::MeasureOptions BedMeasureOptions::reduced(double time_unit) const {
@@ -58,14 +60,13 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
       fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
                      "Give " + handy_text(rounded_up(floor_period * time_unit), dimension::time) + " or more");
     if (problem == MeasureProblem::too_many_periods)
-      fields.require(false, "measure", "the floor would shake more than 1e12 times: no run can reach that",
-                     "Measure shorter, or shake more slowly");
+      fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run can reach",
+                     "Give a shorter \"measure\" or \"settle\", or a lower frequency");
     if (problem == MeasureProblem::too_many_frames)
       fields.require(false, "frames/count",
-                     std::to_string(options.frames) + " frames do not fit into the " +
-                         std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) +
-                         " moments at which the bed is sampled",
-                     "Measure longer, or ask for fewer frames");
+                     std::to_string(options.frames) + " frames were requested, but the bed is sampled at only " +
+                         std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) + " moments",
+                     "Give a longer \"measure\", or a smaller \"count\"");
   }
 }
 

@@ -19,14 +19,14 @@ MeasuredProfile read_measured_profile(const std::filesystem::path& profile,
   out.warnings = std::move(table.notes);
   if (out.profile.std_error.empty())
     out.warnings.push_back(profile.string() +
-                           ": has no standard errors. The errors of the fit come from the scatter of the points about "
-                           "it.");
+                           ": the profile has no standard errors. The errors of the fit follow from the scatter of the "
+                           "points about the fitted curve.");
   const std::optional<Kernel> kernel = stated ? stated : table.kernel;
   out.kernel = kernel.value_or(Kernel{});
   if (!kernel)
     out.warnings.push_back(profile.string() +
-                           ": does not say through which kernel it was measured. It is taken as densities at points; "
-                           "name the kernel if it has one.");
+                           ": the profile does not state through which kernel it was measured. It is taken as "
+                           "densities at points. Give the kernel if the profile was smoothed.");
   return out;
 }
 

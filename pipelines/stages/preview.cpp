@@ -73,14 +73,13 @@ std::string given_besides(const ExtractOptions& options) {
 
 std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t number, const std::string& command) {
   return fmt::format(
-      "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of wrong ones {:.1f} "
-      "%; the "
-      "beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" "
-      "alt=\"the beads found\"></p>\n",
+      "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of false beads {:.1f} "
+      "%; the beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" alt=\"the "
+      "beads found\"></p>\n",
       number, candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark", candidate.rims.radius_px,
       ingest::name_of(candidate.channel), candidate.disks.size(), 100 * candidate.expected_wrong,
       100 * candidate.explained_share,
-      candidate.credible ? "" : escaped(fmt::format("Not believed: {}.", candidate.why_not)),
+      candidate.credible ? "" : escaped(fmt::format("Not credible: {}.", candidate.why_not)),
       candidate.plausible || candidate.credible
           ? fmt::format("<pre>{}</pre>\n", escaped(fmt::format("{} {}", command, options_for(candidate))))
           : "",
@@ -115,7 +114,7 @@ std::string seen_without_options(const std::vector<std::string>& paths, ExtractO
   const std::optional<FirstLook> look = look_at_first(paths, options);
   if (!look || !look->survey.found) return "";
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
-  return fmt::format("Without the {} given, {} {} beads of {:.1f} px radius are seen", fmt::join(given, " and "),
+  return fmt::format("Without the given {}, {} {} beads of {:.1f} px radius are found", fmt::join(given, " and "),
                      best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
                      best.rims.radius_px);
 }
@@ -147,8 +146,8 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
   std::string body;
   const ingest::Survey& survey = look.survey;
   body += survey.found
-              ? "<p>The first candidate is used unless options say otherwise. This is a first look, without the fit of "
-                "each bead: the run may find more of them, and states their radius with its error.</p>\n"
+              ? "<p>The first candidate is used unless options choose another. This is a first look, without a fit of "
+                "each bead. The run may find more beads, and it states their radius with its error.</p>\n"
               : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const ingest::CandidatePictures pictures(look.path);
   std::size_t number = 0;

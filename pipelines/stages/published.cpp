@@ -17,9 +17,10 @@ constexpr std::string_view published_folder = "reference-data/", published_file 
 
 PublishedLookup not_found(const std::string& what, const std::string& wanted, const std::vector<std::string>& names) {
   const std::string nearest = nearest_name(wanted, names);
-  return {{},
-          fmt::format("there is no {} \"{}\"", what, wanted),
-          nearest.empty() ? fmt::format("There are {}", fmt::join(names, ", ")) : "Did you mean \"" + nearest + "\"?"};
+  return {
+      {},
+      fmt::format("there is no {} \"{}\"", what, wanted),
+      nearest.empty() ? fmt::format("Choose from: {}", fmt::join(names, ", ")) : "Did you mean \"" + nearest + "\"?"};
 }
 
 std::optional<double> number_at(const Json& object, const char* key) {

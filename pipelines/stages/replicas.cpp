@@ -86,8 +86,9 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
     sum[k % 2] += part_of(results[k], key, "value");
     ++count[k % 2];
   }
-  return fmt::format("{:.3g} on average where they begin as the recipe says, {:.3g} from a random fill",
-                     sum[0] / count[0], sum[1] / count[1]);
+  return fmt::format(
+      "mean {:.3g} of the beds that start as in the recipe, {:.3g} of those that start from a random fill",
+      sum[0] / count[0], sum[1] / count[1]);
 }
 
 bool differ(double spread, double within, std::size_t n) {
@@ -169,17 +170,17 @@ std::vector<std::string> replica_warnings(const std::vector<Json>& results, cons
   const std::size_t n = results.size();
   if (const auto found = notable_spread(joined, n))
     warnings.push_back(fmt::format(
-        "the {} beds differ by more than chance: {} scatters by {:.2g}, the stated error of each bed is {:.2g}{}. "
-        "The result depends on how the bed was filled; the stated error includes this. A longer \"settle\" may "
-        "reduce the difference; more \"replicas\" reduce the error",
+        "the {} beds differ by more than chance: the standard deviation of {} between beds is {:.2g}, but the stated "
+        "error of each bed is {:.2g}{}. The result depends on how the bed was filled; the stated error includes this. "
+        "A longer \"settle\" may reduce the difference; more \"replicas\" reduce the error",
         n, found->what, found->spread, found->within,
         starts == ReplicaStarts::alternate ? " (" + by_start(results, found->key) + ")" : ""));
   if (const auto found = notable_drift_of(joined))
-    warnings.push_back(fmt::format(
-        "the bed still changes while it is measured: {} is {} by {:.2g} ({:.0f} %) in the second half of the time, "
-        "{:.1f} times the error of this difference. Let it settle longer",
-        found->what, found->change > 0 ? "higher" : "lower", std::abs(found->change), 100 * found->part,
-        std::abs(found->change) / found->error));
+    warnings.push_back(
+        fmt::format("the bed still changes while it is measured: {} is {} by {:.2g} ({:.0f} %) in the second half of "
+                    "the time, which is {:.1f} times the error of this difference. Give a longer \"settle\"",
+                    found->what, found->change > 0 ? "higher" : "lower", std::abs(found->change), 100 * found->part,
+                    std::abs(found->change) / found->error));
   return warnings;
 }
 
@@ -197,7 +198,7 @@ Table replicas_table(const std::vector<Json>& results) {
   }
   std::vector<StatedColumn> columns{{"replica", "1", "number of the replica, from 0"}};
   for (const auto& [name, unit] : quantities) columns.push_back({name, unit, name + " of the replica"});
-  Table table("each replica by itself", columns);
+  Table table("results of each replica", columns);
   for (std::size_t k = 0; k < results.size(); ++k) {
     std::vector<Cell> cells{count_cell(k)};
     for (const auto& [name, unit] : quantities) {

@@ -84,8 +84,8 @@ void share_error(ScalingPoints& points) {
 Json scaling_json(const ScalingFit& options, const fit::PowerProduct& found, std::size_t points) {
   Json out{{"points", points}};
   out["status"] = found.ok ? "ok"
-                           : "needs more points than unknowns, with positive numbers and errors, and columns that "
-                             "vary independently";
+                           : "not fitted: the fit needs more points than unknowns, positive numbers and errors, and "
+                             "columns that vary independently";
   for (std::size_t k = 0; k < options.powers.size(); ++k)
     out["exponents"][options.powers[k]] =
         found.ok ? quantity_json(found.exponents[k], "1", found.exponent_errors[k]) : Json();
@@ -99,15 +99,15 @@ Json scaling_json(const ScalingFit& options, const fit::PowerProduct& found, std
 
 void describe_fit(Fields& fields, ScalingFit& fit) {
   fields.text("name", fit.name, {.help = "name of the fit in scaling.json and of its CSV file", .required = true});
-  fields.text("from", fit.from, {.help = "id of the study; may be left out when there is one"});
+  fields.text("from", fit.from, {.help = "id of the study; may be left out where \"from\" names one study"});
   fields.text(
       "y", fit.y,
-      {.help = "column that is fitted; its errors are in the column std_error or y_error beside it", .required = true});
+      {.help = "column y that is fitted; its standard errors are in the column of the same name with _error at the end",
+       .required = true});
   fields.texts("powers", fit.powers, {.help = "columns x_1, x_2, ... whose exponents are fitted", .required = true});
-  fields.texts(
-      "each", fit.each,
-      {.help =
-           "columns that divide the points into groups; each group has its own amplitude, all share the exponents"});
+  fields.texts("each", fit.each,
+               {.help = "columns that divide the points into groups; each group has its own amplitude, and all groups "
+                        "share the exponents"});
   fields.texts("series", fit.series, {.help = "series of the study that are used; left out, all"});
   fields.map<ColumnLimits>("within", fit.within,
                            [](Fields& f, ColumnLimits& limits) {
@@ -124,16 +124,17 @@ void describe_fit(Fields& fields, ScalingFit& fit) {
 // The study, its columns and series must be there.
 void check_fit(Fields& fields, const ScalingFit& fit) {
   fields.require(!fit.name.empty() && fit.name.find_first_of("/\\ .") == std::string::npos, "name",
-                 "\"" + fit.name + "\" cannot be the name of a file");
-  fields.require(!fit.powers.empty(), "powers", "no column is named");
+                 "\"" + fit.name + "\" cannot be the name of a file: use no spaces, dots and slashes");
+  fields.require(!fit.powers.empty(), "powers", "\"powers\" is empty: give at least one column");
   const std::vector<StatedStage>& from = fields.from();
   const auto study = std::find_if(from.begin(), from.end(), [&](const StatedStage& one) {
     return one.id == fit.from || (fit.from.empty() && from.size() == 1);
   });
   if (study == from.end())
-    return fields.problem("/from", fit.from.empty()
-                                       ? "\"from\" of the stage names several studies: name the one that is meant"
-                                       : "\"" + fit.from + "\" is not in the \"from\" of this stage");
+    return fields.problem(
+        "/from", fit.from.empty()
+                     ? "\"from\" of the stage names several studies: give here the id of the study that is fitted"
+                     : "\"" + fit.from + "\" is not in the \"from\" of this stage");
   const StatedTable* table = study->results != nullptr ? study->results->find_table("table.csv") : nullptr;
   if (table == nullptr) return;
   const auto check = [&](const std::string& where, const std::string& column) {
@@ -150,7 +151,7 @@ void check_fit(Fields& fields, const ScalingFit& fit) {
     const std::string nearest = nearest_name(fit.series[k], names);
     fields.problem(
         "/series/" + std::to_string(k), "the study has no series \"" + fit.series[k] + "\"",
-        nearest.empty() ? fmt::format("There are {}", fmt::join(names, ", ")) : "Did you mean \"" + nearest + "\"?");
+        nearest.empty() ? fmt::format("Choose from: {}", fmt::join(names, ", ")) : "Did you mean \"" + nearest + "\"?");
   }
 }
 
@@ -175,23 +176,23 @@ class Scaling : public Stage {
     for (const ScalingFit& fit : fits_) {
       const std::string at = pointer_join("", fit.name);
       const Given found = given_when("the fit succeeds");
-      list.number(at + "/points", "1", "points used");
+      list.number(at + "/points", "1", "number of points that are used");
       list.text(at + "/status", "ok, or why there is no fit");
       for (const std::string& power : fit.powers)
         list.quantity(pointer_join(at + "/exponents", power), "1", "exponent of " + power, {}, true);
       list.quantity(at + "/amplitude", "1", "factor of the powers, in the units of the columns",
                     both(found, given_if(fit.each.empty(), "\"each\" names no column")));
-      list.number(at + "/chi2", "1", "sum of the squared residuals of ln y over their errors", found);
+      list.number(at + "/chi2", "1", "chi-square: sum of squared residuals of ln y over their squared errors", found);
       list.number(at + "/dof", "1", "degrees of freedom", found);
       list.number(at + "/p_value", "1", "probability of a chi-square at least this large, if the model is right",
                   found);
       list.number(at + "/rms_log_ratio", "1", "rms of ln(y/fit)", found);
       std::vector<StatedColumn> columns{{"series", "", "kind of bed"}};
       for (const std::vector<std::string>* names : {&fit.powers, &fit.each}) {
-        for (const std::string& name : *names) columns.push_back({name, "1", "as in the study"});
+        for (const std::string& name : *names) columns.push_back({name, "1", "value in the study"});
       }
       for (const char* name : {"y", "y_error", "fitted", "ratio", "ratio_error"}) columns.push_back(column_named(name));
-      list.table({fit.name + ".csv", "the points of " + fit.name + ", and the fit at them", columns, found});
+      list.table({fit.name + ".csv", "the points of " + fit.name + ", with the values of the fit", columns, found});
     }
   }
 
@@ -209,18 +210,18 @@ class Scaling : public Stage {
       if (found.ok)
         write_points(context, options, points, found);
       else
-        context.warning(options.name + ": no fit; it " + out[options.name]["status"].get<std::string>());
+        context.warning(options.name + ": " + out[options.name]["status"].get<std::string>());
     }
     write_file(context.output("scaling.json"), dump(out));
   }
 
  private:
   static StatedColumn column_named(const std::string& name) {
-    if (name == "y") return {name, "1", "as in the study"};
+    if (name == "y") return {name, "1", "value in the study"};
     if (name == "y_error") return {name, "1", "standard error of y that the fit uses"};
-    if (name == "fitted") return {name, "1", "the fit at this point"};
-    if (name == "ratio") return {name, "1", "y over the fit"};
-    return {name, "1", "standard error of the ratio by that of y"};
+    if (name == "fitted") return {name, "1", "value of the fit at this point"};
+    if (name == "ratio") return {name, "1", "ratio of y to the fit"};
+    return {name, "1", "standard error of the ratio, from that of y"};
   }
 
   static void write_points(RunContext& context, const ScalingFit& options, const ScalingPoints& points,

@@ -30,17 +30,18 @@ void describe_surface(Fields& fields, SurfaceOptions& surface) {
                 {{sim::RestitutionLaw::constant, "constant"},
                  {sim::RestitutionLaw::power, "power"},
                  {sim::RestitutionLaw::viscoelastic, "viscoelastic"}},
-                {.help = "how the restitution depends on the normal velocity v. Constant: it is e. Power: 1 - (1 - e) "
-                         "(v/v0)^(3/4) below v0, e above (Bizon 1998). Viscoelastic: as of viscoelastic spheres, e at "
-                         "v0 (Mueller and Poeschel 2011)"});
+                {.help = "dependence of the restitution on the normal velocity v. Constant: e at every v. Power: 1 - "
+                         "(1 - e) (v/v0)^(3/4) below v0, e above (Bizon 1998). Viscoelastic: that of viscoelastic "
+                         "spheres, with e at v0 (Mueller and Poeschel 2011)"});
   fields.quantity("restitution_speed", surface.law_speed, dimension::velocity,
-                  {.help = "velocity v0 of the restitution law", .range = positive, .example = "\"0.3 m/s\""});
+                  {.help = "velocity v0 of the restitution law, at which the restitution is e",
+                   .range = positive,
+                   .example = "\"0.3 m/s\""});
   if (fields.decoding())
-    fields.require(
-        (surface.law == sim::RestitutionLaw::constant) == !surface.law_speed, "restitution_speed",
-        "a restitution that depends on speed needs the speed v0 at which it is the stated one, a constant one "
-        "has none",
-        "Give both \"restitution_law\" and \"restitution_speed\", or neither");
+    fields.require((surface.law == sim::RestitutionLaw::constant) == !surface.law_speed, "restitution_speed",
+                   "a restitution that depends on velocity needs \"restitution_speed\" (the velocity v0 at which it is "
+                   "e), and a constant restitution excludes it",
+                   "Give both \"restitution_law\" and \"restitution_speed\", or neither");
   fields.number("friction", surface.friction,
                 {.help = "Coulomb friction coefficient", .range = non_negative, .example = "0.2"});
   fields.number("tangential_restitution", surface.tangential_restitution,
@@ -61,7 +62,7 @@ void read_table(Fields& fields, TableFloorOptions& table) {
     if (table.file.paths.empty()) return;  // it is missing, which has been reported
     if (table.file.paths.size() > 1) {
       fields.problem("/file",
-                     "names " + std::to_string(table.file.paths.size()) + " files, but the floor is one table");
+                     "this names " + std::to_string(table.file.paths.size()) + " files, but the floor needs one table");
       return;
     }
     const FloorTable read = read_floor_table(table.file.paths[0]);
@@ -69,7 +70,7 @@ void read_table(Fields& fields, TableFloorOptions& table) {
     if (!table.period) table.period = read.duration;
   }
   fields.require(table.period.has_value(), "period", "the period of the floor is not known",
-                 "Give \"period\", or a column time in the file");
+                 "Give \"period\", or a column \"time\" in the file");
   if (!table.period) table.period = 1;
 }
 
@@ -77,10 +78,9 @@ void read_table(Fields& fields, TableFloorOptions& table) {
 void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<double> gravity) {
   std::optional<double> amplitude;
   if (fields.mode() == Fields::Mode::encode && !s.gamma) amplitude = s.amplitude;
-  fields.quantity("amplitude", amplitude, dimension::length,
-                  {.help = "amplitude a of the floor; in its place, gamma can be given",
-                   .range = positive,
-                   .example = "\"2.5 mm\""});
+  fields.quantity(
+      "amplitude", amplitude, dimension::length,
+      {.help = "amplitude a of the floor; give either this or gamma", .range = positive, .example = "\"2.5 mm\""});
   fields.number("gamma", s.gamma,
                 {.help = "peak acceleration of the floor over g, Gamma = a (2 pi f)^2/g, in place of the amplitude",
                  .range = positive,
@@ -90,7 +90,7 @@ void describe_shaking(Fields& fields, SinusoidalFloorOptions& s, std::optional<d
   fields.either("amplitude", "gamma", "Give \"amplitude\": \"2.5 mm\", or \"gamma\": 4");
   const double omega = 2 * std::numbers::pi * s.frequency;
   if (fields.decoding()) {
-    fields.require(!s.gamma || gravity, "gamma", "a weightless scene has no Gamma", "Give the amplitude");
+    fields.require(!s.gamma || gravity, "gamma", "a weightless scene has no Gamma", "Give \"amplitude\"");
     s.amplitude =
         amplitude.value_or(s.gamma && gravity && omega > 0 ? amplitude_of(*s.gamma, *gravity, s.frequency) : 0);
   }
@@ -123,16 +123,16 @@ void describe_disks(Fields& f, DiskOptions& d) {
   describe_surface(f, d.surface);
   f.choice("inertia", d.inertia, {{Inertia::disk, "disk"}, {Inertia::sphere, "sphere"}},
            {.help = "moment of inertia: m R^2/2 (disk) or 2 m R^2/5 (sphere)"});
-  f.quantity(
-      "contact_duration", d.contact_duration, dimension::time,
-      {.help = "t_c of the TC model: a contact is elastic if either partner was hit less than t_c ago; 0 for none. "
-               "Default: 1e-4 sqrt(D/g) where anything dissipates",
-       .range = non_negative,
-       .example = "\"1 us\""});
+  f.quantity("contact_duration", d.contact_duration, dimension::time,
+             {.help = "contact duration t_c of the TC model: a contact is elastic if either partner had another "
+                      "contact less than t_c before; 0 for none. Default: 1e-4 sqrt(D/g) where anything dissipates",
+              .range = non_negative,
+              .example = "\"1 us\""});
   f.boolean(
       "rests", d.rests,
-      {.help = "whether a dissipative bed under gravity may rest: it then moves with the floor until the floor falls "
-               "away. Without rest it makes ever smaller contacts, at up to a thousand times the cost"});
+      {.help =
+           "whether a dissipative bed under gravity may rest: it then moves with the floor until the floor falls away. "
+           "Without rest the contacts become smaller and smaller, and they cost up to a thousand times as much"});
   f.boolean(
       "presses", d.presses,
       {.help =
@@ -159,16 +159,17 @@ void describe_disks(Fields& f, DiskOptions& d) {
 void describe_plates(Fields& g, PlatesOptions& p) {
   g.number("friction", p.friction,
            {.help = "Coulomb friction coefficient mu_p of a disk that slides on the plate; for a sphere that rolls, "
-                    "that of rolling. Static friction is as large",
+                    "the coefficient of rolling friction. Static friction has the same coefficient",
             .required = true,
             .range = positive,
             .example = "0.1"});
-  g.quantity("pressing", p.pressing, dimension::acceleration,
-             {.help = "acceleration that presses a disk on the plates: they slow it down by friction times it. "
-                      "Left out, the component of gravity across a tilted plane, gravity sin(tilt); in reduced "
-                      "units tan(tilt)",
-              .range = positive,
-              .example = "\"4.9 m/s^2\""});
+  g.quantity(
+      "pressing", p.pressing, dimension::acceleration,
+      {.help =
+           "acceleration that presses a disk on the plates: they decelerate it by friction times this acceleration. "
+           "Left out, the component of gravity across a tilted plane, gravity sin(tilt); in reduced units tan(tilt)",
+       .range = positive,
+       .example = "\"4.9 m/s^2\""});
   g.choice("motion", p.motion, {{PlateMotion::floor, "floor"}, {PlateMotion::still, "still"}},
            {.help = "motion of the plates. Floor: with the floor, as in a cell that is shaken as a whole. Still: "
                     "none, as where only the floor is a piston"});
@@ -189,23 +190,22 @@ void describe_plates(Fields& g, PlatesOptions& p) {
 }
 
 void describe_tilt_and_plates(Fields& f, BoxOptions& b) {
-  f.quantity(
-      "tilt", b.tilt, dimension::angle,
-      {.help = "angle between the plane of the bed and the vertical: 0 for an upright cell. In the plane acts g = "
-               "gravity cos(tilt), and all numbers (Gamma, m g D, T/(m g), sqrt(D/g)) are with this g. In reduced "
-               "units g in the plane is 1 whatever the tilt",
-       .range = {.low = 0, .high = std::numbers::pi / 2},
-       .example = "\"30 deg\""});
+  f.quantity("tilt", b.tilt, dimension::angle,
+             {.help = "angle between the plane of the bed and the vertical: 0 for an upright cell. In the plane acts g "
+                      "= gravity cos(tilt), and all numbers (Gamma, m g D, T/(m g), sqrt(D/g)) use this g. In reduced "
+                      "units g in the plane is 1 at any tilt",
+              .range = {.low = 0, .high = std::numbers::pi / 2},
+              .example = "\"30 deg\""});
   f.require(!b.tilt || *b.tilt < largest_tilt, "tilt",
             "a bed that lies flat has no gravity in its plane, so no unit of time and no Gamma",
             "Give a tilt below 90 deg, or write the bed in reduced units with \"gravity\": 0");
   f.object<PlatesOptions>(
       "plates", b.plates, describe_plates,
       {.help = "plate under a tilted bed, or plates before and behind it, on which the disks rub. Left out, they are "
-               "smooth. With friction beds neither rest nor press (disks/rests, disks/presses): these have no plates"});
+               "smooth. With plates the options disks/rests and disks/presses have no effect"});
   f.require(!b.plates || b.plates->pressing || b.tilt.value_or(0) > 0, "plates",
             "nothing presses the disks on the plates: the bed is upright",
-            "Give the plates \"pressing\", an acceleration, or the box a \"tilt\"");
+            "Give \"pressing\" (an acceleration) to the plates, or a \"tilt\" to the box");
 }
 
 void describe_sides(Fields& f, BoxOptions& b) {
@@ -218,12 +218,13 @@ void describe_sides(Fields& f, BoxOptions& b) {
                       "slope", s.slope, dimension::angle,
                       {.help = "angle from the vertical by which the sides lean outwards, above 0: the box is W wide "
                                "at the floor and wider above. Left out, the sides are vertical. Sloped sides move with "
-                               "the floor; vertical ones stand still. Densities stay numbers per height and width W. "
-                               "Beds with sloped sides neither rest nor press (disks/rests, disks/presses)",
+                               "the floor; vertical ones stand still. Densities are still numbers per height and per "
+                               "width W. With sloped sides the options disks/rests and disks/presses have no effect",
                        .range = {.low = 1e-3, .high = 1.2},
                        .example = "\"10 deg\""});
                 }),
-            alternative<PeriodicSidesOptions>("periodic", "what leaves on the left enters on the right"));
+            alternative<PeriodicSidesOptions>(
+                "periodic", "periodic boundaries: a disk that leaves on the left enters on the right"));
 }
 
 void describe_box(Fields& f, BoxOptions& b) {
@@ -232,37 +233,36 @@ void describe_box(Fields& f, BoxOptions& b) {
       {.help = "distance W between the side walls", .required = true, .range = positive, .example = "\"89.7 mm\""});
   describe_tilt_and_plates(f, b);
   describe_sides(f, b);
-  f.variant(
-      "lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
-      alternative<FixedLidOptions>("fixed", "a wall at rest",
-                                   [](Fields& g, FixedLidOptions& l) {
-                                     g.quantity("height", l.height, dimension::length,
-                                                {.help = "height of the lid above the mean position of the floor",
-                                                 .required = true,
-                                                 .range = positive});
-                                     describe_surface(g, l.surface);
-                                   }),
-      alternative<PeriodicLidOptions>(
-          "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
-          [](Fields& g, PeriodicLidOptions& l) {
-            g.quantity("height", l.height, dimension::length,
-                       {.help = "period of the box in the vertical direction", .required = true, .range = positive});
-          }),
-      alternative<FreeLidOptions>(
-          "free",
-          "a smooth lid with mass that slides up and down without friction: it lies on the bed and is thrown up",
-          [](Fields& g, FreeLidOptions& l) {
-            g.quantity(
-                "height", l.height, dimension::length,
-                {.help =
-                     "height of its lower face above the mean position of the floor, from which it falls at the start",
-                 .required = true,
-                 .range = positive});
-            g.quantity("mass", l.mass, dimension::mass,
-                       {.help = "mass of the lid", .required = true, .range = positive, .example = "\"2 g\""});
-            g.number("restitution", l.restitution,
-                     {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
-          }));
+  f.variant("lid", b.lid, {.help = "upper boundary of the box"}, alternative<OpenLidOptions>("open", "no lid"),
+            alternative<FixedLidOptions>("fixed", "a lid at rest",
+                                         [](Fields& g, FixedLidOptions& l) {
+                                           g.quantity("height", l.height, dimension::length,
+                                                      {.help = "height of the lid above the mean position of the floor",
+                                                       .required = true,
+                                                       .range = positive});
+                                           describe_surface(g, l.surface);
+                                         }),
+            alternative<PeriodicLidOptions>(
+                "periodic", "no floor and no lid, periodic in the vertical direction (only without gravity)",
+                [](Fields& g, PeriodicLidOptions& l) {
+                  g.quantity(
+                      "height", l.height, dimension::length,
+                      {.help = "period of the box in the vertical direction", .required = true, .range = positive});
+                }),
+            alternative<FreeLidOptions>(
+                "free",
+                "a smooth lid with mass that slides up and down without friction: it lies on the bed and is thrown up",
+                [](Fields& g, FreeLidOptions& l) {
+                  g.quantity("height", l.height, dimension::length,
+                             {.help = "height of the lid's lower face above the mean position of the floor, from which "
+                                      "the lid falls at the start",
+                              .required = true,
+                              .range = positive});
+                  g.quantity("mass", l.mass, dimension::mass,
+                             {.help = "mass of the lid", .required = true, .range = positive, .example = "\"2 g\""});
+                  g.number("restitution", l.restitution,
+                           {.help = "normal coefficient of restitution e", .range = zero_to_one, .example = "0.92"});
+                }));
 }
 
 void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravity) {
@@ -289,49 +289,50 @@ void describe_floor(Fields& f, FloorOptions& floor, std::optional<double> gravit
 }
 
 void describe_bath(Fields& fields, BathOptions& bath) {
-  fields.variant("bath", bath, {.help = "heat bath, in place of or in addition to shaking"},
-                 alternative<NoBathOptions>("none", "no bath, the floor alone drives the bed"),
-                 alternative<LangevinOptions>(
-                     "langevin",
-                     "every interval, v becomes v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi, with "
-                     "xi a normal random number",
-                     [](Fields& f, LangevinOptions& b) {
-                       f.quantity("temperature", b.temperature, dimension::length,
-                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
-                       f.quantity("rate", b.rate, dimension::frequency,
-                                  {.help = "friction rate", .required = true, .range = positive});
-                       f.quantity("interval", b.interval, dimension::time,
-                                  {.help = "time between two kicks", .required = true, .range = positive});
-                     }),
-                 alternative<AndersenOptions>(
-                     "andersen", "the velocity of a disk is drawn again at random moments",
-                     [](Fields& f, AndersenOptions& b) {
-                       f.quantity("temperature", b.temperature, dimension::length,
-                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
-                       f.quantity("rate", b.rate, dimension::frequency,
-                                  {.help = "rate at which the velocity of each disk is drawn again",
-                                   .required = true,
-                                   .range = positive});
-                     }),
-                 alternative<WhiteNoiseOptions>(
-                     "white_noise", "random kicks without friction",
-                     [](Fields& f, WhiteNoiseOptions& b) {
-                       f.quantity("heating", b.heating, cube_over_time,
-                                  {.help = "heating H/m: increase of the variance of each velocity component per time",
-                                   .required = true,
-                                   .range = positive});
-                       f.quantity("interval", b.interval, dimension::time,
-                                  {.help = "time between two kicks", .required = true, .range = positive});
-                       f.boolean(
-                           "conserve_momentum", b.conserve_momentum,
-                           {.help = "whether the mean of all kicks is subtracted, so that momentum is conserved"});
-                     }),
-                 alternative<ThermalFloorOptions>(
-                     "thermal_floor", "a disk leaves the floor with a velocity of a gas at T",
-                     [](Fields& f, ThermalFloorOptions& b) {
-                       f.quantity("temperature", b.temperature, dimension::length,
-                                  {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
-                     }));
+  fields.variant(
+      "bath", bath, {.help = "heat bath, in place of or in addition to shaking"},
+      alternative<NoBathOptions>("none", "no bath, the floor alone drives the bed"),
+      alternative<LangevinOptions>(
+          "langevin",
+          "after every interval, v becomes v exp(-rate interval) + sqrt(T (1 - exp(-2 rate interval))/m) xi, with xi a "
+          "normal random number",
+          [](Fields& f, LangevinOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+            f.quantity(
+                "rate", b.rate, dimension::frequency,
+                {.help = "friction rate: velocities decay as exp(-rate t)", .required = true, .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between two kicks", .required = true, .range = positive});
+          }),
+      alternative<AndersenOptions>(
+          "andersen", "the velocity of a disk is drawn again at random moments",
+          [](Fields& f, AndersenOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+            f.quantity("rate", b.rate, dimension::frequency,
+                       {.help = "rate at which the velocity of each disk is drawn again",
+                        .required = true,
+                        .range = positive});
+          }),
+      alternative<WhiteNoiseOptions>(
+          "white_noise", "random kicks without friction",
+          [](Fields& f, WhiteNoiseOptions& b) {
+            f.quantity("heating", b.heating, cube_over_time,
+                       {.help = "heating H/m: increase of the variance of each velocity component per time",
+                        .required = true,
+                        .range = positive});
+            f.quantity("interval", b.interval, dimension::time,
+                       {.help = "time between two kicks", .required = true, .range = positive});
+            f.boolean("conserve_momentum", b.conserve_momentum,
+                      {.help = "whether the mean of all kicks is subtracted, so that momentum is conserved"});
+          }),
+      alternative<ThermalFloorOptions>(
+          "thermal_floor", "a disk that hits the floor leaves it with a velocity drawn from a gas at temperature T",
+          [](Fields& f, ThermalFloorOptions& b) {
+            f.quantity("temperature", b.temperature, dimension::length,
+                       {.help = "temperature of the bath, T/(m g)", .required = true, .range = positive});
+          }));
 }
 
 void describe_start(Fields& fields, StartOptions& start) {
@@ -388,14 +389,14 @@ FloorTable read_floor_table(const std::filesystem::path& path) {
       char* stop = nullptr;
       const double value = std::strtod(cells[column].c_str(), &stop);
       if (cells[column].empty() || *stop != '\0' || !std::isfinite(value))
-        fail(fmt::format("\"{}\" is no number", cells[column]));
+        fail(fmt::format("\"{}\" is not a number", cells[column]));
       return value;
     };
     table.heights.push_back(number(height_column));
     if (time_column != std::string::npos) {
       times.push_back(number(time_column));
       const std::size_t n = times.size();
-      if (n >= 2 && !(times[n - 1] > times[n - 2])) fail("the times do not rise");
+      if (n >= 2 && !(times[n - 1] > times[n - 2])) fail("the times must increase from row to row");
       const double step = times.size() >= 2 ? times[1] - times[0] : 0;
       if (n >= 3 && std::abs((times[n - 1] - times[0]) / static_cast<double>(n - 1) / step - 1) > 1e-3)
         fail("the times are not equally spaced");
@@ -419,26 +420,27 @@ sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks&
   std::size_t count = 0;
   for (const sim::Species& species : disks.species) count += species.count;
   if (last.size() != count)
-    throw InputError(fmt::format("{}: its last frame has {} disks, the bed {}", path.string(), last.size(), count));
-  if (disks.species.size() > 1 && disks.species[1].diameter == disks.species[0].diameter)
     throw InputError(
-        fmt::format("{}: the species of a disk cannot be determined: the diameters are the same", path.string()));
+        fmt::format("{}: the last frame has {} disks, but the bed has {}", path.string(), last.size(), count));
+  if (disks.species.size() > 1 && disks.species[1].diameter == disks.species[0].diameter)
+    throw InputError(fmt::format(
+        "{}: the species of a disk cannot be determined, because both species have the same diameter", path.string()));
   std::vector<std::size_t> found(disks.species.size());
   for (std::size_t i = 0; i < last.size(); ++i) {
     const double diameter = i < last.radius.size() ? 2 * last.radius[i] : 1;
     std::uint32_t species = 0;
     while (species < disks.species.size() && std::abs(disks.species[species].diameter - diameter) > 1e-9) ++species;
     if (species == disks.species.size())
-      throw InputError(
-          fmt::format("{}: disk {} has the diameter {} D, which is that of no species", path.string(), i, diameter));
+      throw InputError(fmt::format("{}: disk {} has the diameter {} D, but no species has this diameter", path.string(),
+                                   i, diameter));
     ++found[species];
     start.disks.push_back(
         {last.x[i], last.z[i], last.vx[i], last.vz[i], i < last.spin.size() ? last.spin[i] : 0.0, species});
   }
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (found[k] != disks.species[k].count)
-      throw InputError(fmt::format("{}: {} disks of species {}, the bed has {}", path.string(), found[k], k + 1,
-                                   disks.species[k].count));
+      throw InputError(fmt::format("{}: the last frame has {} disks of species {}, but the bed has {}", path.string(),
+                                   found[k], k + 1, disks.species[k].count));
   }
   return start;
 }
@@ -446,13 +448,14 @@ sim::PlacedStart read_start(const std::filesystem::path& path, const sim::Disks&
 void SceneOptions::describe(Fields& fields) {
   reduced_ = fields.reduced();
   if (!reduced_ && fields.mode() != Fields::Mode::encode) disks_.density = 2500;  // glass
-  fields.object<DiskOptions>("disks", disks_, describe_disks, {.help = "the disks", .required = true});
+  fields.object<DiskOptions>("disks", disks_, describe_disks,
+                             {.help = "disks: their number, size, material and rule of contact", .required = true});
   describe_gravity(fields);
   fields.object<BoxOptions>("box", box_, describe_box,
-                            {.help = "the box: its width, side walls and lid", .required = true});
+                            {.help = "box: its width, side walls and lid", .required = true});
   fields.object<FloorOptions>(
       "floor", floor_, [gravity = gravity()](Fields& f, FloorOptions& floor) { describe_floor(f, floor, gravity); },
-      {.help = "the floor"});
+      {.help = "floor: its motion and rule of contact"});
   describe_bath(fields, bath_);
   describe_start(fields, start_);
   if (fields.decoding() || fields.mode() == Fields::Mode::schema)
@@ -468,8 +471,8 @@ void SceneOptions::describe_gravity(Fields& fields) {
   if (fields.decoding() || fields.mode() == Fields::Mode::schema) gravity_ = reduced_ ? 1.0 : usual_gravity;
   if (!reduced_) {
     fields.quantity("gravity", gravity_, dimension::acceleration,
-                    {.help = "acceleration of free fall; of it, a tilted bed feels g = gravity cos(tilt) (box/tilt). A "
-                             "weightless scene is written in reduced units",
+                    {.help = "acceleration of gravity. In the plane of a tilted bed acts g = gravity cos(tilt), see "
+                             "box/tilt. A weightless scene needs reduced units",
                      .range = positive,
                      .example = "\"9.81 m/s^2\""});
     return;
@@ -484,15 +487,16 @@ void SceneOptions::describe_gravity(Fields& fields) {
 void SceneOptions::check_scene(Fields& fields) const {
   const auto* file = std::get_if<FileStartOptions>(&start_);
   if (file != nullptr && file->file.paths.size() != 1) {
-    fields.problem("/start/file",
-                   "names " + std::to_string(file->file.paths.size()) + " files, but the start is one trajectory");
+    fields.problem("/start/file", "this names " + std::to_string(file->file.paths.size()) +
+                                      " files, but the start needs one trajectory");
     return;
   }
   if (!gravity_) {
     fields.require(!box_.tilt, "box/tilt", "a bed without gravity has no tilt",
                    box_.plates ? "Give the plates \"pressing\" instead" : "Leave it out");
     fields.require(!box_.plates || box_.plates->pressing, "box/plates",
-                   "without gravity it must be said what presses the disks on the plates", "Give \"pressing\"");
+                   "without gravity, the plates need \"pressing\": the acceleration that presses the disks on them",
+                   "Give \"pressing\"");
     if (fields.problem_count() > 0) return;
   }
   const sim::Scene laid_out = scene(1);

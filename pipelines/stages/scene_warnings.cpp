@@ -62,10 +62,11 @@ std::pair<double, double> safe_widths(double width) {
 
 std::optional<Misfit> odd_bead(double diameter) {
   if (diameter < largest_bead && diameter >= smallest_bead) return std::nullopt;
-  return Misfit{
-      fmt::format("a bead of {}: beads of experiments are 50 um to some cm", handy_text(diameter, dimension::length)),
-      diameter >= largest_bead ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", diameter)
-                               : "Check its unit"};
+  return Misfit{fmt::format("the bead has a diameter of {}, but beads of experiments are 50 um to a few cm",
+                            handy_text(diameter, dimension::length)),
+                diameter >= largest_bead
+                    ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", diameter)
+                    : "Check its unit"};
 }
 
 std::optional<std::string> odd_gamma(double gamma) {
@@ -130,28 +131,27 @@ void SceneOptions::warn_of_size(Fields& fields) const {
                 fmt::format("the box is {:.3g} diameters wide: nearly every disk touches a side, and what is measured "
                             "depends on the sides as much as on the disks",
                             width),
-                fmt::format("Make it {} or wider", length_text(least_width * length_unit())));
+                fmt::format("Give a width of {} or more", length_text(least_width * length_unit())));
   if (gravity_ && !reduced_ && box_.width >= widest_cell && disks_.count < width)
     fields.warn("wide box", "/box/width",
-                fmt::format("the box is {} wide, {:.4g} diameters, and holds {} disks: they hardly ever meet",
+                fmt::format("the box is {} ({:.4g} diameters) wide and contains {} disks, which hardly ever collide",
                             length_text(box_.width), width, disks_.count),
                 fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", box_.width));
   if (gravity_ && height_at_rest() > highest_bed)
-    fields.warn(
-        "high bed", "/disks/count",
-        fmt::format("{} disks in a box {:.4g} diameters wide make a bed {:.0f} diameters high: shaking from below "
-                    "hardly reaches its top, and the run takes long",
-                    disks_.count, width, height_at_rest()),
-        "Take fewer disks, or a wider box");
+    fields.warn("high bed", "/disks/count",
+                fmt::format("{} disks in a box {:.4g} diameters wide make a bed {:.0f} diameters high: shaking from "
+                            "below hardly reaches its top, and the run takes a long time",
+                            disks_.count, width, height_at_rest()),
+                "Use fewer disks, or a wider box");
   const auto* lid = std::get_if<FixedLidOptions>(&box_.lid);
   const auto* sine = std::get_if<SinusoidalFloorOptions>(&floor_.motion);
   const double top = height_at_rest() * length_unit() + (sine != nullptr ? sine->amplitude : 0);
   if (gravity_ && lid != nullptr && lid->height < top)
     fields.warn("low lid", "/box/lid/height",
                 fmt::format("the lid is {} above the floor's mean position, but the bed at rest reaches {} when the "
-                            "floor is up: the bed is squeezed",
+                            "floor is at its highest position. So the lid squeezes the bed",
                             length_text(lid->height), length_text(top)),
-                "Raise the lid, or take fewer disks");
+                "Raise the lid, or use fewer disks");
 }
 
 std::optional<Misfit> SceneOptions::locking() const {
@@ -161,11 +161,11 @@ std::optional<Misfit> SceneOptions::locking() const {
   const std::optional<Commensurate> near = commensurate(width);
   if (width < least_width || !near) return std::nullopt;
   const auto [below, above] = safe_widths(width);
-  return Misfit{fmt::format("the box is {:.4g} diameters wide, {} {:g}: {} between hard sides, and a locked bed's "
-                            "temperature differs from seed to seed and costs many more collisions",
+  return Misfit{fmt::format("the box is {:.4g} diameters wide, {} {:g}: {} between hard sides. The temperature of a "
+                            "locked bed differs from seed to seed, and such a bed makes many more collisions",
                             width, width == near->multiple ? "exactly" : "nearly", near->multiple,
                             near->whole ? "rows of disks fit exactly and can lock" : "alternate rows can lock"),
-                fmt::format("Unless the width is given by an experiment, take {} ({:g} D) or {} ({:g} D)",
+                fmt::format("Unless an experiment fixes the width, use {} ({:g} D) or {} ({:g} D)",
                             length_text(below * length_unit()), below, length_text(above * length_unit()), above)};
 }
 
@@ -180,8 +180,8 @@ void SceneOptions::warn_of_slope(Fields& fields) const {
   const double factor = 1 + 2 * height_at_rest() * std::tan(slope) / width;
   fields.warn(
       "sloped sides", "/box/sides/slope",
-      fmt::format("at the surface of the bed at rest the box is {:.3g} times as wide as at the floor. "
-                  "Densities and N D/W are per width W of the floor, and theories and fits know vertical sides only",
+      fmt::format("at the surface of the bed at rest the box is {:.3g} times as wide as at the floor. Densities and N "
+                  "D/W are per width W of the floor, and the theories and fits are valid for vertical sides only",
                   factor),
       "Divide a density at height z by 1 + 2 z tan(slope)/W to have it per area, and do not fit such a profile");
 }
@@ -195,10 +195,10 @@ void SceneOptions::warn(Fields& fields, double settle) const {
   if (shaken <= 0 || settle >= least_settle_periods * shaken * (1 - 1e-9)) return;
   if (std::holds_alternative<FileStartOptions>(start_) || fields.has_upstream("simulate")) return;
   fields.warn("short settle", "/settle",
-              fmt::format("the bed settles for {:.3g} periods of the floor before it is measured: its start is still "
-                          "in the means",
+              fmt::format("the bed settles for {:.3g} periods of the floor before it is measured, so the results still "
+                          "depend on its start",
                           settle / shaken),
-              "Settle for " +
+              "Give a \"settle\" of " +
                   (reduced_ ? fmt::format("{:.6g}", least_settle_periods * shaken)
                             : handy_text(least_settle_periods * shaken, dimension::time)) +
                   " or longer");

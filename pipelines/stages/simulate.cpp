@@ -135,22 +135,25 @@ void Simulate::describe(Fields& fields) {
             "hold", step.hold, dimension::time,
             {.help = "time at this temperature; its second half is averaged for schedule.csv", .range = non_negative});
       },
-      {.help =
-           "annealing before the bed settles: temperatures of the bath, one after the other; the last one remains"});
+      {.help = "annealing before the bed settles: temperatures of the bath, one after the other. The last temperature "
+               "is kept for the measurement"});
   fields.texts("observe", observe_,
                {.help = "additional measurements: order (psi_6, neighbours, vacancies), velocities (a2, histogram), "
                         "displacement, pressure (by height, exact time averages), phases (means by height and phase), "
                         "species (temperatures of two species)"});
-  fields.integer("replicas", replicas_,
-                 {.help = "number of beds, each with its own seed. Results are means, and errors hold for the next "
-                          "bed. Default: 4 for a shaken, dissipative bed without a lid, else 1",
-                  .range = from_to(1, 10'000)});
-  fields.choice("replica_starts", starts_, {{ReplicaStarts::alternate, "alternate"}, {ReplicaStarts::same, "same"}},
-                {.help = "start of the replicas. Alternate: on a shaken floor every second bed starts from random "
-                         "positions, so the scatter shows the effect of the start. Same: all start as the first"});
+  fields.integer(
+      "replicas", replicas_,
+      {.help = "number of beds, each with its own seed. The results are means over the beds, and the errors include "
+               "the differences between beds. Default: 4 for a shaken, dissipative bed without a lid, else 1",
+       .range = from_to(1, 10'000)});
+  fields.choice(
+      "replica_starts", starts_, {{ReplicaStarts::alternate, "alternate"}, {ReplicaStarts::same, "same"}},
+      {.help = "start of the replicas. Alternate: on a shaken floor every second bed starts from random positions, so "
+               "the scatter between beds shows the effect of the start. Same: all beds start like the first"});
   fields.number(
       "checkpoint_seconds", checkpoint_seconds_,
-      {.help = "interval of checkpoints: a killed run continues from a state at most about this old; 0: no checkpoints",
+      {.help =
+           "time between checkpoints, in seconds: a killed run continues from its last checkpoint; 0: no checkpoints",
        .range = non_negative});
   fields.boolean("compress", compress_,
                  {.help = "whether the trajectory is compressed (trajectory.extxyz.zst instead of trajectory.extxyz)"});
@@ -162,23 +165,23 @@ void Simulate::check(Fields& fields) {
     const auto& known = ObserveOptions::names();
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string nearest = nearest_name(name, known);
-    fields.problem("/observe", "\"" + name + "\" is nothing that can be observed",
-                   nearest.empty() ? "One of: order, velocities, displacement, pressure, phases, species"
+    fields.problem("/observe", "\"" + name + "\" is not one of the additional measurements",
+                   nearest.empty() ? "Choose from: order, velocities, displacement, pressure, phases, species"
                                    : "Did you mean \"" + nearest + "\"?");
   }
   if (fields.problem_count() > 0) return;
   fields.require(annealing_.empty() || bed_.bath_temperature() > 0, "schedule",
-                 "there is no bath whose temperature could change",
-                 "Name a \"bath\": langevin, andersen or thermal_floor");
+                 "\"schedule\" changes the temperature of a bath, and this bed has no bath with a temperature",
+                 "Give a \"bath\": langevin, andersen or thermal_floor");
   for (std::size_t k = 0; k < annealing_.size(); ++k)
     fields.require(annealing_[k].ramp + annealing_[k].hold > 0, "schedule/" + std::to_string(k),
                    "the step has no duration", "Give \"ramp\" or \"hold\"");
   fields.require(!ObserveOptions::from(observe_).species || bed_.two_species(), "observe",
-                 "the disks are of one species, or of two that are alike",
+                 "\"species\" needs two different species of disks",
                  "Give \"disks\" a \"second\" species of another diameter or density");
   fields.require(!ObserveOptions::from(observe_).pressure || !bed_.periodic_upwards(), "observe",
-                 "the pressure by height needs a height, but the box is periodic upwards",
-                 "compressibility_factor is measured anyway");
+                 "\"pressure\" is the pressure as a function of height, but the box is periodic upwards",
+                 "Leave it out: compressibility_factor is always measured");
   measure_.check(fields, bed_.period(), bed_.time_unit());
   if (!replicas_)
     replicas_ = bed_.period() > 0 && bed_.contact_duration() > 0 && bed_.may_be_filled_at_random() &&
@@ -316,9 +319,9 @@ void Simulate::run(RunContext& context) const {
   Json joined = replicas() > 1 ? joined_results(results) : results[0];
   if (bed_.gamma() > 0) joined["judgement"] = judgement_of(bed_, joined, results.size());
   if (bed_.two_species())
-    joined["objections"] =
-        Json::array({Json{{"why", "The disks are of two kinds, and the models of a profile are those of equal disks."},
-                          {"advice", "Quote the kinetic T_x and T_z by name."}}});
+    joined["objections"] = Json::array({Json{
+        {"why", "The disks are of two kinds, and the models of a profile are those of equal disks."},
+        {"advice", "Quote the kinetic temperatures T_x (horizontal motion) and T_z (vertical motion) separately."}}});
   write_file(context.output("observables.json"), dump(joined));
   for (const std::string& warning : replica_warnings(results, joined, starts_of_replicas(context)))
     context.warning(warning);
@@ -411,8 +414,8 @@ EffortReading Simulate::read(const Effort& effort, const Json& result, const Jso
   const double value = number(result, "/temperature_x/value");
   if (!(value > temperature_at_rest))
     throw StageError(
-        fmt::format("T_x is below {:g} m g D: the disks hardly move sideways, and no error can be a part of it. "
-                    "Leave --budget out",
+        fmt::format("T_x is below {:g} m g D: the disks hardly move sideways, and a relative error of T_x has no "
+                    "meaning. Leave --budget out",
                     temperature_at_rest));
   EffortReading reading;
   reading.effort = effort;

@@ -60,18 +60,18 @@ std::string judgement_line(const FinishedStage& stage) {
 }  // namespace
 
 StagePages simulate_pages() {
-  return {
-      .sections = {{.place = ReportPlace::banner, .html = judgement_html},
-                   {.place = ReportPlace::facts, .html = kinetic_facts_html, .once = true},
-                   {.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
-      .warnings = {{"contact duration", WarningEffect::measurement,
-                    "Give a shorter \"contact_duration\", and compare T."},
-                   {"above the highest bin", WarningEffect::measurement, "Let the profile reach higher (\"profile\")."},
-                   {"checkpoint", WarningEffect::rest, "Nothing: the run began anew."},
-                   {"", WarningEffect::measurement, "Measure longer, or from more beds (\"replicas\")."}},
-      .markdown = judgement_markdown,
-      .terminal = judgement_line,
-      .yields_to_answer = true};
+  return {.sections = {{.place = ReportPlace::banner, .html = judgement_html},
+                       {.place = ReportPlace::facts, .html = kinetic_facts_html, .once = true},
+                       {.place = ReportPlace::motion, .heading = "The bed", .html = motion_html, .once = true}},
+          .warnings = {{"contact duration", WarningEffect::measurement,
+                        "Give a shorter \"contact_duration\", and compare T."},
+                       {"above the highest bin", WarningEffect::measurement,
+                        "The top of the profile is incomplete: leave its highest heights out of a fit."},
+                       {"checkpoint", WarningEffect::rest, "Nothing: the simulation started again from the beginning."},
+                       {"", WarningEffect::measurement, "Measure longer, or simulate more beds (\"replicas\")."}},
+          .markdown = judgement_markdown,
+          .terminal = judgement_line,
+          .yields_to_answer = true};
 }
 
 }  // namespace shakebed::pipelines

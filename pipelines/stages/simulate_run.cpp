@@ -180,7 +180,7 @@ sim::RunControl BedRun::control() {
   control.progress = progress_;
   control.gone_on = [this](const sim::Simulation& simulation) {
     context_.log(
-        fmt::format("goes on after {:.0f} % of the simulated time", 100 * simulation.time() / plan_.schedule.end()));
+        fmt::format("continues after {:.0f} % of the simulated time", 100 * simulation.time() / plan_.schedule.end()));
   };
   control.keep_due = [this](const sim::Simulation& simulation) { return keep_is_due(simulation); };
   control.keep = [this](const sim::Simulation& simulation, const sim::RunControl::State& state) {
@@ -199,7 +199,10 @@ std::vector<std::uint8_t> BedRun::read_checkpoint() const {
 }
 
 void BedRun::warn_of_checkpoint(const char* why) {
-  context_.warning(fmt::format("{}: cannot be used ({}); the run begins anew", checkpoint_.string(), why));
+  context_.warning(
+      fmt::format("{}: this checkpoint cannot be used ({}). The simulation starts again from the beginning. Its "
+                  "results do not change; only computing time is lost.",
+                  checkpoint_.string(), why));
 }
 
 bool BedRun::save_is_due() const {
@@ -272,7 +275,7 @@ void BedRun::write() {
   if (!plan_.annealing.empty()) annealing_.rows(context_.table("schedule.csv")).write(context_.output("schedule.csv"));
   if (measurement().above_profile() > 0)
     context_.warning(std::to_string(measurement().above_profile()) +
-                     " disk positions lay above the highest bin of the profile and are missing from it");
+                     " positions of disks were above the highest bin of the profile and are missing from it");
 }
 
 void write_checkpoint(const fs::path& path, const std::vector<std::uint8_t>& state) {
@@ -288,8 +291,8 @@ void require_precision(const sim::Simulation& simulation, const std::vector<std:
   throw StageError(fmt::format(
       "at time {:.9g} (reduced units), after {} collisions: {}. The run has lost its precision and stops; {}",
       simulation.time(), simulation.counters().collisions(), trouble,
-      last_sound.empty() ? std::string("no earlier state was kept")
-                         : "the last precise state is kept in " + checkpoint.string()));
+      last_sound.empty() ? std::string("no earlier state was stored")
+                         : "the last precise state is stored in " + checkpoint.string()));
 }
 
 }  // namespace shakebed::pipelines

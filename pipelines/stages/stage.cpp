@@ -10,7 +10,7 @@ std::filesystem::path Input::file(std::string_view name) const {
   const std::filesystem::path path = directory / name;
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError(fmt::format("stage \"{}\" ({}) left no file {}", id, stage, name));
+    throw InputError(fmt::format("the stage \"{}\" ({}) has not written the file {}", id, stage, name));
   }
   return path;
 }
@@ -43,9 +43,11 @@ std::vector<const Input*> RunContext::inputs_of(std::string_view kind) const {
 
 const Input& RunContext::input(std::string_view kind) const {
   const auto found = inputs_of(kind);
-  if (found.empty()) throw InputError(fmt::format("needs the result of a stage \"{}\": name one in \"from\"", kind));
+  if (found.empty())
+    throw InputError(fmt::format("this stage needs the result of a stage of kind \"{}\": name one in \"from\"", kind));
   if (found.size() > 1)
-    throw InputError(fmt::format("\"from\" names {} stages \"{}\", one is needed", found.size(), kind));
+    throw InputError(
+        fmt::format("\"from\" names {} stages of kind \"{}\", but this stage reads only one", found.size(), kind));
   return *found.front();
 }
 

@@ -147,13 +147,14 @@ Json written_value(const Parameter& parameter, double value) {
 }
 
 void Study::describe(Fields& fields) {
-  fields.any("stages", chain_,
-             {.help = "stages that are run at every point, as in a recipe; they must not read files of the user",
-              .required = true});
+  fields.any(
+      "stages", chain_,
+      {.help = "stages that are run at every point, as in a recipe; they cannot read other files", .required = true});
   fields.object<Parameter>("parameter", parameter_, describe_parameter,
                            {.help = "parameter that is varied", .required = true});
-  fields.object<Parameter>("second", second_, describe_parameter,
-                           {.help = "a second parameter: every value of the first with every value of this one"});
+  fields.object<Parameter>(
+      "second", second_, describe_parameter,
+      {.help = "second parameter that is varied: every value of the first is combined with every value of this one"});
   fields.map<Change>("series", series_,
                      [](Fields& f, Change& change) {
                        Json set = Json::object();
@@ -172,19 +173,20 @@ void Study::describe(Fields& fields) {
       "collect", collect_,
       [](Fields& f, Collected& c) {
         f.text("at", c.at,
-               {.help = "/<stage id>/<name in its result>, or /<stage id>/<file>.csv together with \"column\"",
+               {.help = "pointer to the number: /<stage id>/<name in its result>, or /<stage id>/<file>.csv together "
+                        "with \"column\"",
                 .required = true});
         f.text("column", c.column, {.help = "column of the CSV file from which one number is taken"});
         f.choice("take", c.take, takes,
-                 {.help = "which number: the largest or smallest, its place, or the mean of the rows. Noise makes the "
-                          "largest too large and the smallest too small"});
+                 {.help = "number that is taken from the column: the largest or the smallest, the place of either, or "
+                          "the mean of the rows. Noise makes the largest too large and the smallest too small"});
         f.text("by", c.by, {.help = "column that gives the place, for \"take\", \"least\" and \"most\""});
         f.number("least", c.least, {.help = "smallest place that is used, in the unit of that column"});
         f.number("most", c.most, {.help = "largest place that is used, in the unit of that column"});
         f.number("times", c.times, {.help = "factor of the collected number"});
         f.number("plus", c.plus, {.help = "constant that is added after the factor"});
       },
-      {.help = "collected numbers: name of a column of table.csv → where the number is", .required = true});
+      {.help = "collected numbers: name of a column of table.csv → pointer to the number", .required = true});
   fields.map<Tabulated>(
       "tables", tables_,
       [](Fields& f, Tabulated& t) {
@@ -196,11 +198,11 @@ void Study::describe(Fields& fields) {
   fields.integer("replicas", replicas_,
                  {.help = "number of runs at every point, each with its own seed", .range = from_to(1, 1000)});
   if (!fields.decoding() || fields.problem_count() > 0) return;
-  fields.require(!parameter_.values.empty(), "parameter/values", "there are no values");
-  fields.require(!collect_.empty(), "collect", "nothing is collected");
+  fields.require(!parameter_.values.empty(), "parameter/values", "the list of values is empty");
+  fields.require(!collect_.empty(), "collect", "\"collect\" is empty: give at least one number");
   if (second_) {
     fields.require(second_->name != parameter_.name, "second/name", "both parameters have the same name");
-    fields.require(!second_->values.empty(), "second/values", "there are no values");
+    fields.require(!second_->values.empty(), "second/values", "the list of values is empty");
   }
   kinds_ = kinds();
 }
@@ -230,7 +232,8 @@ std::vector<StatedColumn> Study::place_columns() const {
   for (const Kind& kind : kinds_) scaled |= kind.change.times.value_or(1) != 1, names.push_back(kind.name);
   std::vector<StatedColumn> columns{{"series", "", "kind of bed", names},
                                     {parameter_.name, unit_of(parameter_, scaled), "parameter that is varied"}};
-  if (second_) columns.push_back({second_->name, unit_of(*second_, second_->times != 1), "what is varied, too"});
+  if (second_)
+    columns.push_back({second_->name, unit_of(*second_, second_->times != 1), "second parameter that is varied"});
   return columns;
 }
 
@@ -283,10 +286,12 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
     // Pictures and verdicts are for people: no number of theirs is collected.
     for (const char* kind : {"chart", "claims", "study"}) {
       if (stage.stage == kind)
-        fields.problem("/stages", fmt::format("a chain holds no {} stage", kind), "Put it after the study");
+        fields.problem("/stages", fmt::format("the chain of a study cannot contain a {} stage", kind),
+                       "Put it after the study");
     }
     if (stage.reads_files)
-      fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file", "Put it after the study");
+      fields.problem("/stages", "the stage \"" + stage.id + "\" reads a file, which a chain of a study cannot do",
+                     "Put it after the study");
   }
   const std::vector<StatedStage> stated = chain.stated();
   for (const auto& [name, collected] : collect_) {
@@ -294,7 +299,7 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
       const std::string where = "/collect/" + escape_pointer_token(name);
       const StatedTable* table = table_at(chain, collected.at);
       if (table == nullptr) {
-        fields.problem(where + "/at", "\"" + collected.at + "\" names no table of the study's stages",
+        fields.problem(where + "/at", "\"" + collected.at + "\" is not a table of the study's stages",
                        "Write /<stage id>/<file>.csv");
         continue;
       }
@@ -310,7 +315,10 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
   for (const auto& [name, table] : tables_) {
     const std::string where = "/tables/" + escape_pointer_token(name);
     if (name.empty() || name.find_first_of("/\\ .") != std::string::npos || name == "table" || name == "replicas")
-      fields.problem(where, "\"" + name + "\" cannot be the name of its file");
+      fields.problem(
+          where,
+          "\"" + name +
+              "\" cannot be the name of a table: use letters, digits, '-' and '_', but not \"table\" or \"replicas\"");
     std::vector<std::string> tokens;
     try {
       tokens = split_pointer(table.at);
@@ -318,7 +326,7 @@ void Study::check_chain(Fields& fields, const Chain& chain) const {
     const auto stage = std::find_if(stated.begin(), stated.end(),
                                     [&](const StatedStage& s) { return !tokens.empty() && s.id == tokens.front(); });
     if (tokens.size() != 2 || stage == stated.end()) {
-      fields.problem(where + "/at", "\"" + table.at + "\" names no file of the study's stages",
+      fields.problem(where + "/at", "\"" + table.at + "\" is not a file of the study's stages",
                      "Write /<stage id>/<file>.csv");
       continue;
     }
@@ -356,7 +364,7 @@ void Study::results(ResultList& list) const {
     }
     if (scaled) unit = "1";  // in a unit of its own
     columns.push_back({name, unit, meaning});
-    columns.push_back({name + "_error", unit, "its standard error"});
+    columns.push_back({name + "_error", unit, "standard error of the mean"});
     runs.push_back({name, unit, meaning});
     for (const std::string& one : names)
       list.quantity(pointer_join(pointer_join("/series", one) + "/#", name), unit, meaning, {}, true);
@@ -376,9 +384,9 @@ void Study::results(ResultList& list) const {
     for (const StatedColumn& column : source->columns) {
       if (column.name == table.key) continue;
       out.columns.push_back(column);
-      out.columns.push_back({column.name + "_error", column.unit, "its standard error"});
+      out.columns.push_back({column.name + "_error", column.unit, "standard error of the mean"});
     }
-    out.columns.push_back({"runs", "1", "runs that have the row"});
+    out.columns.push_back({"runs", "1", "number of runs that have this row"});
     list.table(std::move(out));
   }
 }
@@ -582,7 +590,7 @@ std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& 
   for (std::size_t i = 0; i < all.size(); ++i) time.expect(i, seconds[i]);
   for (const LongPart& part : long_parts(seconds))
     context.notice(
-        fmt::format("the run of {}, {} = {} {}. To save the time, stop with Ctrl-C and leave this value out or "
+        fmt::format("the run of {}, {} = {} {}. To save this time, stop with Ctrl-C. Then remove this value, or "
                     "measure for a shorter time",
                     kinds_[all[part.part].series].name, parameter_.name, parameter_.values[all[part.part].value],
                     long_part_text(part)));
@@ -654,8 +662,10 @@ void Study::run(RunContext& context) const {
   for (const Json& one : kept) found.push_back(kept_numbers(one));
   const Averages averages = average(all, found);
   if (averages.missing > 0)
-    context.warning(fmt::format("{} of {} numbers are missing: the stages of the study did not produce them",
-                                averages.missing, all.size() * collect_.size()));
+    context.warning(
+        fmt::format("{} of {} numbers are missing, because the stages of the study did not produce them. Their cells "
+                    "in replicas.csv are empty",
+                    averages.missing, all.size() * collect_.size()));
   write_described(context, "table.csv", averages.csv);
   write_described(context, "replicas.csv", replicas_csv(all, found));
   write_tables(context, all, kept);

@@ -41,7 +41,7 @@ std::string study_html(const FinishedStage& stage, int&) {
           ? fmt::format("<p>The first {} of {} rows; all are in table.csv.</p>\n", most_study_rows, number)
           : "";
   return fmt::format(
-      "<details><summary>{}: {} rows, to be sorted and filtered</summary>\n<div class=\"scroll\"><table "
+      "<details><summary>{}: {} rows, which can be sorted and filtered</summary>\n<div class=\"scroll\"><table "
       "class=\"sortable\">\n{}{}</table></div>\n{}</details>\n",
       escape_markup(stage.files.id), number, table_head(head), rows, more);
 }

@@ -20,14 +20,14 @@ std::optional<double> StudyTable::number(std::size_t row, std::size_t column) co
   const std::string& text = rows[row][column];
   if (text.empty()) return std::nullopt;
   const std::optional<double> value = number_in(text);
-  if (!value) throw InputError(fmt::format("{}: \"{}\" in column \"{}\" is no number", file, text, header[column]));
+  if (!value) throw InputError(fmt::format("{}: \"{}\" in column \"{}\" is not a number", file, text, header[column]));
   return value;
 }
 
 std::optional<double> StudyTable::error(std::size_t row, const std::string& name) const {
   if (!has(name + "_error")) return std::nullopt;
   const auto found = number(row, column(name + "_error"));
-  if (found && *found < 0) throw InputError(fmt::format("{}: an error of \"{}\" is negative", file, name));
+  if (found && *found < 0) throw InputError(fmt::format("{}: a standard error of \"{}\" is negative", file, name));
   return found;
 }
 
@@ -48,7 +48,7 @@ StudyTable read_study_table(const std::filesystem::path& path) {
                                    table.header.size(), cells.size()));
     table.rows.push_back(std::move(cells));
   });
-  if (table.rows.empty()) throw InputError(table.file + ": holds no rows");
+  if (table.rows.empty()) throw InputError(table.file + ": the table has no rows below its header");
   return table;
 }
 

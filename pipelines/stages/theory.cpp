@@ -25,7 +25,7 @@ const fit::EquationOfState& equation_named(const std::string& name) {
   for (const fit::EquationOfState* row : fit::equations_of_state()) names.emplace_back(row->name());
   const std::string nearest = nearest_name(name, names);
   throw UsageError(fmt::format("there is no equation of state \"{}\"; {}", name,
-                               nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
+                               nearest.empty() ? fmt::format("choose from: {}", fmt::join(names, ", "))
                                                : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
@@ -157,7 +157,7 @@ Json map_json(const MapQuestion& question) {
 std::string map_text(const Json& map) {
   const bool measured = map.contains("measured_reduced_temperature");
   std::string out = fmt::format("Gamma = {:.6g}\n{:<40} {:>10} {:>12} {:>9}{}\n", map["gamma"]["value"].get<double>(),
-                                "reading", "H_0 / D", "T/T_c", "in range", measured ? "  Gamma of measured T" : "");
+                                "formula", "H_0 / D", "T/T_c", "in range", measured ? "  Gamma of measured T" : "");
   for (const Json& row : map["readings"]) {
     if (row["jump"].is_null()) {
       out += fmt::format("{:<40} {}\n", row["name"].get<std::string>(), row["status"].get<std::string>());
@@ -320,7 +320,9 @@ double relative_misfit(const std::vector<fit::Residual>& residuals) {
 std::string why_not_described(const fit::FitResult& result, double misfit) {
   if (!result.ok()) return result.message.empty() ? std::string(fit::to_string(result.status)) : result.message;
   if (misfit > tolerable_misfit)
-    return fmt::format("inside the window the model misses the data by {:.1f} % of the greatest density", 100 * misfit);
+    return fmt::format(
+        "inside the window, the rms difference between model and data is {:.1f} % of the greatest density",
+        100 * misfit);
   if (result.model != "simulation" && result.critical_status == fit::ValueStatus::ok &&
       result.reduced_temperature.value > 1)
     return fmt::format(
@@ -391,7 +393,7 @@ std::string fit_text(const Json& fit) {
                      fit["window"]["high"]["value"].get<double>(), fit["window"]["bins"].get<int>());
   for (const Json& model : fit["models"]) {
     if (model.value("plateau_density_free", false) && model.contains("temperature")) {
-      out += fmt::format("beside it, phi_0 free  T = {:.6g} m g D, phi_0 = {:.4g} ({})\n",
+      out += fmt::format("fit with phi_0 free    T = {:.6g} m g D, phi_0 = {:.4g} ({})\n",
                          model["temperature"]["value"].get<double>(), model["plateau_density"]["value"].get<double>(),
                          model.value("model", ""));
     }

@@ -107,7 +107,7 @@ TEST_F(Animation, PlaysWhatTheTrajectoryHoldsAsTimeWent) {
   EXPECT_EQ(found.scene["label"][3], "phase 0.30, t = 0.3 √(D/g)");
   EXPECT_EQ(found.scene["width"], width);
   EXPECT_EQ(found.scene["walls"], true);
-  EXPECT_THAT(html(frames, 1), HasSubstr("12 disks, 5 frames of the trajectory as time went."));
+  EXPECT_THAT(html(frames, 1), HasSubstr("12 disks, 5 frames of the trajectory in the order of time."));
   EXPECT_EQ(played(frames, 0).scene["label"][3], "t = 0.3 √(D/g)") << "a still floor has no phase";
 }
 

@@ -48,7 +48,7 @@ TEST(ChartNumbers, LineFitIsTheWeightedOneDoneByHand) {
 
 TEST(ChartNumbers, AFitNeedsErrors) {
   const Json found = numbers_of("x,y\n0,1\n1,2\n2,4\n", R"("y": "y", "line_fit": true, "power_fit": true)");
-  EXPECT_EQ(found["line_fit"], "needs two points with errors");
+  EXPECT_EQ(found["line_fit"], "not fitted: the line needs two points with errors");
   EXPECT_FALSE(found.contains("slope"));
   EXPECT_NE(found["power"]["status"], "ok");
   EXPECT_TRUE(found["power"]["exponent"].is_null());

@@ -58,8 +58,8 @@ TEST_F(CheckStage, ConvertsTheUnitOfBounds) {
   EXPECT_TRUE(passes("t", R"("least": "359 um", "most": "0.361 mm")"));
   EXPECT_FALSE(passes("t", R"("least": "361 um")"));
   EXPECT_FALSE(passes("t", R"("most": "359 um")"));
-  EXPECT_EQ(one("t", R"("least": "361 um")")["why"], "below the lower bound");
-  EXPECT_EQ(one("t", R"("most": "359 um")")["why"], "above the upper bound");
+  EXPECT_EQ(one("t", R"("least": "361 um")")["why"], "the result is below the lower bound");
+  EXPECT_EQ(one("t", R"("most": "359 um")")["why"], "the result is above the upper bound");
   EXPECT_TRUE(passes("plain", R"("least": 2.5, "most": 2.5)")) << "bounds are included";
 }
 
@@ -81,7 +81,8 @@ TEST_F(CheckStage, SaysHowFarItIsOffInTheUnitOfTheResult) {
   EXPECT_EQ(row["pointer"], "/fit/t");
   EXPECT_EQ(row["expected"], "0.40 mm +- 5 %");
   EXPECT_EQ(row["found"], "0.00036 +- 2e-05 m");
-  EXPECT_EQ(row["why"], "off by 4e-05, tolerance 2e-05 (10 % of the expected value)");
+  EXPECT_EQ(row["why"],
+            "the difference of 4e-05 is above the tolerance of 2e-05. The difference is 10 % of the expected value");
   EXPECT_EQ(row["note"], "from the paper");
   EXPECT_EQ(one("plain", R"("value": 2, "absolute": 1, "std_errors": 0)")["expected"], "2 +- 1 +- 0 standard errors");
   EXPECT_EQ(one("plain", R"("least": 1, "most": 3)")["expected"], "at least 1, at most 3");
@@ -100,7 +101,7 @@ TEST_F(CheckStage, ComparesWordsAndTruths) {
 
 TEST_F(CheckStage, RefusesAUnitThatTheResultCannotHave) {
   EXPECT_THAT(one("t", R"("value": "0.36 s", "relative": 1)")["why"].get<std::string>(),
-              HasSubstr("the result is in \"m\", the expected value is a time"));
+              HasSubstr("the result is in \"m\", but the expected value is a time"));
   EXPECT_THAT(one("reduced", R"("value": "0.36 mm", "relative": 1)")["why"].get<std::string>(),
               HasSubstr("must be a plain number"));
 }

@@ -134,14 +134,14 @@ const Odd odd[] = {
     {"short-settle", "/stages/0/settle", "4 periods of the floor"},
     {"narrow-box", "/stages/0/box/width", "3.33 diameters wide"},
     {"box-in-metres", "/stages/0/box/width: the box is 30.9 m wide, 1.03e+04 diameters", "did you mean \"30.9 mm\"?"},
-    {"low-lid", "/stages/0/box/lid/height", "the bed is squeezed"},
+    {"low-lid", "/stages/0/box/lid/height", "the lid squeezes the bed"},
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},
     {"alternate-rows-lock", "/stages/0/box/width: the box is 30.5 diameters wide", "alternate rows can lock"},
     {"sloped-sides", "/stages/0/box/sides/slope: at the surface of the bed at rest the box is 1.66 times as wide",
      "do not fit such a profile"},
     {"high-bed", "/stages/0/disks/count: 12000 disks in a box 30.5 diameters wide make a bed 347 diameters high",
-     "Take fewer disks"},
+     "Use fewer disks"},
 };
 
 class OddRecipe : public testing::TestWithParam<Odd> {};

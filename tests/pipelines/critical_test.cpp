@@ -114,7 +114,7 @@ TEST_F(StudyTables, ThatAreNoneAreNamed) {
     EXPECT_EQ(ran.exit_code, 4) << text;
     return ran.err;
   };
-  EXPECT_THAT(refused("series,gamma,T\n"), HasSubstr("table.csv: holds no rows"));
+  EXPECT_THAT(refused("series,gamma,T\n"), HasSubstr("table.csv: the table has no rows"));
   EXPECT_THAT(refused("series,gamma,T\na,1\n"), HasSubstr("table.csv:2: expected 3 columns"));
   EXPECT_THAT(refused("series,gamma,T\nrestitution=0.9 friction=0,x,1\n"), HasSubstr("\"x\" in column \"gamma\""));
   EXPECT_THAT(refused("series,gamma,T\nrestitution=0.9,2,1\n"), HasSubstr("has no friction"));

@@ -22,9 +22,9 @@ TEST(GatheredWarnings, NameEachKindOnceWithItsPoints) {
   all.add("c", Json{"fit: chi2/dof = 3, p = 1e-4", "fit: chi2/dof = 4, p = 1"});  // twice in one point: one point
   all.add("d", Json{"another one"});
   all.add("e", Json::array());
-  EXPECT_THAT(all.lines(),
-              ElementsAre("fit: chi2/dof = 40.7, p = 2.4e-22 (3 points: a, b, c; the numbers are those of the first)",
-                          "bed: T_x differs by -0.5 D (point a)", "another one (point d)"));
+  EXPECT_THAT(all.lines(), ElementsAre("fit: chi2/dof = 40.7, p = 2.4e-22 (3 points: a, b, c; the numbers in this "
+                                       "message are those of the first point)",
+                                       "bed: T_x differs by -0.5 D (point a)", "another one (point d)"));
 }
 
 TEST(GatheredWarnings, KeepWordsApartThatDifferInMoreThanNumbers) {

@@ -93,13 +93,13 @@ TEST_F(Infer, RefusesWhatMakesNoSense) {
     EXPECT_EQ(result.exit_code, 3) << change;
     EXPECT_NE(result.err.find(words), std::string::npos) << result.err;
   };
-  refused("/stages/search/parameters/gamma/set=[\"/flor/gamma\"]", "is no option of the scene");
+  refused("/stages/search/parameters/gamma/set=[\"/flor/gamma\"]", "is not an option of the scene");
   refused("/stages/search/parameters/gamma/high=1", "\"low\" below \"high\"");
   refused("/stages/search/parameters/restitution/high=1.5", "restitution");
   refused("/stages/search/first=10", "need at least 16 beds");
   refused("/stages/search/moments=3", "do not fall on 3");
-  refused("/stages/search/targets={}", "nothing was measured");
-  refused("/stages/search/stored=\"nowhere\"", "no stored beds");
+  refused("/stages/search/targets={}", "no target has a value");
+  refused("/stages/search/stored=\"nowhere\"", "no file of stored beds");
 }
 
 }  // namespace

@@ -128,7 +128,7 @@ TEST_F(OneFact, AKernelThatAnOptionNamesNeedNotBeInTheFile) {
   std::string text = profile_with_one_zero_error("0.01");
   text.erase(0, text.find('\n') + 1);  // the line that names it
   write_text(folder_ / "p.csv", text);
-  const std::string asks = "does not say through which kernel";
+  const std::string asks = "does not state through which kernel";
   const Json silent = Json::parse(run_shakebed({"fit-profile", "p.csv", "--json"}, folder_.path()).out);
   EXPECT_THAT(silent["warnings"].dump(), HasSubstr(asks));
   EXPECT_EQ(silent["kernel"]["kind"], "none");

@@ -49,10 +49,13 @@ std::vector<std::string> warnings_of(const std::vector<Json>& beds, ReplicaStart
 TEST(Replicas, ThatDifferByMoreThanTheyStateAreNamed) {
   const auto warnings = warnings_of({bed(0.16, 0.003), bed(0.20, 0.003), bed(0.17, 0.003), bed(0.22, 0.003)});
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_THAT(warnings[0],
-              HasSubstr("the 4 beds differ by more than chance: T_x scatters by 0.028, the stated error of "
-                        "each bed is 0.003 (0.165 on average where they begin as the recipe says, 0.21 from a random "
-                        "fill)"));
+  EXPECT_THAT(
+      warnings[0],
+      HasSubstr(
+          "the 4 beds differ by more than chance: the standard deviation of T_x between beds is 0.028, but the stated "
+          "error of "
+          "each bed is 0.003 (mean 0.165 of the beds that start as in the recipe, 0.21 of those that start from a "
+          "random fill)"));
   EXPECT_THAT(warnings_of({bed(0.160, 0.003), bed(0.165, 0.003), bed(0.163, 0.003), bed(0.158, 0.003)}), IsEmpty());
   // Two beds 2.1 times their error apart in spread: chance does that in 4 % of all cases.
   EXPECT_THAT(warnings_of({bed(1, 0.1), bed(1.3, 0.1)}), IsEmpty());

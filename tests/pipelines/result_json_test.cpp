@@ -154,7 +154,8 @@ TEST(FitJson, HoldsEveryPlainNumber) {
                       {"/warnings/0", "a word"}});
   EXPECT_FALSE(json["models"][1].contains("temperature"));
   EXPECT_FALSE(json["temperature_by_window"][1].contains("temperature"));
-  EXPECT_EQ(json["why_not"], "inside the window the model misses the data by 12.6 % of the greatest density");
+  EXPECT_EQ(json["why_not"],
+            "inside the window, the rms difference between model and data is 12.6 % of the greatest density");
 }
 
 TEST(FitJson, SaysWhatItDoesNotKnow) {

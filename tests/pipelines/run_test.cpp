@@ -79,7 +79,7 @@ TEST_F(Pipeline, SaysWhyAStageRunsAgain) {
   const std::string density = dry_run({"--set", "/stages/fit/plateau_density=1.0"});
   EXPECT_THAT(density, HasSubstr("bed: up to date"));
   EXPECT_THAT(density, HasSubstr("fit: runs: plateau_density changed 1.1 → 1"));
-  EXPECT_THAT(dry_run({"--force"}), HasSubstr("bed: runs: --force asks for it"));
+  EXPECT_THAT(dry_run({"--force"}), HasSubstr("bed: runs: --force was given"));
   // The same value in other words is the same option.
   EXPECT_THAT(dry_run({"--set", "/stages/bed/floor/amplitude=0.15 cm"}), HasSubstr("bed: up to date"));
   // explain is the same thing.
@@ -107,7 +107,7 @@ TEST_F(Pipeline, RunsAgainWhatOtherCodeHasMade) {
 TEST_F(Pipeline, NoticesOutputsThatWereTouched) {
   ASSERT_EQ(run_recipe().exit_code, 0);
   write_text(folder_ / "o/bed/profile.csv", read_text(folder_ / "o/bed/profile.csv") + "# mine\n");
-  EXPECT_THAT(dry_run(), HasSubstr("bed: runs: its output profile.csv was changed since"));
+  EXPECT_THAT(dry_run(), HasSubstr("bed: runs: its output profile.csv was changed after the run"));
   ASSERT_EQ(run_recipe().exit_code, 0);
   EXPECT_THAT(dry_run(), HasSubstr("bed: up to date"));
   fs::remove(folder_ / "o/fit/fit.json");
@@ -118,7 +118,7 @@ TEST_F(Pipeline, NoticesOutputsThatWereTouched) {
 TEST_F(Pipeline, RunsOnlyWhatIsSelected) {
   const ProgramResult early = run_recipe({"--only", "fit"});
   EXPECT_EQ(early.exit_code, 4);
-  EXPECT_THAT(early.err, HasSubstr("has not run here"));
+  EXPECT_THAT(early.err, HasSubstr("needs the results of \"bed\", which are not in"));
   ASSERT_EQ(run_recipe({"--until", "bed"}).exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "o/fit"));
   ASSERT_EQ(run_recipe({"--only", "fit"}).exit_code, 0);
@@ -254,7 +254,8 @@ TEST_F(Presets, AMistypedNameIsToldWhichThereAre) {
   const ProgramResult mistyped = run({"run", "r.json", "--out", "o", "--preset", "qiuck"});
   EXPECT_EQ(mistyped.exit_code, 2);
   EXPECT_THAT(mistyped.err, HasSubstr("r.json:"));
-  EXPECT_THAT(mistyped.err, HasSubstr("there are quick, full; did you mean \"quick\"?"));
+  EXPECT_THAT(mistyped.err,
+              HasSubstr("there is no preset of this name; choose from: quick, full; did you mean \"quick\"?"));
   EXPECT_FALSE(fs::exists(folder_ / "o"));
   write_text(folder_ / "none.json", small_recipe());
   EXPECT_THAT(run({"run", "none.json", "--preset", "quick"}).err, HasSubstr("none.json has no presets"));
@@ -313,7 +314,7 @@ TEST_F(Pipeline, VerifyNoticesEveryChangedFile) {
   std::filesystem::create_directory(folder_ / "photographs");
   const ProgramResult none = run({"status", "photographs"});
   EXPECT_EQ(none.exit_code, 4);
-  EXPECT_THAT(none.err, HasSubstr("photographs: holds no results"));
+  EXPECT_THAT(none.err, HasSubstr("photographs: this folder contains no results"));
 }
 
 TEST_F(Pipeline, ARunningPipelineHoldsTheFolderAndADeadOneDoesNot) {

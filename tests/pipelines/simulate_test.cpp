@@ -123,7 +123,7 @@ TEST_F(SimulateStage, GoesOnFromAnotherOne) {
   other.replace(other.find("\"count\": 60"), 11, "\"count\": 61");
   const ProgramResult refused = simulate(langevin, other);
   EXPECT_EQ(refused.exit_code, 4);
-  EXPECT_THAT(refused.err, HasSubstr("its last frame has 60 disks, the bed 61"));
+  EXPECT_THAT(refused.err, HasSubstr("the last frame has 60 disks, but the bed has 61"));
 }
 
 // The sine as a table in a file is the sine: the spline through 64 points is as good as it (5e-7 of its amplitude), but
@@ -148,7 +148,7 @@ TEST_F(SimulateStage, TakesTheFloorFromAFile) {
     EXPECT_EQ(result.exit_code, 4) << result.err;
     return result.err;
   };
-  EXPECT_THAT(refused("time,height\n0,0\n1,1\n2,x\n3,0\n"), HasSubstr("shaker.csv:4: \"x\" is no number"));
+  EXPECT_THAT(refused("time,height\n0,0\n1,1\n2,x\n3,0\n"), HasSubstr("shaker.csv:4: \"x\" is not a number"));
   EXPECT_THAT(refused("time,height\n0,0\n1,1\n5,1\n6,0\n"),
               HasSubstr("shaker.csv:4: the times are not equally spaced"));
   EXPECT_THAT(refused("time,height\n0,0\n1,1\n2,1\n"), HasSubstr("at least 4 positions, found 3"));
@@ -167,7 +167,7 @@ TEST_F(SimulateStage, RefusesWhatCannotBeAsked) {
   };
   EXPECT_THAT(refused(R"("observe": ["oder"])"), HasSubstr("Did you mean \"order\"?"));
   EXPECT_THAT(refused(R"("schedule": [ { "temperature": 1, "hold": 5 } ])"),
-              HasSubstr("no bath whose temperature could change"));
+              HasSubstr("this bed has no bath with a temperature"));
   EXPECT_THAT(refused(langevin + std::string(R"(, "schedule": [ { "temperature": 1 } ])")), HasSubstr("/schedule/0"));
   // A box without a floor has no heights.
   write_text(folder_ / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 1,
@@ -209,7 +209,7 @@ TEST(SimulatePrecision, LostStopsTheRunWithItsLastSoundState) {
     EXPECT_THAT(error.what(), HasSubstr("at time 20 "));
     EXPECT_THAT(error.what(), HasSubstr(std::to_string(spoilt.counters().collisions()) + " collisions"));
     EXPECT_THAT(error.what(), HasSubstr("two disks overlap by 0.001 D"));
-    EXPECT_THAT(error.what(), HasSubstr("kept in " + kept.string()));
+    EXPECT_THAT(error.what(), HasSubstr("stored in " + kept.string()));
   }
   const std::string text = read_text(kept);
   ASSERT_GT(text.size(), sound.size());
@@ -223,7 +223,7 @@ TEST(SimulatePrecision, LostStopsTheRunWithItsLastSoundState) {
     pipelines::require_precision(spoilt, {}, folder / "none");
     FAIL();
   } catch (const pipelines::StageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no earlier state was kept"));
+    EXPECT_THAT(error.what(), HasSubstr("no earlier state was stored"));
   }
   EXPECT_FALSE(fs::exists(folder / "none"));
 }

@@ -62,7 +62,7 @@ TEST_F(Tampering, OfTheSameLengthIsNoticedInEveryTableAndResult) {
     change_a_digit(path);
     fs::last_write_time(path, written);
     ASSERT_EQ(fs::file_size(path), before.size());
-    EXPECT_THAT(dry_run(), HasSubstr(std::string(stage) + ": runs: its output " + name + " was changed since"));
+    EXPECT_THAT(dry_run(), HasSubstr(std::string(stage) + ": runs: its output " + name + " was changed after the run"));
     const ProgramResult verified = run({"verify", "o"});
     EXPECT_EQ(verified.exit_code, 6);
     EXPECT_THAT(verified.err, HasSubstr(std::string(stage) + "/" + name + ": changed"));
@@ -105,18 +105,18 @@ StageRecord a_record() {
 }
 // Each way in which the same stage of a recipe can be other work.
 const std::vector<std::pair<std::string, std::function<void(StageRecord&)>>> changes{
-    {"it was a fit stage before", [](StageRecord& r) { r.stage = "map"; }},
+    {"in the last run it was a fit stage", [](StageRecord& r) { r.stage = "map"; }},
     {"the code of fit changed", [](StageRecord& r) { r.code = "c0df"; }},
     {"seed changed 5 → 6", [](StageRecord& r) { r.seed = 6; }},
     {"units changed", [](StageRecord& r) { r.reduced = true; }},
     {"model changed \"fermi\" → \"feron\"", [](StageRecord& r) { r.options["model"] = "feron"; }},
     {"window/low changed 2 → 3", [](StageRecord& r) { r.options["window"]["low"] = 3; }},
-    {"window/high is new: 9", [](StageRecord& r) { r.options["window"]["high"] = 9; }},
-    {"model is gone (was \"fermi\")", [](StageRecord& r) { r.options.erase("model"); }},
+    {"window/high was added: 9", [](StageRecord& r) { r.options["window"]["high"] = 9; }},
+    {"model was removed (it was \"fermi\")", [](StageRecord& r) { r.options.erase("model"); }},
     {"input bed/profile.csv changed", [](StageRecord& r) { r.inputs[0].fast = "aaab"; }},
     {"input bed/bed.json changed", [](StageRecord& r) { r.inputs[1].fast = "bbba"; }},
-    {"input bed/other.csv is new", [](StageRecord& r) { r.inputs[0].file = "bed/other.csv"; }},
-    {"some of its inputs are gone", [](StageRecord& r) { r.inputs.pop_back(); }},
+    {"input bed/other.csv was added", [](StageRecord& r) { r.inputs[0].file = "bed/other.csv"; }},
+    {"some of its inputs were removed", [](StageRecord& r) { r.inputs.pop_back(); }},
 };
 
 TEST(ReasonsToRun, NameEachThingThatChanged) {

@@ -73,7 +73,7 @@ TEST(SweepProgress, NamesAPointThatWillTakeFarLongerThanTheOthers) {
   const std::vector<std::string> found = progress.long_points();
   ASSERT_EQ(found.size(), 1U);
   EXPECT_THAT(found[0], HasSubstr("point 000002 (/stages/bed/measure = 20000 s) will take about"));
-  EXPECT_THAT(found[0], HasSubstr("leave the value out of the sweep or measure for a shorter time"));
+  EXPECT_THAT(found[0], HasSubstr("remove the value from the sweep, or measure for a shorter time"));
 }
 
 // What the fit of a finished point took is learned for the fits. The bed is still known by its trials: the long point

@@ -395,7 +395,8 @@ TEST(ExternalFiles, AFrameThatChangesWhileItIsReadIsNoticed) {
   over = true;
   other.join();
   EXPECT_EQ(disturbed.exit_code, 5) << disturbed.err;
-  EXPECT_NE(disturbed.err.find("000003.png: changed while it was read"), std::string::npos) << disturbed.err;
+  EXPECT_NE(disturbed.err.find("000003.png: this file changed while the stage read it"), std::string::npos)
+      << disturbed.err;
   EXPECT_FALSE(fs::exists(folder / "mine/extract"));
   write_text(frame, whole);
   const ProgramResult again = run_shakebed(measure, folder.path());

@@ -78,7 +78,7 @@ void kill_at_random_moments(int kills, std::uint32_t seed) {
   }
   const ProgramResult last = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   EXPECT_EQ(last.exit_code, 0) << last.err;
-  stale_locks += last.err.find("run by another process") != std::string::npos;
+  stale_locks += last.err.find("because another process is running them") != std::string::npos;
   EXPECT_EQ(read_text(folder / "o/sweep.csv"), expected);
   EXPECT_EQ(stale_locks, 0);
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder / "o/points")) {

@@ -79,12 +79,12 @@ const Mistake mistakes[] = {
     {"BedWiderThanItsDisks", "\"width\": \"30 mm\"", "\"width\": \"2 mm\"", 3, "/stages/0/box/width", ""},
     {"MeasureTooShort", "\"measure\": \"0.5 s\"", "\"measure\": \"1 ms\"", 3, "/stages/0/measure", "period"},
     {"EmptyExpectation", "{ \"value\": 4, \"relative\": 1e-12 }", "{}", 3, "/stages/2/expect/~1bed~1column_number",
-     "nothing is expected"},
+     "this expectation is empty"},
     {"ModelUnknown", "\"plateau_density\": 1.1", "\"model\": \"enskog-rectangel\"", 3, "/stages/1/model",
      "Did you mean"},
     {"SweepWithoutValues", "\"name\": \"small\"",
      "\"name\": \"small\", \"sweep\": {\"over\": {\"/stages/bed/seed\": []}}", 3, "/sweep/over/~1stages~1bed~1seed",
-     "no values"},
+     "the list of values is empty"},
 };
 
 class MalformedRecipe : public testing::TestWithParam<Mistake> {};

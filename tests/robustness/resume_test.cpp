@@ -71,7 +71,7 @@ void kill_and_resume(int replicas, std::uint32_t seed) {
   EXPECT_TRUE(checkpoint || killed < 4) << "there was nothing to go on from";
   const ProgramResult last = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   ASSERT_EQ(last.exit_code, 0) << last.err;
-  EXPECT_NE(read_text(folder / "o/bed/log.txt").find("goes on after"), std::string::npos);
+  EXPECT_NE(read_text(folder / "o/bed/log.txt").find("continues after"), std::string::npos);
   const auto found = results_of(folder / "o");
   for (const auto& [name, text] : expected)
     EXPECT_TRUE(found.contains(name) && found.at(name) == text) << name << " is another";
@@ -83,7 +83,7 @@ void kill_and_resume(int replicas, std::uint32_t seed) {
 TEST(Resume, AKilledSimulationEndsWithTheSameBytes) { kill_and_resume(1, 1); }
 TEST(Resume, SoDoReplicas) { kill_and_resume(2, 2); }
 
-// What cannot be read is said, and the run begins anew.
+// What cannot be read is said, and the run starts again from the beginning.
 TEST(Resume, ADamagedCheckpointIsNotUsed) {
   ScratchFolder folder;
   write_text(folder / "r.json", bed_recipe(1));
@@ -105,7 +105,7 @@ TEST(Resume, ADamagedCheckpointIsNotUsed) {
   write_text(checkpoint, damaged);
   const ProgramResult result = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.err.find("begins anew"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("starts again from the beginning"), std::string::npos) << result.err;
   EXPECT_EQ(results_of(folder / "o"), results_of(folder / "whole"));
 }
 
