@@ -111,7 +111,8 @@ class ProfileReader {
     const auto middle = relative.begin() + static_cast<std::ptrdiff_t>(relative.size() / 2);
     std::nth_element(relative.begin(), middle, relative.end());
     if (*middle <= greatest_error) return;
-    object("Where the bed is densest, the relative error of the density is " + number(100.0 * *middle, 2) + " %.",
+    object("Where the bed is densest, the relative error of the density is " +
+               number(100.0 * *middle, *middle < 1 ? 2 : 3) + " %.",
            "Take more photographs of the bed from the side, or measure longer.");
   }
 

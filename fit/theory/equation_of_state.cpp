@@ -625,6 +625,15 @@ const EquationOfState* find_equation_of_state(std::string_view name) {
   return nullptr;
 }
 
+std::string equation_names() {
+  std::string names;
+  for (const EquationOfState* equation : equations_of_state()) {
+    if (!names.empty()) names += ", ";
+    names += equation->name();
+  }
+  return names;
+}
+
 const EquationOfState& enskog() { return *equations_of_state().front(); }
 const EquationOfState& best_of() { return *equations_of_state().back(); }
 

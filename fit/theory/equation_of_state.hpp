@@ -124,6 +124,8 @@ class EquationOfState {
 // The table: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, best-of. The objects live
 // as long as the program and are safe to share between threads.
 std::span<const EquationOfState* const> equations_of_state();
+// "enskog, henderson, ...", for help and messages.
+std::string equation_names();
 // nullptr when there is no such name.
 const EquationOfState* find_equation_of_state(std::string_view name);
 const EquationOfState& enskog();

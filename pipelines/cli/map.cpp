@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "fit/theory/equation_of_state.hpp"
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/program.hpp"
@@ -78,10 +79,7 @@ void add_map(Program& program) {
   command.add_option("--gravity", given->gravity, "acceleration of gravity (default: \"9.81 m/s^2\")");
   command.add_option("--restitution", given->restitution,
                      "coefficient of restitution of the single ball (default 0: one flight without rebound)");
-  command.add_option(
-      "--eos", given->equation,
-      "equation of state: enskog (default), henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
-      "luding or best-of");
+  command.add_option("--eos", given->equation, "equation of state: " + fit::equation_names() + " (default: enskog)");
   command.add_option("--temperature", given->temperature,
                      "measured T, for which Gamma is computed: T/(m g) as a length, or T in m g D");
 }

@@ -1,5 +1,6 @@
 // implements: pipelines/cli/commands.hpp
 #include "pipelines/stages/theory.hpp"
+#include "fit/theory/equation_of_state.hpp"
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/program.hpp"
@@ -50,9 +51,7 @@ void add_theory(Program& program) {
         return exit_ok;
       });
   command.add_option("--plateau-density", given->plateau_density, plateau_help);
-  command.add_option("--eos", given->equation,
-                     "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, luding, "
-                     "best-of, or all");
+  command.add_option("--eos", given->equation, "equation of state: " + fit::equation_names() + ", or all");
   command.add_option("--diameter", given->diameter, "diameter D with its unit, for lengths");
   command.add_option("--initial-height", given->initial_height, initial_height_help);
   command.add_option("--column-number", given->column_number, "column number N D/W, in place of the initial height");

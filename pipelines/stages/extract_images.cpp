@@ -49,7 +49,8 @@ fs::path refusal_folder(const RunContext& context) { return context.output_direc
   message +=
       proposals.empty()
           ? ". No circles stand out, so no radius can be proposed. The program needs sharp photographs of round beads, "
-            "taken from the side. Each bead must be at least 8 pixels wide and brighter or darker than the background. "
+            "taken from the side. Each bead must be at least 10 pixels wide and brighter or darker than the "
+            "background. "
             "If this is such a photograph, give the region of the beads (--roi) and their radius in pixels (--radius)"
           : fmt::format(
                 ". If one of the pictures in preview.html marks your beads, limit the search to them with --roi, or "

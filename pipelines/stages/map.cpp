@@ -9,6 +9,7 @@
 #include <set>
 
 #include "fit/map/empirical_map.hpp"
+#include "fit/theory/equation_of_state.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/table.hpp"
@@ -45,9 +46,7 @@ class Map : public Stage {
         "restitution", restitution_,
         {.help = "coefficient of restitution of the single ball whose jump defines H_0; 0: one flight without rebound",
          .range = from_to(0, 0.99)});
-    fields.text("equation", equation_,
-                {.help = "equation of state: enskog, henderson, santos-lopez-yuste, percus-yevick, kolafa-rottner, "
-                         "luding or best-of"});
+    fields.text("equation", equation_, {.help = "equation of state: " + fit::equation_names()});
     fields.input_files(
         "table", table_,
         {.help = "table of simulated beds with known T, as written by a study (table.csv); T is interpolated in it, in "

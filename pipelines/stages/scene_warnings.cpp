@@ -65,7 +65,7 @@ std::optional<Misfit> odd_bead(double diameter) {
   return Misfit{fmt::format("the bead has a diameter of {}, but beads of experiments are 50 um to a few cm",
                             handy_text(diameter, dimension::length)),
                 diameter >= largest_bead
-                    ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", diameter)
+                    ? fmt::format("Did you mean \"{:g} mm\"? A plain number is in metres", diameter)
                     : "Check its unit"};
 }
 
@@ -119,7 +119,7 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
   else
     fields.warn("gamma above 50", sine->gamma ? "/floor/gamma" : "/floor/amplitude", here + ". " + *odd,
                 sine->amplitude >= largest_bead && !reduced_
-                    ? fmt::format("A plain number is in metres: did you mean \"{:g} mm\"? {}", sine->amplitude, four)
+                    ? fmt::format("Did you mean \"{:g} mm\"? A plain number is in metres. {}", sine->amplitude, four)
                     : four);
 }
 
@@ -136,7 +136,7 @@ void SceneOptions::warn_of_size(Fields& fields) const {
     fields.warn("wide box", "/box/width",
                 fmt::format("the box is {} ({:.4g} diameters) wide and contains {} disks, which hardly ever collide",
                             length_text(box_.width), width, disks_.count),
-                fmt::format("A plain number is in metres: did you mean \"{:g} mm\"?", box_.width));
+                fmt::format("Did you mean \"{:g} mm\"? A plain number is in metres", box_.width));
   if (gravity_ && height_at_rest() > highest_bed)
     fields.warn("high bed", "/disks/count",
                 fmt::format("{} disks in a box {:.4g} diameters wide make a bed {:.0f} diameters high: shaking from "
@@ -159,7 +159,7 @@ std::optional<Misfit> SceneOptions::locking() const {
     return std::nullopt;
   const double width = box_.width / length_unit();
   const std::optional<Commensurate> near = commensurate(width);
-  if (width < least_width || !near) return std::nullopt;
+  if (width < least_width || disks_.count < width || !near) return std::nullopt;  // no row is full
   const auto [below, above] = safe_widths(width);
   return Misfit{fmt::format("the box is {:.4g} diameters wide, {} {:g}: {} between hard sides. The temperature of a "
                             "locked bed differs from seed to seed, and such a bed makes many more collisions",

@@ -244,6 +244,12 @@ double two_digits(double value) {
   return std::round(value / unit) * unit;
 }
 
+// No longer than `value`, and shorter than `now` as it is shown.
+double shorter_than(double value, double now) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1), shown = std::floor(value / unit) * unit;
+  return shown < two_digits(now) - 0.5 * unit ? shown : shown - unit;
+}
+
 // Replicas that begin from the same placed disks differ by who has which velocity.
 void permute_velocities(sim::Scene& scene) {
   auto* placed = std::get_if<sim::PlacedStart>(&scene.start);
@@ -337,18 +343,19 @@ void Simulate::run(RunContext& context) const {
 void Simulate::warn_of_contact_duration(RunContext& context, const Json& results) const {
   const Json* effect = find_pointer(results, "/contact_duration_effect/value");
   if (effect == nullptr || effect->get<double>() <= allowed_contact_effect) return;
-  const double duration = bed_.contact_duration();
-  const double shorter = sim::contact_duration_for(effect->get<double>(), duration, allowed_contact_effect);
+  const bool reduced = bed_.description().reduced;
+  const double unit = reduced ? 1 : bed_.time_unit(), now = bed_.contact_duration();
+  const double wanted = sim::contact_duration_for(effect->get<double>(), now, allowed_contact_effect);
   const auto text = [&](double time) {
-    return bed_.description().reduced ? fmt::format("{:.2g}", time)
-                                      : "\"" + handy_text(two_digits(time * bed_.time_unit()), dimension::time) + "\"";
+    return reduced ? fmt::format("{:.2g}", time) : "\"" + handy_text(time, dimension::time) + "\"";
   };
   context.warning(
       fmt::format("the contact duration t_c = {} makes {:.2g} % of the contacts elastic, so T may be about {:.2g} % "
                   "too high. This t_c is a numerical cut-off, not the time that a real contact lasts{}. "
                   "\"contact_duration\": {} would reduce this to {:.2g} % or less, with more contacts",
-                  text(duration), 100 * results.at("elastic_share").at("value").get<double>(),
-                  100 * effect->get<double>(), contact_time_text(bed_), text(shorter), 100 * allowed_contact_effect));
+                  text(two_digits(now * unit)), 100 * results.at("elastic_share").at("value").get<double>(),
+                  100 * effect->get<double>(), contact_time_text(bed_), text(shorter_than(wanted * unit, now * unit)),
+                  100 * allowed_contact_effect));
 }
 
 // ------------------------------------------------------------------------------------------------ --budget

@@ -130,10 +130,10 @@ struct Odd {
 const Odd odd[] = {
     {"amplitude-in-metres", "/stages/0/floor/amplitude: Gamma = 1.93e+03", "did you mean \"1.2 mm\"?"},
     {"weak-shaking", "/stages/0/floor/amplitude: Gamma = 0.805", "stays at rest"},
-    {"bead-in-metres", "/stages/0/disks/diameter: a bead of 3 m", "did you mean \"3 mm\"?"},
+    {"bead-in-metres", "/stages/0/disks/diameter: the bead has a diameter of 3 m", "did you mean \"3 mm\"?"},
     {"short-settle", "/stages/0/settle", "4 periods of the floor"},
     {"narrow-box", "/stages/0/box/width", "3.33 diameters wide"},
-    {"box-in-metres", "/stages/0/box/width: the box is 30.9 m wide, 1.03e+04 diameters", "did you mean \"30.9 mm\"?"},
+    {"box-in-metres", "/stages/0/box/width: the box is 30.9 m (1.03e+04 diameters) wide", "did you mean \"30.9 mm\"?"},
     {"low-lid", "/stages/0/box/lid/height", "the lid squeezes the bed"},
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},
@@ -244,7 +244,7 @@ TEST(Suggestions, NameTheDiameterWhoseUnitWasForgotten) {
   const ProgramResult result =
       run_shakebed({"validate", "r.json", "--set", "/stages/bed/disks/diameter=3"}, folder.path());
   EXPECT_EQ(result.exit_code, 3) << result.err;
-  EXPECT_NE(result.err.find("/disks/diameter: a bead of 3 m"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("/disks/diameter: the bead has a diameter of 3 m"), std::string::npos) << result.err;
   EXPECT_NE(result.err.find("did you mean \"3 mm\"?"), std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("/box/width"), std::string::npos) << result.err;
 }

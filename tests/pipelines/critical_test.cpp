@@ -117,7 +117,7 @@ TEST_F(StudyTables, ThatAreNoneAreNamed) {
   EXPECT_THAT(refused("series,gamma,T\n"), HasSubstr("table.csv: the table has no rows"));
   EXPECT_THAT(refused("series,gamma,T\na,1\n"), HasSubstr("table.csv:2: expected 3 columns"));
   EXPECT_THAT(refused("series,gamma,T\nrestitution=0.9 friction=0,x,1\n"), HasSubstr("\"x\" in column \"gamma\""));
-  EXPECT_THAT(refused("series,gamma,T\nrestitution=0.9,2,1\n"), HasSubstr("has no friction"));
+  EXPECT_THAT(refused("series,gamma,T\nrestitution=0.9,2,1\n"), HasSubstr("states no friction"));
   EXPECT_THAT(refused("series,gamma,temp\na,2,1\n"), HasSubstr("has no column \"T\""));
   // Too few beds: no temperature, and a word.
   write_text(folder_ / "table.csv", "series,gamma,T\nrestitution=0.9 friction=0,2,1\n");
@@ -127,7 +127,7 @@ TEST_F(StudyTables, ThatAreNoneAreNamed) {
   EXPECT_THAT(read_text(folder_ / "o/report.html"), HasSubstr("simulated beds give no temperature"));
   std::string without = map_stage;
   without.replace(without.find(R"("bead_friction": 0.1,)"), 21, "");
-  EXPECT_THAT(run(without).err, HasSubstr("give bead_friction"));
+  EXPECT_THAT(run(without).err, HasSubstr("give \"bead_friction\""));
 }
 
 }  // namespace

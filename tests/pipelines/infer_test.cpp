@@ -97,7 +97,7 @@ TEST_F(Infer, RefusesWhatMakesNoSense) {
   refused("/stages/search/parameters/gamma/high=1", "\"low\" below \"high\"");
   refused("/stages/search/parameters/restitution/high=1.5", "restitution");
   refused("/stages/search/first=10", "need at least 16 beds");
-  refused("/stages/search/moments=3", "do not fall on 3");
+  refused("/stages/search/moments=3", "must be a multiple of");
   refused("/stages/search/targets={}", "no target has a value");
   refused("/stages/search/stored=\"nowhere\"", "no file of stored beds");
 }

@@ -66,7 +66,7 @@ TEST(FirstLine, OfABedThatLiesStillSaysSo) {
 
 // A bed that was never pressed does not.
 TEST(FirstLine, OfABedThatWasPressedSaysThatItsDisksWereSoft) {
-  const std::string soft = "The disks were soft while the bed was pressed on the floor.";
+  const std::string soft = "The disks were simulated as soft disks while the bed was pressed on the floor.";
   const Judged bed = judged({.friction = 0, .gamma = 0.7, .contact_duration = "10 us"});
   EXPECT_THAT(bed.first_line, HasSubstr(soft));
   EXPECT_NE(bed.observed["energy_ledger"]["step_error"], 0);
@@ -88,7 +88,7 @@ TEST(FirstLine, OfALongContactDurationSaysByHowMuchTIsTooHigh) {
 TEST(FirstLine, OfABoxOfWholeBeadsSaysThatRowsLock) {
   const Judged bed = judged({.width = 10.0}, "0.2 s");
   EXPECT_THAT(bed.first_line, AllOf(HasSubstr("Rows lock: The box is 10 diameters wide, exactly 10"),
-                                    HasSubstr("take 19.4 mm (9.7 D) or 20.6 mm (10.3 D)")));
+                                    HasSubstr("use 19.4 mm (9.7 D) or 20.6 mm (10.3 D)")));
 }
 
 TEST(FirstLine, OfRoughBeadsWithoutTangentialRestitutionSaysSo) {
