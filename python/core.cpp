@@ -420,27 +420,28 @@ void bind_fits(py::module_& m) {
           const py::gil_scoped_release release;
           return Fit{fit::fit_profile(profile, wanted), diameter};
         });
-  m.def("find_answer", [](const py::object& height, const py::object& density, const py::object& error,
-                          const py::object& covariance, int covariance_samples, const std::string& kernel,
-                          std::optional<double> column_number, std::optional<std::pair<double, double>> temperature_x,
-                          std::optional<std::pair<double, double>> temperature_z,
-                          const std::vector<std::pair<std::string, std::string>>& objections,
-                          std::optional<double> diameter, double origin_error, bool shaken, double width) {
-    fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
-                           .kernel = kernel_named(kernel),
-                           .column_number = column_number};
-    if (temperature_x) input.temperature_x = fit::Estimate{temperature_x->first, temperature_x->second};
-    if (temperature_z) input.temperature_z = fit::Estimate{temperature_z->first, temperature_z->second};
-    for (const auto& [why, advice] : objections) input.objections.push_back({why, advice});
-    input.diameter = diameter, input.origin_error = origin_error;
-    input.shaken = shaken, input.width_between_walls = width;
-    fit::Answer answer;
-    {
-      const py::gil_scoped_release release;
-      answer = fit::find_answer(input);
-    }
-    return answer_of(answer);
-  });
+  m.def(
+      "find_answer",
+      [](const py::object& height, const py::object& density, const py::object& error, const py::object& covariance,
+         int covariance_samples, const std::string& kernel, std::optional<double> column_number,
+         std::optional<std::pair<double, double>> temperature_x, std::optional<std::pair<double, double>> temperature_z,
+         const std::vector<std::pair<std::string, std::string>>& objections, std::optional<double> diameter,
+         double origin_error, bool shaken, double width, double scale_error) {
+        fit::AnswerInput input{.profile = profile_of(height, density, error, covariance, covariance_samples),
+                               .kernel = kernel_named(kernel),
+                               .column_number = column_number};
+        if (temperature_x) input.temperature_x = fit::Estimate{temperature_x->first, temperature_x->second};
+        if (temperature_z) input.temperature_z = fit::Estimate{temperature_z->first, temperature_z->second};
+        for (const auto& [why, advice] : objections) input.objections.push_back({why, advice});
+        input.diameter = diameter, input.origin_error = origin_error;
+        input.shaken = shaken, input.width_between_walls = width, input.scale_error = scale_error;
+        fit::Answer answer;
+        {
+          const py::gil_scoped_release release;
+          answer = fit::find_answer(input);
+        }
+        return answer_of(answer);
+      });
   m.def("theory", [](const std::string& equation, double plateau_density, std::optional<double> diameter,
                      std::optional<double> initial_height, std::optional<double> temperature) {
     pipelines::TheoryQuestion question;

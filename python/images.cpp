@@ -260,6 +260,8 @@ PYBIND11_MODULE(_images, m) {
       .def_property_readonly("ok", [](const ingest::BedFound& f) { return f.ok(); })
       .def_property_readonly("message", [](const ingest::BedFound& f) { return f.message; })
       .def_property_readonly("width", [](const ingest::BedFound& f) { return f.measurement.calibration.width; })
+      .def_property_readonly(
+          "scale_error", [](const ingest::BedFound& f) { return f.measurement.calibration.scale_relative_std_error; })
       .def_property_readonly("scale",
                              [](const ingest::BedFound& f) { return f.measurement.calibration.scale_m_per_px; })
       .def_property_readonly("radius", [](const ingest::BedFound& f) { return f.measurement.calibration.radius_px; })

@@ -379,11 +379,35 @@ class AnswerFinder {
     a.interval.high = a.temperature * std::exp(far);
   }
 
+  // What the statistical error loses when the scale is taken for exact.
+  [[nodiscard]] double part_of_scale() const {
+    Profile exact = input_.profile;
+    const std::size_t n = exact.number_density.size();
+    if (!(input_.scale_error > 0.0) || exact.covariance.size() != n * n) return 0.0;
+    for (std::size_t a = 0; a < n; ++a)
+      for (std::size_t b = 0; b < n; ++b)
+        exact.covariance[a * n + b] -=
+            4.0 * input_.scale_error * input_.scale_error * exact.number_density[a] * exact.number_density[b];
+    for (std::size_t a = 0; a < n && !exact.std_error.empty(); ++a)
+      exact.std_error[a] = std::sqrt(std::max(0.0, exact.covariance[a * n + a]));
+    const auto chosen = std::find_if(votes_.begin(), votes_.end(),
+                                     [&](const Thermometer* one) { return one->name == answer_.thermometer; });
+    const FitResult fit = fit_profile(exact, options_of(**chosen));
+    if (!fit.ok()) return 0.0;
+    const double without = answer_.temperature * fit.statistical_error / fit.temperature.value;
+    return std::sqrt(std::max(0.0, answer_.statistical_error * answer_.statistical_error - without * without));
+  }
+
   // Of one temperature: what its uncertainty comes from.
   void advise() {
     if (answer_.verdict != Verdict::one_temperature) return;
+    const double of_scale = part_of_scale();
     const std::pair<double, const char*> parts[] = {
-        {answer_.statistical_error, "Most of the uncertainty is statistical: a longer measurement reduces it."},
+        {of_scale,
+         "Most of the uncertainty comes from the scale: give the length of a pixel, as a ruler in a photograph "
+         "shows it."},
+        {std::sqrt(std::max(0.0, answer_.statistical_error * answer_.statistical_error - of_scale * of_scale)),
+         "Most of the uncertainty is statistical: a longer measurement reduces it."},
         {std::hypot(answer_.bias_uncertainty, answer_.misfit_error, answer_.spread),
          "Most of the uncertainty comes from the model: a longer measurement does not reduce it."},
         {answer_.wall_uncertainty, "Most of the uncertainty comes from the side walls: a wider bed reduces it."},

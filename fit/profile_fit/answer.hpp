@@ -35,6 +35,8 @@ struct AnswerInput {
   double width_between_walls = 0.0;
   // One standard error of the floor's mean position, from which heights are measured [D].
   double origin_error = 0.0;
+  // One standard error of the length of D in the picture, relative; contained in the covariance of the densities.
+  double scale_error = 0.0;
   // [m]; with it the reasons state T/(m g) in mm, else T in m g D.
   std::optional<double> diameter{};
   double confidence = 0.95;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numbers>
 
 #include "ingest/find/edge_map.hpp"
@@ -29,10 +30,45 @@ constexpr double faintest_edge = 0.25;
 constexpr double places_per_radius = 6;
 constexpr double farthest_gap = 1.5;  // radii of the beads, from a place to the nearest disk found
 // An edge is that of a wall or a floor where the tangent through it meets edges of the same direction on so much of the
-// way, to one side or to both together. The tops of touching beads in a row are met on a third of it; beads that touch
-// the wall hide a part of it. Radii of the beads; cosine.
+// way, to one side or to both together, as far as no disk hides it. The tops of touching beads in a row are met on a
+// third of it. Radii of the beads; cosine.
 constexpr double tangent_from = 0.5, tangent_to = 3, same_direction = 0.95;
 constexpr double least_to_one_side = 0.6, least_to_both = 0.45;
+
+// Between beads that touch a wall or the floor only short pieces of its edge are seen. Radii of the beads, from the
+// straight line that the outermost disks touch; so many must touch it.
+constexpr double beside_wall = 0.3;
+constexpr std::size_t fewest_at_wall = 4;
+
+// Lines that the outermost disks touch: columns left and right, the row below.
+struct OuterLines {
+  double left = -HUGE_VAL, right = HUGE_VAL, below = HUGE_VAL;
+
+  OuterLines(const std::vector<Circle>& disks, double radius) {
+    std::vector<double> lefts, rights, bottoms;
+    for (const Circle& disk : disks) {
+      lefts.push_back(-(disk.x - disk.radius));
+      rights.push_back(disk.x + disk.radius);
+      bottoms.push_back(disk.y + disk.radius);
+    }
+    left = -touched_by_several(lefts, radius, HUGE_VAL);
+    right = touched_by_several(rights, radius, HUGE_VAL);
+    below = touched_by_several(bottoms, radius, HUGE_VAL);
+  }
+
+  [[nodiscard]] bool has(double x, double y, double radius) const {
+    const double near = beside_wall * radius;
+    return std::abs(x - left) < near || std::abs(x - right) < near || std::abs(y - below) < near;
+  }
+
+ private:
+  // The largest of these; `none` unless several are nearly as large.
+  static double touched_by_several(std::vector<double> ends, double radius, double none) {
+    if (ends.size() < fewest_at_wall) return none;
+    std::sort(ends.begin(), ends.end(), std::greater<>());
+    return ends[0] - ends[fewest_at_wall - 1] < beside_wall * radius ? ends[0] : none;
+  }
+};
 
 // Places of a map of edges that no disk covers.
 class FreePlaces {
@@ -44,12 +80,13 @@ class FreePlaces {
         edge_(edges.x.size(), 0) {
     for (const Circle& disk : found) cover(disk.x, disk.y, disk.radius);
     to_disk_ = clearance_;
+    const OuterLines outer(found, radius);
     for (const RidgePixel& pixel : edges.ridge) {
       const int column = static_cast<int>(pixel.x), row = static_cast<int>(pixel.y);
       const std::size_t at = edges.at(column, row);
       const double step = step_per_slope * static_cast<double>(std::hypot(edges.x[at], edges.y[at]));
       if (static_cast<double>(clearance_[at]) < covered * radius || step < faintest_edge * contrast) continue;
-      if (is_straight(pixel)) continue;
+      if (outer.has(pixel.x, pixel.y, radius) || is_straight(pixel)) continue;
       for (int y = std::max(0, row - 1); y <= std::min(edges.height - 1, row + 1); ++y)
         for (int x = std::max(0, column - 1); x <= std::min(edges.width - 1, column + 1); ++x)
           edge_[edges.at(x, y)] = 1;
@@ -90,8 +127,9 @@ class FreePlaces {
       const double x = static_cast<double>(pixel.x) - side * away * static_cast<double>(pixel.unit_y),
                    y = static_cast<double>(pixel.y) + side * away * static_cast<double>(pixel.unit_x);
       if (x < 0 || y < 0 || x >= edges_.width || y >= edges_.height) break;
-      ++seen;
       const std::size_t at = edges_.at(static_cast<int>(x), static_cast<int>(y));
+      if (static_cast<double>(clearance_[at]) < covered * radius_) continue;  // a disk hides it
+      ++seen;
       const float size = std::hypot(edges_.x[at], edges_.y[at]);
       const float along = edges_.x[at] * pixel.unit_x + edges_.y[at] * pixel.unit_y;
       met += size >= edges_.threshold && along >= static_cast<float>(same_direction) * size;

@@ -460,7 +460,10 @@ void Fields::input_files(std::string_view key, InputFiles& files, const About& a
                fs::is_directory(path, error) ? fmt::format("the folder \"{}\" contains no file", item.text)
                : has_wildcards(path)         ? fmt::format("no file matches \"{}\"", item.text)
                                              : fmt::format("there is no file \"{}\"", item.text),
-               fs::path(item.text).is_absolute() ? "" : "Paths are relative to the recipe's folder", true);
+               fs::is_directory(path, error)       ? "Put the files into it, or name another folder"
+               : fs::path(item.text).is_absolute() ? ""
+                                                   : "Paths are relative to the recipe's folder",
+               true);
     }
     files.paths.insert(files.paths.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
   };

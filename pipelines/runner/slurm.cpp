@@ -156,7 +156,9 @@ int submit_slurm(const Plan& plan, const SlurmOptions& options, Console& console
   gather.push_back(gather_script);
   record["gather_job"] = submit(gather);
   write_file_atomically(submitted, dump(record));
-  console.message(fmt::format("{} points, {} to run in {} tasks", points.size(), tasks.missing_points, tasks.tasks));
+  console.message(
+      runs ? fmt::format("{} points, {} to run in {} tasks", points.size(), tasks.missing_points, tasks.tasks)
+           : fmt::format("{} points, all up to date: only the table and the report are written again", points.size()));
   if (options.json) {
     fmt::print("{}", dump(record));
   } else {

@@ -57,6 +57,13 @@ double origin_error(const Input& input) {
   return diameter > 0 ? number("/floor/std_error") * number("/scale/value") / diameter : 0;
 }
 
+double scale_error(const Input& input) {
+  const Json result = input.result();
+  const Json *value = find_pointer(result, "/scale/value"), *error = find_pointer(result, "/scale/std_error");
+  if (value == nullptr || error == nullptr || !value->is_number() || !error->is_number()) return 0;
+  return value->get<double>() > 0 ? error->get<double>() / value->get<double>() : 0;
+}
+
 double width_between_walls(const Input& input) {
   if (!input.has("bed.json")) return 0;
   const BedDescription bed = BedDescription::read(input.file("bed.json"));

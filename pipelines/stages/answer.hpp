@@ -22,6 +22,8 @@ KineticTemperatures kinetic_temperatures(const Input& input, std::optional<doubl
 double contact_duration_effect(const Input& input);
 // One standard error of the floor's mean position [D], where an input stage measured it in photographs; else 0.
 double origin_error(const Input& input);
+// Relative error of the scale of photographs; 0 for others.
+double scale_error(const Input& input);
 // Width between hard side walls that are in view [D]; 0 where there are none. And whether the bed is shaken.
 double width_between_walls(const Input& input);
 bool is_shaken(const Input& input);

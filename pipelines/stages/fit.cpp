@@ -427,7 +427,8 @@ Json answer_of(const FitTask& task, const RunContext& context) {
   // Of the profile's own stage alone: a profile of the user's is not what it measured.
   if (task.source != nullptr && task.path == task.source->directory / "profile.csv")
     input.objections = objections_of(*task.source), input.origin_error = origin_error(*task.source),
-    input.shaken = is_shaken(*task.source), input.width_between_walls = width_between_walls(*task.source);
+    input.scale_error = scale_error(*task.source), input.shaken = is_shaken(*task.source),
+    input.width_between_walls = width_between_walls(*task.source);
   Json answer = answer_json(fit::find_answer(input), task.diameter);
   for (const Input& upstream : context.inputs()) add_judgement(upstream.result(), answer);
   return answer;

@@ -67,7 +67,7 @@ def find_answer(
     covariance_samples: int, kernel: str, column_number: Optional[float],
     temperature_x: Optional[tuple[float, float]], temperature_z: Optional[tuple[float, float]],
     objections: list[tuple[str, str]], diameter: Optional[float], origin_error: float,
-    shaken: bool, width: float,
+    shaken: bool, width: float, scale_error: float,
 ) -> dict[str, Any]: ...
 def theory(
     equation: str, plateau_density: float, diameter: Optional[float], initial_height: Optional[float],

@@ -25,6 +25,7 @@ class Bed:
     message: str
     width: float
     scale: float
+    scale_error: float
     radius: float
     floor: float
     floor_std_error: float

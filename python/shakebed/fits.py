@@ -305,7 +305,8 @@ def find_answer(
                                None if column_number is None else number(column_number, "column_number"),
                                _estimate(temperature_x, "temperature_x"), _estimate(temperature_z, "temperature_z"), [],
                                length, 0.0, False, 0.0 if width_between_walls is None else number(width_between_walls,
-                                                                                                 "width_between_walls"))
+                                                                                                 "width_between_walls"),
+                               0.0)
     return with_lengths(answer, length)
 
 

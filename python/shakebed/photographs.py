@@ -183,7 +183,7 @@ class MeasuredBed:
                                    profile.covariance_samples, profile.kernel, self._bed.column_number, None, None,
                                    self._bed.objections(), self._diameter,
                                    self.floor_std_error * self.scale / self._diameter, self._bed.shaken,
-                                   profile.width_between_walls or 0.0)
+                                   profile.width_between_walls or 0.0, self._bed.scale_error)
         return with_lengths(answer, self._diameter)
 
     @property

@@ -23,7 +23,7 @@ def short(scene):
 @pytest.mark.parametrize("changes, pointer, words", [
     ({"floor": dict(SCENE["floor"], amplitude="0.4 mm")}, "/floor/amplitude", "never throws the bed"),
     ({"box": dict(SCENE["box"], width="30 mm")}, "/box/width", "can lock"),
-    ({"box": dict(SCENE["box"], width=30.92)}, "/box/width", 'did you mean "30.92 mm"'),
+    ({"box": dict(SCENE["box"], width=30.92)}, "/box/width", 'Did you mean "30.92 mm"'),
 ])
 def test_scenes_warn_as_the_command_line_does(short, tmp_path, changes, pointer, words):
     scene = dict(short, **changes)
@@ -46,7 +46,7 @@ def test_a_sound_scene_does_not_warn(short):
 
 
 def test_a_diameter_in_metres_by_mistake_warns():
-    with pytest.warns(shakebed.BedWarning, match='did you mean "3 mm"'):
+    with pytest.warns(shakebed.BedWarning, match='Did you mean "3 mm"'):
         shakebed.theory(diameter=3)
 
 

@@ -108,6 +108,30 @@ TEST(Answer, TakesInTheContactDuration) {
   EXPECT_GT(with.interval.high, without.interval.high);
 }
 
+// The error of the scale is a common factor in the covariance of all densities. Where it makes most of the error of T,
+// the advice is another: pictures add nothing to it.
+TEST(Answer, SaysWhenMostOfItsUncertaintyComesFromTheScale) {
+  for (const double scale_error : {0.0005, 0.04}) {
+    AnswerInput input = column(1.0);
+    const std::size_t n = input.profile.height.size();
+    const std::vector<double>& density = input.profile.number_density;
+    input.profile.covariance.assign(n * n, 0.0);
+    for (std::size_t a = 0; a < n; ++a) {
+      input.profile.covariance[a * n + a] = input.profile.std_error[a] * input.profile.std_error[a];
+      for (std::size_t b = 0; b < n; ++b)
+        input.profile.covariance[a * n + b] += 4 * scale_error * scale_error * density[a] * density[b];
+      input.profile.std_error[a] = std::sqrt(input.profile.covariance[a * n + a]);
+    }
+    input.scale_error = scale_error;
+    const Answer answer = find_answer(input);
+    ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+    EXPECT_EQ(answer.advice.find("the scale") != std::string::npos, scale_error > 0.01) << answer.advice;
+    input.scale_error = 0;
+    EXPECT_EQ(find_answer(input).std_error, answer.std_error) << "only the advice depends on it";
+    EXPECT_EQ(find_answer(input).advice.find("the scale"), std::string::npos);
+  }
+}
+
 TEST(Answer, TakesTheKnownBiasOff) {
   const Answer answer = find_answer(column(1.0));
   ASSERT_TRUE(answer.ok());

@@ -128,12 +128,12 @@ struct Odd {
 };
 
 const Odd odd[] = {
-    {"amplitude-in-metres", "/stages/0/floor/amplitude: Gamma = 1.93e+03", "did you mean \"1.2 mm\"?"},
+    {"amplitude-in-metres", "/stages/0/floor/amplitude: Gamma = 1.93e+03", "Did you mean \"1.2 mm\"?"},
     {"weak-shaking", "/stages/0/floor/amplitude: Gamma = 0.805", "stays at rest"},
-    {"bead-in-metres", "/stages/0/disks/diameter: the bead has a diameter of 3 m", "did you mean \"3 mm\"?"},
+    {"bead-in-metres", "/stages/0/disks/diameter: the bead has a diameter of 3 m", "Did you mean \"3 mm\"?"},
     {"short-settle", "/stages/0/settle", "4 periods of the floor"},
     {"narrow-box", "/stages/0/box/width", "3.33 diameters wide"},
-    {"box-in-metres", "/stages/0/box/width: the box is 30.9 m (1.03e+04 diameters) wide", "did you mean \"30.9 mm\"?"},
+    {"box-in-metres", "/stages/0/box/width: the box is 30.9 m (1.03e+04 diameters) wide", "Did you mean \"30.9 mm\"?"},
     {"low-lid", "/stages/0/box/lid/height", "the lid squeezes the bed"},
     {"commensurate-width", "/stages/0/box/width: the box is 30 diameters wide, exactly 30",
      "59.4 mm (29.7 D) or 60.6 mm (30.3 D)"},
@@ -226,7 +226,7 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   EXPECT_NE(result.err.find("Write \"3 mm\""), std::string::npos) << result.err;
   const ProgramResult mapped = run_shakebed(
       {"map", "--gamma", "4", "--frequency", "20 Hz", "--diameter", "3", "--initial-height", "10"}, folder.path());
-  EXPECT_NE(mapped.err.find("did you mean \"3 mm\"?"), std::string::npos) << mapped.err;
+  EXPECT_NE(mapped.err.find("Did you mean \"3 mm\"?"), std::string::npos) << mapped.err;
   write_text(folder / "r.json", small_recipe());
   for (const auto& [set, says] : {std::pair{"/stages/bed/floor/frequency=\"20\"", "Write \"20 Hz\""},
                                   {"/stages/bed/box/width=\"0.06\"", "Write \"0.06 m\""},
@@ -245,7 +245,7 @@ TEST(Suggestions, NameTheDiameterWhoseUnitWasForgotten) {
       run_shakebed({"validate", "r.json", "--set", "/stages/bed/disks/diameter=3"}, folder.path());
   EXPECT_EQ(result.exit_code, 3) << result.err;
   EXPECT_NE(result.err.find("/disks/diameter: the bead has a diameter of 3 m"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("did you mean \"3 mm\"?"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("Did you mean \"3 mm\"?"), std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("/box/width"), std::string::npos) << result.err;
 }
 

@@ -63,7 +63,8 @@ TEST(Replicas, ThatDifferByMoreThanTheyStateAreNamed) {
 
 TEST(Replicas, AndSingleBedsThatStillChangeAreNamed) {
   EXPECT_THAT(warnings_of({bed(2, 0.1, -0.5, 0.1)}),
-              ElementsAre(HasSubstr("T_x is lower by 0.5 (25 %) in the second half of the time, which is 5.0 times the error")));
+              ElementsAre(HasSubstr(
+                  "T_x is lower by 0.5 (25 %) in the second half of the time, which is 5.0 times the error")));
   EXPECT_THAT(warnings_of({bed(2, 0.1, 0.39, 0.1)}), IsEmpty());
   EXPECT_THAT(warnings_of({bed(2, 0.1, 0, 0)}), IsEmpty());
 }

@@ -199,8 +199,8 @@ TEST(FitText, ShowsValuesAndErrorsInTheSameUnit) {
         "solid height                    9.4 +- 0.12 D\n", "shift                           9.5 +- 0.11 D\n",
         "plateau density                 1.1 +- 0.013 1/D^2\n", "T_c / (m g D)                   0.5 +- 0.015 m g D\n",
         "T / T_c                       0.625 +- 0.016 \n", "chi2 per dof                   1.55\n",
-        "window                 2.5 to 14.25 D, 22 bins\n", "fit with phi_0 free    T = 0.27 m g D, phi_0 = 1.12 (fermi)\n",
-        "warning: a word\n"})
+        "window                 2.5 to 14.25 D, 22 bins\n",
+        "fit with phi_0 free    T = 0.27 m g D, phi_0 = 1.12 (fermi)\n", "warning: a word\n"})
     EXPECT_NE(text.find(line), std::string::npos) << line << "in\n" << text;
 }
 
