@@ -69,6 +69,36 @@ std::string how_far(double ratio_less_one) {
 // Infinite where one of them is 0.
 double ratio_above_one(double a, double b) { return std::max(a, b) / std::min(a, b) - 1.0; }
 
+// The same profile by a diameter that is `factor` times as many pixels.
+Profile scaled(Profile profile, double factor) {
+  for (double& height : profile.height) height /= factor;
+  for (double& density : profile.number_density) density *= factor * factor;
+  for (double& error : profile.std_error) error *= factor * factor;
+  for (double& covariance : profile.covariance) covariance *= std::pow(factor, 4);
+  return profile;
+}
+
+// Without the part of the errors that all densities have in common by the scale (density.hpp): fits that take it for a
+// part of the scatter around a curve prefer low densities.
+Profile with_exact_scale(Profile profile, double scale_error) {
+  const std::size_t n = profile.number_density.size();
+  const auto common = [&](std::size_t a, std::size_t b) {
+    return 4.0 * scale_error * scale_error * profile.number_density[a] * profile.number_density[b];
+  };
+  constexpr double least = 1e-4;  // of a variance, against rounding in a file
+  if (profile.covariance.size() == n * n)
+    for (std::size_t a = 0; a < n; ++a)
+      for (std::size_t b = 0; b < n; ++b) {
+        double& here = profile.covariance[a * n + b];
+        here = a == b ? std::max(least * here, here - common(a, b)) : here - common(a, b);
+      }
+  for (std::size_t a = 0; a < std::min(n, profile.std_error.size()); ++a) {
+    const double variance = profile.std_error[a] * profile.std_error[a];
+    profile.std_error[a] = std::sqrt(std::max(least * variance, variance - common(a, a)));
+  }
+  return profile;
+}
+
 class AnswerFinder {
  public:
   explicit AnswerFinder(const AnswerInput& input)
@@ -203,6 +233,26 @@ class AnswerFinder {
     answer_.statistical_error = chosen_->temperature * chosen_->statistical_error / chosen_->fitted.value;
     answer_.misfit_error = std::sqrt(std::max(0.0, all * all - answer_.statistical_error * answer_.statistical_error));
     answer_.bias_uncertainty = chosen_->temperature * chosen_->bias_uncertainty;
+    without_scale_ = answer_.statistical_error;
+    scale_uncertainty_ = chosen_->temperature * effect_of_scale();
+    answer_.statistical_error = std::hypot(without_scale_, scale_uncertainty_);
+  }
+
+  // Relative: half of what T changes by from a scale that is an error smaller to one that is an error larger.
+  [[nodiscard]] double effect_of_scale() const {
+    if (!(input_.scale_error > 0.0)) return 0.0;
+    const auto chosen = std::find_if(votes_.begin(), votes_.end(),
+                                     [&](const Thermometer* one) { return one->name == answer_.thermometer; });
+    double ends[2] = {};
+    for (const int side : {0, 1}) {
+      const double factor = 1.0 + (side == 0 ? -1.0 : 1.0) * input_.scale_error;  // of D in px
+      FitOptions options = options_of(**chosen);
+      if (options.column_number) *options.column_number *= factor;
+      const FitResult fit = fit_profile(scaled(seen_.profile, factor), options);
+      if (!fit.ok()) return 0.0;
+      ends[side] = std::log(fit.temperature.value);
+    }
+    return 0.5 * std::abs(ends[1] - ends[0]);
   }
 
   // Statistical and of the misfit, relative.
@@ -379,35 +429,14 @@ class AnswerFinder {
     a.interval.high = a.temperature * std::exp(far);
   }
 
-  // What the statistical error loses when the scale is taken for exact.
-  [[nodiscard]] double part_of_scale() const {
-    Profile exact = input_.profile;
-    const std::size_t n = exact.number_density.size();
-    if (!(input_.scale_error > 0.0) || exact.covariance.size() != n * n) return 0.0;
-    for (std::size_t a = 0; a < n; ++a)
-      for (std::size_t b = 0; b < n; ++b)
-        exact.covariance[a * n + b] -=
-            4.0 * input_.scale_error * input_.scale_error * exact.number_density[a] * exact.number_density[b];
-    for (std::size_t a = 0; a < n && !exact.std_error.empty(); ++a)
-      exact.std_error[a] = std::sqrt(std::max(0.0, exact.covariance[a * n + a]));
-    const auto chosen = std::find_if(votes_.begin(), votes_.end(),
-                                     [&](const Thermometer* one) { return one->name == answer_.thermometer; });
-    const FitResult fit = fit_profile(exact, options_of(**chosen));
-    if (!fit.ok()) return 0.0;
-    const double without = answer_.temperature * fit.statistical_error / fit.temperature.value;
-    return std::sqrt(std::max(0.0, answer_.statistical_error * answer_.statistical_error - without * without));
-  }
-
   // Of one temperature: what its uncertainty comes from.
   void advise() {
     if (answer_.verdict != Verdict::one_temperature) return;
-    const double of_scale = part_of_scale();
     const std::pair<double, const char*> parts[] = {
-        {of_scale,
+        {scale_uncertainty_,
          "Most of the uncertainty comes from the scale: give the length of a pixel, as a ruler in a photograph "
          "shows it."},
-        {std::sqrt(std::max(0.0, answer_.statistical_error * answer_.statistical_error - of_scale * of_scale)),
-         "Most of the uncertainty is statistical: a longer measurement reduces it."},
+        {without_scale_, "Most of the uncertainty is statistical: a longer measurement reduces it."},
         {std::hypot(answer_.bias_uncertainty, answer_.misfit_error, answer_.spread),
          "Most of the uncertainty comes from the model: a longer measurement does not reduce it."},
         {answer_.wall_uncertainty, "Most of the uncertainty comes from the side walls: a wider bed reduces it."},
@@ -516,8 +545,9 @@ class AnswerFinder {
   }
 
   const AnswerInput& input_;
-  std::optional<double> column_number_;  // as input_, far from side walls
-  BlurredProfile seen_;                  // without the crystal's rows, far from side walls
+  double without_scale_ = 0.0, scale_uncertainty_ = 0.0;  // parts of the statistical error [m g D]
+  std::optional<double> column_number_;                   // as input_, far from side walls
+  BlurredProfile seen_;                                   // without the crystal's rows, far from side walls
   Answer answer_;
   std::vector<const Thermometer*> votes_;  // of the readings
   const ThermometerReading* chosen_ = nullptr;
@@ -541,6 +571,11 @@ std::string_view to_string(Verdict verdict) {
   return "unknown";
 }
 
-Answer find_answer(const AnswerInput& input) { return AnswerFinder(input).run(); }
+Answer find_answer(const AnswerInput& input) {
+  if (!(input.scale_error > 0.0)) return AnswerFinder(input).run();
+  AnswerInput exact = input;
+  exact.profile = with_exact_scale(input.profile, input.scale_error);
+  return AnswerFinder(exact).run();
+}
 
 }  // namespace shakebed::fit

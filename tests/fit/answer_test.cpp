@@ -108,28 +108,42 @@ TEST(Answer, TakesInTheContactDuration) {
   EXPECT_GT(with.interval.high, without.interval.high);
 }
 
-// The error of the scale is a common factor in the covariance of all densities. Where it makes most of the error of T,
-// the advice is another: pictures add nothing to it.
-TEST(Answer, SaysWhenMostOfItsUncertaintyComesFromTheScale) {
-  for (const double scale_error : {0.0005, 0.04}) {
-    AnswerInput input = column(1.0);
-    const std::size_t n = input.profile.height.size();
-    const std::vector<double>& density = input.profile.number_density;
-    input.profile.covariance.assign(n * n, 0.0);
-    for (std::size_t a = 0; a < n; ++a) {
-      input.profile.covariance[a * n + a] = input.profile.std_error[a] * input.profile.std_error[a];
-      for (std::size_t b = 0; b < n; ++b)
-        input.profile.covariance[a * n + b] += 4 * scale_error * scale_error * density[a] * density[b];
-      input.profile.std_error[a] = std::sqrt(input.profile.covariance[a * n + a]);
-    }
-    input.scale_error = scale_error;
-    const Answer answer = find_answer(input);
-    ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
-    EXPECT_EQ(answer.advice.find("the scale") != std::string::npos, scale_error > 0.01) << answer.advice;
-    input.scale_error = 0;
-    EXPECT_EQ(find_answer(input).std_error, answer.std_error) << "only the advice depends on it";
-    EXPECT_EQ(find_answer(input).advice.find("the scale"), std::string::npos);
+// A column whose densities have the error of a scale in common, as photographs give it.
+AnswerInput with_scale_error(AnswerInput input, double scale_error) {
+  const std::size_t n = input.profile.height.size();
+  const std::vector<double>& density = input.profile.number_density;
+  input.profile.covariance.assign(n * n, 0.0);
+  for (std::size_t a = 0; a < n; ++a) {
+    input.profile.covariance[a * n + a] = input.profile.std_error[a] * input.profile.std_error[a];
+    for (std::size_t b = 0; b < n; ++b)
+      input.profile.covariance[a * n + b] += 4 * scale_error * scale_error * density[a] * density[b];
+    input.profile.std_error[a] = std::sqrt(input.profile.covariance[a * n + a]);
   }
+  input.scale_error = scale_error;
+  return input;
+}
+
+// The error of the scale is a part of that of T, by what T is with another scale: the same column whose heights and
+// densities are those of a diameter 2 % larger. T itself does not depend on the error. Where it is most of the
+// uncertainty, the advice says so: pictures add nothing to it.
+TEST(Answer, HasTheErrorOfTheScale) {
+  const AnswerInput exact = column(1.0, 0.02);
+  const Answer plain = find_answer(exact);
+  ASSERT_EQ(plain.verdict, Verdict::one_temperature) << plain.why;
+  AnswerInput larger = exact;
+  for (double& height : larger.profile.height) height /= 1.02;
+  for (double& density : larger.profile.number_density) density *= 1.02 * 1.02;
+  for (double& error : larger.profile.std_error) error *= 1.02 * 1.02;
+  const double change = std::abs(std::log(find_answer(larger).temperature / plain.temperature));
+  EXPECT_GT(change, 0.02) << "heights alone give 2 %";
+  const Answer known = find_answer(with_scale_error(exact, 0.0002)),
+               unsure = find_answer(with_scale_error(exact, 0.02));
+  ASSERT_EQ(unsure.verdict, Verdict::one_temperature) << unsure.why;
+  EXPECT_NEAR(unsure.temperature, plain.temperature, 2e-3);
+  const double part = std::sqrt(std::pow(unsure.statistical_error, 2) - std::pow(known.statistical_error, 2));
+  EXPECT_NEAR(part / unsure.temperature, change, 0.25 * change);
+  EXPECT_NE(unsure.advice.find("the scale"), std::string::npos) << unsure.advice;
+  EXPECT_EQ(known.advice.find("the scale"), std::string::npos) << known.advice;
 }
 
 TEST(Answer, TakesTheKnownBiasOff) {
