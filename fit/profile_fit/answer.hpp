@@ -35,9 +35,8 @@ struct AnswerInput {
   double width_between_walls = 0.0;
   // One standard error of the floor's mean position, from which heights are measured [D].
   double origin_error = 0.0;
-  // One standard error of the length of D in the picture, relative. It is contained in the errors of the densities,
-  // from which it is taken off: T is fitted again with a smaller and a larger scale, and the change is a part of the
-  // statistical error.
+  // One standard error of the length of D in the picture, relative. The errors of the densities contain it, and it is
+  // taken off there. T is fitted again with a smaller and a larger scale. The change is a part of the statistical error.
   double scale_error = 0.0;
   // [m]; with it the reasons state T/(m g) in mm, else T in m g D.
   std::optional<double> diameter{};
