@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The words of the documents: no dialect, short sentences, symbols that GLOSSARY.md defines, links that lead somewhere,
-correct spelling, README and tutorial easy to read.
+correct spelling, README and tutorial easy to read, and messages quoted in how-to tables that the code still says.
 
 usage: words.py REPOSITORY   (exit 1: something is wrong; what was skipped is printed)
 
@@ -279,6 +279,26 @@ def code_faults(root, rows):
                         yield name, line, "long", f"{len(words(sentence))} words: {sentence.strip()[:90]}..."
 
 
+def quoted_messages(prose):
+    """(line, phrase) of the messages that tables of a how-to page quote: "..." in a row's first cell."""
+    for line, row in prose:
+        if row.startswith("|"):
+            for phrase in re.findall(r'"([^"`]+)"', re.sub(r"`[^`]*`", "", row.split("|")[1])):
+                yield line, phrase
+
+
+def unknown_messages(root):
+    """Quoted messages that the code does not say: their words, in this order, with anything where ... stands."""
+    said = " ".join(piece for room in CODE_ROOMS if (root / room).is_dir()
+                    for file in sorted((root / room).rglob("*.cpp")) for _, piece in code_pieces(file))
+    said = re.sub(r"%\.?\d*[a-z]+|\{[^}]*\}", "#", said).lower()
+    for file in sorted((root / "docs/how-to").glob("*.md")):
+        for line, phrase in quoted_messages(enumerate(file.read_text().splitlines(), 1)):
+            parts = [re.escape(part.strip().lower()) for part in phrase.split("...")]
+            if not re.search("[^.]{0,80}".join(parts), said):
+                yield f"{file.relative_to(root).as_posix()}:{line}: message: no part of the code says \"{phrase}\""
+
+
 def notices_faults(rows):
     """The rules themselves: each must find the fault that it is for."""
     bad = Prose("# A\n\nThe bed remembers. " + "word " * 31 + "end. The value of Q_x grows, <v>.\n\n[x](nowhere.md#b)\n\n```\nremembers\n```\n")
@@ -305,6 +325,14 @@ def notices_faults(rows):
                                    f'    raise ValueError("It remembers.")\n\n\ndef b():\n    """{long}"""\n')
         found = list(code_faults(pathlib.Path(folder), rows))
     assert sorted(fault[1:3] for fault in found) == [(9, "dialect"), (13, "long")], found
+    with tempfile.TemporaryDirectory() as folder:
+        page, code = pathlib.Path(folder) / "docs" / "how-to", pathlib.Path(folder) / "sim"
+        page.mkdir(parents=True)
+        code.mkdir()
+        (page / "a.md").write_text('| "disks ... were left out", or `"x"` | look |\n| "no beads there" | look |\n')
+        (code / "a.cpp").write_text('say("%zu disks beside it were "\n    "left out");\n')
+        found = list(unknown_messages(pathlib.Path(folder)))
+    assert len(found) == 1 and "no beads there" in found[0], found
     assert reading_ease(Prose("Institutional considerations necessitate interdisciplinary communication.\n")) < 0
 
 
@@ -329,6 +357,7 @@ def main():
             if ease < LEAST_EASE:
                 faults.append(f"{name}: reading ease {ease:.1f}, must be at least {LEAST_EASE}: shorter sentences and words")
     faults += [f"{name}:{line}: {kind}: {text}" for name, line, kind, text in code_faults(root, rows)]
+    faults += unknown_messages(root)
     print("\n".join(faults))
     print(f"{len(files)} documents, {len(symbols)} symbols, {len(faults)} faults")
     return 1 if faults else 0

@@ -38,6 +38,7 @@ std::vector<sim::Snapshot> bed_in_equilibrium(std::size_t frames, std::uint64_t 
 struct Look {
   double radius_px, azimuth, height;  // of the light: turns anticlockwise from the right, radians above the picture
   double dark, background;            // grey levels of the dark side and of what is behind
+  double walls = 0;                   // of walls and floor; 0: as what is behind
 };
 
 // Spheres by Lambert's law, four by four points a pixel, light noise.
@@ -50,6 +51,12 @@ GrayFrame drawn(const sim::Snapshot& bed, const Look& look, std::uint64_t seed) 
   GrayFrame frame{static_cast<int>(width * diameter) + 2 * margin, static_cast<int>(22 * diameter) + margin, {}};
   const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
   std::vector<double> level(pixels, look.background);
+  for (std::size_t at = 0; at < pixels && look.walls > 0; ++at) {
+    const auto column = static_cast<double>(at % static_cast<std::size_t>(frame.width)),
+               row = static_cast<double>(at / static_cast<std::size_t>(frame.width));
+    if (column < margin - 0.5 || column > margin - 0.5 + width * diameter || row > frame.height - margin)
+      level[at] = look.walls;
+  }
   for (std::size_t i = 0; i < bed.x.size(); ++i) {
     const double x = margin - 0.5 + bed.x[i] * diameter, y = frame.height - margin - bed.z[i] * diameter;
     const int reach = static_cast<int>(look.radius_px) + 2;
@@ -98,6 +105,8 @@ void expect_measured(const std::vector<Look>& looks, int at_least) {
                 static_cast<double>(found.measurement.disk_total) / static_cast<double>(bed.size()),
                 100 * (diameter_px / truth - 1), 100 * calibration.scale_relative_std_error);
     ++measured;
+    EXPECT_LT(found.measurement.finder.expected_missed, 0.02)
+        << "none is; between beads that touch them walls have edges";
     EXPECT_NEAR(diameter_px / truth, 1, 0.015) << look.radius_px;
     EXPECT_NEAR(diameter_px / truth, 1, 3 * calibration.scale_relative_std_error) << look.radius_px;
     EXPECT_NEAR(static_cast<double>(found.measurement.disk_total), count * static_cast<double>(bed.size()),
@@ -108,7 +117,7 @@ void expect_measured(const std::vector<Look>& looks, int at_least) {
 
 constexpr Look half_seen{10, 0.12, 0.6, 30, 32};
 // Lit from the front, the rim of a sphere is dark all around.
-constexpr Look soft_rim{5.6, 0.3, 1.35, 44, 36};
+constexpr Look soft_rim{5.6, 0.3, 1.35, 44, 36, 80};
 TEST(SideLitSpheres, AreMeasuredByTheirContacts) { expect_measured({half_seen}, 1); }
 TEST(SideLitSpheres, WithASoftRimAreMeasuredByTheirContacts) { expect_measured({soft_rim}, 1); }
 // The third, whose light comes from below, may be refused.
