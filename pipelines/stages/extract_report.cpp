@@ -103,6 +103,11 @@ StagePages extract_pages() {
           {"of the disks found touch", measurement,
            "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
            "(\"scale\")."},
+          {"Touching beads are", measurement,
+           "Nothing if your beads touch. If they do not, give the length of a pixel (\"scale\")."},
+          {"the circles seen are", measurement,
+           "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
+           "(\"scale\")."},
           {"disks found overlap", measurement,
            "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
            "(\"scale\")."},
@@ -127,9 +132,9 @@ StagePages extract_pages() {
           {"frame_rate", rest, "Give \"frame_rate\" if the film was recorded faster than it plays."},
           {"collide between frames", measurement,
            "Record at a higher frame rate, so that disks rarely collide between frames."},
-          {"velocities", measurement,
+          {"is too low", measurement, "Record at a higher frame rate, so that fast disks are followed too."},
+          {"elocities", measurement,
            "Record at a higher frame rate: disks must move less than half a diameter between frames."},
-          {"T is too low", measurement, "Record at a higher frame rate, so that fast disks are followed too."},
           {"", measurement, "Look through the film and the figures of the frames below."}}};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ingest/find/missed_beads.hpp"
 #include "ingest/profile/bed_geometry.hpp"
 #include "ingest/profile/film_calibration.hpp"
 #include "ingest/profile/photographs.hpp"
@@ -105,8 +106,6 @@ void expect_measured(const std::vector<Look>& looks, int at_least) {
                 static_cast<double>(found.measurement.disk_total) / static_cast<double>(bed.size()),
                 100 * (diameter_px / truth - 1), 100 * calibration.scale_relative_std_error);
     ++measured;
-    EXPECT_LT(found.measurement.finder.expected_missed, 0.02)
-        << "none is; between beads that touch them walls have edges";
     EXPECT_NEAR(diameter_px / truth, 1, 0.015) << look.radius_px;
     EXPECT_NEAR(diameter_px / truth, 1, 3 * calibration.scale_relative_std_error) << look.radius_px;
     EXPECT_NEAR(static_cast<double>(found.measurement.disk_total), count * static_cast<double>(bed.size()),
@@ -117,12 +116,35 @@ void expect_measured(const std::vector<Look>& looks, int at_least) {
 
 constexpr Look half_seen{10, 0.12, 0.6, 30, 32};
 // Lit from the front, the rim of a sphere is dark all around.
-constexpr Look soft_rim{5.6, 0.3, 1.35, 44, 36, 80};
+constexpr Look soft_rim{5.6, 0.3, 1.35, 44, 36};
 TEST(SideLitSpheres, AreMeasuredByTheirContacts) { expect_measured({half_seen}, 1); }
 TEST(SideLitSpheres, WithASoftRimAreMeasuredByTheirContacts) { expect_measured({soft_rim}, 1); }
 // The third, whose light comes from below, may be refused.
 TEST(SideLitSpheres, OfOtherLooksAreMeasuredOrRefused) {
   expect_measured({{8, 0.35, 0.5, 40, 38}, {12, 0.25, 0.4, 40, 40}, {7, 0.6, 0.5, 52, 50}}, 2);
+}
+
+// All beads are found, and between those that touch a wall or the floor short pieces of its edge are seen: no place of
+// a missed bead. Where beads are left out, at a wall and elsewhere, they are missed.
+TEST(MissedBeads, AreNoPiecesOfWallsBetweenBeads) {
+  const Look look{6, 0.3, 1.0, 60, 30, 110};
+  const sim::Snapshot bed = bed_in_equilibrium(1, 9, 220)[0];
+  const GrayFrame frame = drawn(bed, look, 5);
+  RimModel model;
+  model.polarity = Polarity::bright_beads;
+  model.radius_px = look.radius_px, model.contrast = 110;
+  std::vector<Circle> beads;
+  for (std::size_t i = 0; i < bed.x.size(); ++i) {
+    Circle circle;
+    circle.x = 30 - 0.5 + bed.x[i] * 12, circle.y = frame.height - 30 - bed.z[i] * 12, circle.radius = 6;
+    beads.push_back(circle);
+  }
+  EXPECT_LE(expected_missed_beads(frame, model, beads, {}), 2) << "of 220";
+  std::sort(beads.begin(), beads.end(), [](const Circle& a, const Circle& b) { return a.x < b.x; });
+  std::vector<Circle> some;
+  for (std::size_t k = 0; k < beads.size(); ++k)
+    if (k % 4 != 0) some.push_back(beads[k]);
+  EXPECT_GT(expected_missed_beads(frame, model, some, {}), 40) << "of 55 left out";
 }
 
 FrameFindings centres(const sim::Snapshot& bed, double diameter_px, double error_px, RandomStream& random) {
