@@ -98,6 +98,13 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);
     throw StageError(fmt::format("{}: cannot be written: {}", path.string(), error.code().message()));
+  } catch (const StageError& error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    std::string what = error.what();  // of the file asked for, not of the one that is renamed
+    if (const std::size_t at = what.find(temporary.string()); at != std::string::npos)
+      what.replace(at, temporary.string().size(), path.string());
+    throw StageError(what);
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);

@@ -120,7 +120,7 @@ void SceneOptions::warn_of_shaking(Fields& fields) const {
     fields.warn("gamma above 50", sine->gamma ? "/floor/gamma" : "/floor/amplitude", here + ". " + *odd,
                 sine->amplitude >= largest_bead && !reduced_
                     ? fmt::format("Did you mean \"{:g} mm\"? A plain number is in metres. {}", sine->amplitude, four)
-                    : four);
+                    : "Check the frequency and the amplitude. " + four);
 }
 
 void SceneOptions::warn_of_size(Fields& fields) const {

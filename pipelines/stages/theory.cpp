@@ -156,11 +156,13 @@ Json map_json(const MapQuestion& question) {
 
 std::string map_text(const Json& map) {
   const bool measured = map.contains("measured_reduced_temperature");
+  bool at_pole = false;
   std::string out = fmt::format("Gamma = {:.6g}\n{:<40} {:>10} {:>12} {:>9}{}\n", map["gamma"]["value"].get<double>(),
                                 "formula", "H_0 / D", "T/T_c", "in range", measured ? "  Gamma of measured T" : "");
   for (const Json& row : map["readings"]) {
     if (row["jump"].is_null()) {
       out += fmt::format("{:<40} {}\n", row["name"].get<std::string>(), row["status"].get<std::string>());
+      at_pole = at_pole || row["status"].get<std::string>() == to_string(fit::ValueStatus::pole);
       continue;
     }
     out += fmt::format("{:<40} {:>10.4f} {:>12.4f} {:>9}", row["name"].get<std::string>(),
@@ -175,6 +177,8 @@ std::string map_text(const Json& map) {
   if (measured) {
     out += fmt::format("measured T/T_c = {:.4f}\n", map["measured_reduced_temperature"]["value"].get<double>());
   }
+  if (at_pole)
+    out += "undefined (pole): the equation of state diverges at the density phi_0 of the solid in this row.\n";
   return out;
 }
 

@@ -2,7 +2,8 @@
 """Runs the documents. Each page of the tutorial and of the how-to has a fresh folder in which its blocks are run in order:
 
   console  lines after "$ " are run; the lines below are what must be printed, up to numbers; "..." alone stands for any
-           lines, at the end of a line for the rest of it
+           lines, at the end of a line for the rest of it. Numbers of an answer (lines that begin with "fit") must agree
+           to 3 % or one unit of their last digit
   json     a recipe, a stage, or a part of a recipe: checked by `shakebed validate`
   python   run
   sh       run
@@ -57,6 +58,18 @@ def shape(line):
     return re.sub(r"# (?:ms|s|min|h)\b", "# s", line)
 
 
+def same_answer(want, printed):
+    """Whether the numbers of an answer are the same, to 3 % or one of the last digit."""
+    if not want.startswith("fit"):
+        return True
+    number = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+    for one, other in zip(re.findall(number, want), re.findall(number, printed)):
+        last = 10.0 ** -len(one.partition("e")[0].partition(".")[2])
+        if abs(float(one) - float(other)) > max(0.03 * abs(float(other)), 1.01 * last):
+            return False
+    return True
+
+
 def is_progress(line):
     return re.match(r"\s+[\w-]+: +#? ?\d* *%", line) or re.match(r"\s+[\w-]+: +\d+ %", line)
 
@@ -78,6 +91,7 @@ def matches(expected, printed):
             same = shape(printed[j]).startswith(shape(want[:-3]).rstrip())
         else:
             same = shape(want) == shape(printed[j])
+        same = same and same_answer(want, printed[j])
         furthest[0] = max(furthest[0], i + same)
         return same and fits(i + 1, j + 1)
 

@@ -237,6 +237,26 @@ TEST(Suggestions, OfferTheUnitThatABeadIsLikelyToHave) {
   }
 }
 
+// At close packing the equation of Santos, Lopez de Haro and Yuste diverges, and that of Henderson does not.
+TEST(Suggestions, SayWhyAMapIsUndefinedAtAPole) {
+  ScratchFolder folder;
+  const auto map = [&](const char* equation) {
+    return run_shakebed({"map", "--gamma", "4", "--frequency", "20 Hz", "--diameter", "3 mm", "--initial-height", "10",
+                         "--eos", equation, "--plateau-density", "1.1547005383792515"},
+                        folder.path());
+  };
+  EXPECT_NE(map("santos-lopez-yuste").out.find("diverges at the density phi_0"), std::string::npos);
+  EXPECT_EQ(map("henderson").out.find("diverges"), std::string::npos);
+}
+
+// A file that cannot be written is named as it was asked for.
+TEST(Suggestions, NameTheFileThatCannotBeWritten) {
+  const ProgramResult result = run_shakebed({"init", "/proc/nowhere/bed.json"}, ".");
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_NE(result.err.find("/proc/nowhere/bed.json"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find(".part"), std::string::npos) << result.err;
+}
+
 // Lengths are checked in diameters: the error once named the width, which was right.
 TEST(Suggestions, NameTheDiameterWhoseUnitWasForgotten) {
   ScratchFolder folder;
