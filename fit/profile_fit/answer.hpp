@@ -36,7 +36,8 @@ struct AnswerInput {
   // One standard error of the floor's mean position, from which heights are measured [D].
   double origin_error = 0.0;
   // One standard error of the length of D in the picture, relative. The errors of the densities contain it, and it is
-  // taken off there. T is fitted again with a smaller and a larger scale. The change is a part of the statistical error.
+  // taken off there. T is fitted again with a smaller and a larger scale. The change is a part of the statistical
+  // error.
   double scale_error = 0.0;
   // [m]; with it the reasons state T/(m g) in mm, else T in m g D.
   std::optional<double> diameter{};

@@ -52,7 +52,7 @@ async function answersSliders() {
   if ((await page.value("document.getElementById('gamma').value")) !== "8.1") complain("an arrow key does not move the slider");
   // A bed that cannot be is refused in words.
   await page.value(set("diameter", 0));
-  await page.until("document.getElementById('state').textContent.startsWith('No such bed: ')");
+  await page.until("document.getElementById('state').textContent.startsWith('This bed cannot be simulated: ')");
   silent(page, "sliders");
   await page.close();
 }
