@@ -238,21 +238,21 @@ class AnswerFinder {
     answer_.statistical_error = std::hypot(without_scale_, scale_uncertainty_);
   }
 
-  // Relative: half of what T changes by from a scale that is an error smaller to one that is an error larger.
+  // Relative: the larger of what T changes by with a scale that is an error smaller, and one that is an error larger.
+  // Where the profile cannot be fitted with one of them, T is uncertain by a factor of e.
   [[nodiscard]] double effect_of_scale() const {
     if (!(input_.scale_error > 0.0)) return 0.0;
     const auto chosen = std::find_if(votes_.begin(), votes_.end(),
                                      [&](const Thermometer* one) { return one->name == answer_.thermometer; });
-    double ends[2] = {};
-    for (const int side : {0, 1}) {
-      const double factor = 1.0 + (side == 0 ? -1.0 : 1.0) * input_.scale_error;  // of D in px
+    double largest = 0.0;
+    for (const double factor : {1.0 - input_.scale_error, 1.0 + input_.scale_error}) {  // of D in px
       FitOptions options = options_of(**chosen);
       if (options.column_number) *options.column_number *= factor;
       const FitResult fit = fit_profile(scaled(seen_.profile, factor), options);
-      if (!fit.ok()) return 0.0;
-      ends[side] = std::log(fit.temperature.value);
+      if (!fit.ok()) return 1.0;
+      largest = std::max(largest, std::abs(std::log(fit.temperature.value / chosen_->fitted.value)));
     }
-    return 0.5 * std::abs(ends[1] - ends[0]);
+    return largest;
   }
 
   // Statistical and of the misfit, relative.
