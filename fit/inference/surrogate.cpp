@@ -183,6 +183,7 @@ Surrogate::Prediction Surrogate::predict(std::span<const double> points) const {
   Prediction out;
   out.mean.resize(count * outputs_);
   out.variance.resize(count * outputs_);
+  out.scatter.resize(count * outputs_);
   const Matrix runs = in_columns(points_, parameters_);
   const auto n = static_cast<Eigen::Index>(runs_);
   const Eigen::Map<const Matrix> factor(factor_.data(), n, n);
@@ -205,6 +206,7 @@ Surrogate::Prediction Surrogate::predict(std::span<const double> points) const {
       for (std::size_t m = 0; m < outputs_; ++m) {
         out.mean[(first + i) * outputs_ + m] = middle_[m] + unit_[m] * mean(row, static_cast<Eigen::Index>(m));
         out.variance[(first + i) * outputs_ + m] = spread_[m] * spread_[m] * (noise + own);
+        out.scatter[(first + i) * outputs_ + m] = spread_[m] * spread_[m] * noise;
       }
     }
   }

@@ -25,9 +25,9 @@ class Surrogate {
   static std::size_t fewest_runs(std::size_t parameters) { return 4 * (parameters + 2); }
 
   // Prediction of a further run at each point: mean and variance, point by point, output by output. The variance holds
-  // the surrogate's own error and the scatter between runs.
+  // the surrogate's own error and the scatter between runs; `scatter` is the variance of the latter alone.
   struct Prediction {
-    std::vector<double> mean, variance;
+    std::vector<double> mean, variance, scatter;
   };
   Prediction predict(std::span<const double> points) const;
 

@@ -8,6 +8,7 @@ class Program;
 void add_reproduce(Program& program);
 void add_run(Program& program);
 void add_fit_images(Program& program);
+void add_infer_bed(Program& program);
 void add_fit_profile(Program& program);
 void add_theory(Program& program);
 void add_map(Program& program);

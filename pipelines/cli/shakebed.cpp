@@ -8,9 +8,9 @@ int main(int argc, char** argv) {
   return exit_code_of([&] {
     Program program(argc, argv);
     for (const auto add :
-         {add_reproduce, add_run,    add_fit_images, add_fit_profile, add_theory,   add_map,     add_audit,
-          add_init,      add_live,   add_schema,     add_reference,   add_validate, add_explain, add_graph,
-          add_status,    add_verify, add_rerun,      add_clean,       add_bench,    add_submit})
+         {add_reproduce, add_run,    add_fit_images, add_infer_bed, add_fit_profile, add_theory,   add_map,
+          add_audit,     add_init,   add_live,       add_schema,    add_reference,   add_validate, add_explain,
+          add_graph,     add_status, add_verify,     add_rerun,     add_clean,       add_bench,    add_submit})
       add(program);
     return program.run();
   });

@@ -161,7 +161,9 @@ BedMeasurement::BedMeasurement(const sim::Scene& scene, const sim::DiskPropertie
       floor_frame_(!std::holds_alternative<sim::StillFloor>(scene.box.floor)),
       plan_(plan),
       bed_(scene, disks, plan.phases, plan.grid, plan.kernel),
-      frames_(scene, disks, 1, plan.grid, plan.kernel) {
+      frames_(scene, disks, 1, plan.grid, plan.kernel),
+      flow_free_(disks, plan.phases),
+      of_phases_(plan.named_phases.size(), frames_) {
   const sim::LayerGrid layers = coarse_layers(plan.grid);
   if (plan.observe.order) order_.emplace(scene, disks, layers);
   if (plan.observe.velocities || plan.observe.phases) lab_.emplace(scene, disks, plan.phases, layers, false);
@@ -200,7 +202,10 @@ void BedMeasurement::look(const sim::Simulation& simulation, const sim::Snapshot
   if (phase == 0 && bed_.periods() > 0) end_period(simulation);
   if (free_lid_) lid_heights_ += at.lid_height;
   bed_.observe(at, phase);
+  flow_free_.observe(at, phase);
   if (frame) frames_.observe(at, 0);
+  for (std::size_t i = 0; i < of_phases_.size(); ++i)
+    if (plan_.named_phases[i] == phase) of_phases_[i].observe(at, 0);
   for (const double z : at.z) above_ += z > plan_.grid.height(plan_.grid.points - 1);
   if (order_) order_->observe(at);
   if (lab_) lab_->observe(at, phase);
@@ -240,6 +245,8 @@ void BedMeasurement::results(const SceneOptions& options, const sim::Scene& scen
   temperature("temperature_x", bed_.temperature_x());
   temperature("temperature_z", bed_.temperature_z());
   temperature("temperature_z_local", bed_.temperature_z_local());
+  temperature("temperature_x_without_flow", flow_free_.x());
+  temperature("temperature_z_without_flow", flow_free_.z());
   temperature("spin_temperature", bed_.spin_temperature());
   if (!weightless) plain("drift_center_of_mass", bed_.drift_of_centre(), "D");
   plain("drift_temperature_x", bed_.drift_of_temperature_x(), energy_name.c_str());
@@ -292,11 +299,12 @@ void BedMeasurement::observed_results(const std::string& energy_name, Json& out)
 }
 
 void BedMeasurement::write_profile(RunContext& context, const char* file, const sim::Profile& density,
-                                   const std::string& origin) const {
+                                   const std::string& origin, std::optional<double> phase) const {
   ProfileTable table = table_of(density, width_, plan_.grid.spacing);
   table.origin = origin;
   table.kernel = plan_.kernel;
   table.column_number = disk_count_ / width_;
+  table.phase = phase;
   write_profile_csv(context.output(file), table);
 }
 
@@ -315,6 +323,11 @@ void BedMeasurement::write(RunContext& context, bool frames) const {
   if (frames)
     write_profile(context, "profile_frames.csv", frames_.density(false),
                   "the floor's mean position, at the moments of the frames only");
+  for (std::size_t i = 0; i < of_phases_.size(); ++i) {
+    const double phase = static_cast<double>(plan_.named_phases[i]) / plan_.phases;
+    write_profile(context, fmt::format("profile_phase_{:02d}.csv", i).c_str(), of_phases_[i].density(false),
+                  "the floor's mean position", phase);
+  }
   const auto write = [&](const char* file, const auto& fill, const auto&... from) {
     fill(context.table(file), from...).write(context.output(file));
   };

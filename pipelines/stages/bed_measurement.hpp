@@ -16,6 +16,7 @@
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/contact_duration.hpp"
 #include "sim/measure/flights.hpp"
+#include "sim/measure/flow_free.hpp"
 #include "sim/measure/measured_bed.hpp"
 #include "sim/measure/observables.hpp"
 #include "sim/measure/order.hpp"
@@ -37,6 +38,7 @@ struct MeasurementPlan {
   HeightGrid grid;
   Kernel kernel;
   ObserveOptions observe;
+  std::vector<std::uint32_t> named_phases{};  // looks of a period with a profile of their own
 };
 
 class BedMeasurement {
@@ -65,8 +67,9 @@ class BedMeasurement {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(bed_, frames_, virial_rate_, collision_rate_, lid_height_, lid_heights_, virial_, collisions_, above_,
-            counters_, dissipated_);
+    archive(bed_, frames_, flow_free_, virial_rate_, collision_rate_, lid_height_, lid_heights_, virial_, collisions_,
+            above_, counters_, dissipated_);
+    for (sim::BedObserver& one : of_phases_) archive(one);
     if (order_) archive(*order_);
     if (lab_) archive(*lab_);
     if (floor_) archive(*floor_);
@@ -78,12 +81,14 @@ class BedMeasurement {
  private:
   void end_period(const sim::Simulation& simulation);
   void observed_results(const std::string& energy_name, Json& out) const;
-  void write_profile(RunContext& context, const char* file, const sim::Profile& density,
-                     const std::string& origin) const;
+  void write_profile(RunContext& context, const char* file, const sim::Profile& density, const std::string& origin,
+                     std::optional<double> phase = std::nullopt) const;
   double width_, disk_count_;
   bool free_lid_, floor_frame_;
   MeasurementPlan plan_;
   sim::BedObserver bed_, frames_;
+  sim::FlowFreeTemperature flow_free_;
+  std::vector<sim::BedObserver> of_phases_;  // one a named phase
   sim::BlockedMean virial_rate_, collision_rate_, lid_height_;
   double lid_heights_ = 0;  // sum over the looks of this period
   double virial_ = 0;

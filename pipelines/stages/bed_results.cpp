@@ -43,6 +43,13 @@ class BedStatement {
     temperature("temperature_z", "vertical kinetic temperature T_z, without the mean velocity of the phase");
     temperature("temperature_z_local",
                 "vertical kinetic temperature, without the mean velocity of each layer and phase");
+    temperature("temperature_x_without_flow",
+                "horizontal kinetic temperature, without the mean velocity of each layer of 1 D at each moment, as a "
+                "film gives it");
+    temperature(
+        "temperature_z_without_flow",
+        "vertical kinetic temperature, without the mean velocity of each layer of 1 D at each moment, as a film "
+        "gives it");
     temperature("spin_temperature", "temperature of the rotation: I <spin^2>, with the moment of inertia I of a disk");
     list_.quantity("/drift_temperature_x", energy_,
                    "drift: T_x in the second half of the measurement minus T_x in the first half");
@@ -160,6 +167,9 @@ class BedStatement {
         {"profile_floor_frame.csv", "density profile above the moving floor", profile_columns("the moving floor")});
     list_.table({"profile_frames.csv", "density profile at the moments of the frames only", profile_columns(),
                  given_if(bed_.frames, "\"frames\" has a \"count\" above 0")});
+    list_.table({"profile_phase_*.csv",
+                 "density profile at one phase of the shaking, of all periods of the bed whose frames are kept",
+                 profile_columns(), given_if(bed_.named_phases, "\"frames\" has phases in \"at\"")});
     list_.table({"covariance.csv", "covariance of the densities of profile.csv", covariance_columns()});
   }
 

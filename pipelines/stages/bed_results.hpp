@@ -13,7 +13,7 @@ struct BedOutput {
   bool judged = false;            // a shaken bed under gravity
   bool contact_duration = false;  // the TC model's
   bool material = false;          // is named
-  bool shaken = false, frames = false, annealed = false;
+  bool shaken = false, frames = false, named_phases = false, annealed = false;
   bool tilted = false;  // and not in reduced units
   bool free_lid = false;
   bool rubs = false;  // on plates

@@ -83,7 +83,7 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
     const std::string pointer = std::string("/velocities/") + axis;
     list.quantity(pointer, "m",
                   "kinetic temperature as T/(m g), without the mean motion at each height in each frame (as "
-                  "temperature_*_local of a simulation)",
+                  "temperature_*_without_flow of a simulation)",
                   timed, true);
     list.number(pointer + "/localisation_bias", "m", "part of the temperature that comes from errors of the centres",
                 timed, true);

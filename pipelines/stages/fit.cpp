@@ -101,6 +101,9 @@ class Fit : public Stage {
                        {.help = "CSV file of your own profile, with columns height [D] and number_density [1/D^2]; "
                                 "default: the profile of the stage in \"from\"",
                         .example = "\"profile.csv\""});
+    fields.text("table", table_,
+                {.help = "table of the stage in \"from\" whose profile is fitted: profile.csv, or profile_phase_00.csv "
+                         "for one phase of the shaking"});
     fields.text("model", options_.model,
                 {.help = "model: enskog-rectangle, hydrostatic:<equation of state>, fermi, rectangle or simulation. "
                          "Simulation compares the profile of the first stage in \"from\" (or of \"profile\") with "
@@ -193,6 +196,8 @@ class Fit : public Stage {
                    "T is already fixed by \"temperature\"; give one of the two");
     fields.require(upstream || fields.has("profile"), "",
                    "there is no profile: neither \"profile\" nor a stage in \"from\"", "Give one of the two");
+    fields.require(profile_.empty() || !fields.has("table"), "table",
+                   "\"table\" is one of the stage in \"from\", but \"profile\" names a file", "Give one of the two");
     fields.require(profile_.paths.size() <= 1, "profile",
                    fmt::format("this names {} files, but the stage fits one profile", profile_.paths.size()),
                    "Give the path of one CSV file");
@@ -219,6 +224,7 @@ class Fit : public Stage {
   Json bootstrap(const FitTask& task, RunContext& context) const;
 
   InputFiles profile_;
+  std::string table_ = "profile.csv";  // of the stage, in place of our own file
   fit::FitOptions options_;
   std::optional<double> diameter_;
   std::optional<Kernel> kernel_;
@@ -440,8 +446,9 @@ FitTask Fit::read_profile(RunContext& context) const {
   task.options = options_;
   task.diameter = diameter_;
   task.source = context.inputs().empty() ? nullptr : &context.inputs().front();
-  task.path = !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : task.source->file("profile.csv");
-  const bool has_covariance = task.source != nullptr && profile_.empty() && task.source->has("covariance.csv");
+  task.path = !profile_.empty() ? std::filesystem::path(profile_.paths.front()) : task.source->file(table_);
+  const bool has_covariance =
+      task.source != nullptr && profile_.empty() && table_ == "profile.csv" && task.source->has("covariance.csv");
   if (errors_ == ErrorSource::covariance && !has_covariance)
     throw InputError("\"errors\": \"covariance\" needs the profile of a simulate or extract stage");
   const bool use_covariance = errors_ != ErrorSource::diagonal && has_covariance && options_.model != simulation_model;

@@ -72,13 +72,11 @@ class Infer : public Stage {
   void run(RunContext& context) const override;
 
  private:
-  void describe_targets(Fields& fields);
   void describe_search(Fields& fields);
   void check(Fields& fields);
   void check_corners(Fields& fields) const;
   std::string made_from() const;
-  std::vector<ScaledTarget> scaled_targets(const RunContext& context) const;
-  std::vector<RunBed> stored_beds() const;
+  std::vector<RunBed> earlier_beds() const;
   std::vector<double> numbers_of_run(RunContext& context, const std::string& name, const std::vector<double>& values,
                                      std::uint64_t stream, double measure, const BedToRun& bed) const;
   std::vector<RunBed> run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
@@ -92,44 +90,6 @@ class Infer : public Stage {
 
   InferOptions options_;
 };
-
-void Infer::describe_targets(Fields& fields) {
-  struct Targets {};
-  Targets none;
-  options_.targets.resize(observables().size());
-  fields.object<Targets>(
-      "targets", none,
-      [this](Fields& f, Targets&) {
-        for (std::size_t k = 0; k < observables().size(); ++k) {
-          const Observable& observable = observables()[k];
-          f.object<InferTarget>(
-              observable.name, options_.targets[k],
-              [&](Fields& g, InferTarget& target) {
-                for (const auto& [key, number, help] :
-                     {std::tuple{"value", &target.value, "measured value"},
-                      std::tuple{"std_error", &target.std_error,
-                                 "standard error of the measured value, without the scatter between beds"}}) {
-                  if (observable.is_length)
-                    g.quantity(key, *number, dimension::length, {.help = help, .range = non_negative});
-                  else
-                    g.number(key, *number, {.help = help});
-                }
-                g.text(
-                    "at", target.at,
-                    {.help =
-                         "pointer to a number of a stage in \"from\", in place of a value: /fit/temperature_over_mg"});
-                if (!g.decoding()) return;
-                g.require(g.has("value") != g.has("at"), "value", "a target has either \"value\" or \"at\"");
-                g.require(!observable.logarithmic || g.has("at") || target.value > 0, "value",
-                          "the measured value must be above 0");
-                g.require(target.std_error >= 0, "std_error", "a standard error cannot be negative");
-                if (!target.at.empty()) g.check_result("/at", target.at);
-              },
-              {.help = observable.meaning});
-        }
-      },
-      {.help = "measured numbers with their errors", .required = true});
-}
 
 void Infer::describe_search(Fields& fields) {
   fields.integer("moments", options_.moments,
@@ -179,6 +139,10 @@ void Infer::describe_search(Fields& fields) {
   fields.text("stored", options_.stored,
               {.help = "name of a file in reference-data with the beds of an earlier run (its beds.json). These beds "
                        "are used and no new ones are run"});
+  fields.input_files("beds", options_.beds,
+                     {.help = "beds.json of an earlier run with the same scene, parameters and measurement. These beds "
+                              "are used and no new ones are run, so that other targets cost little",
+                      .example = "\"results/infer/beds.json\""});
 }
 
 void Infer::describe(Fields& fields) {
@@ -199,7 +163,7 @@ void Infer::describe(Fields& fields) {
   fields.map<UnknownParameter>(
       "parameters", options_.parameters, [](Fields& f, UnknownParameter& p) { p.describe(f); },
       {.help = "unknown parameters: name → pointers into the scene, and prior", .required = true});
-  describe_targets(fields);
+  describe_targets(fields, options_);
   describe_search(fields);
   if (fields.decoding() && fields.problem_count() == 0) check(fields);
 }
@@ -213,6 +177,7 @@ void Infer::check(Fields& fields) {
     if (const JsonNode* node = fields.written(key)) bed.scene.members.push_back({key, node->at, *node});
   }
   bed.views = views_of(options_.moments, options_.average, options_.phase);
+  if (options_.profile) bed.heights = options_.profile->heights();
   fields.require(
       options_.written.period() > 0 && bed.measure >= options_.written.period() * options_.written.time_unit(),
       "measure", "the floor must shake, and \"measure\" must be at least one period of the floor");
@@ -226,10 +191,10 @@ void Infer::check(Fields& fields) {
       "phase",
       fmt::format("this phase is not one of the {} phases at which the bed is measured; give a multiple of 1/{}",
                   bed.phases, bed.phases));
-  fields.require(
-      std::any_of(options_.targets.begin(), options_.targets.end(), [](const auto& t) { return t.has_value(); }),
-      "targets", "no target has a value: at least one measured number is needed",
-      "Give \"temperature_over_mg\" with its error");
+  fields.require(options_.profile || std::any_of(options_.targets.begin(), options_.targets.end(),
+                                                 [](const auto& t) { return t.has_value(); }),
+                 "targets", "no target has a value: at least one measured number is needed",
+                 "Give \"temperature_over_mg\" with its error");
   const std::size_t fewest = fit::Surrogate::fewest_runs(options_.dimensions());
   fields.require(
       options_.first >= fewest, "first",
@@ -250,12 +215,14 @@ void Infer::check(Fields& fields) {
   if (fields.problem_count() > 0) return;
   check_corners(fields);
   if (fields.problem_count() > 0) return;
-  if (!options_.stored.empty()) {
-    try {
-      stored_beds();
-    } catch (const Error& error) {
-      fields.problem("/stored", error.what(), "Leave \"stored\" out: the beds are then run");
-    }
+  fields.require(options_.beds.paths.size() <= 1 && (options_.stored.empty() || options_.beds.empty()), "beds",
+                 "the beds come from one file: give either \"stored\" or one file in \"beds\"");
+  if (fields.problem_count() > 0 || !options_.uses_earlier_beds()) return;
+  const std::string key = options_.beds.empty() ? "stored" : "beds";
+  try {
+    earlier_beds();
+  } catch (const Error& error) {
+    fields.problem("/" + key, error.what(), "Leave \"" + key + "\" out: the beds are then run");
   }
 }
 
@@ -292,6 +259,7 @@ std::string Infer::made_from() const {
     out["parameters"][name] = Json{{"set", p.set}, {"unit", p.unit}, {"values", p.values}};
   for (const View& view : options_.bed.views) out["views"].push_back(view.name);
   for (const Observable& observable : observables()) out["observables"].push_back(observable.name);
+  if (!options_.bed.heights.empty()) out["heights"] = options_.bed.heights;
   return dump_canonical(out);
 }
 
@@ -302,37 +270,6 @@ SceneOptions Infer::scene_at(const std::vector<double>& values) const {
   return bed;
 }
 
-std::vector<ScaledTarget> Infer::scaled_targets(const RunContext& context) const {
-  std::vector<ScaledTarget> out;
-  for (std::size_t k = 0; k < options_.targets.size(); ++k) {
-    if (!options_.targets[k]) continue;
-    InferTarget target = *options_.targets[k];
-    if (!target.at.empty()) {
-      const std::string id = split_pointer(target.at).front();
-      const auto input = std::find_if(context.inputs().begin(), context.inputs().end(),
-                                      [&](const Input& one) { return one.id == id; });
-      const Json result = input->result();
-      const Json* found = find_pointer(result, target.at.substr(1 + escape_pointer_token(id).size()));
-      if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
-        throw InputError(
-            fmt::format("{}: the result at this pointer is not a number, so it cannot be a target", target.at));
-      target.value = (*found)["value"].get<double>();
-      if (found->contains("std_error")) {
-        const Json& error = (*found)["std_error"];
-        if (!error.is_number())
-          throw InputError(fmt::format("{}: this number has no standard error, so it cannot be a target", target.at));
-        target.std_error = std::hypot(target.std_error, error.get<double>());
-      }
-    }
-    const bool logarithmic = observables()[k].logarithmic;
-    if (logarithmic && !(target.value > 0))
-      throw InputError(
-          fmt::format("{}: the target must be above 0, but is {}", observables()[k].name, number_text(target.value)));
-    out.push_back({k, to_scale(k, target.value), logarithmic ? target.std_error / target.value : target.std_error});
-  }
-  return out;
-}
-
 // Numbers that were written down; null stands for one that is missing.
 std::vector<double> numbers_in(const Json& list) {
   std::vector<double> numbers;
@@ -340,17 +277,28 @@ std::vector<double> numbers_in(const Json& list) {
   return numbers;
 }
 
-std::vector<RunBed> Infer::stored_beds() const {
-  const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
-  if (file == nullptr) throw InputError("there is no file of stored beds named \"" + options_.stored + "\"");
-  const Json json = Json::parse(file->text);
-  if (dump_canonical(json.at("made_from")) != made_from())
-    throw InputError("the beds of \"" + options_.stored +
+std::vector<RunBed> Infer::earlier_beds() const {
+  const bool own = !options_.beds.empty();
+  const std::string name = own ? options_.beds.texts[0] : options_.stored;
+  const EmbeddedFile* file = own ? nullptr : find_embedded("reference-data/" + options_.stored + ".json");
+  if (!own && file == nullptr) throw InputError("there is no file of stored beds named \"" + name + "\"");
+  const Json json = own ? read_json(options_.beds.paths[0]) : Json::parse(file->text);
+  if (!json.contains("made_from") || !json.contains("beds"))
+    throw InputError("\"" + name + "\" is not a beds.json of the stage infer");
+  // Densities at heights that are not asked for are left out.
+  Json from = json.at("made_from");
+  std::size_t more = 0;
+  if (options_.bed.heights.empty() && from.contains("heights")) more = from["heights"].size(), from.erase("heights");
+  if (dump_canonical(from) != made_from())
+    throw InputError("the beds of \"" + name +
                      "\" were made with a different scene, different parameters or a different measurement");
   std::vector<RunBed> beds;
   for (const Json& one : json.at("beds")) {
     RunBed bed{one.at("round").get<std::uint32_t>(), one.at("values").get<std::vector<double>>(), {}};
-    bed.numbers = numbers_in(one.at("numbers"));
+    const std::vector<double> numbers = numbers_in(one.at("numbers"));
+    for (std::size_t first = 0; first < numbers.size(); first += options_.bed.numbers() + more)
+      bed.numbers.insert(bed.numbers.end(), numbers.begin() + static_cast<std::ptrdiff_t>(first),
+                         numbers.begin() + static_cast<std::ptrdiff_t>(first + options_.bed.numbers()));
     beds.push_back(std::move(bed));
   }
   return beds;
@@ -432,7 +380,7 @@ fit::Posterior sampled(const RunContext& context, const InferOptions& options, c
 // The beds of all rounds.
 std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledTarget>& targets,
                                   BedsAhead& ahead) const {
-  if (!options_.stored.empty()) return stored_beds();
+  if (options_.uses_earlier_beds()) return earlier_beds();
   const std::size_t d = options_.dimensions();
   const std::vector<double> places = fit::even_points(d, options_.first, context.seed());
   std::vector<std::vector<double>> values;
@@ -511,7 +459,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
   for (const RunBed& bed : found.beds)
     if (bed.round == 0) first.push_back(bed);
   const BedSurrogate surrogate(options_, first, found.targets, context.jobs());
-  const std::size_t d = options_.dimensions(), count = observables().size();
+  const std::size_t d = options_.dimensions(), count = options_.bed.numbers();
   std::mt19937_64 generator(mixed(context.seed() + calibration_stream));
   const auto uniform = [&] { return fit::even_number(generator); };
   std::vector<std::vector<double>> values;
@@ -530,8 +478,11 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     std::vector<ScaledTarget> targets = found.targets;
     bool complete = true;
     for (ScaledTarget& target : targets) {
-      target.value = to_scale(target.observable, beds[i].numbers[view * count + target.observable]) +
-                     target.error * fit::normal_quantile(uniform());
+      // The bed's number has its scatter already.
+      const double scatter = target.includes_scatter ? surrogate.scatter(target.number) : 0;
+      const double error = std::sqrt(std::max(0.0, target.error * target.error - scatter * scatter));
+      target.value = to_scale(target.number, beds[i].numbers[view * count + target.number]) +
+                     error * fit::normal_quantile(uniform());
       complete = complete && std::isfinite(target.value);
     }
     if (!complete) {  // no fit: such a bed gives no targets
@@ -582,10 +533,11 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
                     "parameters like theirs (see beds.csv). A narrower range of the parameters excludes them",
                     given_up, all));
   for (const ScaledTarget& target : found.targets) {
-    const std::size_t used = surrogate.beds(target.observable);
+    if (target.number >= observables().size()) continue;  // a profile needs no fit
+    const std::size_t used = surrogate.beds(target.number);
     if (used + given_up < all)
       sentences.push_back(fmt::format("{}: the fit of {} of {} beds failed, and they were left out",
-                                      observables()[target.observable].name, all - given_up - used, all));
+                                      observables()[target.number].name, all - given_up - used, all));
   }
   std::vector<std::string> left_out;
   for (std::size_t v = 0; v < options.bed.views.size(); ++v)
@@ -603,7 +555,7 @@ std::vector<double> Infer::bed_times() const {
   const BedOfInference& bed = options_.bed;
   const double best_measure = options_.best_measure > 0 ? options_.best_measure : bed.measure;
   const std::size_t design =
-      options_.stored.empty() ? options_.first + std::size_t{options_.rounds} * options_.each : 0;
+      options_.uses_earlier_beds() ? 0 : options_.first + std::size_t{options_.rounds} * options_.each;
   std::vector<double> times(design, bed.settle + bed.measure);
   times.insert(times.end(), std::size_t{options_.best} * options_.replicas, bed.settle + best_measure);
   times.insert(times.end(), options_.calibration, bed.settle + bed.measure);
@@ -613,7 +565,7 @@ std::vector<double> Infer::bed_times() const {
 void Infer::run(RunContext& context) const {
   Inference found;
   BedsAhead ahead(bed_times(), context.jobs());
-  found.targets = scaled_targets(context);
+  found.targets = scaled_targets(context, options_);
   found.beds = design(context, found.targets, ahead);
   context.progress(ahead.time.fraction(), "surrogate and posterior");
   const BedSurrogate surrogate(options_, found.beds, found.targets, context.jobs());

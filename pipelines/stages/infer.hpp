@@ -18,6 +18,17 @@ namespace shakebed::pipelines {
 struct InferTarget {
   double value = 0, std_error = 0;  // as written: lengths in m, reduced in D
   std::string at;                   // or where a stage in "from" has it
+  bool includes_scatter = false;    // whether the error has the scatter of a bed's numbers
+};
+
+// A measured profile as a target: its density at heights that are equally far apart.
+struct ProfileTarget {
+  std::string from;                       // a stage in "from"; or
+  InputFiles file;                        // a table of a profile
+  std::string table = "profile.csv";      // of the stage
+  double low = 0, high = 0, spacing = 1;  // heights [D]
+  bool includes_scatter = true;
+  std::vector<double> heights() const;
 };
 
 // A curve Gamma(f) in the picture: where a formula of the stage map gives a reduced temperature.
@@ -31,6 +42,7 @@ struct InferOptions {
   SceneOptions written;  // the scene as it stands in the recipe
   Parameters parameters;
   std::vector<std::optional<InferTarget>> targets;  // by observable
+  std::optional<ProfileTarget> profile;
   std::uint32_t moments = 0;
   double average = 0.5;
   std::optional<double> phase;
@@ -40,6 +52,8 @@ struct InferOptions {
   std::uint32_t draws = 1000, calibration = 0;
   std::optional<MapCurve> curve;
   std::string stored;
+  InputFiles beds;  // beds.json of an earlier run
+  bool uses_earlier_beds() const { return !stored.empty() || !beds.empty(); }
   std::size_t dimensions() const { return parameters.size(); }
 };
 
@@ -49,44 +63,64 @@ struct RunBed {
   std::vector<double> values, numbers;
 };
 
-// A target on the scale on which it is compared: the logarithm where the scatter is a part of the value.
+// A target on the scale on which it is compared, see to_scale().
 struct ScaledTarget {
-  std::size_t observable = 0;
+  std::size_t number = 0;  // of those of a view
   double value = 0, error = 0;
+  bool includes_scatter = false;
 };
 
-// The surrogates of all observables that targets and proposals need.
+void describe_targets(Fields& fields, InferOptions& options);
+// Throws InputError where a stage or a file does not give what is asked for.
+std::vector<ScaledTarget> scaled_targets(const RunContext& context, const InferOptions& options);
+
+// The surrogates of all numbers that targets and proposals need. Densities at all heights share one.
 class BedSurrogate {
  public:
   BedSurrogate(const InferOptions& options, const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets,
                int threads);
 
-  // Of a number at points of the unit cube, on its scale.
-  fit::Surrogate::Prediction average(std::size_t observable, std::span<const double> places) const;
+  // Means of an observable, averaged over the shaking, at points of the unit cube, on its scale.
+  std::vector<double> average(std::size_t observable, std::span<const double> places) const;
   // Natural logarithm of the probability of the targets at each point and view, without the prior of the view; and
   // chi2.
   struct Fit {
     std::vector<double> log_likelihood, chi2;  // point by point, view by view
   };
   Fit fit(std::span<const double> places, const std::vector<ScaledTarget>& targets) const;
-  // Mean and standard deviation of a target at one point and view.
-  sim::Measured predicted(std::span<const double> place, std::size_t view, std::size_t observable) const;
+  // Mean and standard deviation of a number of one further bed, at one point and view.
+  sim::Measured predicted(std::span<const double> place, std::size_t view, std::size_t number) const;
+  // The same of the densities at all heights of the profile.
+  std::vector<sim::Measured> profile(std::span<const double> place, std::size_t view) const;
   double view_prior(std::size_t view) const { return prior_[view]; }  // 0 where too few fits succeed
-  double scatter(std::size_t observable) const { return models_.at(observable).average->scatter(0); }
+  // Between beds with the same parameters.
+  double scatter(std::size_t number) const { return model_of(number).average->scatter(offset_of(number)); }
   // Shares of the beds that lie within one and two standard deviations of what the others say.
-  std::array<double, 2> within(std::size_t observable) const;
-  std::size_t beds(std::size_t observable) const { return models_.at(observable).rows.size(); }
+  std::array<double, 2> within(std::size_t number) const;
+  std::size_t beds(std::size_t number) const { return model_of(number).rows.size(); }
 
  private:
+  // Of one observable, or of the densities at all heights.
   struct Model {
+    std::vector<std::size_t> numbers;
     std::optional<fit::Surrogate> average, moments;
     std::vector<std::size_t> rows, moment_rows, views;  // the beds that each is made from; views of `moments`
   };
+  // What one model predicts at several points.
+  struct Prediction {
+    fit::Surrogate::Prediction average, moments;
+  };
+  const Model& model_of(std::size_t number) const { return models_[std::min(number, observables().size())]; }
+  static std::size_t offset_of(std::size_t number) { return number - std::min(number, observables().size()); }
+  // The place of a number among the outputs of its model; nothing where the view was left out.
+  std::optional<std::size_t> output_of(std::size_t number, std::size_t view) const;
   std::vector<double> coordinates(std::span<const double> places) const;
+  void leave_out_views(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
+  void train(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets, int threads);
   void correlate(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
 
   const InferOptions& options_;
-  std::vector<Model> models_;                      // by observable
+  std::vector<Model> models_;                      // by observable; then that of the profile
   std::vector<double> prior_;                      // by view
   std::vector<fit::CorrelatedErrors> correlated_;  // by view
 };
@@ -118,9 +152,11 @@ void write_inference(RunContext& context, const InferOptions& options, const Bed
 void draw_pairs(RunContext& context, const InferOptions& options, const Inference& found);
 StagePages infer_pages();
 
-// On the scale of comparison.
-double to_scale(std::size_t observable, double value);
-double from_scale(std::size_t observable, double value);
+// The scale on which numbers are compared: the logarithm where the scatter is a part of the value; of densities a root,
+// since the scatter of a count grows as its root. And the slope of that scale.
+double to_scale(std::size_t number, double value);
+double from_scale(std::size_t number, double value);
+double slope_of_scale(std::size_t number, double value);
 // The parameters at a point of the unit cube.
 std::vector<double> values_at(const InferOptions& options, std::span<const double> places);
 

@@ -7,6 +7,7 @@
 
 #include "fit/inference/posterior.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
+#include "sim/measure/flow_free.hpp"
 #include "sim/measure/measure.hpp"
 #include "sim/measure/observables.hpp"
 
@@ -21,23 +22,50 @@ constexpr double profile_spacing = 0.25;  // of the heights [D]; half the kernel
 constexpr double most_events = 1000;
 constexpr std::uint64_t events_between_questions = 200'000;
 
-enum Number : std::size_t { fitted, shift, solid, density, kinetic_x, kinetic_z, kinetic_z_local, rise, number_count };
+enum Number : std::size_t {
+  fitted,
+  shift,
+  solid,
+  density,
+  kinetic_x,
+  kinetic_z,
+  kinetic_z_local,
+  rise,
+  flow_free_x,
+  flow_free_z,
+  number_count
+};
 
-// Passes on the samples of one phase only, as if it were the single phase of a period.
+// What is measured of a bed, with so many looks a period.
+struct Observers {
+  Observers(const sim::Scene& scene, std::uint32_t looks, const HeightGrid& grid, const Kernel& kernel)
+      : bed([&scene, looks, grid, kernel](const sim::DiskProperties& disks) {
+          return sim::BedObserver(scene, disks, looks, grid, kernel);
+        }),
+        flow_free([looks](const sim::DiskProperties& disks) { return sim::FlowFreeTemperature(disks, looks); }) {}
+  sim::Observing<sim::BedObserver> bed;
+  sim::Observing<sim::FlowFreeTemperature> flow_free;
+};
+
+// Passes on the samples of one phase only, as if it were the single phase of a period; or all of them.
 class AtPhase final : public sim::RunObserver {
  public:
-  AtPhase(sim::Observing<sim::BedObserver>::Make make, std::uint32_t phase) : bed_(std::move(make)), phase_(phase) {}
-  const sim::BedObserver& bed() const { return *bed_; }
-  void prepare(sim::Simulation& simulation) override { bed_.prepare(simulation); }
-  void look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
-    if (phase == phase_) bed_.look(simulation, at, look, 0);
+  AtPhase(Observers observers, std::optional<std::uint32_t> phase) : observers_(std::move(observers)), phase_(phase) {}
+  const Observers& observers() const { return observers_; }
+  void prepare(sim::Simulation& simulation) override {
+    observers_.bed.prepare(simulation), observers_.flow_free.prepare(simulation);
   }
-  void save(sim::ArchiveWriter& out) override { bed_.save(out); }
-  void load(sim::ArchiveReader& in) override { bed_.load(in); }
+  void look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
+    if (phase_ && phase != *phase_) return;
+    const std::uint32_t own = phase_ ? 0 : phase;
+    observers_.bed.look(simulation, at, look, own), observers_.flow_free.look(simulation, at, look, own);
+  }
+  void save(sim::ArchiveWriter& out) override { observers_.bed.save(out), observers_.flow_free.save(out); }
+  void load(sim::ArchiveReader& in) override { observers_.bed.load(in), observers_.flow_free.load(in); }
 
  private:
-  sim::Observing<sim::BedObserver> bed_;
-  std::uint32_t phase_;
+  Observers observers_;
+  std::optional<std::uint32_t> phase_;
 };
 
 }  // namespace
@@ -142,6 +170,15 @@ const std::vector<Observable>& observables() {
       {"temperature_z_local_over_mg", true, "m",
        "kinetic temperature T_z/(m g), vertical, without the mean velocity of each layer of 1 D", true},
       {"center_of_mass_rise", false, "D", "rise of the centre of mass above ideal hexagonal packing", false},
+      {"temperature_x_without_flow_over_mg", true, "m",
+       "kinetic temperature T_x/(m g), horizontal, without the mean motion of each layer of 1 D at each moment, as "
+       "from "
+       "a film",
+       true},
+      {"temperature_z_without_flow_over_mg", true, "m",
+       "kinetic temperature T_z/(m g), vertical, without the mean motion of each layer of 1 D at each moment, as from "
+       "a film",
+       true},
   };
   return all;
 }
@@ -150,6 +187,15 @@ std::size_t observable_number(std::string_view name) {
   const auto& all = observables();
   return static_cast<std::size_t>(
       std::find_if(all.begin(), all.end(), [&](const Observable& o) { return o.name == name; }) - all.begin());
+}
+
+double value_at(const std::vector<double>& places, const std::vector<double>& values, double place) {
+  const auto above = std::lower_bound(places.begin(), places.end(), place);
+  if (above == places.begin()) return values.front();
+  if (above == places.end()) return values.back();
+  const auto i = static_cast<std::size_t>(above - places.begin());
+  const double part = (place - places[i - 1]) / (places[i] - places[i - 1]);
+  return values[i - 1] + part * (values[i] - values[i - 1]);
 }
 
 std::vector<View> views_of(std::uint32_t moments, double average, std::optional<double> phase) {
@@ -183,9 +229,10 @@ SceneOptions BedOfInference::at(const Parameters& parameters, const std::vector<
 
 namespace {
 
-std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& scene, const BedOfInference& options,
+std::vector<double> numbers_of(const Observers& observers, const sim::Scene& scene, const BedOfInference& options,
                                double length) {
   std::vector<double> out(number_count, NAN);
+  const sim::BedObserver& bed = *observers.bed;
   const sim::Profile profile = bed.density(false);
   fit::FitOptions fit;
   fit.plateau_density = options.plateau_density;
@@ -204,7 +251,10 @@ std::vector<double> numbers_of(const sim::BedObserver& bed, const sim::Scene& sc
   out[kinetic_x] = bed.temperature_x().value * length;
   out[kinetic_z] = bed.temperature_z().value * length;
   out[kinetic_z_local] = bed.temperature_z_local().value * length;
+  out[flow_free_x] = observers.flow_free->x().value * length;
+  out[flow_free_z] = observers.flow_free->z().value * length;
   out[rise] = bed.centre_of_mass().value - sim::ideal_centre_of_mass(scene);
+  for (const double height : options.heights) out.push_back(value_at(profile.height, profile.number_density, height));
   return out;
 }
 
@@ -227,19 +277,15 @@ std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t s
   const double column = scene_at.count() / scene_at.box.width;
   const double lowest = -std::ceil((6 * kernel_width + 3) / profile_spacing) * profile_spacing;
   const HeightGrid grid{lowest, profile_spacing, static_cast<std::size_t>((5 * column + 30) / profile_spacing)};
-  const auto observer_of = [&](std::uint32_t looks) {
-    return [&, looks](const sim::DiskProperties& disks) {
-      return sim::BedObserver(scene_at, disks, looks, grid, {KernelKind::gaussian, kernel_width});
-    };
-  };
-  sim::Observing<sim::BedObserver> average(observer_of(phases));
-  std::vector<std::unique_ptr<AtPhase>> moments;
-  std::vector<sim::RunObserver*> observers{&average};
+  std::vector<std::unique_ptr<AtPhase>> of_views;
+  std::vector<sim::RunObserver*> observers;
   for (const View& view : views) {
-    if (view.phase < 0) continue;
-    moments.push_back(std::make_unique<AtPhase>(observer_of(1),
-                                                static_cast<std::uint32_t>(std::lround(view.phase * phases)) % phases));
-    observers.push_back(moments.back().get());
+    const bool average = view.phase < 0;
+    const auto phase = static_cast<std::uint32_t>(std::lround(std::max(0.0, view.phase) * phases)) % phases;
+    of_views.push_back(
+        std::make_unique<AtPhase>(Observers(scene_at, average ? phases : 1, grid, {KernelKind::gaussian, kernel_width}),
+                                  average ? std::nullopt : std::optional(phase)));
+    observers.push_back(of_views.back().get());
   }
   sim::RunControl control;
   const double periods = times.settle / times.period + static_cast<double>(times.periods);
@@ -252,12 +298,12 @@ std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t s
   control.stop = [&] { return context.interrupted() || ++questions > most_questions; };
   if (!sim::measure(scene_at, times, observers, control).finished) {
     context.check_interrupted();
-    return std::vector<double>(number_count * views.size(), NAN);
+    return std::vector<double>(numbers() * views.size(), NAN);
   }
   const double length = bed.length_unit();
-  std::vector<double> out = numbers_of(*average, scene_at, *this, length);
-  for (const auto& moment : moments) {
-    const std::vector<double> own = numbers_of(moment->bed(), scene_at, *this, length);
+  std::vector<double> out;
+  for (const auto& view : of_views) {
+    const std::vector<double> own = numbers_of(view->observers(), scene_at, *this, length);
     out.insert(out.end(), own.begin(), own.end());
   }
   return out;

@@ -52,6 +52,9 @@ struct Observable {
 const std::vector<Observable>& observables();
 std::size_t observable_number(std::string_view name);
 
+// Between the rows of a table, linearly; beyond its ends, the last value.
+double value_at(const std::vector<double>& places, const std::vector<double>& values, double place);
+
 // What the photographs of a bed show: the average over the shaking, or one moment of it.
 struct View {
   std::string name;   // "average", or the phase: "0.25"
@@ -71,12 +74,16 @@ struct BedOfInference {
   double kernel_width = 0.5;      // Gaussian [D]
   double plateau_density = 1.10;  // phi_0 of the fit
   std::vector<View> views;
+  std::vector<double> heights;  // at which the density is compared [D]; none: it is not
+
+  // How many numbers a view has: those of observables(), then the densities at `heights`.
+  std::size_t numbers() const { return observables().size() + heights.size(); }
 
   // The scene with these parameters; what is wrong with it is added to `problems`.
   SceneOptions at(const Parameters& parameters, const std::vector<double>& values,
                   std::vector<Problem>& problems) const;
   sim::MeasurementSchedule schedule(const SceneOptions& bed, double duration) const;
-  // The numbers of observables(), view by view; not a number where a fit does not succeed, or where the bed chatters
+  // The numbers, view by view; not a number where a fit does not succeed, or where the bed chatters
   // and is given up. `progress` is called with the finished share of the run. Throws Interrupted.
   std::vector<double> run(const SceneOptions& bed, std::uint64_t seed, double duration, const RunContext& context,
                           const std::function<void(double)>& progress) const;

@@ -42,7 +42,12 @@ std::string bed_row(const std::string& name, const Json& values, const Json& tar
   for (const auto& [parameter, value] : values.items())
     text += fmt::format("{}{} {:.3g}", text.empty() ? "" : ", ", words(parameter), value.get<double>());
   std::string cells;
-  for (const auto& [ignored, target] : targets.items()) {
+  for (const auto& [name_of_target, target] : targets.items()) {
+    if (name_of_target == "profile") {
+      const Json& most = target.at("largest_difference_in_errors");
+      cells += fmt::format("<td>{}</td>", most.is_number() ? fmt::format("({:.1f} at most)", most.get<double>()) : "");
+      continue;
+    }
     const Json& off = target.at("difference_in_errors");
     cells += fmt::format("<td>{} ({})</td>", shown(target),
                          off.is_number() ? fmt::format("{:+.1f}", off.get<double>()) : "no fit");
@@ -56,6 +61,10 @@ std::string beds_table(const Json& result) {
   std::string head, measured;
   for (const auto& [name, target] : result.at("best")[0].at("targets").items()) {
     head += "<th>" + escape_markup(words(name)) + "</th>";
+    if (name == "profile") {
+      measured += fmt::format("<td>{} heights</td>", target.at("heights").get<int>());
+      continue;
+    }
     measured += "<td>" +
                 shown(quantity_json(target.at("measured").get<double>(), target.at("unit").get<std::string>(),
                                     target.at("measured_error").get<double>())) +

@@ -81,6 +81,7 @@ class Report {
     out["surrogate"] = surrogates();
     if (options_.calibration > 0) out["calibration"] = calibration();
     write_beds(), write_posterior(), write_marginals();
+    if (options_.profile) write_profile();
     write_file(context_.output("infer.json"), dump(out));
   }
 
@@ -160,20 +161,35 @@ class Report {
     return out;
   }
 
+  // Of one further bed: how far it is from the target, in errors of both. An error of the target that includes the
+  // scatter of a bed does so once: the larger of the two counts.
+  static double difference(const ScaledTarget& target, const sim::Measured& at) {
+    return (at.value - target.value) /
+           (target.includes_scatter ? std::max(at.std_error, target.error) : std::hypot(at.std_error, target.error));
+  }
+
+  // `at`: on the scale of comparison, target by target.
   Json target_rows(const std::vector<sim::Measured>& at) const {
     Json out = Json::object();
+    double largest = 0;
     for (std::size_t t = 0; t < found_.targets.size(); ++t) {
       const ScaledTarget& target = found_.targets[t];
-      const Observable& observable = observables()[target.observable];
-      const double value = from_scale(target.observable, at[t].value);
-      Json row = quantity_json(value, unit_of(options_, observable),
-                               observable.logarithmic ? value * at[t].std_error : at[t].std_error);
-      row["measured"] = from_scale(target.observable, target.value);
-      row["measured_error"] =
-          observable.logarithmic ? target.error * from_scale(target.observable, target.value) : target.error;
-      row["difference_in_errors"] = (at[t].value - target.value) / std::hypot(at[t].std_error, target.error);
+      const double off = difference(target, at[t]);
+      if (target.number >= observables().size()) {
+        largest = std::isfinite(off) ? std::max(largest, std::abs(off)) : INFINITY;
+        continue;
+      }
+      const Observable& observable = observables()[target.number];
+      const double value = from_scale(target.number, at[t].value), measured = from_scale(target.number, target.value);
+      Json row =
+          quantity_json(value, unit_of(options_, observable), at[t].std_error / slope_of_scale(target.number, value));
+      row["measured"] = measured;
+      row["measured_error"] = target.error / slope_of_scale(target.number, measured);
+      row["difference_in_errors"] = off;
       out[std::string(observable.name)] = std::move(row);
     }
+    if (options_.profile)
+      out["profile"] = Json{{"heights", options_.bed.heights.size()}, {"largest_difference_in_errors", largest}};
     return out;
   }
 
@@ -189,7 +205,7 @@ class Report {
     }
     const BedSurrogate::Fit fit = surrogate_.fit(place, found_.targets);
     std::vector<sim::Measured> at;
-    for (const ScaledTarget& target : found_.targets) at.push_back(surrogate_.predicted(place, 0, target.observable));
+    for (const ScaledTarget& target : found_.targets) at.push_back(surrogate_.predicted(place, 0, target.number));
     Json out{{"values", std::move(values)}, {"targets", target_rows(at)}};
     if (surrogate_.view_prior(0) > 0) {
       const double chance = fit::chance_of_chi2(fit.chi2[0], static_cast<int>(found_.targets.size()));
@@ -203,7 +219,7 @@ class Report {
     std::vector<Cell> cells;
     Table table = context_.table("best.csv");
     Json out = Json::array();
-    const std::size_t count = observables().size();
+    const std::size_t count = options_.bed.numbers();
     for (std::size_t b = 0; b < found_.best.size(); ++b) {
       const BestBed& bed = found_.best[b];
       const View& view = options_.bed.views[bed.view];
@@ -216,11 +232,11 @@ class Report {
       for (const ScaledTarget& target : found_.targets) {
         std::vector<double> runs;
         for (const std::vector<double>& run : bed.runs)
-          runs.push_back(to_scale(target.observable, run[bed.view * count + target.observable]));
+          runs.push_back(to_scale(target.number, run[bed.view * count + target.number]));
         const auto n = static_cast<double>(runs.size());
         const sim::Measured own = moments_of(runs, std::vector<double>(runs.size(), 1 / n));
         at.push_back({own.value, own.std_error * std::sqrt(n / (n - 1))});
-        const double off = std::abs(own.value - target.value) / std::hypot(at.back().std_error, target.error);
+        const double off = std::abs(difference(target, at.back()));
         most = std::isfinite(off) ? std::max(most, off) : INFINITY;
       }
       row["targets"] = target_rows(at);
@@ -228,7 +244,7 @@ class Report {
       for (std::size_t r = 0; r < bed.runs.size(); ++r) {
         cells = {count_cell(b + 1), count_cell(r), view.name};
         cells.insert(cells.end(), bed.values.begin(), bed.values.end());
-        for (std::size_t o = 0; o < count; ++o) cells.emplace_back(bed.runs[r][bed.view * count + o]);
+        for (std::size_t o = 0; o < observables().size(); ++o) cells.emplace_back(bed.runs[r][bed.view * count + o]);
         table.add(cells);
       }
       out.push_back(std::move(row));
@@ -260,10 +276,9 @@ class Report {
           Json{{"measurement", name}, {"meaning", meaning}, {"reduction", mean}, {"parameters", std::move(each)}});
     };
     for (std::size_t o = 0; o < observables().size(); ++o) {
-      const fit::Surrogate::Prediction prediction = surrogate_.average(o, places);
       add(std::string(observables()[o].name),
-          std::string(observables()[o].meaning) + ", averaged over the shaking, of one bed", prediction.mean,
-          surrogate_.scatter(o) * surrogate_.scatter(o), d);
+          std::string(observables()[o].meaning) + ", averaged over the shaking, of one bed",
+          surrogate_.average(o, places), surrogate_.scatter(o) * surrogate_.scatter(o), d);
     }
     for (std::size_t k = 0; k < d; ++k)
       add(options_.parameters[k].first, "the parameter itself; given is its effect on the other parameters", values_[k],
@@ -321,13 +336,13 @@ class Report {
 
   void write_beds() const {
     Table table = context_.table("beds.csv");
-    const std::size_t count = observables().size();
+    const std::size_t count = options_.bed.numbers();
     for (std::size_t b = 0; b < found_.beds.size(); ++b) {
       const RunBed& bed = found_.beds[b];
       for (std::size_t v = 0; v < options_.bed.views.size(); ++v) {
         std::vector<Cell> cells{count_cell(b + 1), count_cell(bed.round), options_.bed.views[v].name};
         cells.insert(cells.end(), bed.values.begin(), bed.values.end());
-        for (std::size_t o = 0; o < count; ++o) cells.emplace_back(bed.numbers[v * count + o]);
+        for (std::size_t o = 0; o < observables().size(); ++o) cells.emplace_back(bed.numbers[v * count + o]);
         table.add(cells);
       }
     }
@@ -363,6 +378,32 @@ class Report {
     table.write(context_.output("marginals.csv"));
   }
 
+  // The measured densities beside those of further beds, drawn from the posterior.
+  void write_profile() const {
+    const std::size_t first = observables().size(), count = options_.bed.heights.size();
+    const auto n = static_cast<double>(found_.draws.size());
+    std::vector<double> mean(count, 0), square(count, 0);
+    for (std::size_t r = 0; r < found_.draws.size(); ++r) {
+      const auto point = found_.posterior.point(found_.draws[r]);
+      std::vector<double> place(point.begin(), point.end());
+      for (double& one : place) one = std::clamp(one, 0.0, 1.0);
+      const std::vector<sim::Measured> densities = surrogate_.profile(place, found_.draw_views[r]);
+      for (std::size_t i = 0; i < count; ++i) {
+        mean[i] += densities[i].value / n;
+        square[i] += (std::pow(densities[i].value, 2) + std::pow(densities[i].std_error, 2)) / n;
+      }
+    }
+    Table table = context_.table("profile.csv");
+    for (const ScaledTarget& target : found_.targets) {
+      if (target.number < first) continue;
+      const std::size_t i = target.number - first;
+      const double measured = from_scale(target.number, target.value), predicted = from_scale(target.number, mean[i]);
+      table.add({options_.bed.heights[i], measured, target.error / slope_of_scale(target.number, measured), predicted,
+                 std::sqrt(std::max(0.0, square[i] - mean[i] * mean[i])) / slope_of_scale(target.number, predicted)});
+    }
+    table.write(context_.output("profile.csv"));
+  }
+
   RunContext& context_;
   const InferOptions& options_;
   const BedSurrogate& surrogate_;
@@ -390,6 +431,10 @@ void state_targets(ResultList& list, const InferOptions& options, const std::str
     list.number(at + "/difference_in_errors", "1", "difference from the measured number, over the error of both", given,
                 true);
   }
+  if (!options.profile) return;
+  list.number(below + "/targets/profile/heights", "1", "number of heights at which densities are compared", given);
+  list.number(below + "/targets/profile/largest_difference_in_errors", "1",
+              "largest difference from a measured density, over the error of both", given, true);
 }
 
 void state_tables(ResultList& list, const InferOptions& options) {
@@ -429,6 +474,14 @@ void state_tables(ResultList& list, const InferOptions& options) {
                {"high_95", "1", "upper end of the interval of 95 %"},
                {"rank", "1", "share of the posterior below the true value"}},
               given_if(options.calibration > 0, "\"calibration\" is above 0")});
+  list.table({"profile.csv",
+              "measured densities beside those of the posterior",
+              {{"height", "D", "height above the floor"},
+               {"measured", "1/D^2", "measured density (the target)"},
+               {"measured_error", "1/D^2", "standard error of the measured density"},
+               {"predicted", "1/D^2", "density of a further bed, mean over the posterior"},
+               {"predicted_error", "1/D^2", "standard deviation of that density over the posterior and between beds"}},
+              given_if(options.profile.has_value(), "a profile is a target")});
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 // single moments.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "pipelines/stages/infer.hpp"
 #include "statistics/parallel.hpp"
@@ -14,42 +13,57 @@ namespace {
 
 // A moment of the shaking at which more of the fits than this fail is left out.
 constexpr double most_missing = 0.05;
+// Densities are compared as sqrt(n D^2 + this): where no disk is, the root's slope stays finite.
+constexpr double least_density = 0.01;
 
-double number_of(const RunBed& bed, std::size_t view, std::size_t observable) {
-  return to_scale(observable, bed.numbers[view * observables().size() + observable]);
+bool is_density(std::size_t number) { return number >= observables().size(); }
+
+double number_of(const InferOptions& options, const RunBed& bed, std::size_t view, std::size_t number) {
+  return to_scale(number, bed.numbers[view * options.bed.numbers() + number]);
+}
+
+std::string name_of_numbers(const std::vector<std::size_t>& numbers) {
+  return is_density(numbers.front()) ? "profile" : std::string(observables()[numbers.front()].name);
 }
 
 // Beds and what the views gave; beds where one is missing are left out.
-fit::Surrogate trained(const InferOptions& options, const std::vector<RunBed>& beds, std::size_t observable,
-                       const std::vector<std::size_t>& views, std::vector<std::size_t>& rows) {
+fit::Surrogate trained(const InferOptions& options, const std::vector<RunBed>& beds,
+                       const std::vector<std::size_t>& numbers, const std::vector<std::size_t>& views,
+                       std::vector<std::size_t>& rows) {
   fit::TrainingSet set;
-  set.parameters = options.dimensions(), set.outputs = views.size();
+  set.parameters = options.dimensions(), set.outputs = views.size() * numbers.size();
   rows.clear();
   for (std::size_t i = 0; i < beds.size(); ++i) {
-    std::vector<double> numbers;
-    for (const std::size_t view : views) numbers.push_back(number_of(beds[i], view, observable));
-    if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) continue;
+    std::vector<double> row;
+    for (const std::size_t view : views)
+      for (const std::size_t number : numbers) row.push_back(number_of(options, beds[i], view, number));
+    if (!std::all_of(row.begin(), row.end(), [](double x) { return std::isfinite(x); })) continue;
     rows.push_back(i);
-    set.values.insert(set.values.end(), numbers.begin(), numbers.end());
+    set.values.insert(set.values.end(), row.begin(), row.end());
     for (std::size_t k = 0; k < set.parameters; ++k)
       set.points.push_back(options.parameters[k].second.coordinate(beds[i].values[k]));
   }
   try {
     return fit::Surrogate::train(set);
   } catch (const std::invalid_argument& error) {
-    throw StageError(std::string(observables()[observable].name) + ": " + error.what() +
-                     " (beds whose fit failed are not counted)");
+    throw StageError(name_of_numbers(numbers) + ": " + error.what() + " (beds whose fit failed are not counted)");
   }
 }
 
 }  // namespace
 
-double to_scale(std::size_t observable, double value) {
-  if (!observables()[observable].logarithmic) return value;
+double to_scale(std::size_t number, double value) {
+  if (is_density(number)) return std::sqrt(std::max(0.0, value) + least_density);
+  if (!observables()[number].logarithmic) return value;
   return value > 0 ? std::log(value) : NAN;
 }
-double from_scale(std::size_t observable, double value) {
-  return observables()[observable].logarithmic ? std::exp(value) : value;
+double from_scale(std::size_t number, double value) {
+  if (is_density(number)) return value * value - least_density;
+  return observables()[number].logarithmic ? std::exp(value) : value;
+}
+double slope_of_scale(std::size_t number, double value) {
+  if (is_density(number)) return 0.5 / std::sqrt(std::max(0.0, value) + least_density);
+  return observables()[number].logarithmic ? 1 / value : 1;
 }
 
 std::vector<double> values_at(const InferOptions& options, std::span<const double> places) {
@@ -60,13 +74,24 @@ std::vector<double> values_at(const InferOptions& options, std::span<const doubl
 
 BedSurrogate::BedSurrogate(const InferOptions& options, const std::vector<RunBed>& beds,
                            const std::vector<ScaledTarget>& targets, int threads)
-    : options_(options), models_(observables().size()) {
-  const std::vector<View>& views = options.bed.views;
-  for (const View& view : views) prior_.push_back(view.prior);
+    : options_(options) {
+  for (std::size_t o = 0; o < observables().size(); ++o) models_.emplace_back().numbers = {o};
+  if (!options.bed.heights.empty()) {
+    std::vector<std::size_t>& heights = models_.emplace_back().numbers;
+    for (std::size_t h = observables().size(); h < options.bed.numbers(); ++h) heights.push_back(h);
+  }
+  leave_out_views(beds, targets);
+  train(beds, targets, threads);
+  correlate(beds, targets);
+}
+
+// Views at which too few beds gave the targets have no prior.
+void BedSurrogate::leave_out_views(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets) {
+  for (const View& view : options_.bed.views) prior_.push_back(view.prior);
   for (const ScaledTarget& target : targets) {
-    for (std::size_t v = 1; v < views.size(); ++v) {
+    for (std::size_t v = 1; v < prior_.size(); ++v) {
       const auto missing = std::count_if(beds.begin(), beds.end(), [&](const RunBed& bed) {
-        return !std::isfinite(number_of(bed, v, target.observable));
+        return !std::isfinite(number_of(options_, bed, v, target.number));
       });
       if (static_cast<double>(missing) > most_missing * static_cast<double>(beds.size())) prior_[v] = 0;
     }
@@ -78,37 +103,45 @@ BedSurrogate::BedSurrogate(const InferOptions& options, const std::vector<RunBed
         "at the phase of the photographs the fit of the profile fails for too many simulated beds. Measure longer "
         "(\"measure\"), or give another \"phase\"");
   for (double& one : prior_) one /= sum;
+}
+
+void BedSurrogate::train(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets, int threads) {
   std::vector<std::size_t> moments;
-  for (std::size_t v = 1; v < views.size(); ++v)
+  for (std::size_t v = 1; v < prior_.size(); ++v)
     if (prior_[v] > 0) moments.push_back(v);
   for_each_index(2 * models_.size(), threads, [&](std::size_t i) {
-    const std::size_t observable = i / 2;
-    Model& model = models_[observable];
-    const bool wanted =
-        std::any_of(targets.begin(), targets.end(), [&](const ScaledTarget& t) { return t.observable == observable; });
+    Model& model = models_[i / 2];
+    const bool wanted = std::any_of(targets.begin(), targets.end(),
+                                    [&](const ScaledTarget& t) { return &model_of(t.number) == &model; });
     if (i % 2 == 0) {
-      model.average.emplace(trained(options, beds, observable, {0}, model.rows));
+      model.average.emplace(trained(options_, beds, model.numbers, {0}, model.rows));
     } else if (wanted && !moments.empty()) {
       model.views = moments;
-      model.moments.emplace(trained(options, beds, observable, moments, model.moment_rows));
+      model.moments.emplace(trained(options_, beds, model.numbers, moments, model.moment_rows));
     }
   });
-  correlate(beds, targets);
+}
+
+std::optional<std::size_t> BedSurrogate::output_of(std::size_t number, std::size_t view) const {
+  if (view == 0) return offset_of(number);
+  const Model& model = model_of(number);
+  const auto place = std::find(model.views.begin(), model.views.end(), view);
+  if (place == model.views.end()) return std::nullopt;
+  return static_cast<std::size_t>(place - model.views.begin()) * model.numbers.size() + offset_of(number);
 }
 
 // How the scatter of the targets goes together, view by view: what is left of each bed when the others predict it.
 void BedSurrogate::correlate(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets) {
-  for (std::size_t v = 0; v < options_.bed.views.size(); ++v) {
+  for (std::size_t v = 0; v < prior_.size(); ++v) {
     std::vector<double> table(beds.size() * targets.size(), NAN);
     for (std::size_t t = 0; t < targets.size(); ++t) {
-      const Model& model = models_[targets[t].observable];
-      const auto place = std::find(model.views.begin(), model.views.end(), v);
-      if (v > 0 && place == model.views.end()) continue;
+      const auto output = output_of(targets[t].number, v);
+      if (!output) continue;
+      const Model& model = model_of(targets[t].number);
       const fit::Surrogate& surrogate = v == 0 ? *model.average : *model.moments;
       const std::vector<std::size_t>& rows = v == 0 ? model.rows : model.moment_rows;
-      const std::size_t column = v == 0 ? 0 : static_cast<std::size_t>(place - model.views.begin());
       for (std::size_t r = 0; r < rows.size(); ++r)
-        table[rows[r] * targets.size() + t] = surrogate.left_out()[r * surrogate.outputs() + column];
+        table[rows[r] * targets.size() + t] = surrogate.left_out()[r * surrogate.outputs() + *output];
     }
     std::vector<double> complete;
     for (std::size_t i = 0; i < beds.size(); ++i) {
@@ -130,18 +163,19 @@ std::vector<double> BedSurrogate::coordinates(std::span<const double> places) co
   return out;
 }
 
-fit::Surrogate::Prediction BedSurrogate::average(std::size_t observable, std::span<const double> places) const {
-  return models_[observable].average->predict(coordinates(places));
+std::vector<double> BedSurrogate::average(std::size_t observable, std::span<const double> places) const {
+  return models_[observable].average->predict(coordinates(places)).mean;
 }
 
 BedSurrogate::Fit BedSurrogate::fit(std::span<const double> places, const std::vector<ScaledTarget>& targets) const {
   const std::size_t points = places.size() / options_.dimensions(), views = prior_.size(), n = targets.size();
   const std::vector<double> at = coordinates(places);
-  std::vector<fit::Surrogate::Prediction> average, moments;
+  std::vector<Prediction> predictions(models_.size());
   for (const ScaledTarget& target : targets) {
-    const Model& model = models_[target.observable];
-    average.push_back(prior_[0] > 0 ? model.average->predict(at) : fit::Surrogate::Prediction{});
-    moments.push_back(model.moments ? model.moments->predict(at) : fit::Surrogate::Prediction{});
+    const Model& model = model_of(target.number);
+    Prediction& own = predictions[static_cast<std::size_t>(&model - models_.data())];
+    if (prior_[0] > 0 && own.average.mean.empty()) own.average = model.average->predict(at);
+    if (model.moments && own.moments.mean.empty()) own.moments = model.moments->predict(at);
   }
   Fit out{std::vector<double>(points * views, -INFINITY), std::vector<double>(points * views, INFINITY)};
   std::vector<double> off(n), deviation(n), error(n);
@@ -149,13 +183,19 @@ BedSurrogate::Fit BedSurrogate::fit(std::span<const double> places, const std::v
     if (!(prior_[v] > 0)) continue;
     for (std::size_t i = 0; i < points; ++i) {
       for (std::size_t t = 0; t < n; ++t) {
-        const Model& model = models_[targets[t].observable];
-        const auto column =
-            static_cast<std::size_t>(std::find(model.views.begin(), model.views.end(), v) - model.views.begin());
-        const fit::Surrogate::Prediction& prediction = v == 0 ? average[t] : moments[t];
-        const std::size_t cell = v == 0 ? i : i * model.views.size() + column;
-        off[t] = targets[t].value - prediction.mean[cell];
-        deviation[t] = std::sqrt(prediction.variance[cell]), error[t] = targets[t].error;
+        const ScaledTarget& target = targets[t];
+        const Model& model = model_of(target.number);
+        const Prediction& own = predictions[static_cast<std::size_t>(&model - models_.data())];
+        const fit::Surrogate::Prediction& prediction = v == 0 ? own.average : own.moments;
+        const std::size_t outputs = prediction.mean.size() / points;
+        const std::size_t cell = i * outputs + *output_of(target.number, v);
+        off[t] = target.value - prediction.mean[cell];
+        // A measured error that holds the scatter of a bed is not to hold it twice: the larger of the two counts.
+        const double variance = target.includes_scatter
+                                    ? prediction.variance[cell] - prediction.scatter[cell] +
+                                          std::max(prediction.scatter[cell], target.error * target.error)
+                                    : prediction.variance[cell];
+        deviation[t] = std::sqrt(variance), error[t] = target.includes_scatter ? 0 : target.error;
       }
       const fit::Discrepancy found = correlated_[v](off, deviation, error);
       out.chi2[i * views + v] = found.chi2;
@@ -165,26 +205,33 @@ BedSurrogate::Fit BedSurrogate::fit(std::span<const double> places, const std::v
   return out;
 }
 
-sim::Measured BedSurrogate::predicted(std::span<const double> place, std::size_t view, std::size_t observable) const {
-  const Model& model = models_[observable];
-  const auto found = std::find(model.views.begin(), model.views.end(), view);
-  if (view == 0 || found == model.views.end()) {
-    if (view != 0) return {NAN, NAN};
-    const auto one = average(observable, place);
-    return {one.mean[0], std::sqrt(one.variance[0])};
-  }
-  const auto all = model.moments->predict(coordinates(place));
-  const auto column = static_cast<std::size_t>(found - model.views.begin());
-  return {all.mean[column], std::sqrt(all.variance[column])};
+sim::Measured BedSurrogate::predicted(std::span<const double> place, std::size_t view, std::size_t number) const {
+  const auto output = output_of(number, view);
+  if (!output) return {NAN, NAN};
+  const Model& model = model_of(number);
+  const auto all = (view == 0 ? *model.average : *model.moments).predict(coordinates(place));
+  return {all.mean[*output], std::sqrt(all.variance[*output])};
 }
 
-std::array<double, 2> BedSurrogate::within(std::size_t observable) const {
-  const std::vector<double>& left_out = models_[observable].average->left_out();
+std::vector<sim::Measured> BedSurrogate::profile(std::span<const double> place, std::size_t view) const {
+  const Model& model = models_.back();
+  const auto all = (view == 0 ? *model.average : *model.moments).predict(coordinates(place));
+  const std::size_t first = *output_of(model.numbers.front(), view);
+  std::vector<sim::Measured> out;
+  for (std::size_t i = first; i < first + model.numbers.size(); ++i)
+    out.push_back({all.mean[i], std::sqrt(all.variance[i])});
+  return out;
+}
+
+std::array<double, 2> BedSurrogate::within(std::size_t number) const {
+  const fit::Surrogate& surrogate = *model_of(number).average;
+  const std::vector<double>& left_out = surrogate.left_out();
+  const std::size_t runs = left_out.size() / surrogate.outputs();
   std::array<double, 2> out{};
-  for (std::size_t k = 0; k < 2; ++k)
-    out[k] = static_cast<double>(std::count_if(left_out.begin(), left_out.end(),
-                                               [&](double e) { return std::abs(e) < static_cast<double>(k + 1); })) /
-             static_cast<double>(left_out.size());
+  for (std::size_t r = 0; r < runs; ++r) {
+    const double off = std::abs(left_out[r * surrogate.outputs() + offset_of(number)]);
+    for (std::size_t k = 0; k < 2; ++k) out[k] += (off < static_cast<double>(k + 1)) / static_cast<double>(runs);
+  }
   return out;
 }
 

@@ -32,6 +32,12 @@ void BedMeasureOptions::describe(Fields& fields) {
             {.help =
                  "number of moments in each period at which the bed is sampled; the frames use these moments in turn",
              .range = from_to(1, 4096)});
+        f.numbers(
+            "at", frames.frame_phases,
+            {.help = "phases of the shaking, from 0 to below 1, at which the frames are taken (0: the floor rises "
+                     "through its mean height); default: all phases in turn. Each has its own profile, "
+                     "profile_phase_00.csv and so on",
+             .example = "[0, 0.25]"});
       },
       {.help = "frames of the trajectory that are stored"});
   fields.object<sim::MeasureOptions>(
@@ -62,10 +68,17 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
     if (problem == MeasureProblem::too_many_periods)
       fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run can reach",
                      "Give a shorter \"measure\" or \"settle\", or a lower frequency");
+    if (problem == MeasureProblem::frame_phases)
+      fields.require(false, "frames/at",
+                     floor_period > 0 ? "the bed is not sampled at these phases, or one is named twice"
+                                      : "the floor does not shake, so frames have no phases",
+                     floor_period > 0
+                         ? "Give different multiples of 1/" + std::to_string(options.phases) + " from 0 to below 1"
+                         : "Remove \"at\"");
     if (problem == MeasureProblem::too_many_frames)
       fields.require(false, "frames/count",
                      std::to_string(options.frames) + " frames were requested, but the bed is sampled at only " +
-                         std::to_string(sim::plan_looks(floor_period, options).schedule.looks()) + " moments",
+                         std::to_string(sim::plan_looks(floor_period, options).possible_frames()) + " moments",
                      "Give a longer \"measure\", or a smaller \"count\"");
   }
 }

@@ -17,6 +17,7 @@ class BedMeasureOptions {
   double settle() const { return settle_; }      // [s]
   double duration() const { return duration_; }  // [s]
   bool keeps_frames() const { return measure_.frames > 0; }
+  bool names_phases() const { return !measure_.frame_phases.empty(); }
 
  private:
   double settle_ = 0, duration_ = 0;  // [s]

@@ -59,6 +59,7 @@ class Simulate : public Stage, public Scalable {
                              .material = bed_.hertz_contact_time().has_value(),
                              .shaken = bed_.period() > 0,
                              .frames = measure_.keeps_frames(),
+                             .named_phases = measure_.names_phases(),
                              .annealed = !annealing_.empty(),
                              .tilted = bed_.tilt() && !bed_.description().reduced,
                              .free_lid = bed_.has_free_lid(),
@@ -197,14 +198,7 @@ sim::MeasureOptions Simulate::measure_options() const {
   return options;
 }
 
-FramePlan Simulate::frame_plan() const {
-  const sim::LookPlan looks_at = looks();
-  FramePlan plan;
-  plan.file = compress_ ? "trajectory.extxyz.zst" : "trajectory.extxyz";
-  plan.phases = looks_at.shaken;
-  plan.count = looks_at.frames, plan.stride = looks_at.frame_stride;
-  return plan;
-}
+FramePlan Simulate::frame_plan() const { return {looks(), compress_ ? "trajectory.extxyz.zst" : "trajectory.extxyz"}; }
 
 double Simulate::annealing_time() const {
   double time = 0;
@@ -223,8 +217,10 @@ sim::Scene Simulate::scene(const RunContext& context, std::uint64_t seed) const 
 MeasurementPlan Simulate::measurement_plan(const sim::Scene& scene) const {
   const double hottest = annealing_.empty() ? 0 : annealing_.back().temperature / bed_.length_unit();
   const sim::MeasureOptions options = measure_options();
-  const sim::MeasurementSchedule times = looks().schedule;
+  const sim::LookPlan looks_at = looks();
+  const sim::MeasurementSchedule& times = looks_at.schedule;
   MeasurementPlan plan;
+  plan.named_phases = looks_at.frame_phases;
   plan.phases = times.phases;
   plan.period = times.period;
   plan.grid = sim::profile_heights(scene, options, hottest);

@@ -95,7 +95,8 @@ void RunMeasurement::prepare(sim::Simulation& simulation) {
   properties_ = simulation.properties();
   bed_.emplace(plan_.scene, properties_, plan_.measurement);
   frames_.reset();
-  if (plan_.lead && plan_.frames.count > 0) frames_.emplace(plan_.folder / plan_.frames.file, properties_.mass.size());
+  if (plan_.lead && plan_.frames.looks.frames > 0)
+    frames_.emplace(plan_.folder / plan_.frames.file, properties_.mass.size());
 }
 
 void RunMeasurement::begin(sim::Simulation& simulation) {
@@ -105,10 +106,10 @@ void RunMeasurement::begin(sim::Simulation& simulation) {
 
 void RunMeasurement::look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look,
                           std::uint32_t phase) {
-  const bool frame = plan_.frames.takes(look);
+  const bool frame = plan_.frames.looks.takes_frame(look);
   bed_->look(simulation, at, phase, frame);
   if (!frame || !frames_) return;
-  const double part = plan_.frames.phases ? static_cast<double>(phase) / plan_.schedule.phases : 0;
+  const double part = plan_.frames.looks.shaken ? static_cast<double>(phase) / plan_.schedule.phases : 0;
   frames_->add(frame_of(at, plan_.scene, properties_, part));
 }
 
@@ -265,7 +266,7 @@ Json BedRun::results(const SceneOptions& options) const {
 }
 
 void BedRun::write() {
-  measurement().write(context_, plan_.frames.count > 0);
+  measurement().write(context_, plan_.frames.looks.frames > 0);
   measurement_.finish_frames(context_.output(plan_.frames.file));
   TrajectoryWriter final(context_.output("final.extxyz"));
   sim::Snapshot at;

@@ -15,14 +15,13 @@
 #include "pipelines/stages/frame_store.hpp"
 #include "pipelines/stages/stage.hpp"
 #include "sim/measure/measure.hpp"
+#include "sim/measure/measured_bed.hpp"
 
 namespace shakebed::pipelines {
 
 struct FramePlan {
-  std::uint64_t stride = 0, count = 0;  // every stride-th look, so many; 0: none
-  bool phases = false;                  // frames have phases of the floor's period
-  std::string file;                     // in the stage's output
-  bool takes(std::uint64_t look) const { return count > 0 && look % stride == 0 && look / stride < count; }
+  sim::LookPlan looks;
+  std::string file;  // in the stage's output
 };
 
 struct RunPlan {

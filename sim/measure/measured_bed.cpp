@@ -49,7 +49,7 @@ class Observer final : public RunObserver {
   void look(Simulation& simulation, const Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
     if (phase == 0 && bed_->periods() > 0) end_period(simulation);
     bed_->observe(at, phase);
-    if (plan_.frames == 0 || look % plan_.frame_stride != 0 || look / plan_.frame_stride >= plan_.frames) return;
+    if (!plan_.takes_frame(look)) return;
     const double turn = plan_.shaken ? static_cast<double>(phase) / plan_.schedule.phases : 0;
     if (options_.frame_sink) return options_.frame_sink(at, turn);
     out_.frames.push_back(at);
@@ -130,7 +130,13 @@ std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& o
       return formatted(
           "%llu frames are to be stored, but the bed is sampled only %llu times; measure longer or store fewer frames",
           static_cast<unsigned long long>(options.frames),
-          static_cast<unsigned long long>(plan_looks(floor_period, options).schedule.looks()));
+          static_cast<unsigned long long>(plan_looks(floor_period, options).possible_frames()));
+    case Problem::frame_phases:
+      return formatted(
+          "frames are wanted at phases at which the bed is not sampled; give different multiples of 1/%u from 0 to "
+          "below "
+          "1, and a floor that shakes",
+          options.phases);
   }
   return "";
 }
@@ -177,14 +183,45 @@ LookPlan plan_looks(double period, const MeasureOptions& options) {
     schedule.periods = std::max(static_cast<std::uint64_t>(wanted), options.frames);
     schedule.period = options.duration / static_cast<double>(schedule.periods);
   }
+  for (const double phase : options.frame_phases)
+    plan.frame_phases.push_back(static_cast<std::uint32_t>(std::lround(phase * schedule.phases)));
+  std::sort(plan.frame_phases.begin(), plan.frame_phases.end());
   if (options.frames > 0) {
+    const std::uint64_t phases = plan.frame_phases.empty() ? schedule.phases : plan.frame_phases.size();
     plan.frames = options.frames;
-    plan.frame_stride = schedule.looks() / options.frames;
-    while (plan.frame_stride > 1 && std::gcd(plan.frame_stride, std::uint64_t{schedule.phases}) > 1)
-      --plan.frame_stride;
+    plan.frame_stride = plan.possible_frames() / options.frames;
+    while (plan.frame_stride > 1 && std::gcd(plan.frame_stride, phases) > 1) --plan.frame_stride;
   }
   return plan;
 }
+
+bool LookPlan::takes_frame(std::uint64_t look) const {
+  if (frames == 0) return false;
+  std::uint64_t number = look;  // among the looks at which frames may be taken
+  if (!frame_phases.empty()) {
+    const auto phase = static_cast<std::uint32_t>(look % schedule.phases);
+    const auto place = std::lower_bound(frame_phases.begin(), frame_phases.end(), phase);
+    if (place == frame_phases.end() || *place != phase) return false;
+    number = look / schedule.phases * frame_phases.size() + static_cast<std::uint64_t>(place - frame_phases.begin());
+  }
+  return number % frame_stride == 0 && number / frame_stride < frames;
+}
+
+namespace {
+
+// Whether the samples have these phases, each once.
+bool phases_are_sampled(const std::vector<double>& wanted, std::uint32_t phases) {
+  std::vector<double> samples;
+  for (const double phase : wanted) {
+    const double sample = phase * phases;
+    if (!(phase >= 0 && phase < 1) || std::abs(sample - std::round(sample)) > rounding * phases) return false;
+    samples.push_back(std::round(sample));
+  }
+  std::sort(samples.begin(), samples.end());
+  return std::adjacent_find(samples.begin(), samples.end()) == samples.end();
+}
+
+}  // namespace
 
 HeightGrid profile_heights(const Scene& scene, const MeasureOptions& options, double hottest_bath) {
   HeightGrid grid;
@@ -211,6 +248,8 @@ std::vector<MeasureOptions::Problem> MeasureOptions::problems(double floor_perio
     require(duration / floor_period * (1 + rounding) >= 1, Problem::shorter_than_a_period);
     require(duration / floor_period <= most_periods, Problem::too_many_periods);
   }
+  require(frame_phases.empty() || (floor_period > 0 && phases_are_sampled(frame_phases, phases)),
+          Problem::frame_phases);
   if (out.empty() && frames > 0) require(plan_looks(floor_period, *this).frame_stride > 0, Problem::too_many_frames);
   return out;
 }

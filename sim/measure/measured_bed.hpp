@@ -30,6 +30,7 @@ struct MeasureOptions {
   double spacing = measuring_spacing;      // of the profile's heights [D]
   Kernel kernel = measuring_kernel;        // through which density is measured
   std::uint64_t frames = 0;                // snapshots that are kept, equally spaced over the samples
+  std::vector<double> frame_phases{};      // phases of the shaking, 0 to 1, at which they are taken; none: at all
   std::function<bool()> stop{};            // called about every 0.1 s; true ends the run
   std::function<void(double)> progress{};  // gets the fraction of the run that is done
   std::function<void(const Snapshot&, double phase)>
@@ -48,6 +49,7 @@ struct MeasureOptions {
     shorter_than_a_period,
     too_many_periods,
     too_many_frames,
+    frame_phases,  // twice the same, none of the samples, or the floor stands still
   };
   [[nodiscard]] std::vector<Problem> problems(double floor_period) const;
 };
@@ -58,6 +60,13 @@ struct LookPlan {
   std::uint64_t frame_stride = 0;  // in looks; no factor in common with `phases`, so that frames visit every phase
   std::uint64_t frames = 0;
   bool shaken = false;
+  std::vector<std::uint32_t> frame_phases{};  // in rising order; none: frames are taken at all phases
+
+  // How many looks there are at which frames may be taken.
+  std::uint64_t possible_frames() const {
+    return frame_phases.empty() ? schedule.looks() : schedule.periods * frame_phases.size();
+  }
+  bool takes_frame(std::uint64_t look) const;
 };
 LookPlan plan_looks(const Scene& scene, const MeasureOptions& options);
 LookPlan plan_looks(double floor_period, const MeasureOptions& options);  // 0: the floor stands still

@@ -56,7 +56,8 @@ ScratchFolder* ShakenBed::folder_ = nullptr;
 Json* ShakenBed::json_ = nullptr;
 
 TEST_F(ShakenBed, HasItsTemperaturesAsLengthsToo) {
-  for (const std::string name : {"temperature_x", "temperature_z", "temperature_z_local", "spin_temperature"}) {
+  for (const std::string name : {"temperature_x", "temperature_z", "temperature_z_local", "temperature_x_without_flow",
+                                 "temperature_z_without_flow", "spin_temperature"}) {
     const Json &plain = (*json_)[name], &length = (*json_)[name + "_over_mg"];
     EXPECT_EQ(plain["unit"], "m g D");
     EXPECT_EQ(length["unit"], "m");

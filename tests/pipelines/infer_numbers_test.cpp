@@ -68,6 +68,8 @@ TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
   EXPECT_NEAR(design("temperature_x_over_mg", 0) / number(bed["temperature_x_over_mg"]), 1, 0.08);
   EXPECT_NEAR(design("temperature_z_over_mg", 0) / number(bed["temperature_z_over_mg"]), 1, 0.08);
   EXPECT_NEAR(design("temperature_z_local_over_mg", 0) / number(bed["temperature_z_local_over_mg"]), 1, 0.08);
+  for (const std::string name : {"temperature_x_without_flow_over_mg", "temperature_z_without_flow_over_mg"})
+    EXPECT_NEAR(design(name, 0) / number(bed[name]), 1, 0.08) << name;
   EXPECT_NEAR(design("center_of_mass_rise", 0), number(bed["center_of_mass_rise"]), 0.05);
   const Json fit = Json::parse(read_text(found().folder / "s/fit/fit.json"));
   EXPECT_NEAR(design("temperature_over_mg", 0) / number(fit["temperature"]), 1, 0.1);

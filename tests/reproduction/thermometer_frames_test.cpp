@@ -11,10 +11,10 @@
 #include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
 
+namespace shakebed::tests::thermometer_frames {
 namespace {
 
-using namespace shakebed::tests;
-using shakebed::pipelines::Json;
+using pipelines::Json;
 
 struct Case {
   double temperature;         // [T_c]
@@ -117,3 +117,4 @@ INSTANTIATE_TEST_SUITE_P(BelowCritical, ThermometerByFrames,
                          name_of);
 
 }  // namespace
+}  // namespace shakebed::tests::thermometer_frames

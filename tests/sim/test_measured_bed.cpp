@@ -1,6 +1,7 @@
 // When a bed is looked at and at which heights: the rules that the library and the stage `simulate` share.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -42,6 +43,22 @@ TEST(MeasuredBed, FramesVisitEveryPhase) {
       EXPECT_EQ(std::gcd(plan.frame_stride, std::uint64_t{phases}), 1U);
       EXPECT_LE((frames - 1) * plan.frame_stride, plan.schedule.looks() - 1);
     }
+}
+
+TEST(MeasuredBed, FramesAreTakenAtTheNamedPhases) {
+  const std::vector<double> named{0.75, 0.25};
+  const LookPlan plan = plan_looks(0.3, {.duration = 30, .phases = 8, .frames = 50, .frame_phases = named});
+  EXPECT_EQ(plan.possible_frames(), 200U);
+  std::array<int, 8> taken{};
+  for (std::uint64_t look = 0; look < plan.schedule.looks(); ++look) taken[look % 8] += plan.takes_frame(look);
+  EXPECT_EQ(taken, (std::array<int, 8>{0, 0, 25, 0, 0, 0, 25, 0}));
+  for (const std::vector<double>& wrong : std::vector<std::vector<double>>{{0.3}, {0.25, 0.25}, {1}, {-0.25}})
+    EXPECT_EQ((MeasureOptions{.duration = 30, .phases = 8, .frame_phases = wrong}.problems(0.3)),
+              std::vector{Problem::frame_phases});
+  EXPECT_EQ((MeasureOptions{.duration = 30, .frame_phases = {0}}.problems(0)), std::vector{Problem::frame_phases})
+      << "the floor stands still";
+  EXPECT_EQ((MeasureOptions{.duration = 30, .phases = 8, .frames = 101, .frame_phases = {0}}.problems(0.3)),
+            std::vector{Problem::too_many_frames});
 }
 
 TEST(MeasuredBed, WhatCannotBeMeasuredIsNamed) {

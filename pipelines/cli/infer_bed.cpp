@@ -1,0 +1,224 @@
+// implements: pipelines/cli/commands.hpp
+// Two runs in one folder: first the frames are measured, then a recipe is written whose beds have their width and
+// number of disks, and whose targets are what was measured.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipelines/cli/arguments.hpp"
+#include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/image_arguments.hpp"
+#include "pipelines/formats/files.hpp"
+#include "pipelines/formats/profile_csv.hpp"
+#include "statistics/kernel.hpp"
+
+namespace shakebed::pipelines {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Periods of the shaking that a bed settles and is measured.
+constexpr double settling_periods = 50, measured_periods = 100;
+// Densities are compared from this height on, one diameter apart, as far up as they exceed this and twice their error.
+constexpr double lowest_height = 0.5, least_seen_density = 0.02;  // [D], [1/D^2]
+constexpr double fewest_heights = 4;
+
+struct InferBedArguments : ImageArguments {
+  std::vector<double> gamma{2, 8}, restitution{0.3, 0.98}, friction{0, 0.8};
+  std::optional<double> phase;
+  int beds = 120;
+};
+
+// What of the frames' results the inference needs.
+struct MeasuredBed {
+  double diameter = 0, width = 0, frequency = 0;  // [m], [D], [Hz]
+  std::int64_t count = 0;                         // of disks between the walls
+  double highest = 0;                             // at which the density is compared [D]
+  bool velocities = false;
+};
+
+Json measuring_stages(const InferBedArguments& given) {
+  return Json::array(
+      {extract_stage(given),
+       Json{{"stage", "fit"}, {"from", "extract"}, {"plateau_density", plateau_argument(given.plateau_density)}},
+       Json{{"stage", "figure"}, {"from", Json::array({"extract", "fit"})}}});
+}
+
+double highest_of(const ProfileTable& profile) {
+  double highest = lowest_height;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const double error = profile.std_error.empty() ? 0 : profile.std_error[i];
+    if (profile.number_density[i] > std::max(least_seen_density, 2 * error))
+      highest = std::max(highest, profile.height[i]);
+  }
+  return lowest_height + std::floor(highest - lowest_height);
+}
+
+MeasuredBed measured_bed(const fs::path& out, const InferBedArguments& given) {
+  const fs::path folder = out / "extract";
+  const Json result = read_json(folder / "extract.json");
+  const auto number = [&](const char* pointer) -> std::optional<double> {
+    const Json* found = find_pointer(result, pointer);
+    return found != nullptr && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+  };
+  MeasuredBed bed;
+  bed.diameter = positive_argument("--diameter", given.diameter, dimension::length);
+  bed.width = number("/width/value").value_or(0);
+  if (given.frequency)
+    bed.frequency = positive_argument("--frequency", given.frequency, dimension::frequency);
+  else if (const auto found = number("/frequency/value"))
+    bed.frequency = *found;
+  else
+    throw StageError(
+        "the frequency of the shaking is not known. Give --frequency, or for a film of a moving floor --frame-rate");
+  if (given.bead_number)
+    bed.count = static_cast<std::int64_t>(*given.bead_number);
+  else if (const auto column = number("/column_number/value"))
+    bed.count = std::llround(*column * bed.width);
+  else
+    throw StageError(
+        "the number of beads is not known, because the upper border of the frames cuts beads. Give it with "
+        "--bead-number, or take frames that show the whole bed");
+  bed.highest = highest_of(read_profile_csv(folder / "profile.csv"));
+  if (bed.highest < lowest_height + fewest_heights - 1)
+    throw StageError(
+        fmt::format("the bed is only {:g} D high: its profile does not say enough for an inference", bed.highest));
+  const Json* usable = find_pointer(result, "/velocities/usable");
+  bed.velocities = usable != nullptr && usable->is_boolean() && usable->get<bool>();
+  return bed;
+}
+
+Json parameter(const std::vector<std::string>& set, const std::vector<double>& range, const char* option) {
+  return Json{{"set", set}, {"low", range[0]}, {"high", range[1]}, {"why", fmt::format("the range of {}", option)}};
+}
+
+Json targets_of(const MeasuredBed& bed) {
+  Json targets;
+  targets["profile"] = Json{{"from", "extract"}, {"low", lowest_height}, {"high", bed.highest}};
+  if (!bed.velocities) return targets;
+  // The film's temperatures are those without the mean motion at each height.
+  for (const char* axis : {"x", "z"})
+    targets[fmt::format("temperature_{}_without_flow_over_mg", axis)] =
+        Json{{"at", fmt::format("/extract/velocities/temperature_{}_over_mg", axis)}, {"includes_scatter", true}};
+  return targets;
+}
+
+// The stage that infers. Floor and sides are of the beads' material.
+Json inference_stage(const InferBedArguments& given, const MeasuredBed& bed) {
+  const std::string gravity = given.gravity.value_or(default_gravity);
+  const auto middle = [](const std::vector<double>& range) { return (range[0] + range[1]) / 2; };
+  const double restitution = middle(given.restitution), friction = middle(given.friction);
+  double gamma = middle(given.gamma);
+  Json parameters;
+  if (given.amplitude) {
+    const double omega = 2 * std::numbers::pi * bed.frequency;
+    gamma = positive_argument("--amplitude", given.amplitude, dimension::length) * omega * omega /
+            quantity_argument("--gravity", gravity, dimension::acceleration);
+  } else {
+    parameters["gamma"] = parameter({"/floor/gamma"}, given.gamma, "--gamma");
+  }
+  parameters["restitution"] = parameter({"/disks/restitution", "/floor/restitution", "/box/sides/restitution"},
+                                        given.restitution, "--restitution");
+  parameters["friction"] =
+      parameter({"/disks/friction", "/floor/friction", "/box/sides/friction"}, given.friction, "--friction");
+  const auto seconds = [&](double periods) { return number_text(periods / bed.frequency) + " s"; };
+  const Json material{{"restitution", restitution}, {"friction", friction}};
+  Json disks = material, floor = material, sides = material;
+  disks.update(Json{{"count", bed.count}, {"diameter", given.diameter}, {"inertia", "sphere"}});
+  floor.update(Json{{"motion", "sinusoidal"}, {"gamma", gamma}, {"frequency", number_text(bed.frequency) + " Hz"}});
+  sides.update(Json{{"kind", "hard"}});
+  Json stage{
+      {"stage", "infer"},
+      {"id", "infer"},
+      {"from", "extract"},
+      {"disks", std::move(disks)},
+      {"gravity", gravity},
+      {"box", {{"width", number_text(bed.width * bed.diameter) + " m"}, {"sides", std::move(sides)}, {"lid", "open"}}},
+      {"floor", std::move(floor)},
+      {"settle", seconds(settling_periods)},
+      {"measure", seconds(measured_periods)},
+      {"plateau_density", plateau_argument(given.plateau_density)},
+      {"parameters", std::move(parameters)},
+      {"targets", targets_of(bed)},
+      {"first", given.beds},
+      {"rounds", 2},
+      {"each", std::max(1, given.beds / 3)}};
+  if (given.kernel) stage["kernel_width"] = kernel_from(*given.kernel)->width;
+  if (given.phase) stage["phase"] = *given.phase;
+  return stage;
+}
+
+void check_inference(const InferBedArguments& given) {
+  check_arguments(given);
+  const auto check = [](const char* name, const std::vector<double>& range, double least, double most) {
+    if (!(range[0] < range[1]) || range[0] < least || range[1] > most)
+      throw UsageError(fmt::format("{}: expected LOW,HIGH with LOW below HIGH, both from {:g} to {:g}; got {:g},{:g}",
+                                   name, least, most, range[0], range[1]));
+  };
+  check("--gamma", given.gamma, 0.1, 1000);
+  check("--restitution", given.restitution, 0, 1);
+  check("--friction", given.friction, 0, 10);
+  if (!given.kernel) return;
+  const auto kernel = kernel_from(*given.kernel);
+  if (!kernel || kernel->kind != KernelKind::gaussian)
+    throw UsageError("--kernel: the beds of an inference are measured through a Gaussian. Write gaussian:WIDTH (in D)");
+}
+
+int infer_bed(const Call& call, const InferBedArguments& given) {
+  check_inference(given);
+  Json recipe{{"name", "infer-bed"}, {"stages", measuring_stages(given)}};
+  recipe["report"] = Json{{"title", "What the frames say about the bed"},
+                          {"text",
+                           "The disks were found in the given frames. Simulated beds of as many disks, with parameters "
+                           "over the whole ranges, were then compared with the measured profile and, for a film, "
+                           "temperatures. Floor and side walls are taken to be of the beads' material, and the beads "
+                           "to be spheres that touch no plate in front or behind."}};
+  Call measuring = call;
+  measuring.json = true;  // its results are shown with those of the inference
+  Json ignored;
+  RunArguments first = given.run;
+  first.dry_run = false;
+  if (const int code = run_plan_command(measuring, first, plan_of(recipe, given), &ignored); code != exit_ok)
+    return code;
+  const MeasuredBed bed = measured_bed(out_of(call, "infer-bed"), given);
+  recipe["stages"].push_back(inference_stage(given, bed));
+  return run_plan_command(call, given.run, plan_of(recipe, given));
+}
+
+void add_prior_options(CLI::App& command, InferBedArguments& given) {
+  const auto range = [&command](const char* name, std::vector<double>& ends, const char* help) {
+    command.add_option(name, ends, help)->delimiter(',')->expected(2)->type_name("LOW,HIGH");
+  };
+  command.add_option("--frequency", given.frequency, "frequency of the shaking: \"20 Hz\" (default: found in a film)");
+  command.add_option("--amplitude", given.amplitude,
+                     "amplitude of the shaking: \"2.5 mm\". Gamma is then known and is not inferred");
+  range("--gamma", given.gamma, "possible values of Gamma (default: 2,8)");
+  range("--restitution", given.restitution, "possible values of the restitution (default: 0.3,0.98)");
+  range("--friction", given.friction, "possible values of the friction coefficient (default: 0,0.8)");
+  command.add_option("--phase", given.phase,
+                     "phase of the shaking that all frames show, from 0 to 1 (0: the floor rises through its mean "
+                     "height); default: they show all phases alike");
+  command.add_option("--beds", given.beds, "number of simulated beds in the first of three rounds")
+      ->check(CLI::Range(20, 100000))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_infer_bed(Program& program) {
+  const auto given = std::make_shared<InferBedArguments>();
+  CLI::App& command = program.add(
+      {"infer-bed", "photographs or a film of your own → restitution, friction and Gamma with intervals",
+       "  shakebed infer-bed film.mp4 --diameter \"2.99 mm\" --frequency \"20 Hz\" --frame-rate \"500 Hz\" --out o\n"
+       "  shakebed infer-bed photos/*.tif --diameter \"6 mm\" --frequency \"15 Hz\" --amplitude \"5 mm\""},
+      [given](const Call& call) { return infer_bed(call, *given); });
+  add_picture_options(command, *given);
+  add_prior_options(command, *given);
+  add_film_options(command, *given);
+  add_run_options(command, given->run);
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,44 @@
+// Kinetic temperatures without the mean motion of each layer at each moment, as a film of a bed gives them. What whole
+// layers do together is no temperature here: neither the bounce of a bed, which may differ from period to period, nor
+// its sloshing from side to side. Reduced units.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sim/engine/simulation.hpp"
+#include "sim/measure/statistics.hpp"
+
+namespace shakebed::sim {
+
+class FlowFreeTemperature {
+ public:
+  // `phases`: snapshots a period.
+  FlowFreeTemperature(const DiskProperties& disks, std::uint32_t phases) : mass_(disks.mass), phases_(phases) {}
+
+  // The snapshot at the given phase, 0 <= phase < phases.
+  void observe(const Snapshot& at, std::uint32_t phase);
+  // m <(v - u)^2> of one component; u is the mean of the layer of 1 D at that moment. Of n disks in a layer n - 1 are
+  // free; layers of fewer than three are left out. The error is by periods.
+  Measured x() const { return {mean_.mean(0), mean_.std_error(0)}; }
+  Measured z() const { return {mean_.mean(1), mean_.std_error(1)}; }
+
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(period_sum_, mean_);
+  }
+
+ private:
+  struct Layer {
+    double disks = 0, mass = 0;
+    std::array<double, 2> momentum{}, energy{};  // sums of m v and m v^2
+  };
+  std::vector<double> mass_;
+  std::uint32_t phases_;
+  std::array<double, 2> period_sum_{};
+  BlockedMean mean_{2};
+  std::vector<Layer> layers_;  // kept to save allocations
+};
+
+}  // namespace shakebed::sim
