@@ -47,7 +47,8 @@ struct FloorMotion {
   bool known = false;
   double middle = 0, amplitude = 0, phase = 0;
   double middle_std_error = 0;  // by the scatter of the touching beads, and the extrapolation
-  std::size_t touching = 0;     // beads
+  double amplitude_std_error = 0;
+  std::size_t touching = 0;  // beads
 };
 
 // A bottom counts in full while it is below the floor or at most a tolerance above it. The tolerance shrinks, so that

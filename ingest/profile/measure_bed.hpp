@@ -124,6 +124,7 @@ struct BedCalibration {
   // frame, upwards positive. Fitted when the shaking's frequency is known and the floor is not given; 0 when it
   // rests.
   double floor_amplitude_px = 0;
+  double floor_amplitude_std_error_px = 0;
   double floor_phase = 0;  // turns, 0 .. 1
   double left_wall_px = 0, right_wall_px = 0;
   double width = 0;  // D, between the walls

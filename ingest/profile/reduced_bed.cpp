@@ -57,8 +57,8 @@ void enlarge(PixelRectangle& region, int factor) {
 
 void enlarge(BedCalibration& bed, const Enlargement& by) {
   bed.scale_m_per_px = by.reduced_length(bed.scale_m_per_px);
-  for (double* length :
-       {&bed.radius_px, &bed.radius_std_error_px, &bed.edge_width_px, &bed.floor_amplitude_px, &bed.floor_std_error_px})
+  for (double* length : {&bed.radius_px, &bed.radius_std_error_px, &bed.edge_width_px, &bed.floor_amplitude_px,
+                         &bed.floor_amplitude_std_error_px, &bed.floor_std_error_px})
     *length = by.length(*length);
   bed.floor_px = by.place(bed.floor_px) - bed.floor_slope * by.place(0);
   bed.left_wall_px = by.place(bed.left_wall_px);

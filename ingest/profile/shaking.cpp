@@ -75,6 +75,7 @@ void Shaking::find_floor_in_motion(BedCalibration& bed) {
     bed.floor_std_error_px = motion.middle_std_error;
     bed.floor_reference = FloorReference::mean_of_motion;
     bed.floor_amplitude_px = motion.amplitude;
+    bed.floor_amplitude_std_error_px = motion.amplitude_std_error;
     bed.floor_phase = motion.phase;
   }
 }
@@ -104,7 +105,9 @@ void Shaking::take_found(BedCalibration& bed) {
   bed.frequency_false_alarm = in_film_.false_alarm;
   if (bed.floor_amplitude_px > 0) {  // its phase goes with the frequency
     const FloorMotion motion = find_floor_motion(first_bottoms_, diameter_px_, frequency);
-    if (motion.known) bed.floor_amplitude_px = motion.amplitude, bed.floor_phase = motion.phase;
+    if (motion.known)
+      bed.floor_amplitude_px = motion.amplitude, bed.floor_amplitude_std_error_px = motion.amplitude_std_error,
+      bed.floor_phase = motion.phase;
   }
   char text[400];
   std::snprintf(text, sizeof text,

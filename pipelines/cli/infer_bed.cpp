@@ -25,9 +25,13 @@ constexpr double settling_periods = 50, measured_periods = 100;
 // Densities are compared from this height on, one diameter apart, as far up as they exceed this and twice their error.
 constexpr double lowest_height = 0.5, least_seen_density = 0.02;  // [D], [1/D^2]
 constexpr double fewest_heights = 4;
+// Where neither an option nor a film tells Gamma. Below 2 a bed hardly moves.
+const std::vector<double> default_gamma{2, 8};
+// The range of a Gamma that the film tells, in its standard errors.
+constexpr double range_of_measured = 5;
 
 struct InferBedArguments : ImageArguments {
-  std::vector<double> gamma{2, 8}, restitution{0.3, 0.98}, friction{0, 0.8};
+  std::vector<double> gamma, restitution{0.3, 0.98}, friction{0, 0.8};
   std::optional<double> phase;
   int beds = 120;
 };
@@ -35,9 +39,12 @@ struct InferBedArguments : ImageArguments {
 // What of the frames' results the inference needs.
 struct MeasuredBed {
   double diameter = 0, width = 0, frequency = 0;  // [m], [D], [Hz]
+  double frequency_error = 0;                     // relative
   std::int64_t count = 0;                         // of disks between the walls
   double highest = 0;                             // at which the density is compared [D]
   bool velocities = false;
+  double time = 0;                            // of the film [s]; 0: photographs
+  double amplitude = 0, amplitude_error = 0;  // of the floor in a film [m]; 0: not seen
 };
 
 Json measuring_stages(const InferBedArguments& given) {
@@ -70,7 +77,7 @@ MeasuredBed measured_bed(const fs::path& out, const InferBedArguments& given) {
   if (given.frequency)
     bed.frequency = positive_argument("--frequency", given.frequency, dimension::frequency);
   else if (const auto found = number("/frequency/value"))
-    bed.frequency = *found;
+    bed.frequency = *found, bed.frequency_error = number("/frequency/std_error").value_or(0) / *found;
   else
     throw StageError(
         "the frequency of the shaking is not known. Give --frequency, or for a film of a moving floor --frame-rate");
@@ -87,12 +94,17 @@ MeasuredBed measured_bed(const fs::path& out, const InferBedArguments& given) {
     throw StageError(
         fmt::format("the bed is only {:g} D high: its profile does not say enough for an inference", bed.highest));
   const Json* usable = find_pointer(result, "/velocities/usable");
+  bed.amplitude = number("/floor_amplitude/value").value_or(0);
+  bed.amplitude_error = number("/floor_amplitude/std_error").value_or(0);
+  if (given.frame_rate)
+    bed.time =
+        number("/frames").value_or(0) / positive_argument("--frame-rate", given.frame_rate, dimension::frequency);
   bed.velocities = usable != nullptr && usable->is_boolean() && usable->get<bool>();
   return bed;
 }
 
-Json parameter(const std::vector<std::string>& set, const std::vector<double>& range, const char* option) {
-  return Json{{"set", set}, {"low", range[0]}, {"high", range[1]}, {"why", fmt::format("the range of {}", option)}};
+Json parameter(const std::vector<std::string>& set, const std::vector<double>& range, const char* why) {
+  return Json{{"set", set}, {"low", range[0]}, {"high", range[1]}, {"why", why}};
 }
 
 Json targets_of(const MeasuredBed& bed) {
@@ -106,24 +118,38 @@ Json targets_of(const MeasuredBed& bed) {
   return targets;
 }
 
+double middle(const std::vector<double>& range) { return (range[0] + range[1]) / 2; }
+
+// Gamma of the scene as written. It is a parameter unless the amplitude is given: with the amplitude of the floor in a
+// film as its prior, or over a range.
+double gamma_of(const InferBedArguments& given, const MeasuredBed& bed, double gravity, Json& parameters) {
+  const double omega = 2 * std::numbers::pi * bed.frequency, per_amplitude = omega * omega / gravity;
+  if (given.amplitude) return per_amplitude * positive_argument("--amplitude", given.amplitude, dimension::length);
+  if (!given.gamma.empty() || !(bed.amplitude > 0 && bed.amplitude_error > 0)) {
+    const std::vector<double>& range = given.gamma.empty() ? default_gamma : given.gamma;
+    parameters["gamma"] = parameter({"/floor/gamma"}, range, "the range of --gamma");
+    return middle(range);
+  }
+  const double gamma = per_amplitude * bed.amplitude,
+               error = gamma * std::hypot(bed.amplitude_error / bed.amplitude, 2 * bed.frequency_error);
+  parameters["gamma"] = parameter(
+      {"/floor/gamma"}, {std::max(0.5 * gamma, gamma - range_of_measured * error), gamma + range_of_measured * error},
+      "the amplitude of the floor in the film");
+  parameters["gamma"]["mean"] = gamma, parameters["gamma"]["std_error"] = error;
+  return gamma;
+}
+
 // The stage that infers. Floor and sides are of the beads' material.
 Json inference_stage(const InferBedArguments& given, const MeasuredBed& bed) {
   const std::string gravity = given.gravity.value_or(default_gravity);
-  const auto middle = [](const std::vector<double>& range) { return (range[0] + range[1]) / 2; };
   const double restitution = middle(given.restitution), friction = middle(given.friction);
-  double gamma = middle(given.gamma);
   Json parameters;
-  if (given.amplitude) {
-    const double omega = 2 * std::numbers::pi * bed.frequency;
-    gamma = positive_argument("--amplitude", given.amplitude, dimension::length) * omega * omega /
-            quantity_argument("--gravity", gravity, dimension::acceleration);
-  } else {
-    parameters["gamma"] = parameter({"/floor/gamma"}, given.gamma, "--gamma");
-  }
+  const double gamma =
+      gamma_of(given, bed, quantity_argument("--gravity", gravity, dimension::acceleration), parameters);
   parameters["restitution"] = parameter({"/disks/restitution", "/floor/restitution", "/box/sides/restitution"},
-                                        given.restitution, "--restitution");
-  parameters["friction"] =
-      parameter({"/disks/friction", "/floor/friction", "/box/sides/friction"}, given.friction, "--friction");
+                                        given.restitution, "the range of --restitution");
+  parameters["friction"] = parameter({"/disks/friction", "/floor/friction", "/box/sides/friction"}, given.friction,
+                                     "the range of --friction");
   const auto seconds = [&](double periods) { return number_text(periods / bed.frequency) + " s"; };
   const Json material{{"restitution", restitution}, {"friction", friction}};
   Json disks = material, floor = material, sides = material;
@@ -146,6 +172,7 @@ Json inference_stage(const InferBedArguments& given, const MeasuredBed& bed) {
       {"first", given.beds},
       {"rounds", 2},
       {"each", std::max(1, given.beds / 3)}};
+  if (bed.time > 0) stage["target_time"] = number_text(bed.time) + " s";
   if (given.kernel) stage["kernel_width"] = kernel_from(*given.kernel)->width;
   if (given.phase) stage["phase"] = *given.phase;
   return stage;
@@ -158,13 +185,21 @@ void check_inference(const InferBedArguments& given) {
       throw UsageError(fmt::format("{}: expected LOW,HIGH with LOW below HIGH, both from {:g} to {:g}; got {:g},{:g}",
                                    name, least, most, range[0], range[1]));
   };
-  check("--gamma", given.gamma, 0.1, 1000);
+  if (!given.gamma.empty()) check("--gamma", given.gamma, 0.1, 1000);
   check("--restitution", given.restitution, 0, 1);
   check("--friction", given.friction, 0, 10);
   if (!given.kernel) return;
   const auto kernel = kernel_from(*given.kernel);
   if (!kernel || kernel->kind != KernelKind::gaussian)
     throw UsageError("--kernel: the beds of an inference are measured through a Gaussian. Write gaussian:WIDTH (in D)");
+}
+
+// Of the options of a run, those for the stages that measure the frames.
+RunArguments measuring_part(RunArguments run) {
+  std::erase_if(run.settings, [](const std::string& setting) { return setting.starts_with("/stages/infer"); });
+  run.only = run.from = run.until = std::nullopt;
+  run.dry_run = false;
+  return run;
 }
 
 int infer_bed(const Call& call, const InferBedArguments& given) {
@@ -179,13 +214,13 @@ int infer_bed(const Call& call, const InferBedArguments& given) {
   Call measuring = call;
   measuring.json = true;  // its results are shown with those of the inference
   Json ignored;
-  RunArguments first = given.run;
-  first.dry_run = false;
-  if (const int code = run_plan_command(measuring, first, plan_of(recipe, given), &ignored); code != exit_ok)
+  InferBedArguments frames = given, all = given;
+  frames.run = measuring_part(given.run);
+  if (const int code = run_plan_command(measuring, frames.run, plan_of(recipe, frames), &ignored); code != exit_ok)
     return code;
-  const MeasuredBed bed = measured_bed(out_of(call, "infer-bed"), given);
-  recipe["stages"].push_back(inference_stage(given, bed));
-  return run_plan_command(call, given.run, plan_of(recipe, given));
+  if (given.run.force) all.run.force = false, all.run.from = "infer";  // the frames have just been measured
+  recipe["stages"].push_back(inference_stage(given, measured_bed(out_of(call, "infer-bed"), given)));
+  return run_plan_command(call, all.run, plan_of(recipe, all));
 }
 
 void add_prior_options(CLI::App& command, InferBedArguments& given) {
@@ -195,7 +230,8 @@ void add_prior_options(CLI::App& command, InferBedArguments& given) {
   command.add_option("--frequency", given.frequency, "frequency of the shaking: \"20 Hz\" (default: found in a film)");
   command.add_option("--amplitude", given.amplitude,
                      "amplitude of the shaking: \"2.5 mm\". Gamma is then known and is not inferred");
-  range("--gamma", given.gamma, "possible values of Gamma (default: 2,8)");
+  range("--gamma", given.gamma,
+        "possible values of Gamma (default: from the amplitude of the floor in a film, else 2,8)");
   range("--restitution", given.restitution, "possible values of the restitution (default: 0.3,0.98)");
   range("--friction", given.friction, "possible values of the friction coefficient (default: 0,0.8)");
   command.add_option("--phase", given.phase,

@@ -96,7 +96,12 @@ void add_geometry(const ingest::Measurement& found, Json& result) {
     result["frequency"] = quantity_json(bed.shaking_frequency_hz, "Hz", bed.shaking_frequency_std_error_hz);
     result["frequency_given"] = bed.frequency_given;
     if (!bed.frequency_given) result["frequency_false_alarm"] = bed.frequency_false_alarm;
-    result["floor_amplitude"] = quantity_json(bed.floor_amplitude_px * bed.scale_m_per_px, "m");
+    const double amplitude = bed.floor_amplitude_px * bed.scale_m_per_px;
+    result["floor_amplitude"] = amplitude > 0
+                                    ? quantity_json(amplitude, "m",
+                                                    std::hypot(bed.floor_amplitude_std_error_px * bed.scale_m_per_px,
+                                                               amplitude * bed.scale_relative_std_error))
+                                    : quantity_json(amplitude, "m");
     result["floor_phase"] = bed.floor_phase;
   }
   result["left_wall"] = quantity_json(bed.left_wall_px, "px");

@@ -124,6 +124,10 @@ void Infer::describe_search(Fields& fields) {
       "calibration", options_.calibration,
       {.help = "number of beds with known parameters, drawn from the prior, by which the intervals are tested; 0: none",
        .range = from_to(0, 10'000)});
+  fields.quantity("target_time", options_.target_time, dimension::time,
+                  {.help = "time over which the targets that include the scatter of a bed were measured, for instance "
+                           "that of the film: shorter measurements scatter more; 0: the option \"measure\"",
+                   .range = non_negative});
   fields.object<MapCurve>(
       "map_curve", options_.curve,
       [](Fields& f, MapCurve& curve) {
@@ -479,8 +483,9 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     bool complete = true;
     for (ScaledTarget& target : targets) {
       // The bed's number has its scatter already.
-      const double scatter = target.includes_scatter ? surrogate.scatter(target.number) : 0;
-      const double error = std::sqrt(std::max(0.0, target.error * target.error - scatter * scatter));
+      const double scatter = target.includes_scatter ? std::pow(surrogate.scatter(target.number), 2) : 0;
+      const double all = std::max(scatter * options_.scatter_factor(), target.error * target.error);
+      const double error = std::sqrt(std::max(0.0, all - scatter));
       target.value = to_scale(target.number, beds[i].numbers[view * count + target.number]) +
                      error * fit::normal_quantile(uniform());
       complete = complete && std::isfinite(target.value);

@@ -50,11 +50,14 @@ struct InferOptions {
   std::uint32_t best = 3, replicas = 4;
   double best_measure = 0;  // as written; 0: as the others
   std::uint32_t draws = 1000, calibration = 0;
+  double target_time = 0;  // over which the targets were measured, as written; 0: as long as a bed
   std::optional<MapCurve> curve;
   std::string stored;
   InputFiles beds;  // beds.json of an earlier run
   bool uses_earlier_beds() const { return !stored.empty() || !beds.empty(); }
   std::size_t dimensions() const { return parameters.size(); }
+  // What the variance between beds is multiplied by, for one that is measured over the time of the targets.
+  double scatter_factor() const { return target_time > 0 ? bed.measure / target_time : 1; }
 };
 
 // A bed that was run: where, in which round, and its numbers, view by view.
@@ -114,6 +117,7 @@ class BedSurrogate {
   static std::size_t offset_of(std::size_t number) { return number - std::min(number, observables().size()); }
   // The place of a number among the outputs of its model; nothing where the view was left out.
   std::optional<std::size_t> output_of(std::size_t number, std::size_t view) const;
+  double variance_of(double variance, double scatter, const ScaledTarget& target) const;
   std::vector<double> coordinates(std::span<const double> places) const;
   void leave_out_views(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
   void train(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets, int threads);

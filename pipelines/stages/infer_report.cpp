@@ -109,9 +109,29 @@ std::string inference_html(const FinishedStage& stage, int& pictures) {
                      "posterior. Crosses: the most probable beds, which were run again. Circle: the scene as written.");
 }
 
+// "restitution = 0.778 (68 %: 0.737 to 0.802)".
+std::string interval_text(const std::string& name, const Json& p) {
+  const auto number = [&](const char* key) { return p.at(key).get<double>(); };
+  const std::string unit = p.at("unit") == "1" ? "" : " " + p.at("unit").get<std::string>();
+  return fmt::format("{} = {:.3g}{} (68 %: {:.3g} to {:.3g})", words(name), number("median"), unit, number("low_68"),
+                     number("high_68"));
+}
+
 std::string inference_terminal(const FinishedStage& stage) {
   const Json* statement = find_pointer(stage.result, "/agreement/statement");
-  return statement == nullptr ? "" : statement->get<std::string>() + "\n";
+  if (statement == nullptr) return "";
+  std::string out;
+  for (const auto& [name, p] : stage.result.at("parameters").items())
+    out += fmt::format("{}: {}\n", stage.files.id, interval_text(name, p));
+  return out + statement->get<std::string>() + "\n";
+}
+
+std::string inference_markdown(const FinishedStage& stage) {
+  const Json* statement = find_pointer(stage.result, "/agreement/statement");
+  if (statement == nullptr) return "";
+  std::string out = "\n## Parameters of the bed\n\n";
+  for (const auto& [name, p] : stage.result.at("parameters").items()) out += "- " + interval_text(name, p) + "\n";
+  return out + "\n" + statement->get<std::string>() + "\n";
 }
 
 // Gamma against frequency where the reading gives the reduced temperature; rows "frequency gamma".
@@ -224,7 +244,7 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
 
 StagePages infer_pages() {
   return {.sections = {{ReportPlace::claims, "What the measured numbers say about the bed", inference_html}},
-          .markdown = nullptr,
+          .markdown = inference_markdown,
           .terminal = inference_terminal};
 }
 

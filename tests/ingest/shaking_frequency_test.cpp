@@ -154,7 +154,7 @@ struct FilmPulls {  // errors over stated errors
 TEST(ShakingFrequency, AndFloorOfSimulatedBedsAreWithinTheirErrors) {
   std::mt19937_64 random(2026);
   std::uniform_real_distribution<double> any(0, 1);
-  FilmPulls frequency, floor;
+  FilmPulls frequency, floor, amplitude;
   double floor_squares = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     ShakenBed bed{.gamma = 2.5 + 4 * any(random), .restitution = 0.65 + 0.3 * any(random)};
@@ -170,7 +170,8 @@ TEST(ShakingFrequency, AndFloorOfSimulatedBedsAreWithinTheirErrors) {
       if (motion.known && motion.amplitude > 0.02 * film_diameter_px) {
         floor.add(motion.middle - floor_px, motion.middle_std_error);
         floor_squares += std::pow((motion.middle - floor_px) / film_diameter_px, 2);
-        EXPECT_NEAR(motion.amplitude / film_diameter_px, bed.amplitude(), 0.05 + 0.03 * bed.amplitude()) << seed;
+        amplitude.add(motion.amplitude - bed.amplitude() * film_diameter_px, motion.amplitude_std_error);
+        EXPECT_NEAR(motion.amplitude / film_diameter_px, bed.amplitude(), 0.03) << seed;
       }
       std::vector<PlaceInFrame> bottoms;
       for (const LowestBottoms& frame : film)
@@ -182,8 +183,12 @@ TEST(ShakingFrequency, AndFloorOfSimulatedBedsAreWithinTheirErrors) {
       frequency.add(every_second ? twice : once, (every_second ? 2 : 1) * found.std_error);
     }
   }
-  std::printf("rms of error over stated error: frequency %.2f (%g films), floor %.2f (%g films; rms %.4f D)\n",
-              frequency.rms(), frequency.count, floor.rms(), floor.count, std::sqrt(floor_squares / floor.count));
+  std::printf(
+      "rms of error over stated error: frequency %.2f (%g films), floor %.2f (%g films; rms %.4f D), amplitude %.2f\n",
+      frequency.rms(), frequency.count, floor.rms(), floor.count, std::sqrt(floor_squares / floor.count),
+      amplitude.rms());
+  EXPECT_GT(amplitude.rms(), 0.3);
+  EXPECT_LT(amplitude.rms(), 1.2);
   EXPECT_GE(frequency.count, 40);
   EXPECT_GT(frequency.rms(), 0.6);
   EXPECT_LT(frequency.rms(), 1.5);

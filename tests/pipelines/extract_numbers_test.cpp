@@ -46,7 +46,7 @@ ingest::Measurement a_measurement() {
   bed.floor_px = 400, bed.floor_std_error_px = 0.37, bed.floor_reference = ingest::FloorReference::given;
   bed.floor_tilt_degrees = 1.5, bed.floor_tilt_std_error_degrees = 0.11;
   bed.shaking_frequency_hz = 21, bed.shaking_frequency_std_error_hz = 0.13, bed.frequency_false_alarm = 1e-5;
-  bed.floor_amplitude_px = 12, bed.floor_phase = 0.3;
+  bed.floor_amplitude_px = 12, bed.floor_amplitude_std_error_px = 0.3, bed.floor_phase = 0.3;
   bed.left_wall_px = 10, bed.right_wall_px = 310, bed.width = 20;
   bed.scale_given = false, bed.floor_given = true, bed.walls_given = false, bed.walls_are_frame_sides = true;
   found.profile = a_profile(1.1);
@@ -102,7 +102,7 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
                             {"/floor", 400, 0.37, "px"},
                             {"/floor_tilt", 1.5, 0.11, "deg"},
                             {"/frequency", 21, 0.13, "Hz"},
-                            {"/floor_amplitude", 0.0024, -1, "m"},
+                            {"/floor_amplitude", 0.0024, std::hypot(6e-5, 0.05 * 0.0024), "m"},
                             {"/left_wall", 10, -1, "px"},
                             {"/right_wall", 310, -1, "px"},
                             {"/width", 20, -1, "D"},

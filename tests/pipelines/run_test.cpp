@@ -554,7 +554,7 @@ TEST(ReferenceData, IsThatOfThePublishedFit) {
   const Json data =
       read_json(fs::path(SHAKEBED_SOURCE_DIR) / "reference-data/quinn-hong-2000/clement-rajchenbach-1991.json");
   const auto number = [&](const std::string& name) {
-    for (const char* list : {"numbers", "derived"}) {
+    for (const char* list : {"printed", "derived"}) {
       for (const Json& row : data[list]) {
         if (row["name"] == name) return row["value"].get<double>();
       }
@@ -568,7 +568,30 @@ TEST(ReferenceData, IsThatOfThePublishedFit) {
   EXPECT_EQ(number("plateau_density"), fit.plateau_density);
   EXPECT_EQ(number("temperature_over_mg"), fit.temperature_over_mg_in_mm);
   EXPECT_EQ(number("shift_times_plateau"), fit.shift_times_plateau);
-  for (const Json& row : data["numbers"]) EXPECT_FALSE(row["place"].get<std::string>().empty());
+  for (const Json& row : data["printed"]) EXPECT_FALSE(row["place"].get<std::string>().empty());
+}
+
+// Each input that the paper does not print is said to be from the literature or assumed, with the value of the recipe,
+// and the report says which.
+TEST(ReferenceData, KeepsApartWhatIsNotPrinted) {
+  const fs::path project = SHAKEBED_SOURCE_DIR;
+  const Json data = read_json(project / "reference-data/quinn-hong-2000/clement-rajchenbach-1991.json"),
+             recipe = read_json(project / "pipelines/recipes/clement-rajchenbach/figure.json");
+  std::map<std::string, std::string> why;
+  for (const Json& row : recipe["report"]["assumed"]) why[row["input"]] = row["why"];
+  const auto& stages = recipe["stages"];
+  const Json bed =
+      *std::find_if(stages.begin(), stages.end(), [](const Json& one) { return one.value("id", "") == "bed"; });
+  std::size_t rows = 0;
+  for (const auto& [list, words] : {std::pair{"from_the_literature", "from the literature"}, {"assumed", "assumed"}}) {
+    for (const Json& row : data[list]) {
+      const std::string input = row["input"];
+      EXPECT_EQ(bed.at(Json::json_pointer(input.substr(std::string("/stages/bed").size()))), row["value"]) << input;
+      EXPECT_EQ(why[input].rfind(words, 0), 0U) << input << ": " << why[input];
+      ++rows;
+    }
+  }
+  EXPECT_EQ(rows, why.size());
 }
 
 TEST(Recipes, AllShippedOnesAreGood) {

@@ -59,7 +59,7 @@ Json film_stages(const Truth& truth, std::size_t number) {
                        {"id", "film"},
                        {"from", "bed"},
                        {"seed", 1000 + number},
-                       {"scale", "0.2 mm/px"},
+                       {"scale", "0.3 mm/px"},
                        {"blur", 0.8},
                        {"noise", 4},
                        {"exposure", "0.2 ms"},
@@ -73,8 +73,8 @@ Json film_stages(const Truth& truth, std::size_t number) {
 }
 
 Json inference(const Json& extracted, const std::string& earlier) {
-  Json stage{{"stage", "infer"}, {"id", "infer"},        {"from", "extract"}, {"seed", 7}, {"settle", "2.5 s"},
-             {"measure", "5 s"}, {"first", design_beds}, {"rounds", 0},       {"best", 0}};
+  Json stage{{"stage", "infer"}, {"id", "infer"},          {"from", "extract"},    {"seed", 7},   {"settle", "2.5 s"},
+             {"measure", "5 s"}, {"target_time", "0.6 s"}, {"first", design_beds}, {"rounds", 0}, {"best", 0}};
   stage.update(scene({4, 0.8, 0.3}));
   stage["targets"]["profile"] = Json{{"from", "extract"}, {"low", 0.5}, {"high", 15.5}};
   if (extracted["velocities"]["usable"] == true) {
@@ -129,44 +129,56 @@ Found infer(const std::filesystem::path& folder, std::size_t number, const std::
   return found;
 }
 
-// Of 100 intervals of 68 % 59 to 77 hold the truth, of 95 % 91 to 99 (two standard deviations of the counts).
+struct Coverage {
+  double in_68 = 0, in_95 = 0, width = 0, rank_chance = 0;  // shares; the last by chi2
+};
+
+Coverage coverage_of(const std::vector<Found>& found, std::size_t k) {
+  Coverage out;
+  std::array<double, rank_bins> histogram{};
+  for (const Found& one : found) {
+    const Json& row = one.parameters[prior[k].name];
+    const double truth = one.truth[k], rank = one.rank.at(prior[k].name);
+    const auto within = [&](const char* low, const char* high) {
+      return row[low].get<double>() <= truth && truth <= row[high].get<double>() ? 1.0 / beds : 0;
+    };
+    out.in_68 += within("low_68", "high_68"), out.in_95 += within("low_95", "high_95");
+    out.width += row["width_over_prior"].get<double>() / beds;
+    histogram[static_cast<std::size_t>(std::min(rank_bins - 1.0, std::floor(rank * rank_bins)))] += 1;
+    std::printf("  %s %.4g: %.4g to %.4g (68 %%), %.4g to %.4g, rank %.3f%s\n", prior[k].name, truth,
+                row["low_68"].get<double>(), row["high_68"].get<double>(), row["low_95"].get<double>(),
+                row["high_95"].get<double>(), rank, one.velocities ? "" : ", no velocities");
+  }
+  double chi2 = 0;
+  for (const double count : histogram) chi2 += std::pow(count - beds / 10.0, 2) / (beds / 10.0);
+  out.rank_chance = fit::chance_of_chi2(chi2, rank_bins - 1);
+  return out;
+}
+
+// The intervals of all parameters together hold the truth in 68 +- 9 % and 95 +- 4 %, those of each within three
+// standard deviations of 100 counts. Ranks of each are even at 0.05/3, so that one of three fails by chance in one
+// study of twenty.
 TEST(InferredBeds, IntervalsHoldTheParametersOfFilmedBeds) {
   ScratchFolder folder;
   std::vector<Found> found(beds);
   found[0] = infer(folder.path(), 0, "");
   const std::string earlier = (folder / "o0/infer/beds.json").string();
   for_each_index(beds - 1, 2, [&](std::size_t i) { found[i + 1] = infer(folder.path(), i + 1, earlier); });
-  std::size_t with_velocities = 0;
-  for (const Found& one : found) with_velocities += one.velocities;
-  std::printf("  of %zu films %zu with velocities\n", beds, with_velocities);
+  double in_68 = 0, in_95 = 0;
+  for (const Found& one : found) ASSERT_TRUE(one.parameters.is_object());
   for (std::size_t k = 0; k < prior.size(); ++k) {
-    int in_68 = 0, in_95 = 0;
-    double width = 0;
-    std::array<double, rank_bins> histogram{};
-    for (const Found& one : found) {
-      ASSERT_TRUE(one.parameters.is_object());
-      const Json& row = one.parameters[prior[k].name];
-      const double truth = one.truth[k];
-      const auto within = [&](const char* low, const char* high) {
-        return row[low].get<double>() <= truth && truth <= row[high].get<double>();
-      };
-      in_68 += within("low_68", "high_68"), in_95 += within("low_95", "high_95");
-      width += row["width_over_prior"].get<double>() / beds;
-      const double rank = one.rank.at(prior[k].name);
-      histogram[static_cast<std::size_t>(std::min(rank_bins - 1.0, std::floor(rank * rank_bins)))] += 1;
-      std::printf("  %s %.4g: %.4g to %.4g (68 %%), %.4g to %.4g, rank %.3f%s\n", prior[k].name, truth,
-                  row["low_68"].get<double>(), row["high_68"].get<double>(), row["low_95"].get<double>(),
-                  row["high_95"].get<double>(), rank, one.velocities ? "" : ", no velocities");
-    }
-    double chi2 = 0;
-    for (const double count : histogram) chi2 += std::pow(count - beds / 10.0, 2) / (beds / 10.0);
-    const double chance = fit::chance_of_chi2(chi2, rank_bins - 1);
-    std::printf("  %s: %d and %d of %zu hold it, ranks even with p = %.3f, width over the prior's %.3f\n",
-                prior[k].name, in_68, in_95, beds, chance, width);
-    EXPECT_NEAR(in_68, 68, 9) << prior[k].name;
-    EXPECT_NEAR(in_95, 95, 4) << prior[k].name;
-    EXPECT_GT(chance, 0.05) << prior[k].name;
+    const Coverage of = coverage_of(found, k);
+    std::printf("  %s: %.0f and %.0f of %zu hold it, ranks even with p = %.3f, width over the prior's %.3f\n",
+                prior[k].name, beds * of.in_68, beds * of.in_95, beds, of.rank_chance, of.width);
+    EXPECT_NEAR(of.in_68, 0.68, 0.14) << prior[k].name;
+    EXPECT_NEAR(of.in_95, 0.95, 0.066) << prior[k].name;
+    EXPECT_GT(of.rank_chance, 0.05 / 3) << prior[k].name;
+    EXPECT_LT(of.width, 0.95) << prior[k].name << ": nothing was learnt";
+    in_68 += of.in_68 / prior.size(), in_95 += of.in_95 / prior.size();
   }
+  std::printf("  of all intervals %.3f and %.3f hold the truth\n", in_68, in_95);
+  EXPECT_NEAR(in_68, 0.68, 0.09);
+  EXPECT_NEAR(in_95, 0.95, 0.04);
 }
 
 }  // namespace

@@ -1,0 +1,93 @@
+// infer-bed, from pictures of a bed whose parameters are known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipelines/formats/json.hpp"
+#include "tests/pipelines/program.hpp"
+#include "tests/pipelines/read_table.hpp"
+
+namespace shakebed::tests::infer_bed {
+namespace {
+
+using pipelines::Json;
+using pipelines::read_json;
+
+// 60 disks, Gamma = 4, e = 0.8, friction 0.3; 80 pictures at 800 Hz, two periods.
+const std::string hidden = R"({ "name": "hidden", "stages": [
+  { "stage": "simulate", "id": "bed", "seed": 11, "replicas": 1,
+    "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.8, "friction": 0.3, "inertia": "sphere" },
+    "box": { "width": "36.9 mm", "sides": { "kind": "hard", "restitution": 0.8, "friction": 0.3 }, "lid": "open" },
+    "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": "20 Hz", "restitution": 0.8, "friction": 0.3 },
+    "settle": "2 s", "measure": "0.1 s", "frames": { "count": 80, "phases": 40 } },
+  { "stage": "render", "id": "film", "from": "bed", "scale": "0.3 mm/px", "exposure": "0.2 ms" } ] })";
+
+class InferBed : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new ScratchFolder;
+    write_text(*folder_ / "hidden.json", hidden);
+    const ProgramResult ran = run_shakebed({"run", "hidden.json", "--out", "hidden", "--quiet"}, folder_->path());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static ProgramResult infer(const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"infer-bed", "hidden/film/frames", "--diameter", "3 mm", "--out", out,
+                                       "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_shakebed(arguments, folder_->path());
+  }
+  static ScratchFolder* folder_;
+};
+ScratchFolder* InferBed::folder_ = nullptr;
+
+// What is asked of the stage infer follows from the frames: count, width, heights, temperatures, and Gamma from the
+// amplitude of the floor.
+TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
+  const ProgramResult ran = infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--beds", "20", "--set",
+                                        "/stages/infer/rounds=0", "--set", "/stages/infer/best=1", "--set",
+                                        "/stages/infer/best_replicas=2", "--set", "/stages/infer/measure=1 s"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("agree with all"), std::string::npos) << ran.out;
+  for (const char* name : {"infer: gamma = ", "infer: restitution = ", "infer: friction = "})
+    EXPECT_NE(ran.out.find(name), std::string::npos) << ran.out;
+  const Json recipe = read_json(*folder_ / "o/resolved.json"), extract = read_json(*folder_ / "o/extract/extract.json");
+  const Json stage = recipe["stages"].back();
+  ASSERT_EQ(stage["stage"], "infer");
+  EXPECT_EQ(stage["disks"]["count"], 60);
+  EXPECT_EQ(stage["first"], 20);
+  EXPECT_NEAR(std::stod(stage["box"]["width"].get<std::string>()), 0.0369, 2e-4);
+  const Json& gamma = stage["parameters"]["gamma"];
+  const double omega = 2 * M_PI * 20, measured = value(extract["floor_amplitude"]) * omega * omega / 9.81;
+  EXPECT_NEAR(gamma["mean"].get<double>(), measured, 1e-9);
+  EXPECT_NEAR(gamma["mean"].get<double>(), 4, 3 * gamma["std_error"].get<double>());
+  EXPECT_NEAR(gamma["std_error"].get<double>() / measured,
+              error(extract["floor_amplitude"]) / value(extract["floor_amplitude"]), 1e-9);
+  const Json& targets = stage["targets"];
+  EXPECT_EQ(targets["profile"]["from"], "extract");
+  EXPECT_EQ(targets.contains("temperature_x_without_flow_over_mg"), extract["velocities"]["usable"].get<bool>());
+  const Json found = read_json(*folder_ / "o/infer/infer.json");
+  for (const auto& [name, truth] : {std::pair{"gamma", 4.0}, {"restitution", 0.8}, {"friction", 0.3}}) {
+    EXPECT_LT(found["parameters"][name]["low_95"], truth) << name;
+    EXPECT_GT(found["parameters"][name]["high_95"], truth) << name;
+  }
+}
+
+TEST_F(InferBed, SaysWhatIsMissing) {
+  const auto refused = [](const std::vector<std::string>& more, int code, const std::string& words) {
+    const ProgramResult ran = infer("wrong", more);
+    EXPECT_EQ(ran.exit_code, code) << ran.err;
+    EXPECT_NE(ran.err.find(words), std::string::npos) << ran.err;
+  };
+  refused({"--gamma", "5,2"}, 2, "--gamma: expected LOW,HIGH with LOW below HIGH");
+  refused({"--restitution", "0.5,1.2"}, 2, "--restitution: expected LOW,HIGH");
+  refused({"--kernel", "top_hat:1"}, 2, "--kernel: the beds of an inference are measured through a Gaussian");
+  refused({"--frequency", "20"}, 2, "has no unit");
+  refused({}, 5, "the frequency of the shaking is not known. Give --frequency");
+}
+
+}  // namespace
+}  // namespace shakebed::tests::infer_bed
