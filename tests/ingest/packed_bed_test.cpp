@@ -133,8 +133,9 @@ GrayFrame tiled(double pitch, bool hexagonal, const std::function<bool(double u,
       const double row = std::round(y / rise) + k;
       const double off = hexagonal && static_cast<int>(std::abs(row)) % 2 == 1 ? 0.5 * pitch : 0;
       const double across = x - off - std::round((x - off) / pitch) * pitch, down = y - row * rise;
-      if (std::hypot(across, down) >= nearest) continue;
-      nearest = std::hypot(across, down), u = across / pitch, v = down / pitch;
+      const double away = std::hypot(across, down);
+      if (away >= nearest) continue;
+      nearest = away, u = across / pitch, v = down / pitch;
     }
     const double middle_x = x - u * pitch, middle_y = y - v * pitch;
     const bool outside = middle_x < 20 || middle_x > 400 || middle_y < 60 || middle_y > 340;

@@ -19,13 +19,8 @@ namespace fs = std::filesystem;
 
 class Infer : public testing::Test {
  protected:
-  // Each bed is measured for a third of the time: what is compared here are runs with one another.
-  Infer() {
-    const std::string usual = R"("settle": 20, "measure": 60)", brief = R"("settle": 5, "measure": 20)";
-    std::string recipe = infer_recipe;
-    recipe.replace(recipe.find(usual), usual.size(), brief);
-    write_text(folder_ / "r.json", recipe);
-  }
+  // What is compared here are runs with one another.
+  Infer() { write_text(folder_ / "r.json", brief_infer_recipe()); }
   ProgramResult run(const std::string& out, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments{"run", "r.json", "--out", out, "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());
