@@ -183,7 +183,7 @@ void expect_screen_copies_refused(const std::string& ending, std::size_t step = 
     EXPECT_FALSE(survey.found) << copy.name << ending << ": " << survey.candidates.front().disks.size() << " disks";
   }
 }
-TEST(DrawingSigns, ScreenCopiesWithRoundMarksAreRefused) { expect_screen_copies_refused(".png", 5); }
+TEST(DrawingSigns, ScreenCopiesWithRoundMarksAreRefused) { expect_screen_copies_refused(".png", 10); }
 TEST(DrawingSigns, ScreenCopiesOfEveryKindAreRefused) { expect_screen_copies_refused(".png"); }
 TEST(DrawingSigns, ScreenCopiesSavedAsJpegAreRefused) { expect_screen_copies_refused(".jpg"); }
 

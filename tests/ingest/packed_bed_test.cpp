@@ -86,11 +86,19 @@ void expect_all_found(const std::vector<RenderedDisk>& beads, const Photograph& 
   EXPECT_EQ(found.calibration.polarity, photograph.bright ? Polarity::bright_beads : Polarity::dark_beads) << name;
 }
 
+struct Crystal {
+  double radius;  // px
+  Photograph photograph;
+};
+void expect_crystals_found(const std::vector<Crystal>& crystals) {
+  for (const auto& [radius, photograph] : crystals)
+    expect_all_found(crystal(radius), photograph, "crystal of " + std::to_string(radius));
+}
 TEST(PackedBed, SmallBeadsOfACrystalAreFoundByTheirFaces) {
-  const std::vector<Photograph> photographs = {{0.5, 10, false}, {0.8, 2, true}, {0.8, 5, false}, {1.2, 5, true}};
-  std::size_t k = 0;
-  for (const double radius : {3.6, 4.3, 5.3, 6.5, 8.0})
-    expect_all_found(crystal(radius), photographs[k++ % photographs.size()], "crystal of " + std::to_string(radius));
+  expect_crystals_found({{3.6, {0.5, 10, false}}, {6.5, {1.2, 5, true}}});
+}
+TEST(PackedBed, BeadsOfACrystalOfOtherSizesAreFoundByTheirFaces) {
+  expect_crystals_found({{4.3, {0.8, 2, true}}, {5.3, {0.8, 5, false}}, {8.0, {0.5, 10, false}}});
 }
 
 TEST(PackedBed, SmallBeadsOfADisorderedBedAreFoundByTheirFaces) {
@@ -125,8 +133,9 @@ GrayFrame tiled(double pitch, bool hexagonal, const std::function<bool(double u,
       const double row = std::round(y / rise) + k;
       const double off = hexagonal && static_cast<int>(std::abs(row)) % 2 == 1 ? 0.5 * pitch : 0;
       const double across = x - off - std::round((x - off) / pitch) * pitch, down = y - row * rise;
-      if (std::hypot(across, down) >= nearest) continue;
-      nearest = std::hypot(across, down), u = across / pitch, v = down / pitch;
+      const double away = std::hypot(across, down);
+      if (away >= nearest) continue;
+      nearest = away, u = across / pitch, v = down / pitch;
     }
     const double middle_x = x - u * pitch, middle_y = y - v * pitch;
     const bool outside = middle_x < 20 || middle_x > 400 || middle_y < 60 || middle_y > 340;

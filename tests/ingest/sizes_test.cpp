@@ -54,7 +54,9 @@ GrayFrame drawn(const std::vector<Bead>& beads, int width, int height, double ba
         for (const double dy : {-0.25, 0.25}) {
           const double x = column + dx, y = row + dy;
           const auto bead = std::find_if(beads.begin(), beads.end(), [&](const Bead& one) {
-            return std::hypot(one.x - x, one.y - y) < one.radius;
+            const double across = one.x - x, down = one.y - y;
+            return std::abs(across) < one.radius && std::abs(down) < one.radius &&
+                   std::hypot(across, down) < one.radius;
           });
           level += bead == beads.end() ? background / 4
                                        : face(*bead, (x - bead->x) / bead->radius, (y - bead->y) / bead->radius) / 4;

@@ -9,7 +9,7 @@
 #include "sim/engine/simulation.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::bouncing_ball_law {
 namespace {
 
 using tests::expect_law;
@@ -160,4 +160,4 @@ TEST(BouncingBall, EndsItsChatter) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::bouncing_ball_law

@@ -12,7 +12,7 @@
 #include "sim/measure/observables.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::contact_duration_law {
 namespace {
 
 using tests::expect_law;
@@ -145,4 +145,4 @@ TEST(ContactDuration, ItsEffectOnTIsStated) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::contact_duration_law

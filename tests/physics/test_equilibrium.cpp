@@ -7,7 +7,7 @@
 #include "sim/measure/observables.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::equilibrium_law {
 namespace {
 
 using tests::expect_law;
@@ -111,4 +111,4 @@ TEST(ElasticBed, KeepsItsEnergyForAHundredMillionCollisions) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::equilibrium_law

@@ -17,7 +17,7 @@
 #include "sim/engine/random.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::floor_roots_law {
 namespace {
 
 using tests::expect_law;
@@ -309,4 +309,4 @@ INSTANTIATE_TEST_SUITE_P(KindAndOnePartMore, AdversarialFloorRoots,
                          testing::Combine(testing::Range(0, 3), testing::Values(3)));
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::floor_roots_law

@@ -13,7 +13,7 @@
 #include "sim/measure/statistics.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::granular_gas_law {
 namespace {
 
 using std::numbers::pi;
@@ -217,4 +217,4 @@ TEST(HeatedGas, HasItsTemperatureForEveryRestitution) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::granular_gas_law

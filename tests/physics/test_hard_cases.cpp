@@ -11,7 +11,7 @@
 #include "sim/engine/simulation.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::hard_cases_law {
 namespace {
 
 using tests::expect_law;
@@ -226,4 +226,4 @@ TEST(HardCases, ClockIsAsFineAfterTenBillionCollisions) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::hard_cases_law

@@ -11,7 +11,7 @@
 #include "sim/measure/flights.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::hydrostatics_law {
 namespace {
 
 using tests::expect_law;
@@ -183,4 +183,4 @@ TEST(Hydrostatics, FluidBedHasEnskogsProfileAt15CriticalTemperatures) { expect_e
 TEST(Hydrostatics, FluidBedHasEnskogsProfileAt40CriticalTemperatures) { expect_enskog_profile(40, 5, 16000); }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::hydrostatics_law

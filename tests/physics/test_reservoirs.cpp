@@ -10,7 +10,7 @@
 #include "sim/measure/velocities.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::reservoirs_law {
 namespace {
 
 using tests::expect_law;
@@ -139,4 +139,4 @@ TEST(Reservoir, ThermalFloorHoldsTheBedInEquilibrium) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::reservoirs_law

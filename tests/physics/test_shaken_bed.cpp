@@ -9,7 +9,7 @@
 #include "sim/measure/observables.hpp"
 #include "tests/physics/law.hpp"
 
-namespace shakebed::sim {
+namespace shakebed::sim::shaken_bed_law {
 namespace {
 
 using tests::expect_law;
@@ -146,4 +146,4 @@ TEST(ShakenBed, EndsWhereRowsLock) {
 }
 
 }  // namespace
-}  // namespace shakebed::sim
+}  // namespace shakebed::sim::shaken_bed_law

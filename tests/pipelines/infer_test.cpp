@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 
 class Infer : public testing::Test {
  protected:
-  Infer() { write_text(folder_ / "r.json", infer_recipe); }
+  // What is compared here are runs with one another.
+  Infer() { write_text(folder_ / "r.json", brief_infer_recipe()); }
   ProgramResult run(const std::string& out, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments{"run", "r.json", "--out", out, "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());

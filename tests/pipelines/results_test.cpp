@@ -75,10 +75,4 @@ TEST(ResultsOfRecord, AreListedALineARecipe) {
   EXPECT_EQ(run_shakebed({"reproduce", "--list", "--results"}, source).exit_code, 2);
 }
 
-TEST(ResultsOfRecord, HaveRecipesOfTwoPresets) {
-  const ProgramResult all = run_shakebed({"reproduce", "all", "--preset", "quick", "--dry-run"}, source);
-  EXPECT_EQ(all.exit_code, 0) << all.err;
-  EXPECT_EQ(run_shakebed({"reproduce", "all", "--preset", "full", "--dry-run"}, source).exit_code, 0);
-}
-
 }  // namespace

@@ -249,6 +249,6 @@ TEST(StatedResults, OfAStudyAndWhatIsMadeOfIt) {
         { "name": "a", "x": "bath_T", "y": "T", "where": { "series": "a" } } ] } ] } ] })");
 }
 
-TEST(StatedResults, OfASearch) { compare(infer_recipe); }
+TEST(StatedResults, OfASearch) { compare(brief_infer_recipe()); }
 
 }  // namespace

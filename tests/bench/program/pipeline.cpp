@@ -19,8 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // The bed: D = 3 mm, 4 disks a diameter of width, T = m g D by a Langevin bath: a fluid throughout, far above T_c.
-constexpr double diameter = 3e-3, temperature = 1;  // m; m g D
-constexpr int column = 4;                           // N D/W
+constexpr double bed_diameter = 3e-3, temperature = 1;  // m; m g D
+constexpr int bed_column = 4;                           // N D/W
 
 // The fits that are compared. The default is what a recipe gets that asks for nothing. Near the floor the disks stand
 // in layers, and where the bed is dense it changes over one diameter: no model of a local density has either. The other
@@ -50,11 +50,11 @@ Json simulate_json(const Settings& s, std::uint64_t seed, double measure, int fr
       {"stage", "simulate"},
       {"id", "bed"},
       {"seed", seed},
-      {"disks", {{"count", column * s.width}, {"diameter", diameter}}},
+      {"disks", {{"count", bed_column * s.width}, {"diameter", bed_diameter}}},
       {"gravity", 9.81},
-      {"box", {{"width", s.width * diameter}, {"sides", "periodic"}}},
+      {"box", {{"width", s.width * bed_diameter}, {"sides", "periodic"}}},
       {"floor", {{"motion", "still"}}},
-      {"bath", {{"kind", "langevin"}, {"temperature", temperature * diameter}, {"rate", 20}, {"interval", 2e-3}}},
+      {"bath", {{"kind", "langevin"}, {"temperature", temperature * bed_diameter}, {"rate", 20}, {"interval", 2e-3}}},
       {"settle", 2},
       {"measure", measure},
       {"frames", {{"count", frames}}}};
@@ -68,14 +68,15 @@ Json fit_json_of(const Way& way, const char* from) {
 }
 
 Json recipe_of(const Settings& s, std::uint64_t seed) {
-  Json render{{"stage", "render"}, {"from", "bed"}, {"seed", seed}, {"scale", diameter / s.pixels_a_diameter}};
+  Json render{{"stage", "render"}, {"from", "bed"}, {"seed", seed}, {"scale", bed_diameter / s.pixels_a_diameter}};
   if (s.camera_faults)
     render["noise"] = 5, render["exposure"] = 0.5e-3, render["blur"] = 0.8;
   else
     render["noise"] = 0, render["exposure"] = 0, render["blur"] = 0.5, render["gradient_x"] = 0,
     render["gradient_y"] = 0;
-  Json stages = Json::array({simulate_json(s, seed, s.interval * s.frames, s.frames), render,
-                             Json{{"stage", "extract"}, {"from", "render"}, {"diameter", diameter}, {"overlays", 0}}});
+  Json stages =
+      Json::array({simulate_json(s, seed, s.interval * s.frames, s.frames), render,
+                   Json{{"stage", "extract"}, {"from", "render"}, {"diameter", bed_diameter}, {"overlays", 0}}});
   for (const Way& way : ways) stages.push_back(fit_json_of(way, "extract"));
   return Json{{"name", "bench"}, {"stages", std::move(stages)}};
 }
@@ -120,7 +121,7 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 
 std::string settings_text(const Settings& s) {
   return fmt::format("{} px a diameter, {} frames, {} disks, {:.1f} s of bed", s.pixels_a_diameter, s.frames,
-                     column * s.width, s.interval * s.frames);
+                     bed_column * s.width, s.interval * s.frames);
 }
 
 // One setting: cost and errors over several beds, each with a seed of its own.
@@ -198,7 +199,7 @@ std::vector<Dial> all_dials(bool quick) {
 
 // Settings as the first cells of a row.
 std::vector<Json> settings_cells(const Settings& s) {
-  return {s.pixels_a_diameter, s.frames, column * s.width, s.interval * s.frames};
+  return {s.pixels_a_diameter, s.frames, bed_column * s.width, s.interval * s.frames};
 }
 Json percent_or_null(double value) { return number_or_null(100 * value); }
 

@@ -385,9 +385,9 @@ double largest_difference(const sim::Simulation& one, const sim::Simulation& oth
 }
 
 // A disk that rests has a contact each contact duration: that, not a time step, is what piles cost here.
-class HardCases {
+class HardScenes {
  public:
-  HardCases(const Effort& effort, StageResult& result) : effort_(effort), result_(result) {}
+  HardScenes(const Effort& effort, StageResult& result) : effort_(effort), result_(result) {}
 
   void run() {
     effort_.step("simulate: hard cases");
@@ -604,7 +604,7 @@ StageResult bench_simulate(const Effort& effort) {
     error_against_collisions(effort, result);
     contact_clock(effort, result);
     speed_and_growth(effort, result);
-    HardCases(effort, result).run();
+    HardScenes(effort, result).run();
   });
   return result;
 }
