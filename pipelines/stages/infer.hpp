@@ -156,8 +156,8 @@ void write_inference(RunContext& context, const InferOptions& options, const Bed
 void draw_pairs(RunContext& context, const InferOptions& options, const Inference& found);
 StagePages infer_pages();
 
-// The scale on which numbers are compared: the logarithm where the scatter is a part of the value; of densities a root,
-// since the scatter of a count grows as its root. And the slope of that scale.
+// The scale on which numbers are compared, and its slope. It is the logarithm where the scatter is a part of the value.
+// Densities have a root, since the scatter of a count grows as its root.
 double to_scale(std::size_t number, double value);
 double from_scale(std::size_t number, double value);
 double slope_of_scale(std::size_t number, double value);
