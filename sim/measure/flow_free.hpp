@@ -1,6 +1,8 @@
 // Kinetic temperatures without the mean motion of each layer at each moment, as a film of a bed gives them. What whole
 // layers do together is no temperature here: neither the bounce of a bed, which may differ from period to period, nor
 // its sloshing from side to side. Reduced units.
+//
+// One thread at a time may use an observer; different ones share nothing.
 #pragma once
 
 #include <array>
