@@ -11,6 +11,7 @@
 
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/outline.hpp"
+#include "ingest/find/picture_scale.hpp"
 #include "ingest/find/rim_probability.hpp"
 
 namespace shakebed::ingest {
@@ -28,8 +29,22 @@ struct GapModel {
   std::vector<SizeBand> other_sizes;  // empty: all beads are of one size
 };
 
+// At which scale rims are searched, and how.
+struct RimSearch {
+  double wanted_px = quick_radius_px;  // a bead's radius on the map is this to twice this
+  CircleVotes votes{};
+  double least_votes_in_gaps = votes.least;  // beside beads that are found
+};
+inline constexpr RimSearch quick_search{};
+// Of a photograph with 1,100 photoelastic disks of 33 px radius, 690 have a rim that is seen to 60 % or more at 8 px,
+// 50 of them made up by chance; at 16 px 1,000 with 27 by chance.
+inline constexpr RimSearch thorough_search{16, {1.05, 0.2}, 0.15};
+
 struct RimModel {
+  // `automatic`: the edge may be a step up or down, another in each direction, as with disks that are partly brighter
+  // and partly darker than what is behind them.
   Polarity polarity = Polarity::automatic;
+  RimSearch search;
   double radius_px = 0;
   double radius_std_error_px = 0;
   // The radius towards sides without a near neighbour, if enough such sides are seen; else radius_px. Where beads
@@ -58,7 +73,8 @@ struct LearnedRims {
 
 // Learns from one frame, starting from a radius good to a tenth. Where beads are known to be there, poor circles of
 // chance, as the copies of beads of another size make, say nothing against circles that are seen well.
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known = Known::nothing);
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known = Known::nothing,
+                       const RimSearch& search = quick_search);
 
 // Whether the outlines of the disks are round.
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);
