@@ -144,7 +144,7 @@ class Census {
       for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
         if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
         const auto circles = [&](const EdgeMap& map) {
-          return find_circles(map, smallest_at_level, largest_at_level, polarity, faintest_census_support);
+          return find_circles(map, {smallest_at_level, largest_at_level, polarity, faintest_census_support});
         };
         const Found found{circles(edges), {circles(one), circles(other)}};
         const RadiusRange range_of_radii = radii_at(level.scale, options_);

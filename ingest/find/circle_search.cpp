@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <numbers>
 
-#include "ingest/find/nearby.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
@@ -14,8 +13,6 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double radius_ratio = 1.09;    // of one radius voted for to the next: what a peak is wide
-constexpr double least_votes = 0.3;      // share of the rim that must vote for a place
 constexpr double least_alignment = 0.8;  // cosine between an edge's gradient and the ray
 constexpr double least_tolerance = 0.6;  // px: what pixels do to an edge's place
 constexpr double ray_step = 0.5;         // px
@@ -50,6 +47,12 @@ Gradient gradient_at(const EdgeMap& edges, double x, double y) {
   return {mix(edges.x), mix(edges.y)};
 }
 
+// Of the step outwards across a rim; 0: of either sign.
+float sign_of(Polarity polarity) {
+  return polarity == Polarity::bright_beads ? -1.0F : polarity == Polarity::dark_beads ? 1.0F : 0.0F;
+}
+float signed_by(float sign, float step) { return sign == 0 ? std::abs(step) : sign * step; }
+
 // Where along a ray the edge is: its distance from the rim, if there is one.
 struct Met {
   bool in_view = false, edge = false;
@@ -71,7 +74,8 @@ Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double
     if (x < 1 || y < 1 || x >= edges.width - 2 || y >= edges.height - 2) continue;
     met.in_view = met.in_view || k == 0;
     const Gradient gradient = gradient_at(edges, x, y);
-    const float radial = sign * (gradient.x * static_cast<float>(cosine) + gradient.y * static_cast<float>(sine));
+    const float radial =
+        signed_by(sign, gradient.x * static_cast<float>(cosine) + gradient.y * static_cast<float>(sine));
     along[static_cast<std::size_t>(k + used)] = radial;
     if (radial <= best) continue;
     if (radial * radial <
@@ -154,7 +158,8 @@ bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, doubl
       if (column < 1 || row < 1 || column >= edges.width - 1 || row >= edges.height - 1) continue;
       seen = true;
       const std::size_t at = edges.at(column, row);
-      const float radial = sign * (edges.x[at] * static_cast<float>(cosine) + edges.y[at] * static_cast<float>(sine));
+      const float radial =
+          signed_by(sign, edges.x[at] * static_cast<float>(cosine) + edges.y[at] * static_cast<float>(sine));
       edge = edge || (radial > edges.threshold &&
                       radial * radial > 0.6F * (edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]));
     }
@@ -176,8 +181,10 @@ class VoteMap {
         across_(width_),
         sums_(window * width_) {}
 
-  std::vector<Circle> peaks(double radius, float sign) {
-    vote(static_cast<float>(-radius) * sign);
+  std::vector<Circle> peaks(double radius, float sign, double least_votes) {
+    std::fill(votes_.begin(), votes_.end(), Count{0});
+    if (sign <= 0) vote(static_cast<float>(radius));
+    if (sign >= 0) vote(static_cast<float>(-radius));
     const double least = std::ceil(least_votes * 2 * std::numbers::pi * radius);
     std::vector<Circle> peaks;
     if (height_ < window) return peaks;
@@ -195,7 +202,6 @@ class VoteMap {
   static constexpr std::size_t window = 5;
 
   void vote(float shift) {
-    std::fill(votes_.begin(), votes_.end(), Count{0});
     for (const RidgePixel& edge : edges_.ridge) {
       const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
       const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
@@ -251,10 +257,51 @@ class VoteMap {
   std::vector<Count> votes_, across_, sums_;
 };
 
+// Circles that are kept, in cells as wide as the distance that two of them need. Far fewer than all circles.
+struct KeptCircles {
+  std::vector<Circle> all;
+
+  KeptCircles(const std::vector<Circle>& circles, double share) : share_(share) {
+    double largest = 1, right = 0, bottom = 0;
+    if (!circles.empty()) left_ = circles.front().x, top_ = circles.front().y, right = left_, bottom = top_;
+    for (const Circle& circle : circles) {
+      largest = std::max(largest, circle.radius);
+      left_ = std::min(left_, circle.x), right = std::max(right, circle.x);
+      top_ = std::min(top_, circle.y), bottom = std::max(bottom, circle.y);
+    }
+    cell_ = 2 * share * largest;
+    columns_ = static_cast<std::size_t>((right - left_) / cell_) + 3;
+    cells_.resize(columns_ * (static_cast<std::size_t>((bottom - top_) / cell_) + 3));
+  }
+
+  void keep_unless_near(const Circle& circle) {
+    const std::size_t at = cell_of(circle);
+    for (const std::size_t row : {at - columns_, at, at + columns_})
+      for (const std::size_t cell : {row - 1, row, row + 1})
+        for (const std::size_t other : cells_[cell])
+          if (std::hypot(circle.x - all[other].x, circle.y - all[other].y) <
+              share_ * (circle.radius + all[other].radius))
+            return;
+    cells_[at].push_back(all.size());
+    all.push_back(circle);
+  }
+
+ private:
+  // The outermost cells stay empty.
+  [[nodiscard]] std::size_t cell_of(const Circle& circle) const {
+    return (static_cast<std::size_t>((circle.y - top_) / cell_) + 1) * columns_ +
+           static_cast<std::size_t>((circle.x - left_) / cell_) + 1;
+  }
+
+  double share_, cell_ = 1, left_ = 0, top_ = 0;
+  std::size_t columns_ = 0;
+  std::vector<std::vector<std::size_t>> cells_;
+};
+
 }  // namespace
 
 Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, const RimRays& rays) {
-  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
+  const float sign = sign_of(polarity);
   Circle circle = start;
   if (!worth_fitting(edges, start, sign, std::max(1.2, rays.reach * start.radius))) return circle;
   constexpr int rounds = 3;
@@ -305,7 +352,7 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
 }
 
 double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polarity, std::uint64_t open, int fewest) {
-  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
+  const float sign = sign_of(polarity);
   constexpr double reach = 0.15;  // radii
   std::vector<float> distances;
   for (int k = 0; k < circle.directions; ++k) {
@@ -318,19 +365,20 @@ double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polar
   return static_cast<double>(median_of(distances));
 }
 
-std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, Polarity polarity,
-                                 double least_support) {
+std::vector<Circle> find_circles(const EdgeMap& edges, const CirclesAsked& asked) {
   std::vector<Circle> found;
   if (edges.ridge.size() < 8) return found;
-  const float sign = polarity == Polarity::bright_beads ? -1.0F : 1.0F;
-  const int count = static_cast<int>(std::ceil(std::log(to / from) / std::log(radius_ratio) - 1e-9)) + 1;
+  const float sign = sign_of(asked.polarity);
+  const double ratio = asked.votes.radius_ratio;
+  const int count = static_cast<int>(std::ceil(std::log(asked.to_px / asked.from_px) / std::log(ratio) - 1e-9)) + 1;
   VoteMap votes(edges);
   for (int k = 0; k < count; ++k) {
-    const double radius = from * std::pow(radius_ratio, k);
-    for (const Circle& peak : votes.peaks(radius, sign)) {
+    const double radius = asked.from_px * std::pow(ratio, k);
+    for (const Circle& peak : votes.peaks(radius, sign, asked.votes.least)) {
+      if (asked.leave_out && asked.leave_out(peak)) continue;
       StopQuestion::ask();
-      const Circle circle = fit_circle(edges, peak, polarity);
-      if (circle.support >= least_support) found.push_back(circle);
+      const Circle circle = fit_circle(edges, peak, asked.polarity);
+      if (circle.support >= asked.least_support) found.push_back(circle);
     }
   }
   return found;
@@ -343,21 +391,9 @@ std::vector<Circle> without_doubles(std::vector<Circle> circles, double share) {
     if (a.y != b.y) return a.y < b.y;
     return a.x < b.x;
   });
-  double largest = 1;
-  for (const Circle& circle : circles) largest = std::max(largest, circle.radius);
-  const Nearby near(circles.size(), 2 * share * largest,
-                    [&](std::size_t i) { return std::pair(circles[i].x, circles[i].y); });
-  std::vector<std::uint8_t> kept(circles.size(), 0);
-  std::vector<Circle> out;
-  for (std::size_t i = 0; i < circles.size(); ++i) {
-    const bool taken = near.any_near(circles[i].x, circles[i].y, [&](std::size_t j) {
-      return kept[j] != 0 && std::hypot(circles[i].x - circles[j].x, circles[i].y - circles[j].y) <
-                                 share * (circles[i].radius + circles[j].radius);
-    });
-    kept[i] = !taken;
-    if (!taken) out.push_back(circles[i]);
-  }
-  return out;
+  KeptCircles kept(circles, share);
+  for (const Circle& circle : circles) kept.keep_unless_near(circle);
+  return std::move(kept.all);
 }
 
 }  // namespace shakebed::ingest

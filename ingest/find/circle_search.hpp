@@ -3,6 +3,7 @@
 // examined along rays, and centre and radius are fitted to the edges met there.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "ingest/calibrate/calibration.hpp"
@@ -33,16 +34,30 @@ struct RimRays {
   double faint = 0;
 };
 
-// The circle nearest to `start` through edges of this polarity; its support is 0 when there is none.
+// The circle nearest to `start` through edges of this polarity, or of both where it is `automatic`; its support is 0
+// when there is none.
 Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, const RimRays& rays = {});
 
 // Median distance of the edges from the centre of a fitted circle in those of its directions that are `open` (a bit
 // each); 0 when fewer than `fewest` are met.
 double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polarity, std::uint64_t open, int fewest);
 
-// Circles of all radii from `from` to `to` px with at least this support, each radius by itself: one circle can be
-// found from several radii (see without_doubles).
-std::vector<Circle> find_circles(const EdgeMap& edges, double from, double to, Polarity polarity, double least_support);
+// How places of circles are voted for.
+struct CircleVotes {
+  double radius_ratio = 1.09;  // of one radius voted for to the next: what a peak is wide
+  double least = 0.3;          // share of the rim that must vote for a place
+};
+
+// Circles that are looked for.
+struct CirclesAsked {
+  double from_px = 0, to_px = 0;  // radii, of the map
+  Polarity polarity = Polarity::automatic;
+  double least_support = 0;
+  CircleVotes votes{};
+  std::function<bool(const Circle&)> leave_out{};  // places, with the radius voted for, that need not be looked at
+};
+// Each radius by itself: one circle can be found from several radii (see without_doubles).
+std::vector<Circle> find_circles(const EdgeMap& edges, const CirclesAsked& asked);
 
 // Of circles nearer to one another than `share` of their radii's sum, the better supported one.
 std::vector<Circle> without_doubles(std::vector<Circle> circles, double share);

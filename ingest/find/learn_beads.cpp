@@ -269,7 +269,7 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
   calibration.recorded_px = options.recorded_px;
-  calibration.polarity = rims.model.polarity;
+  calibration.polarity = options.seen ? options.seen->polarity : rims.model.polarity;
   calibration.radius_px = calibration.rim_radius_px = rims.model.open_radius_px;
   // Rims of an unknown blur are known to a fifth of a pixel at best.
   constexpr double unknown_blur_px = 0.2;
@@ -292,6 +292,36 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   if (!result.found)
     result.why_not = "no rim of radius " + std::to_string(rims.model.radius_px * options.recorded_px) + " px is seen";
   return result;
+}
+
+double expected_beads(const std::vector<RimDisk>& disks) {
+  double expected = 0;
+  for (const RimDisk& disk : disks) expected += disk.probability;
+  return expected;
+}
+
+double missed_by(const GrayFrame& frame, const RimModel& model, const FindOptions& options) {
+  const RimsFound seen = find_rims(frame, model);
+  std::vector<Circle> found;
+  for (const RimDisk& disk : seen.disks) found.push_back(disk.circle);
+  return share_missed(frame, model, found, seen.expected_missed, options.roi);
+}
+
+// Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
+// clearly more of them. It takes several times as long. Where hardly any is missed it can only add wrong ones: of a
+// photograph of 65 photoelastic disks, all of which the quick search finds, it found 63.
+LearnedRims most_telling(const GrayFrame& frame, LearnedRims quick, const FindOptions& options) {
+  constexpr double clearly_more = 1.03, hardly_any = 0.05;
+  if (missed_by(frame, quick.model, options) < hardly_any) return quick;
+  const auto learned = [&](Polarity polarity) {
+    return learn_rims(frame, polarity, quick.model.radius_px, Known::beads, thorough_search);
+  };
+  LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
+  if (expected_beads(either.disks) > clearly_more * expected_beads(thorough.disks)) thorough = std::move(either);
+  learn_gaps(frame, thorough, options.one_size || options.rims_of_one_size);
+  const double by_quick = expected_beads(find_rims(frame, quick.model).disks);
+  const double by_thorough = expected_beads(find_rims(frame, thorough.model).disks);
+  return by_thorough > clearly_more * by_quick ? thorough : quick;
 }
 
 FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {
@@ -342,7 +372,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
-  return calibration_by_rims(frame, rims, options);
+  return calibration_by_rims(frame, most_telling(frame, std::move(rims), options), options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {

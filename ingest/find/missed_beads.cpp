@@ -190,7 +190,9 @@ class FreePlaces {
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region) {
   const ScaledPicture at = scaled_for(frame, model.radius_px);
-  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  // A threshold that was learned at another scale says nothing here.
+  const bool of_this_scale = model.search.wanted_px == quick_radius_px;
+  const EdgeMap edges = find_edges(at.picture, of_this_scale ? model.threshold : 0);
   std::vector<Circle> disks = found;
   for (Circle& disk : disks) {
     disk.x = at.from_frame_x(disk.x);

@@ -23,7 +23,8 @@ double copy_angle(std::size_t copy);
 // The frame must outlive it; not for several threads at once.
 class PictureMaps {
  public:
-  explicit PictureMaps(const GrayFrame& frame) : frame_(frame) {}
+  // `wanted_px` as in scale_for().
+  PictureMaps(const GrayFrame& frame, double wanted_px) : frame_(frame), wanted_px_(wanted_px) {}
   // `threshold` as in find_edges().
   const PictureMap& scaled_for(double radius_px, float threshold = 0);
   // The same, with its copies.
@@ -38,6 +39,7 @@ class PictureMaps {
   One& made_for(double radius_px, float threshold);
 
   const GrayFrame& frame_;
+  double wanted_px_;
   std::list<One> made_;
 };
 

@@ -8,7 +8,7 @@
 namespace shakebed::ingest {
 
 namespace {
-constexpr double least_radius = 5, wanted_radius = 8;  // px: below the first a rim is too coarse to tell a circle
+constexpr double least_radius = 5;  // px: below it a rim is too coarse to tell a circle
 
 class Stretching {
  public:
@@ -77,13 +77,13 @@ GrayFrame stretched(const GrayFrame& frame, double ratio, double angle) {
   return out;
 }
 
-double scale_for(double radius_px) {
-  return radius_px < least_radius ? 0.5 : std::max(1, static_cast<int>(radius_px / wanted_radius));
+double scale_for(double radius_px, double wanted_px) {
+  return radius_px < least_radius ? 0.5 : std::max(1, static_cast<int>(radius_px / wanted_px));
 }
 
-ScaledPicture scaled_for(const GrayFrame& frame, double radius_px) {
+ScaledPicture scaled_for(const GrayFrame& frame, double radius_px, double wanted_px) {
   ScaledPicture scaled;
-  scaled.scale = scale_for(radius_px);
+  scaled.scale = scale_for(radius_px, wanted_px);
   scaled.picture = scaled.scale < 1 ? doubled(frame) : reduced(frame, static_cast<int>(scaled.scale));
   return scaled;
 }

@@ -29,8 +29,9 @@ struct ScaledPicture {
   [[nodiscard]] double from_frame_y(double y) const { return (y + 0.5 - top) / scale - 0.5; }
 };
 
-// Reduced so that a radius becomes 8 to 16 px, doubled if it is below 5 px; by which factor.
-double scale_for(double radius_px);
-ScaledPicture scaled_for(const GrayFrame& frame, double radius_px);
+// Reduced so that a radius becomes `wanted_px` (8 or more) to twice that, doubled if it is below 5 px; by which factor.
+inline constexpr double quick_radius_px = 8;
+double scale_for(double radius_px, double wanted_px = quick_radius_px);
+ScaledPicture scaled_for(const GrayFrame& frame, double radius_px, double wanted_px = quick_radius_px);
 
 }  // namespace shakebed::ingest

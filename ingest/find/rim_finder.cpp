@@ -37,8 +37,10 @@ constexpr double correlated_px = 3.5;
 constexpr double blur_of_map_px2 = 1.42;
 const RimRays fine_rays = {.count = 48, .reach = 0.15, .tolerance = 0.07, .faint = 0.65};
 
-std::vector<Circle> circles_of(const EdgeMap& edges, double radius, Polarity polarity) {
-  std::vector<Circle> circles = find_circles(edges, radius * 0.93, radius * 1.08, polarity, faintest_rim_support);
+// Of the model's polarity.
+std::vector<Circle> circles_of(const EdgeMap& edges, double radius, const RimModel& model) {
+  std::vector<Circle> circles =
+      find_circles(edges, {radius * 0.93, radius * 1.08, model.polarity, faintest_rim_support, model.search.votes});
   std::erase_if(circles, [&](const Circle& circle) { return std::abs(circle.radius / radius - 1) > radius_window; });
   return without_doubles(std::move(circles), nearest_centres);
 }
@@ -155,12 +157,11 @@ std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPi
 }
 
 // Learns at the scale of this radius, on the copies too.
-LearnedRims learn_rims_at(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
+LearnedRims learn_rims_at(const GrayFrame& frame, const RimModel& start, Known known) {
   LearnedRims learned;
   RimModel& model = learned.model;
-  model.polarity = polarity;
-  model.radius_px = radius_px;
-  const ScaledPicture at = scaled_for(frame, radius_px);
+  model = start;
+  const ScaledPicture at = scaled_for(frame, model.radius_px, model.search.wanted_px);
   const EdgeMap edges = find_edges(at.picture);
   model.threshold = edges.threshold;
   std::vector<EdgeMap> copies;  // in four directions, so that what is oval in one of them is round in another
@@ -175,9 +176,9 @@ LearnedRims learn_rims_at(const GrayFrame& frame, Polarity polarity, double radi
        round < fewest_rounds || (round < most_rounds && std::abs(model.radius_px / at.scale / radius - 1) > settled);
        ++round) {
     radius = model.radius_px / at.scale;
-    circles = circles_of(edges, radius, polarity);
+    circles = circles_of(edges, radius, model);
     std::vector<std::vector<Circle>> by_chance;
-    for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, polarity));
+    for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, model));
     model.probability = probabilities_by_support(circles, by_chance, known);
     measure_rims(circles, at.scale, model);
   }
@@ -191,16 +192,22 @@ LearnedRims learn_rims_at(const GrayFrame& frame, Polarity polarity, double radi
 
 double RimModel::probability_of(double support) const { return probability_at(probability, support); }
 
-LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known) {
-  LearnedRims learned = learn_rims_at(frame, polarity, radius_px, known);
+LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known,
+                       const RimSearch& search) {
+  RimModel start;
+  start.polarity = polarity;
+  start.radius_px = radius_px;
+  start.search = search;
+  LearnedRims learned = learn_rims_at(frame, start, known);
   // Frames are searched at the scale of the radius that was learned: what was learned must be of that scale, too.
-  const double radius = learned.model.radius_px;
-  if (scale_for(radius) != scale_for(radius_px)) learned = learn_rims_at(frame, polarity, radius, known);
+  start.radius_px = learned.model.radius_px;
+  if (scale_for(start.radius_px, search.wanted_px) != scale_for(radius_px, search.wanted_px))
+    learned = learn_rims_at(frame, start, known);
   return learned;
 }
 
 void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
-  PictureMaps maps(frame);
+  PictureMaps maps(frame, learned.model.search.wanted_px);
   std::vector<Circle> beads;
   for (const RimDisk& disk : learned.disks) beads.push_back(disk.circle);
   learned.model.gaps = chances_in_gaps(maps, beads, learned.model, one_size);
@@ -215,10 +222,10 @@ Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std:
 }
 
 RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
-  PictureMaps maps(frame);
+  PictureMaps maps(frame, model.search.wanted_px);
   const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, model.threshold);
   RimsFound found;
-  found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model.polarity), edges, at, model);
+  found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model), edges, at, model);
   const auto drop_faint = [&] {
     std::erase_if(found.disks,
                   [&](const RimDisk& disk) { return disk.circle.contrast < faintest_contrast * model.contrast; });
@@ -246,7 +253,7 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
 }
 
 std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places) {
-  const ScaledPicture at = scaled_for(frame, model.radius_px);
+  const ScaledPicture at = scaled_for(frame, model.radius_px, model.search.wanted_px);
   const EdgeMap edges = find_edges(at.picture, model.threshold);
   std::vector<Circle> circles;
   for (const Circle& place : places) {

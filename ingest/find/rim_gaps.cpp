@@ -16,6 +16,7 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr double gap_reach = 2;            // radii: so far from a bead's rim a circle's rim may be
+constexpr double farthest_fitted = 0.5;    // radii: a fit moves a circle no farther from where votes placed it
 constexpr double nearest_rims = 0.8;       // sums of radii: two circles nearer than that overlap
 constexpr double same_bead_radius = 0.12;  // of the radius that beads share, either way
 // In radii of the beads. At half of it, fringes in photoelastic disks are mistaken for beads, unless there is a size
@@ -38,21 +39,49 @@ constexpr double size_step = 1.04, worthless_support = 0.4;
 // Where a place of the map is in the picture that the beads were found in.
 using ToFrame = std::function<FramePlace(double x, double y)>;
 
+struct GapMap {
+  const EdgeMap& edges;
+  double scale = 1;  // px of the frame a px of the map
+  ToFrame to_frame;
+};
+
+bool within(double radius, const SizeBand& band) { return radius >= band.from_px && radius <= band.to_px; }
+
 // Circles of a map, px of the frame, and which of them lie beside beads and overlap none.
 class GapSearch {
  public:
-  // Radii in px of the frame, `scale` px of the frame a px of the map. `radius_px`: of the beads found at first.
-  GapSearch(const EdgeMap& edges, double scale, const SizeBand& band, double radius_px, Polarity polarity,
-            const ToFrame& to_frame)
-      : radius_(radius_px) {
+  // Of a map, where `scale` px of the frame are one. `model`: of the beads found at first. Circles on those of `beads`
+  // are not looked for.
+  GapSearch(const GapMap& map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
+      : radius_(model.radius_px) {
     const double tolerated = 1 + 0.4 * same_bead_radius;
-    const double from = std::max(least_gap_radius_px, band.from_px * tolerated / scale);
-    const double to = band.to_px / tolerated / scale;
-    if (!(from < to)) return;
-    for (Circle& circle : find_circles(edges, from, to, polarity, faintest_rim_support)) {
-      circle.radius *= scale;
-      if (circle.radius < band.from_px || circle.radius > band.to_px) continue;
-      const auto [x, y] = to_frame(circle.x, circle.y);
+    CirclesAsked asked;
+    asked.from_px = std::max(least_gap_radius_px, band.from_px * tolerated / map.scale);
+    asked.to_px = band.to_px / tolerated / map.scale;
+    if (!(asked.from_px < asked.to_px)) return;
+    // Fringes of a disk that is missed look like small beads where edges of either sign count.
+    const bool small = band.to_px < smallest_spread * (1 + 2 * same_bead_radius) * model.radius_px;
+    if (small && model.polarity == Polarity::automatic) return;
+    asked.polarity = model.polarity;
+    asked.least_support = faintest_rim_support;
+    if (!small) asked.votes = model.search.votes;
+    if (within(model.radius_px, band)) asked.votes.least = model.search.least_votes_in_gaps;
+    double largest = 1;
+    for (const Circle& bead : beads) largest = std::max(largest, bead.radius);
+    const Nearby near(beads.size(), nearest_rims * (largest + band.to_px),
+                      [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
+    asked.leave_out = [&](const Circle& circle) {
+      const auto [x, y] = map.to_frame(circle.x, circle.y);
+      const double radius = circle.radius * map.scale;
+      return near.any_near(x, y, [&](std::size_t i) {
+        return std::hypot(beads[i].x - x, beads[i].y - y) <
+               nearest_rims * (beads[i].radius + radius) - farthest_fitted * radius;
+      });
+    };
+    for (Circle& circle : find_circles(map.edges, asked)) {
+      circle.radius *= map.scale;
+      if (!within(circle.radius, band)) continue;
+      const auto [x, y] = map.to_frame(circle.x, circle.y);
       circle.x = x, circle.y = y;
       circles_.push_back(circle);
       largest_ = std::max(largest_, circle.radius);
@@ -116,15 +145,19 @@ SizeBand around(double radius_px) {
   return band;
 }
 
-bool within(double radius, const SizeBand& band) { return radius >= band.from_px && radius <= band.to_px; }
+GapMap map_of(const PictureMap& map) {
+  return {map.edges, map.at.scale, [&map](double x, double y) {
+            return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
+          }};
+}
 
 // A search in the picture and the same in its copies.
 struct WithCopies {
   GapSearch picture;
   std::vector<GapSearch> copies;
 
-  WithCopies(PictureMaps& maps, const SizeBand& band, const RimModel& model)
-      : WithCopies(maps.with_copies(std::sqrt(band.from_px * band.to_px), model.threshold), band, model) {}
+  WithCopies(PictureMaps& maps, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
+      : WithCopies(maps.with_copies(std::sqrt(band.from_px * band.to_px), model.threshold), band, model, beads) {}
 
   [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) const {
     std::vector<std::vector<Circle>> by_chance;
@@ -138,15 +171,16 @@ struct WithCopies {
   }
 
  private:
-  WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model)
-      : picture(map.edges, map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
-          return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
-        }) {
+  WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
+      : picture(map_of(map), band, model, beads) {
     for (std::size_t k = 0; k < map.copies.size(); ++k)
-      copies.emplace_back(map.copies[k], map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
-        const auto [u, v] = place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
-        return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
-      });
+      copies.emplace_back(GapMap{map.copies[k], map.at.scale,
+                                 [&map, k](double x, double y) {
+                                   const auto [u, v] =
+                                       place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
+                                   return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
+                                 }},
+                          band, model, beads);
   }
 };
 
@@ -162,7 +196,7 @@ class OtherSizes {
       band.from_px = limits[k] * radius, band.to_px = limits[k + 1] * radius;
       SizeBand searched = band;
       searched.from_px *= 1 - same_bead_radius, searched.to_px *= 1 + same_bead_radius;
-      groups_.push_back({band, WithCopies(maps, searched, model)});
+      groups_.push_back({band, WithCopies(maps, searched, model, known)});
     }
     leave_out(around(radius));
   }
@@ -172,8 +206,11 @@ class OtherSizes {
     for (int tried = 0; tried < most_sizes_tried; ++tried) {
       const std::optional<double> radius = next_radius();
       if (!radius) break;
-      if (const std::optional<SizeBand> shared = taken_near(*radius)) found.push_back(*shared);
-      leave_out(around(*radius));
+      tried_.push_back(around(*radius));
+      if (const std::optional<SizeBand> shared = taken_near(*radius)) {
+        found.push_back(*shared);
+        leave_out(tried_.back());
+      }
     }
     for (const Group& group : groups_) {
       if (group.band.from_px < smallest_spread * model_.radius_px ||
@@ -195,10 +232,14 @@ class OtherSizes {
   }
 
   // What circles near this radius say for a size of their own, px of rims.
-  static double gain_near(const std::vector<Circle>& circles, const SizeBand& band) {
+  [[nodiscard]] double gain_near(const std::vector<Circle>& circles, const SizeBand& band) const {
+    const auto was_tried = [&](double radius) {
+      return std::any_of(tried_.begin(), tried_.end(), [&](const SizeBand& one) { return within(radius, one); });
+    };
     double gain = 0;
     for (const Circle& circle : circles)
-      if (within(circle.radius, band)) gain += circle.radius * std::max(0.0, circle.support - worthless_support);
+      if (within(circle.radius, band) && !was_tried(circle.radius))
+        gain += circle.radius * std::max(0.0, circle.support - worthless_support);
     return gain;
   }
 
@@ -229,9 +270,17 @@ class OtherSizes {
       if (within(radius, group.band)) {
         WithCopies search = group.search;
         search.change([&](GapSearch& one) { one.keep_only(band.from_px, band.to_px); });
-        return taken_from(band, search);
+        std::vector<Circle> before = known_;
+        std::optional<SizeBand> taken = taken_from(band, search);
+        // Sizes that differ are left to the spread, which may hold more of them.
+        if (taken && taken->radius_px == 0 && in_the_spread(band)) known_ = std::move(before), taken.reset();
+        return taken;
       }
     return std::nullopt;
+  }
+
+  [[nodiscard]] bool in_the_spread(const SizeBand& band) const {
+    return band.from_px >= smallest_spread * model_.radius_px && band.to_px <= largest_spread * model_.radius_px;
   }
 
   // Adds to the known beads what is likely in this band, if that is enough to believe in it.
@@ -243,8 +292,8 @@ class OtherSizes {
     double expected = 0;
     for (const GapCircle& one : taken) expected += one.probability;
     if (!believed(band, expected, static_cast<double>(taken.size()))) return std::nullopt;
-    known_ = std::move(with_these);
     band.radius_px = shared_radius(taken);
+    known_ = std::move(with_these);
     return band;
   }
 
@@ -270,6 +319,7 @@ class OtherSizes {
   std::vector<Circle>& known_;
   double of_one_size_;
   std::vector<Group> groups_;
+  std::vector<SizeBand> tried_;  // sizes of their own; where one is not believed, its circles may be of a spread
 };
 
 }  // namespace
@@ -280,9 +330,7 @@ GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, 
   const auto take = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size,
                         const std::vector<SizeBand>& before) {
     const PictureMap& map = maps.scaled_for(std::sqrt(band.from_px * band.to_px), model.threshold);
-    GapSearch search(map.edges, map.at.scale, band, model.radius_px, model.polarity, [&](double x, double y) {
-      return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
-    });
+    GapSearch search(map_of(map), band, model, known);
     for (const SizeBand& other : before) search.leave_out(other.from_px, other.to_px);
     out.expected_missed += take_likely(search, probability, size, known, out.circles);
   };
@@ -299,7 +347,7 @@ GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, 
 GapModel chances_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model, bool one_size) {
   GapModel gaps;
   std::vector<Circle> known = beads;
-  const WithCopies same(maps, around(model.radius_px), model);
+  const WithCopies same(maps, around(model.radius_px), model, known);
   gaps.same_size = same.probabilities(known);
   std::vector<GapCircle> taken;
   take_likely(same.picture, gaps.same_size, nullptr, known, taken);

@@ -364,6 +364,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   }
   if (survey.found) {
     SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), options);
+    survey.candidates.front().by_rims = settled.by_rims;
     if (settled.channel != survey.candidates.front().channel)
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }

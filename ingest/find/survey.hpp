@@ -19,6 +19,7 @@ struct SurveyCandidate {
   double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
+  bool by_rims = false;        // beads will be found by their rims alone, as far as a trial showed
   bool one_sided = false;      // one side of the rim is hardly seen in any: light from the other side
   bool not_round = false;      // circles are seen, but on outlines that are not round ...
   std::string why_not_round;   // ... a sentence
@@ -34,6 +35,9 @@ struct Survey {
   std::string why_not;                      // a sentence unless found
   std::vector<SurveyCandidate> candidates;  // best first
 };
+
+// Frames of more pixels may be reduced (reduction_for() in profile/photographs.hpp).
+inline constexpr double large_frame_pixels = 2e6;
 
 struct SurveyOptions {
   Polarity polarity = Polarity::automatic;

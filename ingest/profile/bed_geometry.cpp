@@ -72,13 +72,22 @@ class GeometryFinder {
   }
 
   void take(const TouchingDistance& touching) {
-    warnings_.push_back(formatted(
-        "%s The circles seen are %.4g px wide. Touching beads are %.4g +- %.1g px apart, and this is taken for "
-        "their diameter.",
+    const double circle_px = 2 * refined_.radius_px * refined_.recorded_px;
+    const std::string why =
         half_seen() ? "The beads are lit from one side, and hardly any rim is seen on the other."
-                    : "The outline seen is smaller than the beads.",
-        2 * refined_.radius_px * refined_.recorded_px, touching.px * refined_.recorded_px,
-        touching.std_error_px * refined_.recorded_px));
+                    : "The outline seen is smaller than the beads, or they repel each other and do not touch.";
+    const std::string what =
+        formatted("%s The circles seen are %.4g px wide. Nearest beads are %.4g +- %.1g px apart", why.c_str(),
+                  circle_px, touching.px * refined_.recorded_px, touching.std_error_px * refined_.recorded_px);
+    if (options_.scale_m_per_px)
+      warnings_.push_back(what + ". The scale given is used.");
+    else if (half_seen())
+      warnings_.push_back(what + ", and this is taken for their diameter.");
+    else
+      warnings_.push_back(what +
+                          formatted(", and this is taken for their diameter. If they do not touch, give the scale "
+                                    "of the circles: --scale \"%.4g mm/px\".",
+                                    1e3 * options_.bead_diameter_m / circle_px));
     refined_.radius_px = 0.5 * touching.px;
     refined_.radius_std_error_px = 0.5 * touching.std_error_px;
   }

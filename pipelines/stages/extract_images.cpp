@@ -99,7 +99,8 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   ingest::FrameSourceOptions& source = film.source;
   source.channel = chosen->channel;
   measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px, chosen->one_sided};
-  source.reduction = measure.reduction = ingest::reduction_for(look->width, look->height, chosen->rims.radius_px);
+  source.reduction = measure.reduction =
+      ingest::reduction_for(look->width, look->height, chosen->rims.radius_px, chosen->by_rims);
   if (const std::string why = ingest::why_reduced(look->width, look->height, source.reduction); !why.empty())
     context.warning(why);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,

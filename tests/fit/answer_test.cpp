@@ -146,6 +146,20 @@ TEST(Answer, HasTheErrorOfTheScale) {
   EXPECT_EQ(known.advice.find("the scale"), std::string::npos) << known.advice;
 }
 
+// With a diameter 60 % larger, disks would cover more than the plane: no fit exists, and T is uncertain by a factor of
+// e.
+TEST(Answer, IsUncertainByAFactorOfEWhereAFitWithAnotherScaleFails) {
+  const AnswerInput exact = column(1.0, 0.02);
+  AnswerInput larger = exact;
+  for (double& height : larger.profile.height) height /= 1.6;
+  for (double& density : larger.profile.number_density) density *= 1.6 * 1.6;
+  for (double& error : larger.profile.std_error) error *= 1.6 * 1.6;
+  ASSERT_FALSE(find_answer(larger).ok()) << "else this tests nothing";
+  const Answer known = find_answer(with_scale_error(exact, 0.0002)), unsure = find_answer(with_scale_error(exact, 0.6));
+  const double part = std::sqrt(std::pow(unsure.statistical_error, 2) - std::pow(known.statistical_error, 2));
+  EXPECT_NEAR(part / unsure.temperature, 1, 0.02);
+}
+
 TEST(Answer, TakesTheKnownBiasOff) {
   const Answer answer = find_answer(column(1.0));
   ASSERT_TRUE(answer.ok());

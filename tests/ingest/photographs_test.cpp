@@ -159,6 +159,9 @@ TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
     const int by = reduction_for(4000, 3000, radius);
     EXPECT_EQ(by, std::max(1, static_cast<int>(radius / 12)));
     EXPECT_LT(radius / by, 24);
+    const int by_rims = reduction_for(4000, 3000, radius, true);
+    EXPECT_EQ(by_rims, std::max(1, static_cast<int>(radius / 24)));
+    EXPECT_LT(radius / by_rims, 48);
   }
 }
 

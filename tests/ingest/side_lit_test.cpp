@@ -180,9 +180,10 @@ TEST(TouchingDistance, IsWeighedAgainstTheOutline) {
   RandomStream random(6);
   std::vector<FrameFindings> frames;
   for (const sim::Snapshot& bed : bed_in_equilibrium(10, 21)) frames.push_back(centres(bed, 20, 0.04, random));
+  std::optional<double> scale;  // given
   const auto weighed = [&](double radius, double error, BedCalibration& bed, bool one_side = false) {
     FilmCalibration film;
-    film.options.bead_diameter_m = 2e-3;
+    film.options.bead_diameter_m = 2e-3, film.options.scale_m_per_px = scale;
     film.finder.width = 500, film.finder.height = 600;
     if (one_side) film.options.find.seen = BeadsSeen{Polarity::bright_beads, radius, true};
     FinderCalibration refined;
@@ -197,7 +198,11 @@ TEST(TouchingDistance, IsWeighedAgainstTheOutline) {
   EXPECT_NEAR(bed.radius_px, 10, 0.06);
   EXPECT_LT(bed.radius_std_error_px, 0.045);
   EXPECT_NEAR(bed.scale_m_per_px, 1e-4, 6e-7);
-  EXPECT_NE(weighed(9.7, 0.02, bed).find("smaller than the beads"), std::string::npos);
+  const std::string smaller = weighed(9.7, 0.02, bed);
+  EXPECT_NE(smaller.find("smaller than the beads"), std::string::npos);
+  EXPECT_NE(smaller.find("If they do not touch, give the scale of the circles: --scale \"0.1031 mm/px\""),
+            std::string::npos)
+      << smaller;
   EXPECT_NEAR(bed.radius_px, 10, 0.06);
   EXPECT_NE(weighed(10.6, 0.02, bed).find("half of the difference"), std::string::npos);
   EXPECT_NEAR(bed.radius_px, 10.6, 1e-12) << "or of several sizes";
@@ -206,6 +211,14 @@ TEST(TouchingDistance, IsWeighedAgainstTheOutline) {
   EXPECT_NEAR(bed.radius_px, 9, 1e-12);
   EXPECT_NE(weighed(8.5, 0.02, bed, true).find("lit from one side"), std::string::npos);
   EXPECT_NEAR(bed.radius_px, 10, 0.06);
+  scale = 1e-4;
+  for (const double radius : {8.5, 9.7}) {
+    const std::string words = weighed(radius, 0.02, bed, radius < 9);
+    EXPECT_EQ(words.find("taken for their diameter"), std::string::npos) << words;
+    EXPECT_NE(words.find("The scale given is used."), std::string::npos) << words;
+    EXPECT_EQ(bed.scale_m_per_px, 1e-4);
+  }
+  scale.reset();
   frames.resize(0);
   weighed(8.5, 0.02, bed, true);
   EXPECT_TRUE(bed.outline_in_doubt) << "no contacts are seen";

@@ -106,6 +106,43 @@ TEST(Sizes, BeadsOfTwoSizesAreFoundEachWithItsRadius) {
   EXPECT_LT(learned.calibration.expected_missed, 0.02);
 }
 
+// Disks in polarised light, close together: a thin dark outline, and fringes that are brighter or darker than what is
+// behind them.
+struct Fringed {
+  std::vector<Bead> beads;
+  GrayFrame frame;
+};
+Fringed fringed_bed(double radius, unsigned seed) {
+  std::mt19937 random(seed);
+  const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  Fringed bed;
+  const int lines = 9, a_line = 12;
+  for (int row = 0; row < lines; ++row)
+    for (int column = 0; column < a_line - row % 2; ++column) {
+      Bead bead{radius * (1.3 + 2.06 * column + 1.03 * (row % 2)), radius * (1.3 + 1.8 * row), radius};
+      bead.x += 0.05 * radius * (part() - 0.5), bead.y += 0.05 * radius * (part() - 0.5);
+      if (part() < 0.9) bed.beads.push_back(bead);
+    }
+  const auto face = [](const Bead& bead, double u, double v) {
+    if (std::hypot(u, v) > 1 - 2.2 / bead.radius) return 70.0;
+    return 150 + 70 * std::sin(4 * u * v + bead.x) * std::cos(2.5 * u + bead.y);
+  };
+  bed.frame = drawn(bed.beads, static_cast<int>(radius * (2.06 * a_line + 0.8)),
+                    static_cast<int>(radius * (1.8 * lines + 1)), 150, face, seed);
+  return bed;
+}
+
+TEST(Sizes, DisksWithFringesBrighterAndDarkerThanTheBackgroundAreFound) {
+  const Fringed bed = fringed_bed(26, 4);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 26};
+  const CalibrationResult learned = learn_beads({&bed.frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  const FindResult result = find_beads(bed.frame, learned.calibration, options);
+  const auto hits = static_cast<double>(found_beads(result.disks, bed.beads));
+  EXPECT_GE(2 * hits / static_cast<double>(result.disks.size() + bed.beads.size()), 0.98);
+}
+
 // Large beads of 13 px, of which the diameter is given first or second.
 struct GivenDiameters {
   double ratio = 1;
