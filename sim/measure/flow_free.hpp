@@ -2,7 +2,8 @@
 // layers do together is no temperature here: neither the bounce of a bed, which may differ from period to period, nor
 // its sloshing from side to side. Reduced units.
 //
-// One thread at a time may use an observer; different ones share nothing.
+// An observer owns its sums and keeps nothing of the scene. One thread at a time may use one; different ones share
+// nothing.
 #pragma once
 
 #include <array>
