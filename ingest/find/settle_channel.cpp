@@ -19,8 +19,8 @@ constexpr double clearly_more = 1.03;                           // times as many
 constexpr double inside = 0.8, outside = 1.15, farthest = 1.3;  // radii: where a face and what is behind it are seen
 constexpr double least_contrast = 4;                            // grey levels between the two
 
-// Shares of disks that are wrong or beads that are missed, below which another channel is not tried. At 0.02 a photograph
-// of 65 photoelastic disks, all of which are found by their faces, is searched in a channel that shows 63.
+// Shares of disks that are wrong or beads that are missed, below which another channel is not tried. At 0.02 a
+// photograph of 65 photoelastic disks, all of which are found by their faces, is searched in a channel that shows 63.
 constexpr double hardly = 0.05;
 
 struct Trial {

@@ -142,7 +142,7 @@ constexpr double least_contact_tolerance = 0.02;  // D: what touching beads scat
 // Of the step from this tolerance to none. In 40 simulated beds the floor was then off by 0.3 of the step (root mean
 // square; beads located to 0.003 and 0.01 D), and by 0.6 with beads located to 0.02 D.
 constexpr double step_to_no_tolerance_wrong = 0.4;
-// The amplitude is stated as the middle is: in 24 films of 12 other beds it was off by half of that (root mean square).
+// The amplitude is stated as the middle is: in 23 films of 12 other beds it was off by half of that (root mean square).
 
 std::vector<Bottom> bottoms_by_phase(const std::vector<LowestBottoms>& frames, double turns_per_frame) {
   std::vector<Bottom> bottoms;

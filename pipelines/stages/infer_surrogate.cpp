@@ -170,7 +170,8 @@ std::vector<double> BedSurrogate::average(std::size_t observable, std::span<cons
 // Of the difference between a target and the prediction. A measured error that includes the scatter of a bed is not to
 // count it twice: the larger of the two counts, the scatter being that of a bed measured as long as the target. Its
 // error alone would not do, since a short film does not tell how far a bed wanders that keeps its motion for long: T_x
-// of 24 simulated beds over twelve periods was off by 32 % (root mean square; from longer runs), where 11 % were stated.
+// of 24 simulated beds over twelve periods was off by 32 % (root mean square; from longer runs), where 11 % were
+// stated.
 double BedSurrogate::variance_of(double variance, double scatter, const ScaledTarget& target) const {
   if (!target.includes_scatter) return variance;
   return variance - scatter + std::max(scatter * options_.scatter_factor(), target.error * target.error);

@@ -133,9 +133,8 @@ std::string sentence_of(MeasureOptions::Problem problem, const MeasureOptions& o
           static_cast<unsigned long long>(plan_looks(floor_period, options).possible_frames()));
     case Problem::frame_phases:
       return formatted(
-          "frames are wanted at phases at which the bed is not sampled; give different multiples of 1/%u from 0 to "
-          "below "
-          "1, and a floor that shakes",
+          "frames are wanted at phases at which the bed is not sampled; give different multiples of 1/%u, from 0 to "
+          "below 1, and a floor that shakes",
           options.phases);
   }
   return "";
