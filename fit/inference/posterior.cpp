@@ -243,6 +243,16 @@ Discrepancy CorrelatedErrors::operator()(std::span<const double> difference, std
   return {factor.matrixL().solve(off).squaredNorm(), 2 * factor.matrixLLT().diagonal().array().log().sum()};
 }
 
+double log_likelihood(const Discrepancy& found, const EstimatedCovariance& covariance) {
+  const double samples = std::max(2.0, static_cast<double>(covariance.samples));
+  const double numbers = static_cast<double>(covariance.numbers),
+               parameters = static_cast<double>(covariance.parameters);
+  const double more = std::max(1.0, samples - numbers - 4);
+  const double b = (more + 2) / ((more + 3) * more) * std::max(0.0, numbers - parameters);
+  const double power = parameters + 2 + (samples - 1 + b) / (1 + b);
+  return -0.5 * (power * std::log1p(found.chi2 / (samples - 1)) + found.log_determinant);
+}
+
 std::vector<double> correlation_of(std::size_t count, const std::vector<double>& rows) {
   const std::size_t n = rows.size() / count;
   std::vector<double> product(count * count, 0.0), square(count * count, 0.0);

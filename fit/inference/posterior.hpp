@@ -80,6 +80,14 @@ class CorrelatedErrors {
   std::size_t count_;
   std::vector<double> correlation_;
 };
+// Logarithm of the probability of a discrepancy whose covariance was itself estimated. It has the tails of Student's
+// distribution, with the power at which intervals of the parameters hold the truth as often as they say
+// [PercivalEtAl2022].
+struct EstimatedCovariance {
+  std::size_t samples = 0, numbers = 0, parameters = 0;  // it is from so many samples of so many numbers
+};
+double log_likelihood(const Discrepancy& found, const EstimatedCovariance& covariance);
+
 // Of the columns of a table with `count` columns, moved towards no correlation as far as so few rows ask for
 // [LedoitWolf2004, towards the identity].
 std::vector<double> correlation_of(std::size_t count, const std::vector<double>& rows);

@@ -319,9 +319,10 @@ class StepStatistics {
       t.finite_time_error = std::hypot(1 - finite_time_factor(all_.correlation(axis)) / t.finite_time_factor,
                                        correction_missed * (1 - 1 / t.finite_time_factor));
     }
-    const double scale = t.finite_time_factor * to_temperature;
-    t.over_mg_m = std::max(0.0, all_.moved(axis) / all_.count) * scale;
-    t.std_error_m = with_correction(statistics::mean_of(squares_by_frame(axis)).std_error * scale, t);
+    t.displacement_m = std::max(0.0, all_.moved(axis) / all_.count) * to_temperature;
+    t.displacement_error_m = statistics::mean_of(squares_by_frame(axis)).std_error * to_temperature;
+    t.over_mg_m = t.displacement_m * t.finite_time_factor;
+    t.std_error_m = with_correction(t.displacement_error_m * t.finite_time_factor, t);
     return t;
   }
 
@@ -408,17 +409,18 @@ VelocityMeasurement VelocityMeter::result() {
   const auto mean_of = [&](KineticTemperature VelocityMeasurement::*component) {
     KineticTemperature mean;
     mean.finite_time_factor = 0;
-    std::vector<double> series;
+    std::vector<double> series, displacements;
     for (const VelocityMeasurement& one : measured_) {
       const KineticTemperature& t = one.*component;
-      series.push_back(t.over_mg_m);
+      series.push_back(t.over_mg_m), displacements.push_back(t.displacement_m);
       mean.localisation_bias_m += t.localisation_bias_m / n;
       mean.finite_time_factor += t.finite_time_factor / n;
       mean.finite_time_error += t.finite_time_error / n;
     }
-    const statistics::Mean found = statistics::mean_of(series);
+    const statistics::Mean found = statistics::mean_of(series), moved = statistics::mean_of(displacements);
     mean.over_mg_m = found.value;
     mean.std_error_m = with_correction(found.std_error, mean);
+    mean.displacement_m = moved.value, mean.displacement_error_m = moved.std_error;
     return mean;
   };
   all.horizontal = mean_of(&VelocityMeasurement::horizontal);

@@ -39,6 +39,8 @@ struct KineticTemperature {
   double localisation_bias_m = 0;  // what was taken off: 2 sigma^2/(g dt^2)
   double finite_time_factor = 1;   // what it was multiplied by: 1 + the loss of speed over dt by collisions
   double finite_time_error = 0;    // share of T that this correction may be wrong by
+  // The same of displacements over the time between frames, before the correction.
+  double displacement_m = 0, displacement_error_m = 0;
 };
 
 struct VelocityMeasurement {

@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Periods of the shaking that a bed settles and is measured.
-constexpr double settling_periods = 50, measured_periods = 100;
+// Periods of the shaking that a bed settles, and that it is measured at most.
+constexpr double settling_periods = 50, most_periods = 100;
 // Densities are compared from this height on, one diameter apart, as far up as they exceed this and twice their error.
 constexpr double lowest_height = 0.5, least_seen_density = 0.02;  // [D], [1/D^2]
 constexpr double fewest_heights = 4;
@@ -33,7 +33,7 @@ constexpr double range_of_measured = 5;
 struct InferBedArguments : ImageArguments {
   std::vector<double> gamma, restitution{0.3, 0.98}, friction{0, 0.8};
   std::optional<double> phase;
-  int beds = 120;
+  int beds = 160;
 };
 
 // What of the frames' results the inference needs.
@@ -43,7 +43,7 @@ struct MeasuredBed {
   std::int64_t count = 0;                         // of disks between the walls
   double highest = 0;                             // at which the density is compared [D]
   bool velocities = false;
-  double time = 0;                            // of the film [s]; 0: photographs
+  double time = 0, frame_rate = 0;            // of the film [s], [Hz]; 0: photographs
   double amplitude = 0, amplitude_error = 0;  // of the floor in a film [m]; 0: not seen
 };
 
@@ -96,9 +96,10 @@ MeasuredBed measured_bed(const fs::path& out, const InferBedArguments& given) {
   const Json* usable = find_pointer(result, "/velocities/usable");
   bed.amplitude = number("/floor_amplitude/value").value_or(0);
   bed.amplitude_error = number("/floor_amplitude/std_error").value_or(0);
-  if (given.frame_rate)
-    bed.time =
-        number("/frames").value_or(0) / positive_argument("--frame-rate", given.frame_rate, dimension::frequency);
+  if (given.frame_rate) {
+    bed.frame_rate = positive_argument("--frame-rate", given.frame_rate, dimension::frequency);
+    bed.time = number("/frames").value_or(0) / bed.frame_rate;
+  }
   bed.velocities = usable != nullptr && usable->is_boolean() && usable->get<bool>();
   return bed;
 }
@@ -111,11 +112,19 @@ Json targets_of(const MeasuredBed& bed) {
   Json targets;
   targets["profile"] = Json{{"from", "extract"}, {"low", lowest_height}, {"high", bed.highest}};
   if (!bed.velocities) return targets;
-  // The film's temperatures are those without the mean motion at each height.
+  // The film's temperatures are those without the mean motion at each height. Displacements of disks between frames are
+  // compared with those in the simulated beds, so that none needs a correction for collisions meanwhile.
   for (const char* axis : {"x", "z"})
     targets[fmt::format("temperature_{}_without_flow_over_mg", axis)] =
-        Json{{"at", fmt::format("/extract/velocities/temperature_{}_over_mg", axis)}, {"includes_scatter", true}};
+        Json{{"at", fmt::format("/extract/velocities/temperature_{}_of_displacements_over_mg", axis)},
+             {"includes_scatter", true}};
   return targets;
+}
+
+// Beds are measured as long as the film, so that they scatter as it does. Where a film is longer, it scatters less.
+double measured_periods(const MeasuredBed& bed) {
+  if (!(bed.time > 0)) return most_periods;
+  return std::clamp(std::round(bed.time * bed.frequency), 1.0, most_periods);
 }
 
 double middle(const std::vector<double>& range) { return (range[0] + range[1]) / 2; }
@@ -165,14 +174,14 @@ Json inference_stage(const InferBedArguments& given, const MeasuredBed& bed) {
       {"box", {{"width", number_text(bed.width * bed.diameter) + " m"}, {"sides", std::move(sides)}, {"lid", "open"}}},
       {"floor", std::move(floor)},
       {"settle", seconds(settling_periods)},
-      {"measure", seconds(measured_periods)},
+      {"measure", seconds(measured_periods(bed))},
       {"plateau_density", plateau_argument(given.plateau_density)},
       {"parameters", std::move(parameters)},
       {"targets", targets_of(bed)},
       {"first", given.beds},
       {"rounds", 2},
       {"each", std::max(1, given.beds / 3)}};
-  if (bed.time > 0) stage["target_time"] = number_text(bed.time) + " s";
+  if (bed.velocities) stage["frame_rate"] = number_text(bed.frame_rate) + " Hz";
   if (given.kernel) stage["kernel_width"] = kernel_from(*given.kernel)->width;
   if (given.phase) stage["phase"] = *given.phase;
   return stage;
@@ -188,6 +197,8 @@ void check_inference(const InferBedArguments& given) {
   if (!given.gamma.empty()) check("--gamma", given.gamma, 0.1, 1000);
   check("--restitution", given.restitution, 0, 1);
   check("--friction", given.friction, 0, 10);
+  if (given.phase && given.frame_rate)
+    throw UsageError("--phase: a film (--frame-rate) shows all phases of the shaking. Leave out one of the two");
   if (!given.kernel) return;
   const auto kernel = kernel_from(*given.kernel);
   if (!kernel || kernel->kind != KernelKind::gaussian)

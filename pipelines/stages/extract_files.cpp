@@ -148,8 +148,13 @@ Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
     json["localisation_bias"] = t.localisation_bias_m, json["finite_time_factor"] = t.finite_time_factor;
     return json;
   };
+  const auto of_displacements = [](const ingest::KineticTemperature& t) {
+    return quantity_json(t.displacement_m, "m", t.displacement_error_m);
+  };
   return Json{{"temperature_x_over_mg", temperature(velocities.horizontal)},
               {"temperature_z_over_mg", temperature(velocities.vertical)},
+              {"temperature_x_of_displacements_over_mg", of_displacements(velocities.horizontal)},
+              {"temperature_z_of_displacements_over_mg", of_displacements(velocities.vertical)},
               {"usable", velocities.usable()},
               {"linked_share", velocities.linked_share},
               {"mean_step", quantity_json(velocities.mean_step, "D")}};

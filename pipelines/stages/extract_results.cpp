@@ -90,6 +90,10 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
     list.number(pointer + "/finite_time_factor", "1",
                 "factor that corrects the temperature for the finite time between frames", timed, true);
   }
+  for (const char* axis : {"x", "z"})
+    list.quantity(std::string("/velocities/temperature_") + axis + "_of_displacements_over_mg", "m",
+                  "the same from the displacements between frames, without the correction for the time between them",
+                  timed, true);
   list.truth("/velocities/usable",
              "whether the velocities are reliable: enough disks were followed, and few collided between frames", timed,
              true);

@@ -24,6 +24,7 @@ namespace {
 constexpr std::array scene_keys = {"disks", "gravity", "box", "floor", "bath", "start", "start_temperature"};
 // Corners of the prior at which the scene is checked before anything runs.
 constexpr std::size_t most_corners = 64;
+constexpr double most_looks = 4096;  // a period
 // Best beds are this far from one another, the range of a parameter being 1.
 constexpr double distance_of_best = 0.3;
 // Streams of seeds: beds of the design count from 1.
@@ -74,6 +75,7 @@ class Infer : public Stage {
  private:
   void describe_search(Fields& fields);
   void check(Fields& fields);
+  void check_film(Fields& fields) const;
   void check_corners(Fields& fields) const;
   std::string made_from() const;
   std::vector<RunBed> earlier_beds() const;
@@ -124,10 +126,6 @@ void Infer::describe_search(Fields& fields) {
       "calibration", options_.calibration,
       {.help = "number of beds with known parameters, drawn from the prior, by which the intervals are tested; 0: none",
        .range = from_to(0, 10'000)});
-  fields.quantity("target_time", options_.target_time, dimension::time,
-                  {.help = "time over which the targets that include the scatter of a bed were measured, for instance "
-                           "that of the film: shorter measurements scatter more; 0: the option \"measure\"",
-                   .range = non_negative});
   fields.object<MapCurve>(
       "map_curve", options_.curve,
       [](Fields& f, MapCurve& curve) {
@@ -159,6 +157,12 @@ void Infer::describe(Fields& fields) {
                  {.help = "number of equally spaced moments in each period of the shaking at which the bed is "
                           "measured; its profile is the average over them",
                   .range = from_to(1, 4096)});
+  fields.quantity(
+      "frame_rate", options_.bed.frame_rate, dimension::frequency,
+      {.help = "frame rate of the film that the targets come from. Each bed is then measured at the moments "
+               "of its frames, in place of \"phases\", and temperature_x_without_flow_over_mg and "
+               "temperature_z_without_flow_over_mg are those of displacements between frames",
+       .range = positive});
   fields.number("kernel_width", options_.bed.kernel_width,
                 {.help = "standard deviation of the Gaussian kernel of the profile, in D", .range = from_to(0.01, 10)});
   fields.number("plateau_density", options_.bed.plateau_density,
@@ -195,6 +199,7 @@ void Infer::check(Fields& fields) {
       "phase",
       fmt::format("this phase is not one of the {} phases at which the bed is measured; give a multiple of 1/{}",
                   bed.phases, bed.phases));
+  check_film(fields);
   fields.require(options_.profile || std::any_of(options_.targets.begin(), options_.targets.end(),
                                                  [](const auto& t) { return t.has_value(); }),
                  "targets", "no target has a value: at least one measured number is needed",
@@ -227,6 +232,30 @@ void Infer::check(Fields& fields) {
     earlier_beds();
   } catch (const Error& error) {
     fields.problem("/" + key, error.what(), "Leave \"" + key + "\" out: the beds are then run");
+  }
+}
+
+// A film shows every phase, and its temperatures depend on the time between its frames.
+void Infer::check_film(Fields& fields) const {
+  const BedOfInference& bed = options_.bed;
+  if (bed.frame_rate) {
+    fields.require(options_.moments == 0 && !options_.phase, "frame_rate",
+                   "a film shows every phase of the shaking, so \"frame_rate\" excludes \"phase\" and \"moments\"");
+    const double frames = *bed.frame_rate * options_.written.period() * options_.written.time_unit();
+    fields.require(frames >= 1 && frames <= most_looks, "frame_rate",
+                   fmt::format("a period of the shaking must have 1 to {} frames, but has {:.3g}", most_looks, frames));
+  }
+  for (const char* axis : {"x", "z"}) {
+    const std::string name = fmt::format("temperature_{}_without_flow_over_mg", axis);
+    const auto& target = options_.targets[observable_number(name)];
+    const bool displacements = target && target->at.ends_with("_of_displacements_over_mg");
+    fields.require(!displacements || bed.frame_rate, "targets/" + name + "/at",
+                   "a temperature of displacements depends on the time between the frames",
+                   "Give \"frame_rate\", that of the film");
+    fields.require(
+        !bed.frame_rate || !target || target->at.empty() || displacements, "targets/" + name + "/at",
+        "with \"frame_rate\" this target must be a temperature of displacements",
+        fmt::format("Write for example \"/extract/velocities/temperature_{}_of_displacements_over_mg\"", axis));
   }
 }
 
@@ -264,6 +293,7 @@ std::string Infer::made_from() const {
   for (const View& view : options_.bed.views) out["views"].push_back(view.name);
   for (const Observable& observable : observables()) out["observables"].push_back(observable.name);
   if (!options_.bed.heights.empty()) out["heights"] = options_.bed.heights;
+  if (options_.bed.frame_rate) out["frame_rate"] = *options_.bed.frame_rate;
   return dump_canonical(out);
 }
 
@@ -356,31 +386,6 @@ std::vector<RunBed> Infer::run_beds(RunContext& context, std::uint32_t round, st
   return beds;
 }
 
-fit::LogLikelihood log_likelihood(const BedSurrogate& surrogate, const InferOptions& options,
-                                  const std::vector<ScaledTarget>& targets) {
-  return [&surrogate, &options, &targets](std::span<const double> places) {
-    const BedSurrogate::Fit found = surrogate.fit(places, targets);
-    const std::size_t views = options.bed.views.size();
-    std::vector<double> out(places.size() / options.dimensions(), -INFINITY);
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      double sum = 0, greatest = -INFINITY;
-      for (std::size_t v = 0; v < views; ++v) greatest = std::max(greatest, found.log_likelihood[i * views + v]);
-      for (std::size_t v = 0; v < views; ++v)
-        sum += surrogate.view_prior(v) * std::exp(found.log_likelihood[i * views + v] - greatest);
-      if (std::isfinite(greatest)) out[i] = greatest + std::log(sum);
-    }
-    return out;
-  };
-}
-
-fit::Posterior sampled(const RunContext& context, const InferOptions& options, const BedSurrogate& surrogate,
-                       const std::vector<ScaledTarget>& targets) {
-  fit::SamplingOptions sampling;
-  sampling.seed = mixed(context.seed());
-  sampling.threads = context.jobs();
-  return fit::sample_posterior(options.dimensions(), log_likelihood(surrogate, options, targets), sampling);
-}
-
 // The beds of all rounds.
 std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledTarget>& targets,
                                   BedsAhead& ahead) const {
@@ -392,8 +397,7 @@ std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledT
     values.push_back(values_at(options_, std::span<const double>(places).subspan(i * d, d)));
   std::vector<RunBed> beds = run_beds(context, 0, 1, values, ahead);
   for (std::uint32_t round = 1; round <= options_.rounds; ++round) {
-    const BedSurrogate surrogate(options_, beds, targets, context.jobs());
-    const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
+    const fit::Posterior posterior = known_parameters(context, options_, beds, targets).posterior;
     const std::vector<std::size_t> draws =
         fit::equal_draws(posterior.weight, 20 * options_.each, context.seed() + round);
     std::vector<double> points;
@@ -462,7 +466,8 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
   std::vector<RunBed> first;
   for (const RunBed& bed : found.beds)
     if (bed.round == 0) first.push_back(bed);
-  const BedSurrogate surrogate(options_, first, found.targets, context.jobs());
+  const KnownParameters of_first = known_parameters(context, options_, first, found.targets);
+  const BedSurrogate& surrogate = *of_first.all;
   const std::size_t d = options_.dimensions(), count = options_.bed.numbers();
   std::mt19937_64 generator(mixed(context.seed() + calibration_stream));
   const auto uniform = [&] { return fit::even_number(generator); };
@@ -484,7 +489,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     for (ScaledTarget& target : targets) {
       // The bed's number has its scatter already.
       const double scatter = target.includes_scatter ? std::pow(surrogate.scatter(target.number), 2) : 0;
-      const double all = std::max(scatter * options_.scatter_factor(), target.error * target.error);
+      const double all = std::max(scatter, target.error * target.error);
       const double error = std::sqrt(std::max(0.0, all - scatter));
       target.value = to_scale(target.number, beds[i].numbers[view * count + target.number]) +
                      error * fit::normal_quantile(uniform());
@@ -494,7 +499,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
       ++incomplete;
       continue;
     }
-    const fit::Posterior posterior = sampled(context, options_, surrogate, targets);
+    const fit::Posterior posterior = known_parameters(context, options_, first, targets).posterior;
     for (std::size_t k = 0; k < d; ++k) {
       const double truth = values[i][k];
       CalibrationRow row{i, k, truth, 0, 0, 0, 0, 0};
@@ -539,7 +544,10 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
                     given_up, all));
   for (const ScaledTarget& target : found.targets) {
     if (target.number >= observables().size()) continue;  // a profile needs no fit
-    const std::size_t used = surrogate.beds(target.number);
+    const auto used =
+        static_cast<std::size_t>(std::count_if(found.beds.begin(), found.beds.end(), [&](const RunBed& b) {
+          return std::isfinite(b.numbers[target.number]);
+        }));
     if (used + given_up < all)
       sentences.push_back(fmt::format("{}: the fit of {} of {} beds failed, and they were left out",
                                       observables()[target.number].name, all - given_up - used, all));
@@ -573,9 +581,10 @@ void Infer::run(RunContext& context) const {
   found.targets = scaled_targets(context, options_);
   found.beds = design(context, found.targets, ahead);
   context.progress(ahead.time.fraction(), "surrogate and posterior");
-  const BedSurrogate surrogate(options_, found.beds, found.targets, context.jobs());
-  for (const std::string& sentence : missing_numbers(options_, found, surrogate)) context.warning(sentence);
-  found.posterior = sampled(context, options_, surrogate, found.targets);
+  const KnownParameters known = known_parameters(context, options_, found.beds, found.targets);
+  const BedSurrogate& surrogate = *known.near;
+  for (const std::string& sentence : missing_numbers(options_, found, *known.all)) context.warning(sentence);
+  found.posterior = known.posterior;
   if (!(found.posterior.effective > 0))
     throw StageError(
         "all simulated beds are too far from the targets to give a posterior. Check the targets, or give wider ranges "
@@ -608,7 +617,7 @@ void Infer::run(RunContext& context) const {
   for (const RunBed& bed : found.beds)
     stored["beds"].push_back(Json{{"round", bed.round}, {"values", bed.values}, {"numbers", bed.numbers}});
   write_file(context.output("beds.json"), dump(stored));
-  write_inference(context, options_, surrogate, found);
+  write_inference(context, options_, known, found);
   draw_pairs(context, options_, found);
 }
 

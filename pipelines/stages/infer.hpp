@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 
 #include "fit/inference/posterior.hpp"
 #include "fit/inference/surrogate.hpp"
@@ -50,14 +51,11 @@ struct InferOptions {
   std::uint32_t best = 3, replicas = 4;
   double best_measure = 0;  // as written; 0: as the others
   std::uint32_t draws = 1000, calibration = 0;
-  double target_time = 0;  // over which the targets were measured, as written; 0: as long as a bed
   std::optional<MapCurve> curve;
   std::string stored;
   InputFiles beds;  // beds.json of an earlier run
   bool uses_earlier_beds() const { return !stored.empty() || !beds.empty(); }
   std::size_t dimensions() const { return parameters.size(); }
-  // What the variance between beds is multiplied by, for one that is measured over the time of the targets.
-  double scatter_factor() const { return target_time > 0 ? bed.measure / target_time : 1; }
 };
 
 // A bed that was run: where, in which round, and its numbers, view by view.
@@ -77,11 +75,26 @@ void describe_targets(Fields& fields, InferOptions& options);
 // Throws InputError where a stage or a file does not give what is asked for.
 std::vector<ScaledTarget> scaled_targets(const RunContext& context, const InferOptions& options);
 
+// A box in the unit cube of the parameters.
+struct Region {
+  std::vector<double> low, high;
+  bool holds(std::span<const double> place) const;
+  std::vector<double> place(std::span<const double> of_region) const;  // of points of the region's own unit cube
+  double volume() const;
+};
+
 // The surrogates of all numbers that targets and proposals need. Densities at all heights share one.
 class BedSurrogate {
  public:
+  // `region`: where the beds are, the unit of its lengths; `every_number`: also those that no target has, for
+  // proposals.
+  struct Training {
+    Region region;
+    bool every_number = false;
+    int threads = 1;
+  };
   BedSurrogate(const InferOptions& options, const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets,
-               int threads);
+               const Training& training);
 
   // Means of an observable, averaged over the shaking, at points of the unit cube, on its scale.
   std::vector<double> average(std::size_t observable, std::span<const double> places) const;
@@ -117,16 +130,18 @@ class BedSurrogate {
   static std::size_t offset_of(std::size_t number) { return number - std::min(number, observables().size()); }
   // The place of a number among the outputs of its model; nothing where the view was left out.
   std::optional<std::size_t> output_of(std::size_t number, std::size_t view) const;
-  double variance_of(double variance, double scatter, const ScaledTarget& target) const;
+  std::vector<double> scaled(std::vector<double> coordinates) const;
   std::vector<double> coordinates(std::span<const double> places) const;
   void leave_out_views(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
-  void train(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets, int threads);
+  void train(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets, const Training& training);
   void correlate(const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
 
   const InferOptions& options_;
+  std::vector<double> low_, range_;                // of the region, by parameter, in coordinates
   std::vector<Model> models_;                      // by observable; then that of the profile
   std::vector<double> prior_;                      // by view
   std::vector<fit::CorrelatedErrors> correlated_;  // by view
+  std::vector<std::size_t> correlated_beds_;       // behind each
 };
 
 struct BestBed {
@@ -138,6 +153,16 @@ struct CalibrationRow {
   std::size_t bed = 0, parameter = 0;
   double truth = 0, low_68 = 0, high_68 = 0, low_95 = 0, high_95 = 0, rank = 0;
 };
+
+// A posterior and the surrogates that give it: of all beds, and of those where the posterior is (every number).
+struct KnownParameters {
+  std::shared_ptr<const BedSurrogate> all, near;
+  Region region;  // of `near`
+  std::size_t beds_near = 0;
+  fit::Posterior posterior;  // in the unit cube of the whole prior
+};
+KnownParameters known_parameters(const RunContext& context, const InferOptions& options,
+                                 const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
 
 // All that was found, for infer_results.cpp.
 struct Inference {
@@ -151,7 +176,7 @@ struct Inference {
   std::vector<CalibrationRow> calibration;
 };
 void state_inference(ResultList& list, const InferOptions& options);
-void write_inference(RunContext& context, const InferOptions& options, const BedSurrogate& surrogate,
+void write_inference(RunContext& context, const InferOptions& options, const KnownParameters& known,
                      const Inference& found);
 void draw_pairs(RunContext& context, const InferOptions& options, const Inference& found);
 StagePages infer_pages();

@@ -42,9 +42,13 @@ struct Observers {
       : bed([&scene, looks, grid, kernel](const sim::DiskProperties& disks) {
           return sim::BedObserver(scene, disks, looks, grid, kernel);
         }),
-        flow_free([looks](const sim::DiskProperties& disks) { return sim::FlowFreeTemperature(disks, looks); }) {}
+        flow_free([looks](const sim::DiskProperties& disks) { return sim::FlowFreeTemperature(disks, looks); }),
+        filmed([&scene, looks](const sim::DiskProperties& disks) {
+          return sim::FlowFreeDisplacement(scene, disks, looks);
+        }) {}
   sim::Observing<sim::BedObserver> bed;
   sim::Observing<sim::FlowFreeTemperature> flow_free;
+  sim::Observing<sim::FlowFreeDisplacement> filmed;
 };
 
 // Passes on the samples of one phase only, as if it were the single phase of a period; or all of them.
@@ -54,14 +58,20 @@ class AtPhase final : public sim::RunObserver {
   const Observers& observers() const { return observers_; }
   void prepare(sim::Simulation& simulation) override {
     observers_.bed.prepare(simulation), observers_.flow_free.prepare(simulation);
+    observers_.filmed.prepare(simulation);
   }
   void look(sim::Simulation& simulation, const sim::Snapshot& at, std::uint64_t look, std::uint32_t phase) override {
     if (phase_ && phase != *phase_) return;
     const std::uint32_t own = phase_ ? 0 : phase;
     observers_.bed.look(simulation, at, look, own), observers_.flow_free.look(simulation, at, look, own);
+    if (!phase_) observers_.filmed.look(simulation, at, look, own);
   }
-  void save(sim::ArchiveWriter& out) override { observers_.bed.save(out), observers_.flow_free.save(out); }
-  void load(sim::ArchiveReader& in) override { observers_.bed.load(in), observers_.flow_free.load(in); }
+  void save(sim::ArchiveWriter& out) override {
+    observers_.bed.save(out), observers_.flow_free.save(out), observers_.filmed.save(out);
+  }
+  void load(sim::ArchiveReader& in) override {
+    observers_.bed.load(in), observers_.flow_free.load(in), observers_.filmed.load(in);
+  }
 
  private:
   Observers observers_;
@@ -172,12 +182,11 @@ const std::vector<Observable>& observables() {
       {"center_of_mass_rise", false, "D", "rise of the centre of mass above ideal hexagonal packing", false},
       {"temperature_x_without_flow_over_mg", true, "m",
        "kinetic temperature T_x/(m g), horizontal, without the mean motion of each layer of 1 D at each moment, as "
-       "from "
-       "a film",
+       "from a film; with \"frame_rate\" that of displacements",
        true},
       {"temperature_z_without_flow_over_mg", true, "m",
        "kinetic temperature T_z/(m g), vertical, without the mean motion of each layer of 1 D at each moment, as from "
-       "a film",
+       "a film; with \"frame_rate\" that of displacements",
        true},
   };
   return all;
@@ -251,8 +260,10 @@ std::vector<double> numbers_of(const Observers& observers, const sim::Scene& sce
   out[kinetic_x] = bed.temperature_x().value * length;
   out[kinetic_z] = bed.temperature_z().value * length;
   out[kinetic_z_local] = bed.temperature_z_local().value * length;
-  out[flow_free_x] = observers.flow_free->x().value * length;
-  out[flow_free_z] = observers.flow_free->z().value * length;
+  const sim::FlowFreeTemperature& now = *observers.flow_free;
+  const sim::FlowFreeDisplacement& filmed = *observers.filmed;
+  out[flow_free_x] = (options.frame_rate ? filmed.x() : now.x()).value * length;
+  out[flow_free_z] = (options.frame_rate ? filmed.z() : now.z()).value * length;
   out[rise] = bed.centre_of_mass().value - sim::ideal_centre_of_mass(scene);
   for (const double height : options.heights) out.push_back(value_at(profile.height, profile.number_density, height));
   return out;
@@ -260,13 +271,18 @@ std::vector<double> numbers_of(const Observers& observers, const sim::Scene& sce
 
 }  // namespace
 
+std::uint32_t BedOfInference::looks(const SceneOptions& bed) const {
+  if (!frame_rate) return phases;
+  return static_cast<std::uint32_t>(std::max(1L, std::lround(*frame_rate * bed.period() * bed.time_unit())));
+}
+
 sim::MeasurementSchedule BedOfInference::schedule(const SceneOptions& bed, double duration) const {
   sim::MeasurementSchedule times;
   times.period = bed.period();
   times.settle = std::ceil(settle / bed.time_unit() / times.period * (1 - 1e-12)) * times.period;
   times.periods =
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(duration / bed.time_unit() / times.period * (1 + 1e-12)));
-  times.phases = phases;
+  times.phases = looks(bed);
   return times;
 }
 
@@ -281,9 +297,10 @@ std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t s
   std::vector<sim::RunObserver*> observers;
   for (const View& view : views) {
     const bool average = view.phase < 0;
-    const auto phase = static_cast<std::uint32_t>(std::lround(std::max(0.0, view.phase) * phases)) % phases;
+    const std::uint32_t all = times.phases;
+    const auto phase = static_cast<std::uint32_t>(std::lround(std::max(0.0, view.phase) * all)) % all;
     of_views.push_back(
-        std::make_unique<AtPhase>(Observers(scene_at, average ? phases : 1, grid, {KernelKind::gaussian, kernel_width}),
+        std::make_unique<AtPhase>(Observers(scene_at, average ? all : 1, grid, {KernelKind::gaussian, kernel_width}),
                                   average ? std::nullopt : std::optional(phase)));
     observers.push_back(of_views.back().get());
   }

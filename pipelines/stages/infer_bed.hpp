@@ -71,8 +71,9 @@ struct BedOfInference {
   bool reduced = false;
   double settle = 0, measure = 0;  // as written
   std::uint32_t phases = 32;
-  double kernel_width = 0.5;      // Gaussian [D]
-  double plateau_density = 1.10;  // phi_0 of the fit
+  std::optional<double> frame_rate;  // of a film, as written: temperatures without flow are then of displacements
+  double kernel_width = 0.5;         // Gaussian [D]
+  double plateau_density = 1.10;     // phi_0 of the fit
   std::vector<View> views;
   std::vector<double> heights;  // at which the density is compared [D]; none: it is not
 
@@ -82,6 +83,8 @@ struct BedOfInference {
   // The scene with these parameters; what is wrong with it is added to `problems`.
   SceneOptions at(const Parameters& parameters, const std::vector<double>& values,
                   std::vector<Problem>& problems) const;
+  // Looks a period: as many as frames where the bed is filmed.
+  std::uint32_t looks(const SceneOptions& bed) const;
   sim::MeasurementSchedule schedule(const SceneOptions& bed, double duration) const;
   // The numbers, view by view; not a number where a fit does not succeed, or where the bed chatters
   // and is given up. `progress` is called with the finished share of the run. Throws Interrupted.

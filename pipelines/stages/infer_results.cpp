@@ -55,8 +55,8 @@ sim::Measured moments_of(const std::vector<double>& values, const std::vector<do
 
 class Report {
  public:
-  Report(RunContext& context, const InferOptions& options, const BedSurrogate& surrogate, const Inference& found)
-      : context_(context), options_(options), surrogate_(surrogate), found_(found) {
+  Report(RunContext& context, const InferOptions& options, const KnownParameters& known, const Inference& found)
+      : context_(context), options_(options), known_(known), surrogate_(*known.near), found_(found) {
     const fit::Posterior& posterior = found.posterior;
     values_.resize(options.dimensions());
     for (std::size_t i = 0; i < posterior.size(); ++i) {
@@ -203,11 +203,12 @@ class Report {
       values[name] = *value;
       place.push_back(parameter.place(*value));
     }
-    const BedSurrogate::Fit fit = surrogate_.fit(place, found_.targets);
+    const BedSurrogate& surrogate = known_.region.holds(place) ? *known_.near : *known_.all;
+    const BedSurrogate::Fit fit = surrogate.fit(place, found_.targets);
     std::vector<sim::Measured> at;
-    for (const ScaledTarget& target : found_.targets) at.push_back(surrogate_.predicted(place, 0, target.number));
+    for (const ScaledTarget& target : found_.targets) at.push_back(surrogate.predicted(place, 0, target.number));
     Json out{{"values", std::move(values)}, {"targets", target_rows(at)}};
-    if (surrogate_.view_prior(0) > 0) {
+    if (surrogate.view_prior(0) > 0) {
       const double chance = fit::chance_of_chi2(fit.chi2[0], static_cast<int>(found_.targets.size()));
       out["chi2"] = fit.chi2[0], out["deviations"] = fit::as_deviations(chance);
     }
@@ -406,16 +407,17 @@ class Report {
 
   RunContext& context_;
   const InferOptions& options_;
-  const BedSurrogate& surrogate_;
+  const KnownParameters& known_;
+  const BedSurrogate& surrogate_;  // of the beds where the posterior is
   const Inference& found_;
   std::vector<std::vector<double>> values_;  // by parameter, of every point
 };
 
 }  // namespace
 
-void write_inference(RunContext& context, const InferOptions& options, const BedSurrogate& surrogate,
+void write_inference(RunContext& context, const InferOptions& options, const KnownParameters& known,
                      const Inference& found) {
-  Report(context, options, surrogate, found).write();
+  Report(context, options, known, found).write();
 }
 
 namespace {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 namespace shakebed::sim {
 
@@ -28,10 +29,32 @@ void FlowFreeTemperature::observe(const Snapshot& at, std::uint32_t phase) {
       sum[k] += layer.disks / (layer.disks - 1) *
                 std::max(0.0, layer.energy[k] - layer.momentum[k] * layer.momentum[k] / layer.mass);
   }
-  for (std::size_t k = 0; k < 2; ++k) period_sum_[k] += disks > 0 ? sum[k] / disks / phases_ : 0;
+  for (std::size_t k = 0; k < 2; ++k) period_sum_[k] += disks > 0 ? sum[k] / disks : 0;
+  ++period_looks_;
   if (phase + 1 < phases_) return;
+  for (double& one : period_sum_) one /= period_looks_;
   mean_.add(period_sum_);
-  period_sum_ = {};
+  period_sum_ = {}, period_looks_ = 0;
+}
+
+FlowFreeDisplacement::FlowFreeDisplacement(const Scene& scene, const DiskProperties& disks, std::uint32_t phases)
+    : temperature_(disks, phases) {
+  if (std::holds_alternative<PeriodicSides>(scene.box.sides)) period_x_ = scene.box.width;
+}
+
+void FlowFreeDisplacement::observe(const Snapshot& at, std::uint32_t phase) {
+  const std::size_t count = before_.x.size();
+  if (count > 0) {
+    const double time = at.time - before_.time;
+    before_.vx.resize(count), before_.vz.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double dx = at.x[i] - before_.x[i];
+      before_.vx[i] = (period_x_ > 0 ? std::remainder(dx, period_x_) : dx) / time;
+      before_.vz[i] = (at.z[i] - before_.z[i]) / time;
+    }
+    temperature_.observe(before_, phase);
+  }
+  before_.time = at.time, before_.x = at.x, before_.z = at.z;
 }
 
 }  // namespace shakebed::sim

@@ -29,7 +29,7 @@ class FlowFreeTemperature {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(period_sum_, mean_);
+    archive(period_sum_, period_looks_, mean_);
   }
 
  private:
@@ -40,8 +40,31 @@ class FlowFreeTemperature {
   std::vector<double> mass_;
   std::uint32_t phases_;
   std::array<double, 2> period_sum_{};
+  std::uint32_t period_looks_ = 0;
   BlockedMean mean_{2};
   std::vector<Layer> layers_;  // kept to save allocations
+};
+
+// The same of the displacements from look to look over the time between them, as of the frames of a film. It is
+// smaller, since disks collide meanwhile.
+class FlowFreeDisplacement {
+ public:
+  // `phases`: looks a period, all of which are to be given. A displacement is of the period in which it ends.
+  FlowFreeDisplacement(const Scene& scene, const DiskProperties& disks, std::uint32_t phases);
+
+  void observe(const Snapshot& at, std::uint32_t phase);
+  Measured x() const { return temperature_.x(); }
+  Measured z() const { return temperature_.z(); }
+
+  template <class Archive>
+  void visit(Archive& archive) {
+    archive(temperature_, before_.time, before_.x, before_.z);
+  }
+
+ private:
+  FlowFreeTemperature temperature_;
+  double period_x_ = 0;  // 0: walls
+  Snapshot before_;  // the last look; no disks: there was none
 };
 
 }  // namespace shakebed::sim

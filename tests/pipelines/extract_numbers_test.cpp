@@ -151,8 +151,8 @@ TEST(ExtractNumbers, StandUnderTheirNamesWithErrorsAndUnits) {
 
 TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
   ingest::VelocityMeasurement velocities;
-  velocities.horizontal = {1e-3, 2e-4, 3e-5, 1.1};
-  velocities.vertical = {4e-3, 5e-4, 6e-5, 1.2};
+  velocities.horizontal = {1e-3, 2e-4, 3e-5, 1.1, 0.1, 7e-4, 8e-5};
+  velocities.vertical = {4e-3, 5e-4, 6e-5, 1.2, 0.1, 9e-4, 2e-5};
   velocities.linked_share = 0.97, velocities.mean_step = 0.14;
   const Json json = velocity_numbers(velocities);
   const Json &x = json["temperature_x_over_mg"], &z = json["temperature_z_over_mg"];
@@ -165,6 +165,13 @@ TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
   EXPECT_EQ(error(z), 5e-4);
   EXPECT_EQ(z["localisation_bias"], 6e-5);
   EXPECT_EQ(z["finite_time_factor"], 1.2);
+  const Json& moved_x = json["temperature_x_of_displacements_over_mg"];
+  const Json& moved_z = json["temperature_z_of_displacements_over_mg"];
+  EXPECT_EQ(value(moved_x), 7e-4);
+  EXPECT_EQ(error(moved_x), 8e-5);
+  EXPECT_EQ(moved_x["unit"], "m");
+  EXPECT_EQ(value(moved_z), 9e-4);
+  EXPECT_EQ(error(moved_z), 2e-5);
   EXPECT_EQ(json["linked_share"], 0.97);
   EXPECT_EQ(json["usable"], true);
   velocities.horizontal.finite_time_factor = 2.1;

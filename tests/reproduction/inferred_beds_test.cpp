@@ -25,7 +25,7 @@ namespace {
 using pipelines::Json;
 
 constexpr std::size_t beds = 100;
-constexpr int design_beds = 160, rank_bins = 10;
+constexpr int design_beds = 480, rank_bins = 10;
 
 struct Range {
   const char* name;
@@ -73,14 +73,15 @@ Json film_stages(const Truth& truth, std::size_t number) {
 }
 
 Json inference(const Json& extracted, const std::string& earlier) {
-  Json stage{{"stage", "infer"}, {"id", "infer"},          {"from", "extract"},    {"seed", 7},   {"settle", "2.5 s"},
-             {"measure", "5 s"}, {"target_time", "0.6 s"}, {"first", design_beds}, {"rounds", 0}, {"best", 0}};
+  Json stage{{"stage", "infer"},   {"id", "infer"},          {"from", "extract"},    {"seed", 7},   {"settle", "2.5 s"},
+             {"measure", "0.6 s"}, {"frame_rate", "800 Hz"}, {"first", design_beds}, {"rounds", 0}, {"best", 0}};
   stage.update(scene({4, 0.8, 0.3}));
   stage["targets"]["profile"] = Json{{"from", "extract"}, {"low", 0.5}, {"high", 15.5}};
   if (extracted["velocities"]["usable"] == true) {
     for (const char* axis : {"x", "z"})
       stage["targets"][fmt::format("temperature_{}_without_flow_over_mg", axis)] =
-          Json{{"at", fmt::format("/extract/velocities/temperature_{}_over_mg", axis)}, {"includes_scatter", true}};
+          Json{{"at", fmt::format("/extract/velocities/temperature_{}_of_displacements_over_mg", axis)},
+               {"includes_scatter", true}};
   }
   const auto set = [&](const Range& range, std::vector<std::string> pointers) {
     stage["parameters"][range.name] = Json{{"set", pointers}, {"low", range.low}, {"high", range.high}};

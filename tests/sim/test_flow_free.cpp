@@ -70,5 +70,54 @@ TEST(FlowFree, HasTheErrorOfItsPeriods) {
   EXPECT_NEAR(observer.z().std_error / (4 * relative), 1, 0.3);
 }
 
+// Places of four disks of one layer at two moments, 0.5 apart.
+Snapshot placed(double time, std::vector<double> x, std::vector<double> z) {
+  Snapshot at;
+  at.time = time;
+  at.vx.assign(x.size(), 1e3), at.vz.assign(x.size(), -1e3);  // not looked at
+  at.x = std::move(x), at.z = std::move(z);
+  return at;
+}
+Scene wide(Sides sides) {
+  Scene scene;
+  scene.disks.species = {{.count = 4}};
+  scene.box.width = 10;
+  scene.box.sides = std::move(sides);
+  return scene;
+}
+
+// Displacements along x 0.1, 0.2, 0.3, 0.4 over 0.5: squares about their mean 0.05/0.25, three velocities are free.
+// Along z all move by 0.2 but one, by -0.2: mean 0.1, squares 3 0.1^2 + 0.3^2 = 0.12.
+TEST(FlowFree, OfDisplacementsIsThatOfMeanVelocitiesBetweenLooks) {
+  const DiskProperties disks{std::vector<double>(4, 0.5), std::vector<double>(4, 1.0)};
+  FlowFreeDisplacement observer(wide(HardSides{}), disks, 1);
+  observer.observe(placed(3, {1, 2, 3, 4}, {0.5, 0.5, 0.6, 0.7}), 0);
+  observer.observe(placed(3.5, {1.1, 2.2, 3.3, 4.4}, {0.7, 0.7, 0.8, 0.5}), 0);
+  EXPECT_NEAR(observer.x().value, 0.05 / 0.25 / 3, 1e-12);
+  EXPECT_NEAR(observer.z().value, 0.12 / 0.25 / 3, 1e-12);
+}
+
+// The same displacements across the periodic border.
+TEST(FlowFree, OfDisplacementsGoesAcrossPeriodicSides) {
+  const DiskProperties disks{std::vector<double>(4, 0.5), std::vector<double>(4, 1.0)};
+  FlowFreeDisplacement observer(wide(PeriodicSides{}), disks, 1);
+  observer.observe(placed(0, {9.9, 2, 3, 9.8}, {0.5, 0.5, 0.6, 0.7}), 0);
+  observer.observe(placed(0.5, {0, 2.2, 3.3, 0.2}, {0.7, 0.7, 0.8, 0.5}), 0);
+  EXPECT_NEAR(observer.x().value, 0.05 / 0.25 / 3, 1e-12);
+}
+
+// A displacement is of the period in which it ends, so that the first period has one less than the others.
+TEST(FlowFree, OfDisplacementsIsTheMeanOfPeriods) {
+  const DiskProperties disks{std::vector<double>(4, 0.5), std::vector<double>(4, 1.0)};
+  FlowFreeDisplacement observer(wide(HardSides{}), disks, 2);
+  const std::vector<double> z(4, 0.5);
+  observer.observe(placed(0, {1, 2, 3, 4}, z), 0);
+  observer.observe(placed(1, {1, 2, 3, 5}, z), 1);  // squares 0.75 about the mean: 0.25
+  EXPECT_NEAR(observer.x().value, 0.25, 1e-12);
+  observer.observe(placed(2, {1, 2, 3, 7}, z), 0);   // four times as much
+  observer.observe(placed(3, {1, 2, 3, 10}, z), 1);  // nine times as much
+  EXPECT_NEAR(observer.x().value, (0.25 + 0.25 * (4 + 9) / 2) / 2, 1e-12);
+}
+
 }  // namespace
 }  // namespace shakebed::sim::flow_free
