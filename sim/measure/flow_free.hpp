@@ -64,7 +64,7 @@ class FlowFreeDisplacement {
  private:
   FlowFreeTemperature temperature_;
   double period_x_ = 0;  // 0: walls
-  Snapshot before_;  // the last look; no disks: there was none
+  Snapshot before_;      // the last look; no disks: there was none
 };
 
 }  // namespace shakebed::sim
