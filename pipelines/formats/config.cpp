@@ -405,8 +405,27 @@ void Fields::texts(std::string_view key, std::vector<std::string>& values, const
 }
 
 namespace {
-bool has_wildcards(const std::filesystem::path& path) {
-  return path.filename().string().find_first_of("*?") != std::string::npos;
+bool has_wildcards(const std::filesystem::path& path) { return path.string().find_first_of("*?") != std::string::npos; }
+
+// All that a path with wildcards, also in names of folders, fits.
+std::vector<std::filesystem::path> matching(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> found{path.root_path()};
+  for (const fs::path& part : path.relative_path()) {
+    std::vector<fs::path> next;
+    for (const fs::path& before : found) {
+      if (!has_wildcards(part)) {
+        next.push_back(before / part);
+        continue;
+      }
+      std::error_code error;
+      for (const fs::directory_entry& entry : fs::directory_iterator(before.empty() ? "." : before, error))
+        if (fnmatch(part.c_str(), entry.path().filename().c_str(), FNM_PERIOD) == 0)
+          next.push_back(before / entry.path().filename());
+    }
+    found = std::move(next);
+  }
+  return found;
 }
 
 // The file of this name, the files in the folder of this name, or those that fit a name with wildcards; in the order of
@@ -417,12 +436,9 @@ std::vector<std::string> files_named(const std::filesystem::path& path) {
   if (fs::is_regular_file(path, error)) return {path.string()};
   const bool folder = fs::is_directory(path, error);
   if (!folder && !has_wildcards(path)) return {};
-  const std::string pattern = folder ? "*" : path.filename().string();
   std::vector<std::string> found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder ? path : path.parent_path(), error)) {
-    if (entry.is_regular_file(error) && fnmatch(pattern.c_str(), entry.path().filename().c_str(), FNM_PERIOD) == 0)
-      found.push_back(entry.path().string());
-  }
+  for (const fs::path& file : matching(folder ? path / "*" : path))
+    if (fs::is_regular_file(file, error)) found.push_back(file.string());
   std::sort(found.begin(), found.end(),
             [](const std::string& a, const std::string& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   return found;

@@ -65,7 +65,7 @@ struct About {
   std::string_view example = {};  // shown in messages and in the schema
 };
 
-// A file, or several (an array, wildcards * and ? in the last part of a path, all files of a folder), that the user
+// A file, or several (an array, wildcards * and ? in a path, all files of a folder), that the user
 // names in a recipe. Paths are relative to the recipe.
 struct InputFiles {
   std::vector<std::string> texts;  // as written

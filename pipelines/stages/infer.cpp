@@ -75,10 +75,12 @@ class Infer : public Stage {
  private:
   void describe_search(Fields& fields);
   void check(Fields& fields);
+  void check_first_round(Fields& fields) const;
   void check_film(Fields& fields) const;
   void check_corners(Fields& fields) const;
   std::string made_from() const;
   std::vector<RunBed> earlier_beds() const;
+  std::vector<RunBed> beds_in(const Json& json, const std::string& name) const;
   std::vector<double> numbers_of_run(RunContext& context, const std::string& name, const std::vector<double>& values,
                                      std::uint64_t stream, double measure, const BedToRun& bed) const;
   std::vector<RunBed> run_beds(RunContext& context, std::uint32_t round, std::size_t first_number,
@@ -108,6 +110,11 @@ void Infer::describe_search(Fields& fields) {
   fields.integer(
       "first", options_.first,
       {.help = "number of beds in the first round, spread over the whole prior", .range = from_to(8, 100'000)});
+  fields.integer("part", options_.part,
+                 {.help = "which part of the first round this run has, from 1 to \"parts\"; a sweep over the parts "
+                          "shares the beds among machines, and \"beds\" puts them together",
+                  .range = from_to(1, 10'000)});
+  fields.integer("parts", options_.parts, {.help = "number of parts of the first round", .range = from_to(1, 10'000)});
   fields.integer(
       "rounds", options_.rounds,
       {.help = "number of further rounds, with beds in the region of the posterior", .range = from_to(0, 20)});
@@ -142,8 +149,9 @@ void Infer::describe_search(Fields& fields) {
               {.help = "name of a file in reference-data with the beds of an earlier run (its beds.json). These beds "
                        "are used and no new ones are run"});
   fields.input_files("beds", options_.beds,
-                     {.help = "beds.json of an earlier run with the same scene, parameters and measurement. These beds "
-                              "are used and no new ones are run, so that other targets cost little",
+                     {.help = "beds.json of earlier runs with the same scene, parameters and measurement, for instance "
+                              "of all parts of a first round. These beds are used and no new ones are run, so that "
+                              "other targets cost little",
                       .example = "\"results/infer/beds.json\""});
 }
 
@@ -204,10 +212,7 @@ void Infer::check(Fields& fields) {
                                                  [](const auto& t) { return t.has_value(); }),
                  "targets", "no target has a value: at least one measured number is needed",
                  "Give \"temperature_over_mg\" with its error");
-  const std::size_t fewest = fit::Surrogate::fewest_runs(options_.dimensions());
-  fields.require(
-      options_.first >= fewest, "first",
-      fmt::format("{} unknown parameters need at least {} beds in the first round", options_.dimensions(), fewest));
+  check_first_round(fields);
   for (const auto& [name, parameter] : options_.parameters) {
     for (const std::string& pointer : parameter.set) {
       const std::string where = "/parameters/" + escape_pointer_token(name) + "/set";
@@ -224,8 +229,8 @@ void Infer::check(Fields& fields) {
   if (fields.problem_count() > 0) return;
   check_corners(fields);
   if (fields.problem_count() > 0) return;
-  fields.require(options_.beds.paths.size() <= 1 && (options_.stored.empty() || options_.beds.empty()), "beds",
-                 "the beds come from one file: give either \"stored\" or one file in \"beds\"");
+  fields.require(options_.stored.empty() || options_.beds.empty(), "beds",
+                 "beds are either stored or your own: give one of \"stored\" and \"beds\"");
   if (fields.problem_count() > 0 || !options_.uses_earlier_beds()) return;
   const std::string key = options_.beds.empty() ? "stored" : "beds";
   try {
@@ -233,6 +238,20 @@ void Infer::check(Fields& fields) {
   } catch (const Error& error) {
     fields.problem("/" + key, error.what(), "Leave \"" + key + "\" out: the beds are then run");
   }
+}
+
+void Infer::check_first_round(Fields& fields) const {
+  const std::size_t fewest = fit::Surrogate::fewest_runs(options_.dimensions());
+  fields.require(
+      options_.first >= fewest, "first",
+      fmt::format("{} unknown parameters need at least {} beds in the first round", options_.dimensions(), fewest));
+  fields.require(options_.part <= options_.parts, "part",
+                 fmt::format("part {} of {} does not exist", options_.part, options_.parts));
+  fields.require(options_.parts == 1 || options_.rounds == 0, "rounds",
+                 "a part of the first round is followed by no further rounds", "Give \"rounds\": 0");
+  fields.require(
+      options_.first / options_.parts >= fewest, "parts",
+      fmt::format("{} unknown parameters need at least {} beds in each part", options_.dimensions(), fewest));
 }
 
 // A film shows every phase, and its temperatures depend on the time between its frames.
@@ -312,11 +331,20 @@ std::vector<double> numbers_in(const Json& list) {
 }
 
 std::vector<RunBed> Infer::earlier_beds() const {
-  const bool own = !options_.beds.empty();
-  const std::string name = own ? options_.beds.texts[0] : options_.stored;
-  const EmbeddedFile* file = own ? nullptr : find_embedded("reference-data/" + options_.stored + ".json");
-  if (!own && file == nullptr) throw InputError("there is no file of stored beds named \"" + name + "\"");
-  const Json json = own ? read_json(options_.beds.paths[0]) : Json::parse(file->text);
+  if (options_.beds.empty()) {
+    const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
+    if (file == nullptr) throw InputError("there is no file of stored beds named \"" + options_.stored + "\"");
+    return beds_in(Json::parse(file->text), options_.stored);
+  }
+  std::vector<RunBed> all;
+  for (const std::string& path : options_.beds.paths) {
+    const std::vector<RunBed> some = beds_in(read_json(path), path);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+std::vector<RunBed> Infer::beds_in(const Json& json, const std::string& name) const {
   if (!json.contains("made_from") || !json.contains("beds"))
     throw InputError("\"" + name + "\" is not a beds.json of the stage infer");
   // Densities at heights that are not asked for are left out.
@@ -393,9 +421,10 @@ std::vector<RunBed> Infer::design(RunContext& context, const std::vector<ScaledT
   const std::size_t d = options_.dimensions();
   const std::vector<double> places = fit::even_points(d, options_.first, context.seed());
   std::vector<std::vector<double>> values;
-  for (std::size_t i = 0; i < options_.first; ++i)
+  const std::size_t begin = options_.begin_of(options_.part), end = options_.begin_of(options_.part + 1);
+  for (std::size_t i = begin; i < end; ++i)
     values.push_back(values_at(options_, std::span<const double>(places).subspan(i * d, d)));
-  std::vector<RunBed> beds = run_beds(context, 0, 1, values, ahead);
+  std::vector<RunBed> beds = run_beds(context, 0, 1 + begin, values, ahead);
   for (std::uint32_t round = 1; round <= options_.rounds; ++round) {
     const fit::Posterior posterior = known_parameters(context, options_, beds, targets).posterior;
     const std::vector<std::size_t> draws =
@@ -567,8 +596,10 @@ std::vector<std::string> missing_numbers(const InferOptions& options, const Infe
 std::vector<double> Infer::bed_times() const {
   const BedOfInference& bed = options_.bed;
   const double best_measure = options_.best_measure > 0 ? options_.best_measure : bed.measure;
-  const std::size_t design =
-      options_.uses_earlier_beds() ? 0 : options_.first + std::size_t{options_.rounds} * options_.each;
+  const std::size_t design = options_.uses_earlier_beds()
+                                 ? 0
+                                 : options_.begin_of(options_.part + 1) - options_.begin_of(options_.part) +
+                                       std::size_t{options_.rounds} * options_.each;
   std::vector<double> times(design, bed.settle + bed.measure);
   times.insert(times.end(), std::size_t{options_.best} * options_.replicas, bed.settle + best_measure);
   times.insert(times.end(), options_.calibration, bed.settle + bed.measure);

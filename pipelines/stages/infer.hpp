@@ -48,14 +48,19 @@ struct InferOptions {
   double average = 0.5;
   std::optional<double> phase;
   std::uint32_t first = 160, rounds = 2, each = 60;
+  std::uint32_t part = 1, parts = 1;  // of the first round, which other runs share
   std::uint32_t best = 3, replicas = 4;
   double best_measure = 0;  // as written; 0: as the others
   std::uint32_t draws = 1000, calibration = 0;
   std::optional<MapCurve> curve;
   std::string stored;
-  InputFiles beds;  // beds.json of an earlier run
+  InputFiles beds;  // beds.json of earlier runs
   bool uses_earlier_beds() const { return !stored.empty() || !beds.empty(); }
   std::size_t dimensions() const { return parameters.size(); }
+  // Of the beds of the first round, the number of the first of part k, and so one past the last of part k - 1.
+  std::uint32_t begin_of(std::uint32_t k) const {
+    return static_cast<std::uint32_t>(std::uint64_t{first} * (k - 1) / parts);
+  }
 };
 
 // A bed that was run: where, in which round, and its numbers, view by view.

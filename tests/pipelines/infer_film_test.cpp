@@ -1,4 +1,5 @@
-// Temperatures of films in an inference, and beds that answer differently in different parts of the prior.
+// Temperatures of films in an inference, beds that answer differently in different parts of the prior, and beds that
+// several runs share.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -137,6 +138,40 @@ TEST(InferNear, IsNotWidenedByBedsElsewhere) {
   // The scatter is known from 60 beds or more, to 9 %.
   EXPECT_NEAR(value(gamma), 4.5, 0.03);
   EXPECT_NEAR(error(gamma) / (0.1 / 3), 1, 0.25);
+}
+
+// Two runs that share the beds of the first round, as a sweep over the parts would, and one that has their beds: the
+// same posterior as that of one run, to the last digit.
+TEST(InferParts, TogetherAreTheWhole) {
+  const ScratchFolder folder;
+  Json json = recipe();
+  Json& stage = json["stages"][0];
+  stage["first"] = 33;
+  ASSERT_EQ(run(folder.path(), json, "whole").exit_code, 0);
+  stage["parts"] = 2;
+  Json sweep = json;
+  sweep["sweep"] = Json{{"kind", "grid"}, {"over", {{"/stages/search/part", {1, 2}}}}, {"collect", {"/search/beds"}}};
+  const ProgramResult swept = run(folder.path(), sweep, "parts");
+  ASSERT_EQ(swept.exit_code, 0) << swept.err;
+  const NumberTable beds(folder / "parts/sweep.csv");
+  EXPECT_EQ(beds("search_beds", 0), 16);
+  EXPECT_EQ(beds("search_beds", 1), 17);
+  stage.erase("parts");
+  stage["beds"] = "parts/points/*/search/beds.json";
+  const ProgramResult ran = run(folder.path(), json, "together");
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  for (const char* file : {"posterior.csv", "beds.csv", "marginals.csv"})
+    EXPECT_EQ(read_text(folder / "together/search" / file), read_text(folder / "whole/search" / file)) << file;
+  const auto refused = [&](const Json& more, const std::string& words) {
+    Json wrong = recipe();
+    wrong["stages"][0].update(more);
+    const ProgramResult failed = run(folder.path(), wrong, "wrong");
+    EXPECT_EQ(failed.exit_code, 3) << failed.err;
+    EXPECT_NE(failed.err.find(words), std::string::npos) << failed.err;
+  };
+  refused({{"parts", 2}, {"part", 3}, {"first", 40}}, "part 3 of 2 does not exist");
+  refused({{"parts", 3}, {"first", 40}}, "at least 16 beds in each part");
+  refused({{"parts", 2}, {"first", 40}, {"rounds", 1}}, "Give \"rounds\": 0");
 }
 
 }  // namespace
