@@ -528,7 +528,7 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
       ++incomplete;
       continue;
     }
-    const fit::Posterior posterior = known_parameters(context, options_, first, targets).posterior;
+    const fit::Posterior posterior = known_parameters(context, options_, first, targets, of_first.all).posterior;
     for (std::size_t k = 0; k < d; ++k) {
       const double truth = values[i][k];
       CalibrationRow row{i, k, truth, 0, 0, 0, 0, 0};

@@ -166,8 +166,10 @@ struct KnownParameters {
   std::size_t beds_near = 0;
   fit::Posterior posterior;  // in the unit cube of the whole prior
 };
+// `of_all`: the surrogate of all beds for targets of the same numbers, where there is one.
 KnownParameters known_parameters(const RunContext& context, const InferOptions& options,
-                                 const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets);
+                                 const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets,
+                                 std::shared_ptr<const BedSurrogate> of_all = nullptr);
 
 // All that was found, for infer_results.cpp.
 struct Inference {

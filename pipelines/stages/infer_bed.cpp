@@ -38,17 +38,19 @@ enum Number : std::size_t {
 
 // What is measured of a bed, with so many looks a period.
 struct Observers {
-  Observers(const sim::Scene& scene, std::uint32_t looks, const HeightGrid& grid, const Kernel& kernel)
+  Observers(const sim::Scene& scene, std::uint32_t looks, const HeightGrid& grid, const Kernel& kernel, bool of_film)
       : bed([&scene, looks, grid, kernel](const sim::DiskProperties& disks) {
           return sim::BedObserver(scene, disks, looks, grid, kernel);
         }),
         flow_free([looks](const sim::DiskProperties& disks) { return sim::FlowFreeTemperature(disks, looks); }),
         filmed([&scene, looks](const sim::DiskProperties& disks) {
           return sim::FlowFreeDisplacement(scene, disks, looks);
-        }) {}
+        }),
+        film(of_film) {}
   sim::Observing<sim::BedObserver> bed;
   sim::Observing<sim::FlowFreeTemperature> flow_free;
   sim::Observing<sim::FlowFreeDisplacement> filmed;
+  bool film;  // whether `filmed` looks
 };
 
 // Passes on the samples of one phase only, as if it were the single phase of a period; or all of them.
@@ -64,7 +66,7 @@ class AtPhase final : public sim::RunObserver {
     if (phase_ && phase != *phase_) return;
     const std::uint32_t own = phase_ ? 0 : phase;
     observers_.bed.look(simulation, at, look, own), observers_.flow_free.look(simulation, at, look, own);
-    if (!phase_) observers_.filmed.look(simulation, at, look, own);
+    if (observers_.film) observers_.filmed.look(simulation, at, look, own);
   }
   void save(sim::ArchiveWriter& out) override {
     observers_.bed.save(out), observers_.flow_free.save(out), observers_.filmed.save(out);
@@ -299,9 +301,9 @@ std::vector<double> BedOfInference::run(const SceneOptions& bed, std::uint64_t s
     const bool average = view.phase < 0;
     const std::uint32_t all = times.phases;
     const auto phase = static_cast<std::uint32_t>(std::lround(std::max(0.0, view.phase) * all)) % all;
-    of_views.push_back(
-        std::make_unique<AtPhase>(Observers(scene_at, average ? all : 1, grid, {KernelKind::gaussian, kernel_width}),
-                                  average ? std::nullopt : std::optional(phase)));
+    of_views.push_back(std::make_unique<AtPhase>(
+        Observers(scene_at, average ? all : 1, grid, {KernelKind::gaussian, kernel_width}, frame_rate.has_value()),
+        average ? std::nullopt : std::optional(phase)));
     observers.push_back(of_views.back().get());
   }
   sim::RunControl control;

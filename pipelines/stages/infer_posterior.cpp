@@ -167,11 +167,12 @@ class NearPosterior {
 }  // namespace
 
 KnownParameters known_parameters(const RunContext& context, const InferOptions& options,
-                                 const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets) {
+                                 const std::vector<RunBed>& beds, const std::vector<ScaledTarget>& targets,
+                                 std::shared_ptr<const BedSurrogate> of_all) {
   const NearPosterior near(context, options, beds, targets);
   KnownParameters known;
   known.region = whole(options.dimensions()), known.beds_near = beds.size();
-  known.all = near.surrogate(thinned(beds), known.region, false);
+  known.all = of_all ? std::move(of_all) : near.surrogate(thinned(beds), known.region, false);
   known.posterior = near.posterior(*known.all, known.region);
   Region region = known.posterior.effective > 0 ? about(known.posterior) : known.region;
   bool at_edges = false;
@@ -183,7 +184,9 @@ KnownParameters known_parameters(const RunContext& context, const InferOptions& 
     at_edges = share_at_edges(known.posterior, region) > at_the_edge;
     region = at_edges ? wider(region, growth * growth) : about(known.posterior);
   }
-  if (!known.near) known.near = near.surrogate(beds, known.region, true);
+  if (known.near) return known;
+  known.near = near.surrogate(beds, known.region, true);
+  if (beds.size() > most_of_all) known.posterior = near.posterior(*known.near, known.region);
   return known;
 }
 
