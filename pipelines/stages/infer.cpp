@@ -517,9 +517,8 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     bool complete = true;
     for (ScaledTarget& target : targets) {
       // The bed's number has its scatter already.
-      const double scatter = target.includes_scatter ? std::pow(surrogate.scatter(target.number), 2) : 0;
-      const double all = std::max(scatter, target.error * target.error);
-      const double error = std::sqrt(std::max(0.0, all - scatter));
+      const double missing = std::pow(target.least_scatter, 2) - std::pow(surrogate.scatter(target.number), 2);
+      const double error = std::sqrt(std::max(0.0, missing) + std::pow(target.further_error, 2));
       target.value = to_scale(target.number, beds[i].numbers[view * count + target.number]) +
                      error * fit::normal_quantile(uniform());
       complete = complete && std::isfinite(target.value);

@@ -69,11 +69,12 @@ struct RunBed {
   std::vector<double> values, numbers;
 };
 
-// A target on the scale on which it is compared, see to_scale().
+// A target on the scale on which it is compared, see to_scale(). Its difference from a bed's number scatters as beds
+// do, at least by `least_scatter`, and has a further error.
 struct ScaledTarget {
   std::size_t number = 0;  // of those of a view
   double value = 0, error = 0;
-  bool includes_scatter = false;
+  double least_scatter = 0, further_error = 0;
 };
 
 void describe_targets(Fields& fields, InferOptions& options);

@@ -161,11 +161,9 @@ class Report {
     return out;
   }
 
-  // Of one further bed: how far it is from the target, in errors of both. An error of the target that includes the
-  // scatter of a bed does so once: the larger of the two counts.
+  // Of one further bed: how far it is from the target, in errors of both.
   static double difference(const ScaledTarget& target, const sim::Measured& at) {
-    return (at.value - target.value) /
-           (target.includes_scatter ? std::max(at.std_error, target.error) : std::hypot(at.std_error, target.error));
+    return (at.value - target.value) / std::hypot(std::max(at.std_error, target.least_scatter), target.further_error);
   }
 
   // `at`: on the scale of comparison, target by target.

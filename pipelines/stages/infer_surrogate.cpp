@@ -26,13 +26,9 @@ std::string name_of_numbers(const std::vector<std::size_t>& numbers) {
   return is_density(numbers.front()) ? "profile" : std::string(observables()[numbers.front()].name);
 }
 
-// Of the difference between a target and the prediction. A measured error that includes the scatter of a bed is not to
-// count it twice: the larger of the two counts. Its error alone would not do, since a short film does not tell how far
-// a bed wanders that keeps its motion for long: T_x of 24 simulated beds over twelve periods was off by 32 % (root mean
-// square; from longer runs), where 11 % were stated.
+// Of the difference between a target and the prediction, but for the target's further error.
 double variance_of(double variance, double scatter, const ScaledTarget& target) {
-  if (!target.includes_scatter) return variance;
-  return variance - scatter + std::max(scatter, target.error * target.error);
+  return variance - scatter + std::max(scatter, target.least_scatter * target.least_scatter);
 }
 
 // Beds at points of the unit cube of their region.
@@ -243,7 +239,7 @@ BedSurrogate::Fit BedSurrogate::fit(std::span<const double> places, const std::v
         const std::size_t cell = i * outputs + *output_of(target.number, v);
         off[t] = target.value - prediction.mean[cell];
         deviation[t] = std::sqrt(variance_of(prediction.variance[cell], prediction.scatter[cell], target));
-        error[t] = target.includes_scatter ? 0 : target.error;
+        error[t] = target.further_error;
       }
       const fit::Discrepancy found = correlated_[v](off, deviation, error);
       out.chi2[i * views + v] = found.chi2;

@@ -134,6 +134,15 @@ void describe_targets(Fields& fields, InferOptions& options) {
 
 namespace {
 
+// An error that includes the scatter of a bed is not to count it twice: the larger of the two counts. The error alone
+// would not do, since a short film does not tell how far a bed wanders that keeps its motion for long: T_x of 24
+// simulated beds over twelve periods was off by 32 % (root mean square; from longer runs), where 11 % were stated.
+ScaledTarget scaled(std::size_t number, double value, double error, bool includes_scatter) {
+  ScaledTarget out{number, to_scale(number, value), error * slope_of_scale(number, value)};
+  (includes_scatter ? out.least_scatter : out.further_error) = out.error;
+  return out;
+}
+
 ScaledTarget number_target(const RunContext& context, const InferOptions& options, std::size_t k) {
   InferTarget target = *options.targets[k];
   if (!target.at.empty()) {
@@ -154,7 +163,7 @@ ScaledTarget number_target(const RunContext& context, const InferOptions& option
   if (observables()[k].logarithmic && !(target.value > 0))
     throw InputError(
         fmt::format("{}: the target must be above 0, but is {}", observables()[k].name, number_text(target.value)));
-  return {k, to_scale(k, target.value), target.std_error * slope_of_scale(k, target.value), target.includes_scatter};
+  return scaled(k, target.value, target.std_error, target.includes_scatter);
 }
 
 std::vector<ScaledTarget> profile_targets(const RunContext& context, const InferOptions& options) {
@@ -163,6 +172,9 @@ std::vector<ScaledTarget> profile_targets(const RunContext& context, const Infer
   const std::filesystem::path path =
       from_stage ? input_named(context, target.from).file(target.table) : std::filesystem::path(target.file.paths[0]);
   const ProfileTable profile = read_profile_csv(path);
+  // Beds are measured as long as a film, so that their scatter is that of its profile. What a film of few periods
+  // states may be more, since the density near the floor goes up and down with it: 0.044 where beds scatter by 0.016.
+  const bool filmed = from_stage && target.includes_scatter && options.bed.frame_rate;
   const PlaceErrors more = from_stage ? place_errors(input_named(context, target.from)) : PlaceErrors{};
   const Kernel wanted{KernelKind::gaussian, options.bed.kernel_width};
   if (profile.std_error.empty())
@@ -184,9 +196,10 @@ std::vector<ScaledTarget> profile_targets(const RunContext& context, const Infer
                       path.string(), profile.height.front(), profile.height.back(), height));
     const std::size_t number = observables().size() + i;
     const double density = above ? 0 : value_at(profile.height, profile.number_density, height);
-    const double error = std::hypot(value_at(profile.height, profile.std_error, height), more(profile, height));
-    out.push_back(
-        {number, to_scale(number, density), error * slope_of_scale(number, density), target.includes_scatter});
+    const double place = more(profile, height), slope = slope_of_scale(number, density);
+    const double error = std::hypot(value_at(profile.height, profile.std_error, height), place);
+    out.push_back(scaled(number, density, error, target.includes_scatter));
+    if (filmed) out.back().least_scatter = 0, out.back().further_error = place * slope;
   }
   return out;
 }
