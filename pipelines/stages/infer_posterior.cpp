@@ -12,12 +12,13 @@ namespace shakebed::pipelines {
 
 namespace {
 
+// Of 100 films, margins of 0.25 and 0.5 did as well (67 and 92 to 93 % of the truths within 68 and 95 % intervals).
 // The region reaches over this share of the posterior, and by this part of its width beyond on each side.
 constexpr double share_beyond = 0.001, margin = 0.25;
 // It grows by this factor until so many beds of each parameter and one more are in it.
 constexpr double growth = 1.25;
 constexpr std::size_t beds_each = 20;
-constexpr double least_half = 1e-3;
+constexpr double least_half = 1e-3;  // of a side of the region, so that it can grow from a point
 // The first surrogate, of the whole prior, is made from so many beds: its time grows with their third power.
 constexpr std::size_t most_of_all = 200;
 // Where more than this share of the posterior lies in the outermost tenth of a side, it is made again in a wider
