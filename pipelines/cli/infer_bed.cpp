@@ -216,12 +216,14 @@ RunArguments measuring_part(RunArguments run) {
 int infer_bed(const Call& call, const InferBedArguments& given) {
   check_inference(given);
   Json recipe{{"name", "infer-bed"}, {"stages", measuring_stages(given)}};
-  recipe["report"] = Json{{"title", "What the frames say about the bed"},
-                          {"text",
-                           "The disks were found in the given frames. Simulated beds of as many disks, with parameters "
-                           "over the whole ranges, were then compared with the measured profile and, for a film, "
-                           "temperatures. Floor and side walls are taken to be of the beads' material, and the beads "
-                           "to be spheres that touch no plate in front or behind."}};
+  recipe["report"] =
+      Json{{"title", "What the frames say about the bed"},
+           {"text",
+            "The disks were found in the given frames. Simulated beds of as many disks, with parameters "
+            "over the whole ranges, were then compared with the measured profile and, for a film, "
+            "with temperatures from displacements between frames. These are below T_x and T_z, since "
+            "beads collide between frames. Floor and side walls are taken to be of the beads' material, and the beads "
+            "to be spheres that touch no plate in front or behind."}};
   Call measuring = call;
   measuring.json = true;  // its results are shown with those of the inference
   Json ignored;
