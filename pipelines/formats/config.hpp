@@ -118,6 +118,9 @@ class Fields {
 
   Mode mode() const { return mode_; }
   bool decoding() const { return mode_ == Mode::decode; }
+  // Whether a key is to be described: always, but when writing only if `used`. For keys that exclude each other, so
+  // that what is written can be read again.
+  bool describes(bool used) const { return mode_ != Mode::encode || used; }
   const std::string& pointer() const { return pointer_; }
   const Source& source() const { return source_; }
 

@@ -304,9 +304,12 @@ void Infer::check_corners(Fields& fields) const {
 
 // All that the numbers of a bed depend on.
 std::string Infer::made_from() const {
-  Json out{{"scene", options_.bed.scene.to_json()},     {"settle", options_.bed.settle},
-           {"measure", options_.bed.measure},           {"phases", options_.bed.phases},
-           {"kernel_width", options_.bed.kernel_width}, {"plateau_density", options_.bed.plateau_density}};
+  Json out{{"scene", options_.bed.written_out(options_.bed.scene)},
+           {"settle", options_.bed.settle},
+           {"measure", options_.bed.measure},
+           {"phases", options_.bed.phases},
+           {"kernel_width", options_.bed.kernel_width},
+           {"plateau_density", options_.bed.plateau_density}};
   for (const auto& [name, p] : options_.parameters)
     out["parameters"][name] = Json{{"set", p.set}, {"unit", p.unit}, {"values", p.values}};
   for (const View& view : options_.bed.views) out["views"].push_back(view.name);
@@ -349,6 +352,7 @@ std::vector<RunBed> Infer::beds_in(const Json& json, const std::string& name) co
     throw InputError("\"" + name + "\" is not a beds.json of the stage infer");
   // Densities at heights that are not asked for are left out.
   Json from = json.at("made_from");
+  if (from.contains("scene")) from["scene"] = options_.bed.written_out(to_node(from["scene"]));
   std::size_t more = 0;
   if (options_.bed.heights.empty() && from.contains("heights")) more = from["heights"].size(), from.erase("heights");
   if (dump_canonical(from) != made_from())

@@ -228,6 +228,10 @@ SceneOptions BedOfInference::at(const Parameters& parameters, const std::vector<
     for (const std::string& pointer : parameters[k].second.set)
       set_pointer(node, pointer, to_node(parameters[k].second.written(values[k])), ValueFrom::file);
   }
+  return read(node, problems);
+}
+
+SceneOptions BedOfInference::read(const JsonNode& node, std::vector<Problem>& problems) const {
   Fields::Source own = source;
   own.problems = &problems, own.warnings = nullptr, own.input_files = nullptr;
   Fields fields = Fields::decode(node, "", own);
@@ -236,6 +240,16 @@ SceneOptions BedOfInference::at(const Parameters& parameters, const std::vector<
   bed.describe(fields);
   fields.finish();
   return bed;
+}
+
+Json BedOfInference::written_out(const JsonNode& node) const {
+  std::vector<Problem> problems;
+  SceneOptions bed = read(node, problems);
+  Json out = Json::object();
+  Fields fields = Fields::encode(out);
+  fields.set_reduced(reduced);
+  bed.describe(fields);
+  return out;
 }
 
 namespace {

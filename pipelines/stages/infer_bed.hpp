@@ -83,6 +83,9 @@ struct BedOfInference {
   // The scene with these parameters; what is wrong with it is added to `problems`.
   SceneOptions at(const Parameters& parameters, const std::vector<double>& values,
                   std::vector<Problem>& problems) const;
+  SceneOptions read(const JsonNode& node, std::vector<Problem>& problems) const;
+  // A scene with every option written out: the same for all ways to write the same scene.
+  Json written_out(const JsonNode& node) const;
   // Looks a period: as many as frames where the bed is filmed.
   std::uint32_t looks(const SceneOptions& bed) const;
   sim::MeasurementSchedule schedule(const SceneOptions& bed, double duration) const;

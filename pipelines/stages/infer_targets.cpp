@@ -26,13 +26,15 @@ void describe_number(Fields& f, InferTarget& target, const Observable& observabl
   for (const auto& [key, number, help] :
        {std::tuple{"value", &target.value, "measured value"},
         std::tuple{"std_error", &target.std_error, "standard error of the measured value"}}) {
+    if (!f.describes(target.at.empty())) continue;
     if (observable.is_length)
       f.quantity(key, *number, dimension::length, {.help = help, .range = non_negative});
     else
       f.number(key, *number, {.help = help});
   }
-  f.text("at", target.at,
-         {.help = "pointer to a number of a stage in \"from\", in place of a value: /fit/temperature_over_mg"});
+  if (f.describes(!target.at.empty()))
+    f.text("at", target.at,
+           {.help = "pointer to a number of a stage in \"from\", in place of a value: /fit/temperature_over_mg"});
   f.boolean("includes_scatter", target.includes_scatter, {.help = includes_scatter_help});
   if (!f.decoding()) return;
   f.require(f.has("value") != f.has("at"), "value", "a target has either \"value\" or \"at\"");
@@ -42,13 +44,16 @@ void describe_number(Fields& f, InferTarget& target, const Observable& observabl
 }
 
 void describe_profile(Fields& f, ProfileTarget& profile) {
-  f.text("from", profile.from, {.help = "stage in \"from\" whose profile this is", .example = "\"extract\""});
+  if (f.describes(!profile.from.empty()))
+    f.text("from", profile.from, {.help = "stage in \"from\" whose profile this is", .example = "\"extract\""});
   f.text("table", profile.table,
          {.help = "table of that stage: profile.csv, or profile_phase_03.csv for one phase of a film"});
-  f.input_files("file", profile.file,
-                {.help = "CSV file of your own profile, in place of \"from\", with columns height [D], number_density "
-                         "[1/D^2] and std_error",
-                 .example = "\"profile.csv\""});
+  if (f.describes(!profile.file.empty()))
+    f.input_files(
+        "file", profile.file,
+        {.help = "CSV file of your own profile, in place of \"from\", with columns height [D], number_density "
+                 "[1/D^2] and std_error",
+         .example = "\"profile.csv\""});
   f.number("low", profile.low, {.help = "lowest height at which densities are compared, in D", .required = true});
   f.number("high", profile.high, {.help = "greatest height at which densities are compared, in D", .required = true});
   f.number("spacing", profile.spacing,

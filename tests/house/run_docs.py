@@ -155,7 +155,11 @@ class Page:
                 self.fault(line, f"{command}\n  expected: {missing}\n  printed:\n    " + printed.replace("\n", "\n    "))
 
     def json_block(self, line, lines):
-        value = json.loads("\n".join(lines))
+        try:
+            value = json.loads("\n".join(lines))
+        except json.JSONDecodeError as error:
+            self.fault(line, f"no JSON by itself: {error}")
+            return
         starter = self.folder / ".starter.json"
         if not starter.exists():
             self.shell("shakebed init .starter.json")

@@ -10,6 +10,7 @@
 #include "tests/pipelines/infer_recipe.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/pipelines/read_table.hpp"
+#include "tests/pipelines/written_out.hpp"
 
 namespace shakebed::tests::infer_profile {
 namespace {
@@ -121,6 +122,22 @@ TEST_F(InferProfile, UsesTheBedsOfAnEarlierRun) {
   EXPECT_EQ(other.exit_code, 3);
   EXPECT_NE(other.err.find("a different scene, different parameters or a different measurement"), std::string::npos)
       << other.err;
+}
+
+// resolved.json is a recipe: where one key takes the place of another, it has only the one that was used.
+TEST_F(InferProfile, IsTheSameRecipeWithEveryOptionWrittenOut) {
+  write_text(*folder_ / "mine.csv", "height,number_density,std_error\n0,0.9,0.01\n5,0.5,0.01\n6,0.3,0.01\n");
+  const Json range{{"low", 0.5}, {"high", 5.5}};
+  Json from = range, file = range;
+  from["from"] = "bed", file["file"] = "mine.csv";
+  for (const Json& targets : {Json{{"profile", from}}, Json{{"profile", file}},
+                              Json{{"center_of_mass_rise", {{"value", 9}, {"std_error", 0.1}}}},
+                              Json{{"center_of_mass_rise", {{"at", "/bed/center_of_mass_rise"}}}}}) {
+    Json json = again(targets);
+    json["stages"][1].erase("beds");  // of another measurement
+    const std::string once = written_out(json.dump(), folder_->path());
+    EXPECT_EQ(written_out(once, folder_->path()), once);
+  }
 }
 
 TEST_F(InferProfile, RefusesProfilesThatCannotBeCompared) {

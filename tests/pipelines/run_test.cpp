@@ -12,6 +12,7 @@
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/json.hpp"
 #include "tests/pipelines/program.hpp"
+#include "tests/pipelines/written_out.hpp"
 
 namespace {
 
@@ -605,6 +606,17 @@ TEST(Recipes, AllShippedOnesAreGood) {
     ++recipes;
   }
   EXPECT_GE(recipes, 3);
+}
+
+// A recipe with every option written out means the same, and can be read.
+TEST(Recipes, AreTheSameWithEveryOptionWrittenOut) {
+  for (const fs::directory_entry& entry :
+       fs::recursive_directory_iterator(fs::path(SHAKEBED_SOURCE_DIR) / "pipelines/recipes")) {
+    if (entry.path().extension() != ".json") continue;
+    const fs::path folder = entry.path().parent_path();
+    const std::string once = written_out(read_text(entry.path()), folder);
+    EXPECT_EQ(written_out(once, folder), once) << entry.path();
+  }
 }
 
 TEST(Schema, TheOneInTheTreeIsTheProgramsOwn) {
