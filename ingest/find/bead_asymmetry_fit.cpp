@@ -137,7 +137,7 @@ BeadProfile recentred(const BeadProfile& profile, double by_x, double by_y) {
   }
   const auto level_at = [&](double r, std::size_t d) {
     const double x = r * cosine[d] + by_x, y = r * sine[d] + by_y;
-    return value_at(profile.level, profile.step_px, std::hypot(x, y)) + profile.asymmetry->at(x, y);
+    return value_at(profile.level, profile.step_px, std::sqrt(x * x + y * y)) + profile.asymmetry->at(x, y);
   };
   BeadProfile moved = profile;
   for (std::size_t k = 0; k + 1 < profile.level.size(); ++k) {

@@ -26,26 +26,26 @@ double scaled_bessel_i0(double x) {
   return series / std::sqrt(x);
 }
 
+// Nodes of the rule, and how far the Gaussian is followed (in blurs). Over radii of 1.5 to 200 px and blurs of 0.08 to
+// 3 px the five shapes are off by at most 3e-7, the Bessel function's 2e-7 aside. 20 nodes: 3e-6.
+constexpr std::size_t quadrature_nodes = 24;
+constexpr double followed = 5.5;
+
 // Calls use(r, weight) at quadrature nodes: sum of weight * c(r/R) is F(d). The substitution r = R - v^2 integrates a
 // sphere's vertical tangent at the rim without loss.
 template <typename Use>
 void integrate_over_disk(double radius, double blur, double distance, const Use& use) {
-  static const GaussLegendre rule = gauss_legendre(20);
-  const double low = std::max(0.0, distance - 7 * blur), high = std::min(radius, distance + 7 * blur);
+  static const GaussLegendre rule = gauss_legendre(quadrature_nodes);
+  const double low = std::max(0.0, distance - followed * blur), high = std::min(radius, distance + followed * blur);
   if (high <= low) return;
-  const double v_low = std::sqrt(radius - high), v_high = std::sqrt(radius - low);
-  constexpr int pieces = 3;
+  const double from = std::sqrt(radius - high), length = std::sqrt(radius - low) - from;
   const double inverse_square = 1 / (blur * blur);
-  for (int piece = 0; piece < pieces; ++piece) {
-    const double from = v_low + (v_high - v_low) * piece / pieces;
-    const double length = (v_high - v_low) / pieces;
-    for (std::size_t k = 0; k < rule.node.size(); ++k) {
-      const double v = from + length * rule.node[k];
-      const double r = radius - v * v;
-      const double gap = r - distance;
-      use(r, length * rule.weight[k] * 2 * v * r * inverse_square * std::exp(-0.5 * gap * gap * inverse_square) *
-                 scaled_bessel_i0(r * distance * inverse_square));
-    }
+  for (std::size_t k = 0; k < quadrature_nodes; ++k) {
+    const double v = from + length * rule.node[k];
+    const double r = radius - v * v;
+    const double gap = r - distance;
+    use(r, length * rule.weight[k] * 2 * v * r * inverse_square * std::exp(-0.5 * gap * gap * inverse_square) *
+               scaled_bessel_i0(r * distance * inverse_square));
   }
 }
 

@@ -33,20 +33,6 @@ Direction direction_of(int k, int count) {
   return table[static_cast<std::size_t>(k) * directions_in_table / static_cast<std::size_t>(count)];
 }
 
-struct Gradient {
-  float x, y;
-};
-Gradient gradient_at(const EdgeMap& edges, double x, double y) {
-  const int column = static_cast<int>(x), row = static_cast<int>(y);
-  const float right = static_cast<float>(x - column), lower = static_cast<float>(y - row);
-  const std::size_t at = edges.at(column, row), below = at + static_cast<std::size_t>(edges.width);
-  const auto mix = [&](const std::vector<float>& field) {
-    return (1 - lower) * ((1 - right) * field[at] + right * field[at + 1]) +
-           lower * ((1 - right) * field[below] + right * field[below + 1]);
-  };
-  return {mix(edges.x), mix(edges.y)};
-}
-
 // Of the step outwards across a rim; 0: of either sign.
 float sign_of(Polarity polarity) {
   return polarity == Polarity::bright_beads ? -1.0F : polarity == Polarity::dark_beads ? 1.0F : 0.0F;
@@ -59,39 +45,70 @@ struct Met {
   double offset = 0;  // px outwards
   float slope = 0;    // grey levels per px
 };
+
+// Gradients along a ray.
+constexpr int most_ray_steps = 64;  // either way
+struct AlongRay {
+  std::array<float, 2 * most_ray_steps + 1> radial;   // outwards
+  std::array<float, 2 * most_ray_steps + 1> aligned;  // the same; 0 where the gradient points elsewhere
+};
+
+// Steps `first` to `last`, all of them in the picture, from a rim at (x, y). Without branches, so that g++ takes
+// several steps at once.
+void sample_ray(const EdgeMap& edges, float x, float y, float cosine, float sine, float sign, int first, int last,
+                AlongRay& ray) {
+  const float *along_x = edges.x.data(), *along_y = edges.y.data();
+  const int width = edges.width;
+  constexpr float least = static_cast<float>(least_alignment * least_alignment);
+  const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;  // of either sign: the larger of both
+  for (int k = first; k <= last; ++k) {
+    const float distance = static_cast<float>(k) * static_cast<float>(ray_step);
+    const float px = x + distance * cosine, py = y + distance * sine;
+    const int column = static_cast<int>(px), row = static_cast<int>(py);
+    const float right = px - static_cast<float>(column), lower = py - static_cast<float>(row);
+    const int at = row * width + column, below = at + width;
+    const float dx = (1 - lower) * ((1 - right) * along_x[at] + right * along_x[at + 1]) +
+                     lower * ((1 - right) * along_x[below] + right * along_x[below + 1]);
+    const float dy = (1 - lower) * ((1 - right) * along_y[at] + right * along_y[at + 1]) +
+                     lower * ((1 - right) * along_y[below] + right * along_y[below + 1]);
+    const float outwards = dx * cosine + dy * sine;
+    const float radial = one * outwards > other * outwards ? one * outwards : other * outwards;
+    ray.radial[static_cast<std::size_t>(k + most_ray_steps)] = radial;
+    ray.aligned[static_cast<std::size_t>(k + most_ray_steps)] =
+        radial * radial < least * (dx * dx + dy * dy) ? 0 : radial;
+  }
+}
+
 Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double sine, float sign, double reach) {
   Met met;
-  const int steps = static_cast<int>(std::ceil(reach / ray_step));
-  const int used = std::min(steps, 64);
-  std::array<float, 130> along;  // along[k + used]; 0 outside the picture. Clearing all of it took a fifth of the time
-  std::fill_n(along.begin(), 2 * used + 1, 0.0F);
+  const double rim_x = circle.x + circle.radius * cosine, rim_y = circle.y + circle.radius * sine;
+  const auto in_picture = [&](int k) {
+    const double x = rim_x + k * ray_step * cosine, y = rim_y + k * ray_step * sine;
+    return x >= 1 && y >= 1 && x < edges.width - 2 && y < edges.height - 2;
+  };
+  const int used = std::min(static_cast<int>(std::ceil(reach / ray_step)), most_ray_steps);
+  int first = -used, last = used;
+  while (first <= last && !in_picture(first)) ++first;
+  while (last >= first && !in_picture(last)) --last;
+  if (first > last) return met;
+  met.in_view = first <= 0 && last >= 0;
+  AlongRay ray;
+  sample_ray(edges, static_cast<float>(rim_x), static_cast<float>(rim_y), static_cast<float>(cosine),
+             static_cast<float>(sine), sign, first, last, ray);
   float best = edges.threshold;
   int best_step = 0;
-  bool found = false;
-  for (int k = -used; k <= used; ++k) {
-    const double distance = circle.radius + k * ray_step;
-    const double x = circle.x + distance * cosine, y = circle.y + distance * sine;
-    if (x < 1 || y < 1 || x >= edges.width - 2 || y >= edges.height - 2) continue;
-    met.in_view = met.in_view || k == 0;
-    const Gradient gradient = gradient_at(edges, x, y);
-    const float radial =
-        signed_by(sign, gradient.x * static_cast<float>(cosine) + gradient.y * static_cast<float>(sine));
-    along[static_cast<std::size_t>(k + used)] = radial;
-    if (radial <= best) continue;
-    if (radial * radial <
-        static_cast<float>(least_alignment * least_alignment) * (gradient.x * gradient.x + gradient.y * gradient.y))
-      continue;
-    best = radial;
-    best_step = k;
-    found = true;
+  for (int k = first; k <= last; ++k) {
+    const float aligned = ray.aligned[static_cast<std::size_t>(k + most_ray_steps)];
+    if (aligned > best) best = aligned, best_step = k, met.edge = true;
   }
-  if (!found) return met;
-  met.edge = true;
+  if (!met.edge) return met;
   met.offset = best_step * ray_step;
   met.slope = best;
   if (best_step > -used && best_step < used) {
-    const float before = along[static_cast<std::size_t>(best_step + used - 1)],
-                after = along[static_cast<std::size_t>(best_step + used + 1)];
+    const auto radial = [&](int k) {
+      return k < first || k > last ? 0.0F : ray.radial[static_cast<std::size_t>(k + most_ray_steps)];
+    };
+    const float before = radial(best_step - 1), after = radial(best_step + 1);
     const float bend = before - 2 * best + after;
     if (bend < 0) met.offset += ray_step * std::clamp(0.5 * static_cast<double>((before - after) / bend), -0.5, 0.5);
   }

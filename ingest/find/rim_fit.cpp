@@ -52,7 +52,7 @@ std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<doub
       const double x = distance[i] * std::cos(angle), y = distance[i] * std::sin(angle);
       for (std::size_t a = 0; a < rule.node.size(); ++a)
         for (std::size_t b = 0; b < rule.node.size(); ++b) {
-          const double r = std::hypot(x + rule.node[a] - 0.5, y + rule.node[b] - 0.5);
+          const double dx = x + rule.node[a] - 0.5, dy = y + rule.node[b] - 0.5, r = std::sqrt(dx * dx + dy * dy);
           const double place = std::clamp((r - low) / step, 0.0, static_cast<double>(count) - 1.001);
           const auto cell = static_cast<std::size_t>(place);
           const double part = place - static_cast<double>(cell);
@@ -154,15 +154,20 @@ class RimLeastSquares {
   double misfit_of(double radius, double edge, std::vector<double>& residual) {
     const std::vector<double>&distance = data_.distance, &level = data_.level;
     const auto rows = shapes_at(radius, edge, distance);
-    const auto shape = [&](std::size_t i, std::size_t a) { return a < 5 ? rows[i][a] : 1.0; };
+    // A shape that takes no part is 0 everywhere.
+    const auto shape = [&](std::size_t i, std::size_t a) { return use_[a] ? (a < 5 ? rows[i][a] : 1.0) : 0.0; };
     std::vector<double> matrix(rim_terms * rim_terms, 0.0), right(rim_terms, 0.0);
-    for (std::size_t i = 0; i < distance.size(); ++i)
+    for (std::size_t i = 0; i < distance.size(); ++i) {
+      std::array<double, rim_terms> at;
+      for (std::size_t a = 0; a < rim_terms; ++a) at[a] = shape(i, a);
       for (std::size_t a = 0; a < rim_terms; ++a) {
-        if (!use_[a]) continue;
-        right[a] += data_.weight[i] * shape(i, a) * level[i];
-        for (std::size_t b = 0; b < rim_terms; ++b)
-          if (use_[b]) matrix[a * rim_terms + b] += data_.weight[i] * shape(i, a) * shape(i, b);
+        const double weighted = data_.weight[i] * at[a];
+        right[a] += weighted * level[i];
+        for (std::size_t b = 0; b <= a; ++b) matrix[a * rim_terms + b] += weighted * at[b];
       }
+    }
+    for (std::size_t a = 0; a < rim_terms; ++a)
+      for (std::size_t b = a + 1; b < rim_terms; ++b) matrix[a * rim_terms + b] = matrix[b * rim_terms + a];
     const double ridge = 1e-9 * matrix[0];
     for (std::size_t a = 0; a < rim_terms; ++a) matrix[a * (rim_terms + 1)] += use_[a] ? ridge : 1.0;
     if (use_[5]) matrix.back() += data_.offset_weight;
@@ -173,8 +178,7 @@ class RimLeastSquares {
     area_misfit_ = 0;
     for (std::size_t i = 0; i < distance.size(); ++i) {
       double model = 0;
-      for (std::size_t a = 0; a < rim_terms; ++a)
-        if (use_[a]) model += right[a] * shape(i, a);
+      for (std::size_t a = 0; a < rim_terms; ++a) model += right[a] * shape(i, a);
       const double gap = level[i] - model;
       residual[i] = std::sqrt(data_.weight[i]) * gap;
       sum += residual[i] * residual[i];

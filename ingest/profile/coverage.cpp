@@ -26,7 +26,7 @@ std::vector<double> contrast_by_row(const FinderCalibration& finder) {
     const double y = (static_cast<double>(k) - 0.5 - static_cast<double>(half)) * row_step_px;
     double row = 0;
     for (double x = 0.5 * row_step_px; x < reach; x += row_step_px) {
-      row += 2 * level_at(std::hypot(x, y));
+      row += 2 * level_at(std::sqrt(x * x + y * y));
       if (finder.profile.asymmetry)  // y_px grows downwards
         row += finder.profile.asymmetry->at(x, -y) + finder.profile.asymmetry->at(-x, -y);
     }
