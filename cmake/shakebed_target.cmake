@@ -72,14 +72,15 @@ function(shakebed_test_headers name)
 endfunction()
 
 # shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [UNITY files]
-#               [OPTIMIZED] [BY_SUITE] [LONG patterns...] [LONG_COST seconds] [STUDY patterns...])
+#               [OPTIMIZED] [BY_SUITE] [BY_HAND] [LONG patterns...] [LONG_COST seconds] [STUDY patterns...])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
 # compute long. BY_SUITE: the tests of a suite are one ctest case, for programs that take long to start (OpenCV's
 # libraries take a quarter of a second). LONG, STUDY: names of tests (* and ? as in --gtest_filter) that also get the
 # label long or study. UNITY: how many files are compiled at once, if not as many as elsewhere.
-# LONG_COST: what a long one takes; ctest starts the dearest first.
+# LONG_COST: what a long one takes; ctest starts the dearest first. BY_HAND: the program has no quick tests, and is built
+# with the target by_hand, not with all.
 function(shakebed_test name)
-  cmake_parse_arguments(ARG "OPTIMIZED;BY_SUITE" "TIMEOUT;UNITY;LONG_COST" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED;BY_SUITE;BY_HAND" "TIMEOUT;UNITY;LONG_COST" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -110,7 +111,12 @@ function(shakebed_test name)
   if(ARG_BY_SUITE)
     set(discover shakebed_discover_suites)
   endif()
-  cmake_language(CALL ${discover} ${name} quick "-${slow}" ${ARG_TIMEOUT} ${ARG_LABELS})
+  if(ARG_BY_HAND)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    add_dependencies(by_hand ${name})
+  else()
+    cmake_language(CALL ${discover} ${name} quick "-${slow}" ${ARG_TIMEOUT} ${ARG_LABELS})
+  endif()
   if(ARG_LONG)
     cmake_language(CALL ${discover} ${name} long "${long}" ${ARG_TIMEOUT} ${ARG_LABELS} long)
   endif()
@@ -131,7 +137,8 @@ function(shakebed_discover_tests name part filter timeout)
                        TEST_LIST ${name}_${part}_tests PROPERTIES TIMEOUT ${timeout} COST ${cost})
   set(labels_file "${CMAKE_CURRENT_BINARY_DIR}/${name}_${part}_labels.cmake")
   file(WRITE "${labels_file}" "foreach(test IN LISTS ${name}_${part}_tests)\n"
-       "  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARGN}\")\nendforeach()\n")
+       "  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARGN}\")\nendforeach()\n"
+       "set_tests_properties(${name}_NOT_BUILT PROPERTIES LABELS \"${ARGN}\")\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${labels_file}")
 endfunction()
 

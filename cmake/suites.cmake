@@ -5,6 +5,7 @@
 if(NOT EXISTS "${program}")
   get_filename_component(name "${program}" NAME)
   add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)
+  set_tests_properties(${name}_NOT_BUILT PROPERTIES LABELS "${labels}")
   return()
 endif()
 execute_process(COMMAND "${program}" --gtest_list_tests "--gtest_filter=${filter}" OUTPUT_VARIABLE listed
