@@ -236,6 +236,8 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   for (const RimDisk& disk : found.disks) beads.push_back(disk.circle);
   const GapCircles more = circles_in_gaps(maps, beads, model);
   found.expected_missed = more.expected_missed;
+  for (auto gone = more.displaced.rbegin(); gone != more.displaced.rend(); ++gone)
+    found.disks.erase(found.disks.begin() + static_cast<std::ptrdiff_t>(*gone));
   for (const GapCircle& one : more.circles) {
     const PictureMap& map = maps.scaled_for(one.circle.radius, model.threshold);
     const Circle coarse = on_the_map(one.circle, map.at);

@@ -33,6 +33,9 @@ constexpr double fewest_small = 6, least_share_of_small = 0.1;
 // Mean probability of sizes outside a spread: drawn beads 0.95 or more, fringes in disks that were missed 0.78 at most.
 constexpr double least_sure_far_off = 0.9;
 constexpr int most_sizes_tried = 3;
+// A bead gives its place to a larger one for which at least this speaks, where less than this share of it speaks for
+// the bead. Beads found inside coins: a fifth to a third.
+constexpr double sure_rival = 0.9, small_share_of_evidence = 0.5;
 // Radii are tried in steps of this ratio. A circle speaks for a size by what its support exceeds this.
 constexpr double size_step = 1.04, worthless_support = 0.4;
 
@@ -106,6 +109,8 @@ class GapSearch {
     }
     return without_doubles(std::move(free), nearest_rims);
   }
+
+  [[nodiscard]] const std::vector<Circle>& all() const { return circles_; }
 
   void leave_out(double from_px, double to_px) {
     std::erase_if(circles_, [&](const Circle& one) { return one.radius >= from_px && one.radius <= to_px; });
@@ -322,11 +327,45 @@ class OtherSizes {
   std::vector<SizeBand> tried_;  // sizes of their own; where one is not believed, its circles may be of a spread
 };
 
+double evidence_of(const Circle& circle) { return circle.radius * std::max(0.0, circle.support - worthless_support); }
+
+// Which beads were found inside larger ones: a larger circle of a size that is believed in is far better seen there.
+// Smaller ones displace none: fringes inside a photoelastic disk are often better seen than its rim.
+std::vector<std::size_t> displaced_by_larger_ones(PictureMaps& maps, const std::vector<Circle>& beads,
+                                                  const RimModel& model) {
+  std::vector<std::size_t> displaced;
+  const Nearby near(beads.size(), 2 * largest_shared * model.radius_px,
+                    [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
+  for (SizeBand size : model.gaps->other_sizes) {
+    size.from_px = std::max(size.from_px, (1 + same_bead_radius) * model.radius_px);
+    const PictureMap& map = maps.scaled_for(std::sqrt(size.from_px * size.to_px), model.threshold);
+    const GapSearch search(map_of(map), size, model, {});
+    for (const Circle& rival : search.all()) {
+      if (probability_at(size.probability, rival.support) < sure_rival) continue;
+      std::vector<std::size_t> beaten;
+      double against = 0;
+      near.any_near(rival.x, rival.y, [&](std::size_t i) {
+        if (std::hypot(beads[i].x - rival.x, beads[i].y - rival.y) < nearest_rims * (beads[i].radius + rival.radius))
+          beaten.push_back(i), against += evidence_of(beads[i]);
+        return false;
+      });
+      if (against < small_share_of_evidence * evidence_of(rival))
+        displaced.insert(displaced.end(), beaten.begin(), beaten.end());
+    }
+  }
+  std::sort(displaced.begin(), displaced.end());
+  displaced.erase(std::unique(displaced.begin(), displaced.end()), displaced.end());
+  return displaced;
+}
+
 }  // namespace
 
 GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model) {
   GapCircles out;
-  std::vector<Circle> known = beads;
+  out.displaced = displaced_by_larger_ones(maps, beads, model);
+  std::vector<Circle> known;
+  for (std::size_t i = 0; i < beads.size(); ++i)
+    if (!std::binary_search(out.displaced.begin(), out.displaced.end(), i)) known.push_back(beads[i]);
   const auto take = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size,
                         const std::vector<SizeBand>& before) {
     const PictureMap& map = maps.scaled_for(std::sqrt(band.from_px * band.to_px), model.threshold);

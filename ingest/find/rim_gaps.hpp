@@ -22,7 +22,8 @@ struct GapCircle {
 };
 struct GapCircles {
   std::vector<GapCircle> circles;
-  double expected_missed = 0;  // sum of the probabilities of those that are too unlikely to be reported
+  double expected_missed = 0;          // sum of the probabilities of those that are too unlikely to be reported
+  std::vector<std::size_t> displaced;  // beads in whose place one of another size is far better seen
 };
 
 // `beads`: those found at first, px of the frame.

@@ -214,6 +214,32 @@ TEST(Sizes, ASecondDiameterThatNoBeadHasIsNotFound) {
   }
 }
 
+// Coins: in the pictures of larger ones there are arcs of the radius that most have. A bead of that size is found there at
+// first, and gives its place to the larger one.
+TEST(Sizes, ABeadInsideALargerOneGivesItsPlace) {
+  std::vector<double> radii(36, 20.0);
+  for (std::size_t k = 0; k < 36; k += 3) radii[k] = k % 9 == 0 ? 29.5 : 29.0;
+  const std::vector<Bead> beads = scattered(36, radii, 520, 440, 3);
+  ASSERT_EQ(beads.size(), 36U);
+  const auto face = [](const Bead& bead, double u, double v) {
+    if (bead.radius > 29.2) return std::hypot(u - 0.32, v) < 0.68 || v > 0.2 ? 80.0 : 140.0;
+    return bead.radius > 25 ? 80 : 80 + 210 * std::max(0.0, std::sin(2 * std::atan2(v, u) + bead.x) - 0.3);
+  };
+  const GrayFrame frame = drawn(beads, 520, 440, 190, face, 5);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 20};
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  ASSERT_TRUE(learned.calibration.rims);
+  const RimsFound found = find_rims(frame, *learned.calibration.rims);
+  EXPECT_EQ(found.disks.size(), 36U);
+  for (const Bead& bead : beads)
+    EXPECT_TRUE(std::any_of(found.disks.begin(), found.disks.end(), [&](const RimDisk& disk) {
+      return std::hypot(disk.circle.x - bead.x, disk.circle.y - bead.y) < 0.1 * bead.radius &&
+             std::abs(disk.circle.radius - bead.radius) < 0.1 * bead.radius;
+    })) << bead.x << " " << bead.y << " " << bead.radius;
+}
+
 TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
   const std::vector<Bead> beads = scattered(50, {18}, 520, 460, 12);
   const GrayFrame frame = drawn(beads, 520, 460, 190, fringed_face, 6);
