@@ -227,13 +227,15 @@ int infer_bed(const Call& call, const InferBedArguments& given) {
   Call measuring = call;
   measuring.json = true;  // its results are shown with those of the inference
   Json ignored;
+  Console console(level_of(call));  // for both runs: what the first has warned of is not said again
   InferBedArguments frames = given, all = given;
   frames.run = measuring_part(given.run);
-  if (const int code = run_plan_command(measuring, frames.run, plan_of(recipe, frames), &ignored); code != exit_ok)
+  if (const int code = run_plan_command(measuring, frames.run, plan_of(recipe, frames), console, &ignored);
+      code != exit_ok)
     return code;
   if (given.run.force) all.run.force = false, all.run.from = "infer";  // the frames have just been measured
   recipe["stages"].push_back(inference_stage(given, measured_bed(out_of(call, "infer-bed"), given)));
-  return run_plan_command(call, all.run, plan_of(recipe, all));
+  return run_plan_command(call, all.run, plan_of(recipe, all), console, nullptr);
 }
 
 void add_prior_options(CLI::App& command, InferBedArguments& given) {

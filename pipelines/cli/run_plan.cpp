@@ -172,8 +172,12 @@ void show_warnings(const Plan& plan) {
 }
 
 int run_plan_command(const Call& call, const RunArguments& run, const Plan& given, Json* result) {
-  RunOptions options = run_options(call, run, given);
   Console console(level_of(call));
+  return run_plan_command(call, run, given, console, result);
+}
+
+int run_plan_command(const Call& call, const RunArguments& run, const Plan& given, Console& console, Json* result) {
+  RunOptions options = run_options(call, run, given);
   if (!given.sweep && run.gather)
     throw UsageError("--gather: this recipe has no \"sweep\", so there is nothing to gather");
   if (!given.sweep && run.shard) throw UsageError("--shard: this recipe has no \"sweep\", so it has one point only");

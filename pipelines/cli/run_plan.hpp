@@ -35,5 +35,7 @@ void show_warnings(const Plan& plan);
 
 // Runs a plan, or says what would run. With --json the result goes to stdout, or into `result` when there is one.
 int run_plan_command(const Call& call, const RunArguments& run, const Plan& plan, Json* result = nullptr);
+// One of several runs of a command, all with this console.
+int run_plan_command(const Call& call, const RunArguments& run, const Plan& plan, Console& console, Json* result);
 
 }  // namespace shakebed::pipelines

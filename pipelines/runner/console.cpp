@@ -28,7 +28,13 @@ void Console::message(std::string_view line) {
 void Console::detail(std::string_view line) {
   if (level_ == Level::verbose) write("", line);
 }
-void Console::warning(std::string_view line) { write("warning: ", line); }
+void Console::warning(std::string_view line) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!warned_.emplace(line).second) return;
+  }
+  write("warning: ", line);
+}
 void Console::error(std::string_view line) { write("error: ", line); }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -20,7 +21,7 @@ class Console {
 
   void message(std::string_view line);  // not when quiet
   void detail(std::string_view line);   // only when verbose
-  void warning(std::string_view line);  // always
+  void warning(std::string_view line);  // always, the same one once
   void error(std::string_view line);    // always
   // One line that is overwritten on a terminal; elsewhere a plain line every 10 %, or 20 s at most. The fraction is the
   // share of the time that is over, from which the time left follows where it is not given. Call it with 0 at the
@@ -37,6 +38,7 @@ class Console {
   bool terminal_;
   std::mutex mutex_;
   bool line_open_ = false;
+  std::set<std::string, std::less<>> warned_;
   std::string progress_of_;
   Clock::time_point progress_since_{}, progress_shown_{};
   double shown_fraction_ = -1;
