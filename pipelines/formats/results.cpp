@@ -60,19 +60,21 @@ bool file_fits(std::string_view stated, std::string_view asked) {
 
 }  // namespace
 
+void ResultList::add(StatedResult result) {
+  result.tokens = split_pointer(result.pointer);
+  results_.push_back(std::move(result));
+}
 void ResultList::quantity(std::string pointer, std::string unit, std::string meaning, Given given, bool may_be_null) {
-  results_.push_back(
-      {std::move(pointer), ResultKind::quantity, std::move(unit), std::move(meaning), std::move(given), may_be_null});
+  add({std::move(pointer), ResultKind::quantity, std::move(unit), std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::number(std::string pointer, std::string unit, std::string meaning, Given given, bool may_be_null) {
-  results_.push_back(
-      {std::move(pointer), ResultKind::number, std::move(unit), std::move(meaning), std::move(given), may_be_null});
+  add({std::move(pointer), ResultKind::number, std::move(unit), std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::text(std::string pointer, std::string meaning, Given given) {
-  results_.push_back({std::move(pointer), ResultKind::text, "", std::move(meaning), std::move(given), false});
+  add({std::move(pointer), ResultKind::text, "", std::move(meaning), std::move(given), false});
 }
 void ResultList::truth(std::string pointer, std::string meaning, Given given, bool may_be_null) {
-  results_.push_back({std::move(pointer), ResultKind::truth, "", std::move(meaning), std::move(given), may_be_null});
+  add({std::move(pointer), ResultKind::truth, "", std::move(meaning), std::move(given), may_be_null});
 }
 void ResultList::table(StatedTable table) { tables_.push_back(std::move(table)); }
 
@@ -80,7 +82,7 @@ const StatedResult* ResultList::find(std::string_view pointer) const {
   const std::vector<std::string> asked = split_pointer(pointer);
   const StatedResult* found = nullptr;
   for (const StatedResult& result : results_) {
-    const std::vector<std::string> stated = split_pointer(result.pointer);
+    const std::vector<std::string>& stated = result.tokens;
     const bool whole = stated.size() == asked.size();
     const bool part =
         result.kind == ResultKind::quantity && asked.size() == stated.size() + 1 && is_part_of_quantity(asked.back());
@@ -108,7 +110,7 @@ namespace {
 std::vector<std::string> below(const ResultList& results, const std::vector<std::string>& asked) {
   std::vector<std::string> out;
   for (const StatedResult& result : results.all()) {
-    const std::vector<std::string> stated = split_pointer(result.pointer);
+    const std::vector<std::string>& stated = result.tokens;
     if (stated.size() > asked.size() && std::equal(asked.begin(), asked.end(), stated.begin(),
                                                    [](const auto& a, const auto& s) { return token_fits(s, a); }))
       out.push_back(filled(result.pointer, asked));

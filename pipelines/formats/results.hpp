@@ -37,6 +37,7 @@ struct StatedResult {
   std::string meaning;  // a plain sentence without its full stop
   Given given{};
   bool may_be_null = false;
+  std::vector<std::string> tokens{};  // of the pointer; filled by ResultList
 };
 struct StatedColumn {
   std::string name;     // of letters, digits and '_'; ends in the unit where that is not D, m, g reduced or 1
@@ -82,6 +83,8 @@ class ResultList {
   const StatedStage* from(std::string_view kind) const;  // the first of a kind
 
  private:
+  void add(StatedResult result);
+
   std::vector<StatedStage> from_;
   std::vector<StatedResult> results_;
   std::vector<StatedTable> tables_;
