@@ -49,6 +49,9 @@ struct Met {
 // Gradients along a ray.
 constexpr int most_ray_steps = 64;  // either way
 struct AlongRay {
+  static const float* at(const std::array<float, 2 * most_ray_steps + 1>& steps, int k) {
+    return steps.data() + most_ray_steps + k;
+  }
   std::array<float, 2 * most_ray_steps + 1> radial;   // outwards
   std::array<float, 2 * most_ray_steps + 1> aligned;  // the same; 0 where the gradient points elsewhere
 };
@@ -58,6 +61,7 @@ struct AlongRay {
 void sample_ray(const EdgeMap& edges, float x, float y, float cosine, float sine, float sign, int first, int last,
                 AlongRay& ray) {
   const float *along_x = edges.x.data(), *along_y = edges.y.data();
+  float *radial_at = ray.radial.data() + most_ray_steps, *aligned_at = ray.aligned.data() + most_ray_steps;
   const int width = edges.width;
   constexpr float least = static_cast<float>(least_alignment * least_alignment);
   const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;  // of either sign: the larger of both
@@ -73,9 +77,8 @@ void sample_ray(const EdgeMap& edges, float x, float y, float cosine, float sine
                      lower * ((1 - right) * along_y[below] + right * along_y[below + 1]);
     const float outwards = dx * cosine + dy * sine;
     const float radial = one * outwards > other * outwards ? one * outwards : other * outwards;
-    ray.radial[static_cast<std::size_t>(k + most_ray_steps)] = radial;
-    ray.aligned[static_cast<std::size_t>(k + most_ray_steps)] =
-        radial * radial < least * (dx * dx + dy * dy) ? 0 : radial;
+    radial_at[k] = radial;
+    aligned_at[k] = radial * radial < least * (dx * dx + dy * dy) ? 0 : radial;
   }
 }
 
@@ -98,16 +101,14 @@ Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double
   float best = edges.threshold;
   int best_step = 0;
   for (int k = first; k <= last; ++k) {
-    const float aligned = ray.aligned[static_cast<std::size_t>(k + most_ray_steps)];
+    const float aligned = *AlongRay::at(ray.aligned, k);
     if (aligned > best) best = aligned, best_step = k, met.edge = true;
   }
   if (!met.edge) return met;
   met.offset = best_step * ray_step;
   met.slope = best;
   if (best_step > -used && best_step < used) {
-    const auto radial = [&](int k) {
-      return k < first || k > last ? 0.0F : ray.radial[static_cast<std::size_t>(k + most_ray_steps)];
-    };
+    const auto radial = [&](int k) { return k < first || k > last ? 0.0F : *AlongRay::at(ray.radial, k); };
     const float before = radial(best_step - 1), after = radial(best_step + 1);
     const float bend = before - 2 * best + after;
     if (bend < 0) met.offset += ray_step * std::clamp(0.5 * static_cast<double>((before - after) / bend), -0.5, 0.5);

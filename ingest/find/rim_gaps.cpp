@@ -74,10 +74,10 @@ class GapSearch {
     const Nearby near(beads.size(), nearest_rims * (largest + band.to_px),
                       [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
     asked.leave_out = [&](const Circle& circle) {
-      const auto [x, y] = map.to_frame(circle.x, circle.y);
+      const FramePlace place = map.to_frame(circle.x, circle.y);
       const double radius = circle.radius * map.scale;
-      return near.any_near(x, y, [&](std::size_t i) {
-        return std::hypot(beads[i].x - x, beads[i].y - y) <
+      return near.any_near(place.x, place.y, [&](std::size_t i) {
+        return std::hypot(beads[i].x - place.x, beads[i].y - place.y) <
                nearest_rims * (beads[i].radius + radius) - farthest_fitted * radius;
       });
     };

@@ -40,8 +40,8 @@ constexpr int lens_rounds = 5;
 constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25;
 // Of aspect and radial term: a smaller correction needs no new search for the beads.
 constexpr double small_correction = 0.01;
-// Of the expected radius: what is found is the second species when it is nearer than this, by faces and by rims.
-constexpr double nearly_by_faces = 0.08, nearly_by_rims = 0.1;
+// Of the expected radius: what is found by faces is the second species when it is nearer than this.
+constexpr double nearly_by_faces = 0.08;
 // Of a radius by votes, or by rims that blur has moved inwards.
 constexpr double radius_off = 0.07;
 

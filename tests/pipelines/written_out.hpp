@@ -17,7 +17,7 @@ inline std::string written_out(const std::string& recipe, const std::filesystem:
   std::vector<pipelines::Problem> problems;
   auto document = pipelines::parse_json(recipe, "r.json", problems);
   if (!document) throw std::runtime_error("not a JSON document");
-  return dump(pipelines::make_plan(std::move(*document), "r.json", folder).resolved);
+  return pipelines::dump(pipelines::make_plan(std::move(*document), "r.json", folder).resolved);
 }
 
 }  // namespace shakebed::tests
