@@ -338,6 +338,7 @@ std::vector<std::size_t> displaced_by_larger_ones(PictureMaps& maps, const std::
                     [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
   for (SizeBand size : model.gaps->other_sizes) {
     size.from_px = std::max(size.from_px, (1 + same_bead_radius) * model.radius_px);
+    if (size.from_px >= size.to_px) continue;
     const PictureMap& map = maps.scaled_for(std::sqrt(size.from_px * size.to_px), model.threshold);
     const GapSearch search(map_of(map), size, model, {});
     for (const Circle& rival : search.all()) {
