@@ -23,7 +23,7 @@ BeadAsymmetry::BeadAsymmetry(Harmonics harmonics) : harmonics_(std::move(harmoni
 }
 
 double BeadAsymmetry::at(double dx, double dy) const {
-  const double r = std::sqrt(dx * dx + dy * dy);  // std::hypot takes five times as long
+  const double r = std::sqrt(dx * dx + dy * dy);
   if (r >= reach_ || r < 1e-9) return 0;
   const double place = r / harmonics_.step_px;
   const auto cell = static_cast<std::size_t>(place);

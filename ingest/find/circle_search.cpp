@@ -46,25 +46,30 @@ struct Met {
   float slope = 0;    // grey levels per px
 };
 
-// Gradients along a ray.
-constexpr int most_ray_steps = 64;  // either way
+// Outwards through a rim at (x, y) [px]. `sign`: of the step that is looked for, see sign_of().
+struct RimRay {
+  float x, y, cosine, sine, sign;
+};
+// Gradients along a ray, from `most_ray_steps` inwards to as many outwards.
+constexpr int most_ray_steps = 64;
 struct AlongRay {
   static const float* at(const std::array<float, 2 * most_ray_steps + 1>& steps, int k) {
     return steps.data() + most_ray_steps + k;
   }
-  std::array<float, 2 * most_ray_steps + 1> radial;   // outwards
+  std::array<float, 2 * most_ray_steps + 1> radial;   // grey levels per px
   std::array<float, 2 * most_ray_steps + 1> aligned;  // the same; 0 where the gradient points elsewhere
 };
 
-// Steps `first` to `last`, all of them in the picture, from a rim at (x, y). Without branches, so that g++ takes
-// several steps at once.
-void sample_ray(const EdgeMap& edges, float x, float y, float cosine, float sine, float sign, int first, int last,
-                AlongRay& ray) {
+// Steps `first` to `last`, all of them in the picture. Without branches, so that g++ takes several steps at once.
+AlongRay sampled(const EdgeMap& edges, const RimRay& ray, int first, int last) {
+  AlongRay out;
+  float *radial_at = out.radial.data() + most_ray_steps, *aligned_at = out.aligned.data() + most_ray_steps;
   const float *along_x = edges.x.data(), *along_y = edges.y.data();
-  float *radial_at = ray.radial.data() + most_ray_steps, *aligned_at = ray.aligned.data() + most_ray_steps;
   const int width = edges.width;
   constexpr float least = static_cast<float>(least_alignment * least_alignment);
-  const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;  // of either sign: the larger of both
+  // As signed_by(): of either sign, the larger of both.
+  const float one = ray.sign == 0 ? 1.0F : ray.sign, other = ray.sign == 0 ? -1.0F : ray.sign;
+  const float x = ray.x, y = ray.y, cosine = ray.cosine, sine = ray.sine;
   for (int k = first; k <= last; ++k) {
     const float distance = static_cast<float>(k) * static_cast<float>(ray_step);
     const float px = x + distance * cosine, py = y + distance * sine;
@@ -80,6 +85,7 @@ void sample_ray(const EdgeMap& edges, float x, float y, float cosine, float sine
     radial_at[k] = radial;
     aligned_at[k] = radial * radial < least * (dx * dx + dy * dy) ? 0 : radial;
   }
+  return out;
 }
 
 Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double sine, float sign, double reach) {
@@ -95,9 +101,10 @@ Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double
   while (last >= first && !in_picture(last)) --last;
   if (first > last) return met;
   met.in_view = first <= 0 && last >= 0;
-  AlongRay ray;
-  sample_ray(edges, static_cast<float>(rim_x), static_cast<float>(rim_y), static_cast<float>(cosine),
-             static_cast<float>(sine), sign, first, last, ray);
+  const AlongRay ray = sampled(edges,
+                               {static_cast<float>(rim_x), static_cast<float>(rim_y), static_cast<float>(cosine),
+                                static_cast<float>(sine), sign},
+                               first, last);
   float best = edges.threshold;
   int best_step = 0;
   for (int k = first; k <= last; ++k) {

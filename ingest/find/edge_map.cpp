@@ -77,7 +77,7 @@ void fill_gradients(const GrayFrame& smooth, EdgeMap& edges) {
 float threshold_of(const GrayFrame& frame, const EdgeMap& edges) {
   std::vector<float> sizes;
   const std::size_t step = std::max<std::size_t>(1, edges.x.size() / 60000);
-  for (std::size_t at = 0; at < edges.x.size(); at += step) sizes.push_back(edges.size(at));
+  for (std::size_t at = 0; at < edges.x.size(); at += step) sizes.push_back(edges.slope(at));
   const float strong = quantile_of(sizes, 0.95);
   return std::max({noise_multiple * gradient_noise * white_noise_of(frame), weakest_share * strong, least_threshold});
 }

@@ -84,7 +84,7 @@ class FreePlaces {
     for (const RidgePixel& pixel : edges.ridge) {
       const int column = static_cast<int>(pixel.x), row = static_cast<int>(pixel.y);
       const std::size_t at = edges.at(column, row);
-      const double step = step_per_slope * static_cast<double>(edges.size(at));
+      const double step = step_per_slope * static_cast<double>(edges.slope(at));
       if (static_cast<double>(clearance_[at]) < covered * radius || step < faintest_edge * contrast) continue;
       if (outer.has(pixel.x, pixel.y, radius) || is_straight(pixel)) continue;
       for (int y = std::max(0, row - 1); y <= std::min(edges.height - 1, row + 1); ++y)
@@ -130,7 +130,7 @@ class FreePlaces {
       const std::size_t at = edges_.at(static_cast<int>(x), static_cast<int>(y));
       if (static_cast<double>(clearance_[at]) < covered * radius_) continue;  // a disk hides it
       ++seen;
-      const float size = edges_.size(at);
+      const float size = edges_.slope(at);
       const float along = edges_.x[at] * pixel.unit_x + edges_.y[at] * pixel.unit_y;
       met += size >= edges_.threshold && along >= static_cast<float>(same_direction) * size;
     }

@@ -50,7 +50,7 @@ double edge_length(const EdgeMap& edges, double contrast) {
   double sum = 0;
   for (const RidgePixel& pixel : edges.ridge) {
     const std::size_t at = edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y));
-    const double step = step_per_slope * static_cast<double>(edges.size(at));
+    const double step = step_per_slope * static_cast<double>(edges.slope(at));
     sum += std::min(1.0, step / std::max(1e-6, contrast));
   }
   return sum;

@@ -329,42 +329,48 @@ class OtherSizes {
 
 double evidence_of(const Circle& circle) { return circle.radius * std::max(0.0, circle.support - worthless_support); }
 
-// Which beads were found inside larger ones: a larger circle of a size that is believed in is far better seen there.
-// Smaller ones displace none: fringes inside a photoelastic disk are often better seen than its rim.
-std::vector<std::size_t> displaced_by_larger_ones(PictureMaps& maps, const std::vector<Circle>& beads,
-                                                  const RimModel& model) {
-  std::vector<std::size_t> displaced;
+// Larger circles of a size that is believed in, each far better seen than the beads found inside it, whose place it
+// takes. Smaller ones displace none: fringes inside a photoelastic disk are often better seen than its rim.
+GapCircles displacing_circles(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model) {
+  GapCircles out;
+  const auto overlap = [](const Circle& one, const Circle& other) {
+    return std::hypot(one.x - other.x, one.y - other.y) < nearest_rims * (one.radius + other.radius);
+  };
   const Nearby near(beads.size(), 2 * largest_shared * model.radius_px,
                     [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
-  for (SizeBand size : model.gaps->other_sizes) {
-    size.from_px = std::max(size.from_px, (1 + same_bead_radius) * model.radius_px);
-    if (size.from_px >= size.to_px) continue;
-    const PictureMap& map = maps.scaled_for(std::sqrt(size.from_px * size.to_px), model.threshold);
-    const GapSearch search(map_of(map), size, model, {});
-    for (const Circle& rival : search.all()) {
-      if (probability_at(size.probability, rival.support) < sure_rival) continue;
-      std::vector<std::size_t> beaten;
+  for (const SizeBand& size : model.gaps->other_sizes) {
+    SizeBand larger = size;
+    larger.from_px = std::max(size.from_px, (1 + same_bead_radius) * model.radius_px);
+    if (larger.from_px >= larger.to_px) continue;
+    const PictureMap& map = maps.scaled_for(std::sqrt(larger.from_px * larger.to_px), model.threshold);
+    for (const Circle& rival : without_doubles(GapSearch(map_of(map), larger, model, {}).all(), nearest_rims)) {
+      const double its = probability_at(size.probability, rival.support);
+      if (its < sure_rival) continue;
+      std::vector<std::size_t> inside;
       double against = 0;
       near.any_near(rival.x, rival.y, [&](std::size_t i) {
-        if (std::hypot(beads[i].x - rival.x, beads[i].y - rival.y) < nearest_rims * (beads[i].radius + rival.radius))
-          beaten.push_back(i), against += evidence_of(beads[i]);
+        if (overlap(beads[i], rival)) inside.push_back(i), against += evidence_of(beads[i]);
         return false;
       });
-      if (against < small_share_of_evidence * evidence_of(rival))
-        displaced.insert(displaced.end(), beaten.begin(), beaten.end());
+      if (inside.empty() || against > small_share_of_evidence * evidence_of(rival)) continue;
+      if (std::any_of(out.circles.begin(), out.circles.end(),
+                      [&](const GapCircle& one) { return overlap(one.circle, rival); }))
+        continue;
+      out.circles.push_back({rival, its, &size});
+      out.displaced.insert(out.displaced.end(), inside.begin(), inside.end());
     }
   }
-  std::sort(displaced.begin(), displaced.end());
-  displaced.erase(std::unique(displaced.begin(), displaced.end()), displaced.end());
-  return displaced;
+  std::sort(out.displaced.begin(), out.displaced.end());
+  out.displaced.erase(std::unique(out.displaced.begin(), out.displaced.end()), out.displaced.end());
+  return out;
 }
 
 }  // namespace
 
 GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model) {
-  GapCircles out;
-  out.displaced = displaced_by_larger_ones(maps, beads, model);
+  GapCircles out = displacing_circles(maps, beads, model);
   std::vector<Circle> known;
+  for (const GapCircle& one : out.circles) known.push_back(one.circle);
   for (std::size_t i = 0; i < beads.size(); ++i)
     if (!std::binary_search(out.displaced.begin(), out.displaced.end(), i)) known.push_back(beads[i]);
   const auto take = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size,

@@ -214,8 +214,8 @@ TEST(Sizes, ASecondDiameterThatNoBeadHasIsNotFound) {
   }
 }
 
-// Coins: in the pictures of larger ones there are arcs of the radius that most have. A bead of that size is found there at
-// first, and gives its place to the larger one.
+// Coins: in the pictures of larger ones there are arcs of the radius that most have. A bead of that size is found there
+// at first, and gives its place to the larger one.
 TEST(Sizes, ABeadInsideALargerOneGivesItsPlace) {
   std::vector<double> radii(36, 20.0);
   for (std::size_t k = 0; k < 36; k += 3) radii[k] = k % 9 == 0 ? 29.5 : 29.0;
