@@ -23,6 +23,10 @@ SCENE = {
 }
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "long: takes seconds; one of the long set, as the tests so labelled in C++ are")
+
+
 @pytest.fixture
 def scene():
     return dict(SCENE)

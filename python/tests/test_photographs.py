@@ -30,6 +30,7 @@ def test_drawn_disks_are_found():
     assert found.std_error.shape == (len(centres), 2) and not found.bright
 
 
+@pytest.mark.long
 def test_types_and_strides_of_images_do_not_matter():
     image, _ = drawn_image(seed=2)
     wanted = shakebed.find_disks(image)
@@ -103,6 +104,7 @@ def test_the_profile_of_photographs_knows_the_walls_only_where_both_are_in_view(
     assert cut.profile.width_between_walls is None
 
 
+@pytest.mark.long
 def test_control_c_ends_the_search_in_one_picture():
     code = (
         "import sys, time, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
@@ -144,6 +146,7 @@ def test_errors_of_photographs(tmp_path):
         shakebed.measure_bed(drawn_image()[0][None], 0)
 
 
+@pytest.mark.long
 def test_control_c_ends_a_measurement_on_several_threads():
     code = (
         "import sys, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
@@ -176,6 +179,7 @@ def test_frames_in_memory_are_read_where_they_lie():
     assert float(done.stdout) < 60  # MiB; 4,000 frames of 220 x 180 levels in floating point would be 604
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_images():
     image, _ = drawn_image(shape=(70, 80), radius=7, count=5)
 

@@ -153,11 +153,11 @@ TEST(Engine, ReturnsAfterSoManyEventsAndMakesTheSameBytes) {
 
 void expect_resumes(const Scene& scene, double saved_at, double end) {
   const auto a = simulate(scene);
-  std::vector<std::uint8_t> saved;
-  while (a->time() < saved_at) {
+  for (int k = 0; a->time() < saved_at; ++k) {
     a->advance_to(a->next_synchronisation());
-    saved = a->checkpoint();
+    if (k % 64 == 0) static_cast<void>(a->checkpoint());  // changes nothing
   }
+  const std::vector<std::uint8_t> saved = a->checkpoint();
   const auto b = simulate(scene);
   b->restore(saved);
   EXPECT_EQ(a->time(), b->time());
@@ -178,8 +178,8 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[5].start = RandomStart{};
   scenes[6] = gentle_bed();
   scenes[7] = resting_bed(0.5);
-  for (const Scene& scene : scenes) expect_resumes(scene, 60, 110);
-  for (std::uint64_t seed = 0; seed < 10; ++seed)
+  for (const Scene& scene : scenes) expect_resumes(scene, 30, 55);
+  for (std::uint64_t seed = 0; seed < 4; ++seed)
     expect_resumes(random_stack(seed), 6, 18);  // some of the disks at rest
 }
 
@@ -413,9 +413,9 @@ TEST(Engine, LetsTheFloorFallAwayFromAPlasticBall) {
 TEST(Engine, SaysWhereDisksCollapse) {
   Scene scene;
   scene.gravity = UniformGravity{};
-  scene.disks.species = {{200, 1, 1}};
+  scene.disks.species = {{80, 1, 1}};
   scene.disks.contact = {0.5, 0, 0};
-  scene.box.width = 15;
+  scene.box.width = 6;
   scene.box.sides = HardSides{{0.5, 0, 0}};
   scene.box.floor_surface = {0.5, 0, 0};
   const auto pile = simulate(scene);

@@ -274,14 +274,14 @@ TEST(Plates, GoOnFromACheckpointToTheSameBytes) {
   for (const Scene& scene : scenes_between_plates()) {
     const auto a = simulate(scene), b = simulate(scene);
     std::vector<std::uint8_t> saved;
-    while (a->time() < 20) {
+    while (a->time() < 10) {
       a->advance_to(a->next_synchronisation());
       saved = a->checkpoint();
     }
     b->restore(saved);
     expect_same_bytes(*a, *b);
-    a->advance_to(60);
-    b->advance_to(60);
+    a->advance_to(25);
+    b->advance_to(25);
     expect_same_bytes(*a, *b);
   }
 }
