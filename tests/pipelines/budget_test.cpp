@@ -296,7 +296,7 @@ TEST(BudgetOfABed, ChangesItsTimeItsReplicasAndItsContactDuration) {
   EXPECT_TRUE(bed.limits().even_beds);
   EXPECT_DOUBLE_EQ(bed.limits().settling, 9);
   EXPECT_NEAR(bed.limits().shortest, 16 / 20.0, 1e-12) << "periods";
-  EXPECT_NEAR(bed.pilot_length(), 64 / 20.0, 1e-12);
+  EXPECT_NEAR(bed.pilot_length(), 16 / 20.0, 1e-12);
   // 1 us is 5.7e-5 sqrt(D/g); a tenth of it is allowed, and in place of the hundredth 1e-6.
   EXPECT_EQ(bed.limits().most_refinement, 2);
   const auto contact_duration = [&](int refinement) {
