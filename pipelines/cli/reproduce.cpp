@@ -143,6 +143,7 @@ void add_reproduce(Program& program) {
                 "print the recorded results of all recipes, or of one recipe, and run nothing")
       ->excludes("--list");
   add_preset(command, given->run);
+  add_budget(command, given->run);
   add_run_options(command, given->run);
 }
 

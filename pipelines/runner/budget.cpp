@@ -27,7 +27,7 @@ namespace {
 // Errors that can be asked for.
 constexpr double smallest_error = 1e-4, largest_error = 0.5;
 constexpr std::uint32_t beds_of_pilot = 8, most_beds = 10'000;
-constexpr int most_pilots = 4;
+constexpr int most_pilots = 6;
 // The blocks of one bed of a pilot count as so many independent samples, in the uncertainty of `within`.
 constexpr double blocks_of_bed = 1;
 // Beds of a pilot differ by more than they state, at this significance.
@@ -39,9 +39,8 @@ constexpr double most_extrapolation = 12, next_extrapolation = 6;
 constexpr double longer_pilot = 4, share_of_choice = 0.5;
 // The estimated systematic part may be this share of the error. In a bed (149 disks, e = 0.91, friction 0.14, Gamma
 // = 2.7) the estimate was 0.4 %, and T_x fell by 1.8 +- 0.6 % with a contact duration of 1e-6 in place of 1e-4.
-constexpr double systematic_share = 0.1;
-// So much a step of refinement reduces it at least: 6 to 11 times in three beds (e = 0.8 to 0.95, Gamma = 3 and 4).
-constexpr double gain_of_refinement = 6;
+// So above a quarter of the error it is reduced at any cost.
+constexpr double systematic_share = 0.1, needed_share = 0.25;
 constexpr double pilot_share_of_time = 0.25;  // of a budget in time
 constexpr double time_to_spare = 0.95;
 constexpr std::uint64_t pilot_stream = 0x70696c6f74;  // its seeds are none of the run's
@@ -95,10 +94,12 @@ class Chooser {
     const double beds = pilot.effort.beds;
     const double measured = beds * pilot.effort.length, settled = beds * pilot.settling;
     measuring_ = {pilot.measuring_work.cpu_seconds / measured, pilot.measuring_work.events / measured};
-    // Later settling costs as much as measuring.
-    const double rest = limits.settling - pilot.settling;
-    settling_ = {(settled > 0 ? pilot.settling_work.cpu_seconds / beds : 0) + rest * measuring_.cpu_seconds,
-                 (settled > 0 ? pilot.settling_work.events / beds : 0) + rest * measuring_.events};
+    // Later settling has as many events as measuring. Nobody looks, so an event costs what it did in the settling
+    // before.
+    const double rest = (limits.settling - pilot.settling) * measuring_.events;
+    const Work& before = pilot.settling_work.events > 0 ? pilot.settling_work : pilot.measuring_work;
+    settling_ = {(settled > 0 ? pilot.settling_work.cpu_seconds / beds : 0) + rest * before.cpu_seconds / before.events,
+                 (settled > 0 ? pilot.settling_work.events / beds : 0) + rest};
     // Beds that differ are measured no shorter than those that showed how much.
     shortest_ = std::max(limits.shortest, variance_.frozen > 0 ? pilot.effort.length : 0);
   }
@@ -217,11 +218,13 @@ std::optional<Effort> next_pilot(const EffortReading& pilot, const EffortLimits&
                                  const Budget& budget) {
   Effort next = pilot.effort;
   const double allowed = systematic_share * (budget.error > 0 ? budget.error : choice.stated_error);
+  // First the model, by short pilots: a finer one may take many times as long.
   if (pilot.systematic > allowed && next.refinement < limits.most_refinement) {
-    const double steps = allowed > 0 ? std::ceil(std::log(pilot.systematic / allowed) / std::log(gain_of_refinement))
-                                     : limits.most_refinement;
-    next.refinement = std::min(limits.most_refinement, next.refinement + std::max(1, static_cast<int>(steps)));
+    ++next.refinement;
+    return next;
   }
+  // Where no statistics reach the error, a longer pilot is of no use.
+  if (budget.error > 0 && pilot.systematic >= budget.error) return std::nullopt;
   if (budget.error > 0 && choice.effort.length > most_extrapolation * next.length)
     next.length = rounded_up(choice.effort.length / next_extrapolation);
   const double longer = longer_pilot * pilot.effort.length;
@@ -230,6 +233,15 @@ std::optional<Effort> next_pilot(const EffortReading& pilot, const EffortLimits&
     next.length = std::max(next.length, rounded_up(longer));
   if (next == pilot.effort) return std::nullopt;
   return next;
+}
+
+Refinement judged(const EffortReading& coarse, const EffortReading& fine, const Budget& budget) {
+  const auto events = [](const EffortReading& pilot) {
+    return pilot.measuring_work.events / (pilot.effort.beds * pilot.effort.length);
+  };
+  if (fine.systematic * events(fine) < coarse.systematic * events(coarse)) return Refinement::cheap;
+  const bool needed = coarse.systematic > needed_share * budget.error && fine.systematic < budget.error;
+  return needed ? Refinement::dear : Refinement::useless;
 }
 
 namespace {
@@ -267,7 +279,11 @@ class StageBudget {
     EffortReading reading;
     EffortChoice choice;
     for (int pilot = 0; pilot < most_pilots; ++pilot) {
-      reading = run_pilot(effort, pilot);
+      const EffortReading found = run_pilot(effort, pilot);
+      const bool refined = pilot > 0 && effort.refinement > reading.effort.refinement;
+      const Refinement gain = refined ? judged(reading, found, budget_) : Refinement::cheap;
+      if (gain != Refinement::useless) reading = found;
+      if (gain != Refinement::cheap) limits_.most_refinement = reading.effort.refinement;
       choice = choose_effort(reading, limits_, left(), jobs_);
       const std::optional<Effort> next = next_pilot(reading, limits_, choice, budget_);
       if (!next) break;

@@ -57,7 +57,7 @@ EffortReading eight_beds() {
   pilot.effort = {10, 8, 0};
   pilot.settling = 10;
   pilot.within = pilot.spread = 0.04;
-  pilot.settling_work = {0.8, 8e5};
+  pilot.settling_work = {0.4, 8e5};
   pilot.measuring_work = {1.6, 1.6e6};  // 0.02 s and 20,000 events a unit of length
   return pilot;
 }
@@ -86,8 +86,9 @@ TEST(EffortForAnError, IsThatOfWhichTheStatedErrorIsAsAsked) {
 
 TEST(EffortForAnError, CostsWhatThePilotsBedsCostForAsLong) {
   const EffortChoice one = choose_effort(eight_beds(), limits(), error_of(0.01), 1);
-  // Of each bed: 10 settled as the pilot did, the rest of 10,000 and the measurement at the measuring rate.
-  const double cpu_of_bed = 0.1 + (1e4 - 10 + one.effort.length) * 0.02;
+  // Of each bed: 10 settled as the pilot did, the rest of 10,000 with the events of the measurement, each of which
+  // costs what it does while nobody looks, and the measurement.
+  const double cpu_of_bed = 0.05 + (1e4 - 10) * 2e4 * 5e-7 + one.effort.length * 0.02;
   EXPECT_NEAR(one.work.cpu_seconds, 4 * cpu_of_bed, 1e-6 * cpu_of_bed);
   EXPECT_NEAR(one.work.events, 4 * (1e5 + (1e4 - 10 + one.effort.length) * 2e4), 1);
   EXPECT_NEAR(choose_effort(eight_beds(), limits(), error_of(0.01), 3).wall_seconds, 2 * cpu_of_bed, 1e-6 * cpu_of_bed)
@@ -155,6 +156,39 @@ TEST(EffortForATime, FitsIntoIt) {
 TEST(EffortForATime, IsNotPossibleBelowTheTimeToSettle) {
   EXPECT_FALSE(choose_effort(eight_beds(), limits(), {.seconds = 60, .text = "60 s"}, 1).possible)
       << "200 s of settling a bed";
+}
+
+// Per bed and unit of length: 20,000 events with the coarse model.
+TEST(RefinementOfAModel, IsJudgedByItsEventsAndByWhatItGains) {
+  EffortReading coarse = eight_beds(), fine = eight_beds();
+  coarse.systematic = 0.02, fine.systematic = 0.01;
+  fine.effort.refinement = 1, fine.effort.length = 20;
+  const auto with_events = [&](double times) {
+    fine.measuring_work.events = 2 * times * coarse.measuring_work.events;  // it is twice as long
+    return fine;
+  };
+  EXPECT_EQ(judged(coarse, with_events(1.9), error_of(0.5)), Refinement::cheap);
+  EXPECT_EQ(judged(coarse, with_events(2.1), error_of(0.5)), Refinement::useless);
+  EXPECT_EQ(judged(coarse, with_events(2.1), error_of(0.079)), Refinement::dear) << "2 % is more than a quarter of it";
+  EXPECT_EQ(judged(coarse, with_events(2.1), error_of(0.081)), Refinement::useless);
+  EXPECT_EQ(judged(coarse, with_events(2.1), error_of(0.009)), Refinement::useless) << "1 % is left, too much";
+  EXPECT_EQ(judged(coarse, with_events(2.1), {.seconds = 60, .text = "60 s"}), Refinement::useless);
+}
+
+TEST(NextPilot, IsNoneWhereTheModelAloneMissesTheError) {
+  EffortReading pilot = eight_beds();
+  pilot.spread = 0.3;
+  EffortLimits quick = limits();
+  quick.settling = 10;
+  const auto next = [&] {
+    return next_pilot(pilot, quick, choose_effort(pilot, quick, error_of(0.03), 1), error_of(0.03));
+  };
+  ASSERT_TRUE(next()) << "a longer one: beds differ";
+  pilot.systematic = 0.03;
+  EXPECT_FALSE(next());
+  quick.most_refinement = 1;
+  ASSERT_TRUE(next());
+  EXPECT_EQ(next()->refinement, 1);
 }
 
 TEST(NextPilot, IsLongerWhereTheChoiceIsMuchLonger) {
