@@ -102,8 +102,7 @@ Answer real_run(const Plan& plan, const RunOptions& options, Console& console) {
   install_interrupt_handler();
   const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   const bool ended = outcome.code == exit_ok || outcome.code == exit_check_failed;
-  if (ended && !options.budget.is_null())
-    for (const std::string& line : reached_by_budget(plan, options.budget, outcome)) console.message(line);
+  if (ended && !options.budget.is_null()) say_reached(plan, options.budget, outcome, console);
   if (!outcome.error.empty()) console.error(outcome.error);
   for (const std::string& check : outcome.failed_checks) console.error("check failed: " + check);
   return {outcome.code,

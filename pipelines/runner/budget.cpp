@@ -34,6 +34,8 @@ constexpr double blocks_of_bed = 1;
 constexpr double differ_significance = 0.05;
 // A choice may be longer than its pilot by this factor; the next pilot is then shorter than the choice by the other.
 constexpr double most_extrapolation = 12, next_extrapolation = 6;
+// No pilot is repeated to be longer by less than this factor.
+constexpr double hardly_longer = 1.5;
 // Beds that differ are watched for longer, as long as the pilot costs less than this share of the choice: the
 // difference may pass.
 constexpr double longer_pilot = 4, share_of_choice = 0.5;
@@ -41,6 +43,7 @@ constexpr double longer_pilot = 4, share_of_choice = 0.5;
 // = 2.7) the estimate was 0.4 %, and T_x fell by 1.8 +- 0.6 % with a contact duration of 1e-6 in place of 1e-4.
 // So above a quarter of the error it is reduced at any cost.
 constexpr double systematic_share = 0.1, needed_share = 0.25;
+constexpr double miss_significance = 0.01;
 constexpr double pilot_share_of_time = 0.25;  // of a budget in time
 constexpr double time_to_spare = 0.95;
 constexpr std::uint64_t pilot_stream = 0x70696c6f74;  // its seeds are none of the run's
@@ -227,6 +230,9 @@ std::optional<Effort> next_pilot(const EffortReading& pilot, const EffortLimits&
   if (budget.error > 0 && pilot.systematic >= budget.error) return std::nullopt;
   if (budget.error > 0 && choice.effort.length > most_extrapolation * next.length)
     next.length = rounded_up(choice.effort.length / next_extrapolation);
+  if (const double telling = std::min(choice.effort.length, limits.telling);
+      budget.error > 0 && telling > hardly_longer * next.length)
+    next.length = rounded_up(telling);
   const double longer = longer_pilot * pilot.effort.length;
   if (budget.error > 0 && variance_of(pilot).frozen > 0 &&
       pilot.effort.beds * longer < share_of_choice * choice.effort.beds * (limits.settling + choice.effort.length))
@@ -274,7 +280,7 @@ class StageBudget {
         console_(console) {}
 
   Scalable::Changes choose(Json& record) {
-    Effort effort{scalable_.pilot_length(), beds_of_pilot, 0};
+    Effort effort{budget_.error > 0 ? limits_.pilot : limits_.telling, beds_of_pilot, 0};
     if (budget_.seconds > 0) shorten_pilot(effort);
     EffortReading reading;
     EffortChoice choice;
@@ -446,8 +452,15 @@ BudgetedPlan choose_by_budget(const Plan& plan, const Budget& budget, const RunO
   return {make_plan(std::move(document), plan.file, plan.directory), std::move(record)};
 }
 
-std::vector<std::string> reached_by_budget(const Plan& plan, const Json& record, const RunOutcome& outcome) {
-  std::vector<std::string> lines;
+bool misses(double stated, double asked, std::uint32_t beds) {
+  if (beds < 2) return stated > asked;
+  const boost::math::chi_squared_distribution<double, InDouble> chi2(beds - 1.0);
+  return (beds - 1.0) * squared(stated / asked) >
+         boost::math::quantile(boost::math::complement(chi2, miss_significance));
+}
+
+void say_reached(const Plan& plan, const Json& record, const RunOutcome& outcome, Console& console) {
+  const Budget asked = parse_budget(record.at("asked").get<std::string>());
   for (const Json& one : record.at("stages")) {
     const std::size_t i = plan.index_of(one.at("id").get<std::string>());
     const StageOutcome& stage = outcome.stages.at(i);
@@ -457,13 +470,19 @@ std::vector<std::string> reached_by_budget(const Plan& plan, const Json& record,
     const EffortReading reading =
         scalable.read(effort, input_of(plan.stages[i], outcome.out).result(), stage.cost->timings);
     const double squares = std::max(squared(few_beds_factor(effort.beds) * reading.spread), squared(reading.within));
-    lines.push_back(fmt::format("{}: stated error of {}: {} (expected {}). Processor time: {} (expected {})", stage.id,
-                                scalable.number(), per_cent(std::sqrt(squares / effort.beds)),
-                                per_cent(one.at("stated_error").get<double>()),
+    const double stated = std::sqrt(squares / effort.beds);
+    console.message(fmt::format("{}: stated error of {}: {} (expected {}). Processor time: {} (expected {})", stage.id,
+                                scalable.number(), per_cent(stated), per_cent(one.at("stated_error").get<double>()),
                                 duration_text(reading.settling_work.cpu_seconds + reading.measuring_work.cpu_seconds),
                                 duration_text(one.at("cpu_seconds").get<double>())));
+    if (!(asked.error > 0 && misses(stated, asked.error, effort.beds))) continue;
+    const double times = squared(stated / asked.error);
+    console.warning(fmt::format(
+        "{}: the stated error of {} is {}, more than the wanted {}: these beds differ by more than those of the pilot. "
+        "About {:.2g} times as many beds would reach it: set \"replicas\" to {}",
+        stage.id, scalable.number(), per_cent(stated), asked.text, times,
+        static_cast<long>(std::ceil(times * effort.beds))));
   }
-  return lines;
 }
 
 }  // namespace shakebed::pipelines

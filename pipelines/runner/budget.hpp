@@ -62,7 +62,10 @@ struct BudgetedPlan {
 // StageError where a pilot fails or the time is too short, Interrupted.
 BudgetedPlan choose_by_budget(const Plan& plan, const Budget& budget, const RunOptions& options, Console& console);
 
-// What the finished run has reached, a line a stage, beside what was expected.
-std::vector<std::string> reached_by_budget(const Plan& plan, const Json& record, const RunOutcome& outcome);
+// Says what the finished run has reached, a line a stage, beside what was expected; warns where the error is larger
+// than asked by more than chance.
+void say_reached(const Plan& plan, const Json& record, const RunOutcome& outcome, Console& console);
+// Whether a stated error of so many beds is above the one asked for by more than it scatters (1 % significance).
+bool misses(double stated, double asked, std::uint32_t beds);
 
 }  // namespace shakebed::pipelines

@@ -26,6 +26,8 @@ struct Effort {
 struct EffortLimits {
   double settling = 0;            // before the measurement, of each bed
   double shortest = 0;            // length below which a measurement says nothing
+  double pilot = 0;               // length of a first pilot
+  double telling = 0;             // length that shows how much a longer measurement scatters
   double written = 0;             // length in the recipe
   std::uint32_t fewest_beds = 1;  // as in the recipe
   bool even_beds = false;         // every second bed starts otherwise
@@ -57,7 +59,6 @@ class Scalable {
   virtual std::string systematic_cause() const = 0;
   virtual std::string systematic_remedy() const = 0;
   virtual EffortLimits limits() const = 0;
-  virtual double pilot_length() const = 0;  // of a first short run
   // The options with which the stage works so much.
   virtual Changes changes(const Effort& effort) const = 0;
   // The same for a pilot, which settles for no longer than it measures, and keeps no frames.

@@ -175,6 +175,32 @@ TEST(RefinementOfAModel, IsJudgedByItsEventsAndByWhatItGains) {
   EXPECT_EQ(judged(coarse, with_events(2.1), {.seconds = 60, .text = "60 s"}), Refinement::useless);
 }
 
+// Four beds: chi2 of three degrees of freedom is above 11.34 in 1 % of all cases: 1.944 times the error.
+TEST(StatedError, MissesWhatWasAskedWhereMoreThanChanceIsBetween) {
+  EXPECT_TRUE(misses(0.0196, 0.01, 4));
+  EXPECT_FALSE(misses(0.0193, 0.01, 4));
+  EXPECT_TRUE(misses(0.0125, 0.01, 100));
+  EXPECT_FALSE(misses(0.0115, 0.01, 100));
+  EXPECT_TRUE(misses(0.0101, 0.01, 1)) << "one bed: nothing is known of its scatter";
+}
+
+TEST(NextPilot, IsAsLongAsTheChoiceUpToWhatTells) {
+  const EffortReading pilot = eight_beds();
+  const auto next = [&](double choice, double telling) {
+    EffortLimits given = limits();
+    given.telling = telling;
+    EffortChoice chosen;
+    chosen.effort = {choice, 4, 0};
+    return next_pilot(pilot, given, chosen, error_of(0.01));
+  };
+  ASSERT_TRUE(next(30, 40));
+  EXPECT_EQ(next(30, 40)->length, 30);
+  ASSERT_TRUE(next(60, 40));
+  EXPECT_EQ(next(60, 40)->length, 40);
+  EXPECT_FALSE(next(14, 40)) << "hardly longer";
+  EXPECT_FALSE(next(60, 10));
+}
+
 TEST(NextPilot, IsNoneWhereTheModelAloneMissesTheError) {
   EffortReading pilot = eight_beds();
   pilot.spread = 0.3;
@@ -330,7 +356,8 @@ TEST(BudgetOfABed, ChangesItsTimeItsReplicasAndItsContactDuration) {
   EXPECT_TRUE(bed.limits().even_beds);
   EXPECT_DOUBLE_EQ(bed.limits().settling, 9);
   EXPECT_NEAR(bed.limits().shortest, 16 / 20.0, 1e-12) << "periods";
-  EXPECT_NEAR(bed.pilot_length(), 16 / 20.0, 1e-12);
+  EXPECT_NEAR(bed.limits().pilot, 16 / 20.0, 1e-12);
+  EXPECT_NEAR(bed.limits().telling, 64 / 20.0, 1e-12);
   // 1 us is 5.7e-5 sqrt(D/g); a tenth of it is allowed, and in place of the hundredth 1e-6.
   EXPECT_EQ(bed.limits().most_refinement, 2);
   const auto contact_duration = [&](int refinement) {
