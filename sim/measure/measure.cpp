@@ -84,7 +84,8 @@ class Run {
       if (stops(part)) return false;
       while (!simulation_->advance_towards(synchronises ? synchronisation : time, control_.events_between_questions))
         if (stops(part)) return false;
-      if (synchronises && control_.keep && (!control_.keep_due || control_.keep_due(*simulation_)))
+      if (!synchronises) return true;  // its time may be below this one by rounding, and go no further
+      if (control_.keep && (!control_.keep_due || control_.keep_due(*simulation_)))
         control_.keep(*simulation_, [this] { return state(); });
     }
     return true;

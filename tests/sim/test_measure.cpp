@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <random>
 #include <stdexcept>
 #include <vector>
 
@@ -63,6 +64,39 @@ TEST(Measure, LooksAtEveryPhaseOfEveryPeriodOnce) {
   EXPECT_EQ(diary.seen.size(), 12U * 8 * 2 * 60);
   EXPECT_EQ(diary.begun, 1);
   EXPECT_EQ(diary.ended, 1);
+}
+
+// A moment between two synchronisations that the sum of the first and of the time since then does not reach.
+double moment_lost_to_rounding(double first, double second) {
+  double moment = 0.25 * first + 0.75 * second;
+  for (int attempt = 0; attempt < 16; ++attempt, moment = std::nextafter(moment, second)) {
+    const double since = moment - first;
+    if (first + since < moment) return moment;
+  }
+  return 0;
+}
+
+// The time of a run is such a sum. Every look is made, wherever it is by rounding.
+TEST(Measure, EndsWhateverTheMomentsOfItsLooks) {
+  Scene scene = measured_bed_scene();
+  std::mt19937_64 random(1);
+  int tried = 0;
+  for (int k = 0; k < 40; ++k) {
+    scene.box.floor = SinusoidalFloor{0.8, 0.3 + 0.3 * std::ldexp(static_cast<double>(random() >> 11), -53)};
+    const auto bed = simulate(scene);
+    for (int synchronisation = 0; synchronisation < 4; ++synchronisation) {
+      const double first = bed->next_synchronisation();
+      bed->advance_to(first);
+      const double moment = moment_lost_to_rounding(first, bed->next_synchronisation());
+      if (moment == 0) continue;
+      ++tried;
+      int questions = 0;
+      RunControl control;
+      control.stop = [&] { return ++questions > 100'000; };
+      EXPECT_TRUE(measure(scene, {.bath = {}, .settle = moment, .period = 1}, {}, control).finished) << moment;
+    }
+  }
+  EXPECT_GE(tried, 1);
 }
 
 TEST(Measure, SeesWhatAHandWrittenLoopSees) {
