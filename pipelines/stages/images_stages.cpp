@@ -8,6 +8,7 @@
 
 #include "pipelines/stages/extract_images.hpp"
 #include "pipelines/stages/preview.hpp"
+#include "pipelines/stages/proposals.hpp"
 #include "pipelines/stages/render_images.hpp"
 #include "pipelines/version.hpp"
 
@@ -21,12 +22,14 @@ Previewed preview_images(const PreviewRequest& request) {
     if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
-  write_preview(request.folder, *look, request.files, request.options);
+  require_inside(request.options, *look);
   if (!look->survey.found) {
-    const std::string without = seen_without_options(paths, request.options);
-    return {false,
-            fmt::format("{}: no beads: {}{}", look->path, look->survey.why_not, without.empty() ? "" : ". " + without)};
+    const std::vector<Proposal> proposals = proposals_for(*look, request.options, RefusedBy::first_look);
+    write_preview(request.folder, *look, request.files, request.options, proposals);
+    return {false, fmt::format("{}: no beads: {}. {}", look->path, look->survey.why_not,
+                               advice_of(proposals, request.options))};
   }
+  write_preview(request.folder, *look, request.files, request.options);
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
   if (const auto scale = request.options.scale)
     if (const std::string why = ingest::why_not_scale(request.options.diameter, *scale, best.rims.radius_px);
