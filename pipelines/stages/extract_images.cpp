@@ -45,12 +45,12 @@ std::string advice(const ExtractOptions& options, RunContext& context, const Fir
   return fmt::format("See {}. {}", (folder / "preview.html").string(), advice_of(proposals, options));
 }
 
-// Says what the first frame shows instead of beads.
+// Says what the first frame shows instead of beads, or instead of those described.
 [[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
-                         const std::vector<std::string>& paths) {
+                         const std::vector<std::string>& paths, const std::string& why) {
   context.progress(0, "trying other options");
   const std::vector<Proposal> proposals = proposals_for(look, options, RefusedBy::first_look);
-  const std::string what = fmt::format("{}: no beads: {}", look.path, look.survey.why_not);
+  const std::string what = fmt::format("{}: {}", look.path, why);
   if (proposals.empty())
     if (const std::string others = advice_of_other_pictures(paths, options); !others.empty())
       throw StageError(fmt::format("{}. {}", what, others));
@@ -66,12 +66,12 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   fs::remove_all(refusal_folder(context), error);
   if (!look) return true;  // measure_bed() says which files cannot be read
   require_inside(options, *look);
-  if (!look->survey.found) refuse(options, context, *look, film.paths);
+  if (!look->survey.found) refuse(options, context, *look, film.paths, "no beads: " + look->survey.why_not);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
   if (options.scale)
     if (const std::string why = ingest::why_not_scale(options.diameter, *options.scale, chosen->rims.radius_px);
         !why.empty())
-      throw StageError(fmt::format("{}: {}", look->path, why));
+      refuse(options, context, *look, film.paths, why);
   if (chosen->not_round)
     context.warning(fmt::format(
         "{}: the outlines are not those of disks ({}). They are measured because shape is \"any\". If these are your "
@@ -151,12 +151,17 @@ class Extraction {
     try {
       for (const std::string& one : judge_disks(options_, found).warnings) context_.warning(one);
     } catch (const StageError& error) {
-      const std::optional<FirstLook> look = look_at_first(film_.paths, options_);
-      if (!look) throw;
-      context_.progress(1, "trying other options");
-      const std::vector<Proposal> proposals = proposals_for(*look, options_, RefusedBy::measurement);
-      throw StageError(fmt::format("{}. {}", error.what(), advice(options_, context_, *look, proposals)));
+      refuse_measured(error.what());
     }
+  }
+
+  // With options that were tried on the first picture.
+  [[noreturn]] void refuse_measured(const std::string& what) {
+    const std::optional<FirstLook> look = look_at_first(film_.paths, options_);
+    if (!look) throw StageError(what);
+    context_.progress(done_, "trying other options");
+    const std::vector<Proposal> proposals = proposals_for(*look, options_, RefusedBy::measurement);
+    throw StageError(fmt::format("{}. {}", what, advice(options_, context_, *look, proposals)));
   }
 
   // Scale, floor and walls of a render stage, unless they are to be found.
@@ -222,11 +227,22 @@ class Extraction {
       on_the_way.take(frame, disks);
     };
     time_.begin(finding);
-    ingest::Measurement found = ingest::measure_bed(source, measure_);
+    ingest::Measurement found = measured(source);
     time_.end(finding);
     context_.check_interrupted();
     on_the_way.close();
     return found;
+  }
+
+  ingest::Measurement measured(ingest::FrameSource& source) {
+    try {
+      return ingest::measure_bed(source, measure_);
+    } catch (const ingest::InputError& error) {
+      if (!error.problem().starts_with("no disks")) throw;
+      const std::string what = fmt::format("{}: {}", error.problem(), error.why());
+      if (rendered_ == nullptr) refuse_measured(what);
+      throw StageError(what + ". Give the render stage less noise, or a finer scale");
+    }
   }
 
   void warn(const ingest::Measurement& found) {
@@ -260,7 +276,8 @@ class Extraction {
       all.push_back({"The outlines are not those of disks, but the theory describes disks.",
                      "Use only the positions and the number of the beads."});
     const double seen = 2 * found.calibration.radius_px, given = options_.diameter / found.calibration.scale_m_per_px;
-    if (found.calibration.scale_given && std::max(seen / given, given / seen) > 1 + most_off_scale)
+    if (found.calibration.scale_given && !found.calibration.scale_of_contacts &&
+        std::max(seen / given, given / seen) > 1 + most_off_scale)
       all.push_back({fmt::format("By the scale and the diameter given, a bead is {:.4g} px wide, but the beads found "
                                  "are {:.4g} px wide. The scale or the diameter is wrong, and with it every length.",
                                  given, seen),
@@ -270,8 +287,10 @@ class Extraction {
       all.push_back({fmt::format("A second diameter was given, but beads of only one size were found. It is unknown "
                                  "which of the two they are, so every length may be wrong by up to {:.0f} %.",
                                  100 * (std::max(ratio, 1 / ratio) - 1)),
-                     "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
-                     "of the first kind (--radius)."});
+                     options_.radius ? "Leave the second diameter out if all beads are alike. Else take photographs in "
+                                       "which both kinds are at least 12 px wide."
+                                     : "Leave the second diameter out if all beads are alike, or give the radius of "
+                                       "the first kind (--radius)."});
     }
     if (found.second_finder)
       all.push_back({"The bed contains beads of two diameters, but the theory describes equal disks.",

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t most_proposed = 2, most_tries = 6;
 constexpr std::size_t fewest_of_region = 3;  // circles that a region of their own is proposed for
 constexpr double sure = 0.5;                 // probability of a circle that the region must hold
-constexpr double neighbours_radii = 8;       // between the centres of circles of one region
+constexpr double neighbours_radii = 20;      // between the centres of circles of one region
 constexpr double margin_radii = 2.5;         // around the centres: a bead and the light beside it
 
 // The options that restrict what is found.
@@ -182,10 +182,11 @@ class Proposer {
 };
 
 std::string words_of(const Proposal& proposal) {
-  std::string text;
-  if (!proposal.leave_out.empty()) text = fmt::format("leave out {}", fmt::join(proposal.leave_out, " and "));
-  if (!proposal.give.empty()) text += (text.empty() ? "give " : " and give ") + proposal.give;
-  return text + fmt::format(" (tried: {})", proposal.seen);
+  const std::string without = fmt::format("{}", fmt::join(proposal.leave_out, " and "));
+  const std::string change = without.empty()         ? "give " + proposal.give
+                             : proposal.give.empty() ? "leave out " + without
+                                                     : fmt::format("instead of {} give {}", without, proposal.give);
+  return fmt::format("{} (tried: {})", change, proposal.seen);
 }
 
 }  // namespace
