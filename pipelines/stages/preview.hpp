@@ -30,6 +30,7 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
 struct Proposal {
   std::vector<std::string> leave_out;  // options as on the command line: --radius
   std::string give;                    // --polarity dark --radius 9.87; may be empty
+  std::string when;                    // condition of it, " where neighbouring beads touch"; may be empty
   std::string seen;                    // "63 dark beads of 9.9 px radius"
   ExtractOptions options;              // all that were tried
   ingest::SurveyCandidate found;       // the disks, to be drawn

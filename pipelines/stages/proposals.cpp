@@ -15,10 +15,11 @@ namespace shakebed::pipelines {
 namespace {
 
 constexpr std::size_t most_proposed = 2, most_tries = 6;
-constexpr std::size_t fewest_of_region = 3;  // circles that a region of their own is proposed for
-constexpr double sure = 0.5;                 // probability of a circle that the region must hold
-constexpr double neighbours_radii = 20;      // between the centres of circles of one region
-constexpr double margin_radii = 2.5;         // around the centres: a bead and the light beside it
+constexpr std::size_t most_other_pictures = 3;  // a survey takes seconds where pictures are large
+constexpr std::size_t fewest_of_region = 3;     // circles that a region of their own is proposed for
+constexpr double sure = 0.5;                    // probability of a circle that the region must hold
+constexpr double neighbours_radii = 20;         // between the centres of circles of one region
+constexpr double margin_radii = 2.5;            // around the centres: a bead and the light beside it
 
 // The options that restrict what is found.
 void leave_out(const std::string& name, ExtractOptions& options) {
@@ -148,7 +149,9 @@ class Proposer {
     if (trial->contacts.missing() && !options_.scale) {
       const double scale = options_.diameter / trial->contacts.touching_px;
       const std::string text = fmt::format("{:.4g} mm/px", 1e3 * scale);
-      propose({}, fmt::format("--scale \"{}\"", text), [&](ExtractOptions& o) { o.scale = 1e-3 * std::stod(text); });
+      if (propose({}, fmt::format("--scale \"{}\"", text),
+                  [&](ExtractOptions& o) { o.scale = 1e-3 * std::stod(text); }))
+        proposals_.back().when = " where neighbouring beads touch";
     }
     if (options_.shape == BeadShape::round)
       propose({}, "--shape any", [](ExtractOptions& o) { o.shape = BeadShape::any; });
@@ -186,7 +189,7 @@ std::string words_of(const Proposal& proposal) {
   const std::string change = without.empty()         ? "give " + proposal.give
                              : proposal.give.empty() ? "leave out " + without
                                                      : fmt::format("instead of {} give {}", without, proposal.give);
-  return fmt::format("{} (tried: {})", change, proposal.seen);
+  return fmt::format("{} (tried: {}){}", change, proposal.seen, proposal.when);
 }
 
 }  // namespace
@@ -212,7 +215,7 @@ std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptio
 }
 
 std::string advice_of_other_pictures(const std::vector<std::string>& paths, const ExtractOptions& options) {
-  for (std::size_t k = 1; k < std::min(paths.size(), ingest::most_tried); ++k)
+  for (std::size_t k = 1; k < std::min(paths.size(), 1 + most_other_pictures); ++k)
     if (const std::optional<Trial> trial = try_options(paths[k], options))
       return fmt::format("{} shows {} beads: leave out the picture{} before it",
                          std::filesystem::path(paths[k]).filename().string(), trial->beads, k == 1 ? "" : "s");

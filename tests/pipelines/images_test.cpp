@@ -207,7 +207,7 @@ TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
       run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--preview", "--out", "p"}, folder_->path());
   EXPECT_EQ(preview.exit_code, 5) << preview.err;
   // Where nothing was seen, nothing is proposed.
-  EXPECT_THAT(result.err, HasSubstr("No circles stand out"));
+  EXPECT_THAT(result.err, HasSubstr("No option that was tried leads to beads"));
   EXPECT_THAT(result.err, HasSubstr("at least 10 pixels wide"));
   EXPECT_THAT(result.err, Not(HasSubstr("--radius ")));
   EXPECT_THAT(read_text(*folder_ / "p/preview.html"), Not(HasSubstr("--radius")));
@@ -286,7 +286,7 @@ TEST_F(Images, WrongPolarityIsNamedWhereBeadsAreSeenWithoutIt) {
     if (preview) arguments.emplace_back("--preview");
     const ProgramResult result = run_shakebed(arguments, folder_->path());
     EXPECT_EQ(result.exit_code, 5) << result.out;
-    EXPECT_THAT(result.err, testing::ContainsRegex("Without the given polarity, 1[0-9]+ dark beads of (9|10)"));
+    EXPECT_THAT(result.err, testing::ContainsRegex("leave out --polarity .tried: 1[0-9]+ dark beads of (9|10)"));
   }
 }
 
