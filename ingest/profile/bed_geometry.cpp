@@ -140,7 +140,7 @@ class GeometryFinder {
     if (bed_.scale_of_contacts)
       warnings_.push_back(formatted(
           "The circles seen are %.4g px wide. By the scale given a bead is %.4g px wide, and nearest beads are "
-          "as far apart: the circles are taken for a part of the beads, or for beads with their shadows.",
+          "as far apart. The circles are taken for a part of the beads, or for beads with their shadows.",
           2 * refined_.radius_px * recorded, diameter_px_ * recorded));
     else
       warnings_.push_back(

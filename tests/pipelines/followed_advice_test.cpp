@@ -121,9 +121,10 @@ Words split(const std::string& text) {
   std::string word;
   bool quoted = false;
   for (const char c : text + " ") {
+    const bool space = c == ' ' || c == '\n';
     if (c == '"')
       quoted = !quoted;
-    else if (c != ' ' || quoted)
+    else if (!space || quoted)
       word += c;
     else if (!word.empty())
       words.push_back(std::move(word)), word.clear();
@@ -343,6 +344,74 @@ TEST(FollowedAdvice, ToGiveTheScaleOfTouchingBeadsEndsTheDoubt) {
   // Another scale, which neither circles nor contacts confirm, is doubted.
   followed.back() = "0.12 mm/px";
   EXPECT_THAT(runner.run(followed).err, HasSubstr("Check the scale"));
+}
+
+// Beads at random heights, and their dimmer images below the floor.
+std::vector<Place> loose_bed() {
+  std::mt19937 random(5);
+  const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  std::vector<Place> places;
+  while (places.size() < 90) {
+    const Place one{10 + 300 * part(), 200 - 8 + 40 * std::log(1 - part())};
+    if (std::none_of(places.begin(), places.end(), [&](const Place& other) {
+          return one.y < 10 || std::hypot(one.x - other.x, one.y - other.y) < 16.5;
+        }))
+      places.push_back(one);
+  }
+  return places;
+}
+std::string polished_floor() {
+  std::vector<Place> images;
+  for (const Place& place : loose_bed())
+    if (400 - place.y < 252) images.push_back({place.x, 400 - place.y});
+  return PaintedPicture(320, 280).disks(loose_bed(), 8, 60).disks(images, 8, 120).noise(2).pgm();
+}
+
+// Few beads far beside the bed.
+std::string beads_beside() {
+  return PaintedPicture(520, 180).disks(bed(), 10, 60).disks({{400, 40}, {450, 110}}, 10, 60).noise(3).pgm();
+}
+
+// A round pan from above.
+std::string pan() {
+  std::mt19937 random(2);
+  const auto across = [&] { return 400 * (static_cast<double>(random()) / 4294967296.0); };
+  std::vector<Place> places;
+  for (int tries = 0; tries < 20000; ++tries) {
+    const double x = across(), y = across();
+    if (std::hypot(x - 200, y - 200) < 170 && std::none_of(places.begin(), places.end(), [&](const Place& other) {
+          return std::hypot(x - other.x, y - other.y) < 20;
+        }))
+      places.push_back({x, y});
+  }
+  return PaintedPicture(400, 400).disks(places, 10, 60).noise(3).pgm();
+}
+
+// An option named by a warning or by the answer: once it is given, this is not said again.
+void expect_ends(const char* said, const std::string& picture, const char* option, const std::string& value,
+                 double beads) {
+  SCOPED_TRACE(said);
+  Runner runner(picture);
+  const ProgramResult warned = runner.run(runner.arguments({}));
+  ASSERT_EQ(warned.exit_code, 0) << warned.err;
+  const std::string words = warned.err + runner.answer();
+  ASSERT_THAT(words, HasSubstr(said));
+  const std::size_t begin = words.find(std::string("give ") + option + " ");
+  const std::string named = value.empty() && begin != std::string::npos ? split(words.substr(begin)).at(2) : value;
+  ASSERT_FALSE(named.empty()) << words;
+  const ProgramResult followed =
+      runner.run(runner.arguments({option, named.back() == '.' ? named.substr(0, named.size() - 1) : named}));
+  ASSERT_EQ(followed.exit_code, 0) << followed.err;
+  EXPECT_THAT(followed.err + runner.answer(), Not(HasSubstr(said)));
+  EXPECT_NEAR(runner.beads(), beads, 1);
+}
+
+TEST(FollowedAdvice, OfAWarningEndsIt) {
+  expect_ends("beside the bed, separated", beads_beside(), "--roi", "", number_of_beads());
+  expect_ends("mirror those above row", polished_floor(), "--roi", "", static_cast<double>(loose_bed().size()));
+  Runner runner(pan());
+  runner.run(runner.arguments({}));
+  expect_ends("the lowest disks lie on an arc", pan(), "--floor", "380", runner.beads());
 }
 
 TEST(FollowedAdvice, OnALowProfileIsToGiveMorePhotographs) {

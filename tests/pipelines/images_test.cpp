@@ -252,7 +252,8 @@ TEST_F(Images, APreviewTakesTheScaleAsARunDoes) {
     const ProgramResult another_unit = ends("3 m/px", preview);
     EXPECT_EQ(another_unit.exit_code, 5) << preview;
     EXPECT_THAT(another_unit.err, HasSubstr("with the length of a pixel given (scale), a bead of 3 mm is 0.001 px"));
-    EXPECT_THAT(another_unit.err, HasSubstr("a pixel is 0.15")) << "the true scale is 0.15 mm/px";
+    EXPECT_THAT(another_unit.err, HasSubstr("a pixel is about 0.15")) << "the true scale is 0.15 mm/px";
+    EXPECT_THAT(another_unit.err, HasSubstr("leave out --scale (tried: 160 dark beads"));
   }
   EXPECT_EQ(ends("0.15 mm/px", true).exit_code, 0);
 }
