@@ -346,6 +346,40 @@ TEST(FollowedAdvice, ToGiveTheScaleOfTouchingBeadsEndsTheDoubt) {
   EXPECT_THAT(runner.run(followed).err, HasSubstr("Check the scale"));
 }
 
+TEST(FollowedAdvice, OnATruncatedPictureIsToCompleteIt) {
+  const std::string whole = dark_beads();
+  Runner runner(whole.substr(0, whole.size() / 3));
+  const ProgramResult refused = runner.run(runner.arguments({}));
+  EXPECT_EQ(refused.exit_code, 4);
+  EXPECT_THAT(refused.err, HasSubstr("photo.pgm: the picture cannot be read"));
+  EXPECT_THAT(refused.err, HasSubstr("check that the file is complete"));
+  write_text(runner.folder() / "photo.pgm", whole);
+  EXPECT_EQ(runner.run(runner.arguments({})).exit_code, 0);
+  EXPECT_NEAR(runner.beads(), number_of_beads(), 0);
+}
+
+TEST(FollowedAdvice, OnDisksLostInNoiseIsToRenderWithLess) {
+  const ScratchFolder folder;
+  write_text(folder / "bed.json", R"({ "name": "noisy", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1,
+      "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.9 }, "gravity": "9.81 m/s^2",
+      "box": { "width": "25 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "0.5 s", "measure": "0.5 s", "frames": { "count": 4 } },
+    { "stage": "render", "from": "bed", "scale": "0.15 mm/px", "noise": 127 },
+    { "stage": "extract", "from": "render", "diameter": "3 mm" }] })");
+  const Words arguments{"run", "bed.json", "--out", "out"};
+  const ProgramResult refused = run_shakebed(arguments, folder.path());
+  ASSERT_EQ(refused.exit_code, 5) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("no disks in any of the first 4 frames"));
+  EXPECT_THAT(refused.err, HasSubstr("Give the render stage less noise"));
+  Words followed = arguments;
+  followed.insert(followed.end(), {"--set", "/stages/1/noise=20"});
+  const ProgramResult result = run_shakebed(followed, folder.path());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NEAR(read_json(folder / "out/extract/extract.json")["truth"]["recall"].get<double>(), 1, 0.02);
+}
+
 // Beads at random heights, and their dimmer images below the floor.
 std::vector<Place> loose_bed() {
   std::mt19937 random(5);
