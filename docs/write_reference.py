@@ -150,7 +150,7 @@ def messages():
         for file in sorted((ROOT / room).rglob("*.cpp")):
             text = re.sub(r"^\s*//.*$", "", file.read_text(), flags=re.MULTILINE)
             place = "/".join(file.relative_to(ROOT).parts[:2])
-            for hit in re.finditer(r"throw (UsageError|ConfigError|InputError|StageError)\(|(?:context\.)warning\(", text):
+            for hit in re.finditer(r"throw (UsageError|ConfigError|InputError|StageError)\(|(?:context|judgement)\.warning\(", text):
                 message = message_of(balanced(text, hit.end() - 1))
                 if len(message.split()) >= 4:
                     found.add((EXIT_CODES.get(hit.group(1), 0), place, message))
@@ -164,6 +164,9 @@ def messages_page():
             "| exit code | meaning |", "|---|---|", "| 0 | success |"]
     page += [f"| {code} | {meaning} |" for code, meaning in MEANING.items()]
     page += ["| 6 | a `check` stage found a number outside its expectation |", "| 130 | interrupted |", ""]
+    page += ["Where a picture shows no beads, or not those described, the message goes on with changes of the options. Each of them was\n"
+             "tried on the picture: `give --roi 10,20,300,200 (tried: 63 dark beads of 10.1 px radius)`. Where none leads to beads, it says\n"
+             "what a photograph must be like.\n"]
     all_messages = messages()
     for code, title in [*((code, f"Exit code {code}: {meaning}") for code, meaning in MEANING.items()), (0, "Warnings")]:
         rows = [(place, message) for found, place, message in all_messages if found == code]

@@ -160,9 +160,11 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
                                   100 * support / count);
   else if (candidate.one_sided && !lit_from_one_side)
     candidate.why_not = "one side of the rim is missing from all circles";
-  else if (candidate.explained_share < least_explained)
+  else if (candidate.explained_share < least_explained) {
+    candidate.few_edges = true;
     candidate.why_not = formatted("the rims of the circles make up only %.1f %% of the edges in the picture",
                                   100 * candidate.explained_share);
+  }
 }
 
 // Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.

@@ -26,6 +26,7 @@ struct SurveyCandidate {
   std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads
   bool credible = false;       // "no beads here" does not explain the picture as well
   std::string why_not;         // a sentence, unless credible
+  bool few_edges = false;      // they may be beads, but other things make up the picture
   // The circles are no chance, so they may be beads of another shape, or smaller than those that are believed unasked.
   bool plausible = false;
 };

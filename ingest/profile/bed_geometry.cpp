@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/floor.hpp"
 #include "ingest/profile/touching_distance.hpp"
 #include "statistics/text.hpp"
@@ -46,6 +47,7 @@ class GeometryFinder {
     radius.refine(refined_);
     if (refined_.profile.asymmetry)
       refined_.radius_std_error_px = std::hypot(refined_.radius_std_error_px, one_sided_light * refined_.radius_px);
+    circle_px_ = 2 * refined_.radius_px;
     if (const std::optional<TouchingDistance> touching = touching_distance(frames_, refined_.radius_px))
       weigh(*touching);
     else if (half_seen() && !options_.scale_m_per_px)
@@ -126,11 +128,25 @@ class GeometryFinder {
         bed_.scale_given ? *options_.scale_m_per_px : options_.bead_diameter_m / (2 * refined_.radius_px);
     bed_.scale_relative_std_error = bed_.scale_given ? 0 : refined_.radius_std_error_px / refined_.radius_px;
     diameter_px_ = options_.bead_diameter_m / bed_.scale_m_per_px;
-    if (bed_.scale_given && std::abs(2 * refined_.radius_px / diameter_px_ - 1) > fair_scale)
+    if (bed_.scale_given) compare_scale();
+  }
+
+  // The scale given is to be that of the beads, of the circles seen, or of beads that touch.
+  void compare_scale() {
+    const auto agrees = [&](double px) { return std::abs(px / diameter_px_ - 1) <= fair_scale; };
+    if (agrees(2 * refined_.radius_px) || agrees(circle_px_)) return;
+    const double contacts_px = contacts_of(frames_, 0.5 * diameter_px_).touching_px, recorded = refined_.recorded_px;
+    bed_.scale_of_contacts = agrees(contacts_px);
+    if (bed_.scale_of_contacts)
+      warnings_.push_back(formatted(
+          "The circles seen are %.4g px wide. By the scale given a bead is %.4g px wide, and nearest beads are "
+          "as far apart. The circles are taken for a part of the beads, or for beads with their shadows.",
+          2 * refined_.radius_px * recorded, diameter_px_ * recorded));
+    else
       warnings_.push_back(
           formatted("By the scale given, a bead is %.4g px wide, but the beads found are %.4g px wide. Check the scale "
-                    "and the diameter.",
-                    diameter_px_ * refined_.recorded_px, 2 * refined_.radius_px * refined_.recorded_px));
+                    "and the diameter, or leave the scale out.",
+                    diameter_px_ * recorded, 2 * refined_.radius_px * recorded));
   }
 
   void set_floor() {
@@ -202,6 +218,7 @@ class GeometryFinder {
   FinderCalibration& refined_;
   BedCalibration& bed_;
   double diameter_px_ = 0;
+  double circle_px_ = 0;  // diameter of the circles seen
   std::vector<std::string> warnings_;
 };
 

@@ -157,7 +157,7 @@ class FilmLearner {
       throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
                        "check the files");
     throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
-                     "check that beads are visible, or give their radius and polarity");
+                     "check that sharp beads, at least 10 px wide, are visible");
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.

@@ -230,7 +230,7 @@ class BedMeasurer {
     bed_.floor_tilt_degrees = std::atan(bed_.floor_slope) * 180 / std::numbers::pi;
     const double lowest_floor = bed_.floor_px + std::max(0.0, bed_.floor_slope * film_.finder.width);
     bins_.count = bins_up_to(options_.highest.value_or((lowest_floor + refined_.radius_px) / diameter_px_ + 1));
-    if (!options_.profile_from_coverage) return;
+    if (!options_.profile_from_coverage || bed_.scale_of_contacts) return;  // circles are not all that beads cover
     const FrameSides sides = sides_of(film_);
     const double counted_width = options_.left_wall_px && options_.right_wall_px
                                      ? *options_.right_wall_px - *options_.left_wall_px
@@ -251,7 +251,8 @@ class BedMeasurer {
     const double height = film_.finder.height, row = options_.floor_px.value_or(0);
     if (row >= -height && row <= farthest * height) return;
     throw std::invalid_argument(
-        formatted("the floor given is at row %.6g, but the picture has %.0f rows: check the row of the floor",
+        formatted("the floor given is at row %.6g, but the picture has %.0f rows: correct it, or leave the floor "
+                  "out (--floor): it is then found",
                   row * film_.finder.recorded_px, height * film_.finder.recorded_px));
   }
 

@@ -129,6 +129,7 @@ struct BedCalibration {
   double left_wall_px = 0, right_wall_px = 0;
   double width = 0;  // D, between the walls
   bool floor_given = false, walls_given = false, scale_given = false;
+  bool scale_of_contacts = false;      // the scale given is that of beads that touch, not of the circles seen
   bool outline_in_doubt = false;       // beads lit from one side, and too few touch to show their diameter
   bool walls_are_frame_sides = false;  // no walls seen: the profile is that of the part of the bed in view
 };

@@ -204,7 +204,8 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
   if (given <= most * seen && seen <= most * given) return {};
   return formatted(
       "with the length of a pixel given (scale), a bead of %g mm is %.3g px wide, but the circles found are %.3g px "
-      "wide. If they are the beads, a pixel is %.4g mm. Check the unit of scale and the diameter",
+      "wide. If they are the beads, a pixel is about %.3g mm. Check the unit of scale and the diameter, or leave scale "
+      "out: it is then found",
       1e3 * bead_diameter_m, given, seen, 1e3 * bead_diameter_m / seen);
 }
 

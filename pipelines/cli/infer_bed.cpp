@@ -91,8 +91,10 @@ MeasuredBed measured_bed(const fs::path& out, const InferBedArguments& given) {
         "--bead-number, or take frames that show the whole bed");
   bed.highest = highest_of(read_profile_csv(folder / "profile.csv"));
   if (bed.highest < lowest_height + fewest_heights - 1)
-    throw StageError(
-        fmt::format("the bed is only {:g} D high: its profile does not say enough for an inference", bed.highest));
+    throw StageError(fmt::format(
+        "the density exceeds twice its error only up to {:g} D, and an inference needs {:g} D. Give more "
+        "photographs of the bed (here {:g}) or a longer film, which reduces the error, or take a higher bed",
+        bed.highest, lowest_height + fewest_heights - 1, number("/frames").value_or(0)));
   const Json* usable = find_pointer(result, "/velocities/usable");
   bed.amplitude = number("/floor_amplitude/value").value_or(0);
   bed.amplitude_error = number("/floor_amplitude/std_error").value_or(0);

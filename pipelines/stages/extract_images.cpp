@@ -20,7 +20,9 @@
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
 #include "pipelines/stages/film.hpp"
+#include "pipelines/stages/picture_trial.hpp"
 #include "pipelines/stages/preview.hpp"
+#include "pipelines/stages/proposals.hpp"
 #include "statistics/time_left.hpp"
 
 namespace shakebed::pipelines {
@@ -34,44 +36,25 @@ namespace fs = std::filesystem;
 // Where the pictures of a refusal stay: beside the folders of the stages, since this stage leaves none.
 fs::path refusal_folder(const RunContext& context) { return context.output_directory().parent_path() / "no-beads"; }
 
-// Says what the first frame shows instead of beads.
-[[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
-                         const std::vector<std::string>& paths) {
-  const ingest::Survey& survey = look.survey;
+// What was tried on the picture, with the page that shows it: two sentences.
+std::string advice(const ExtractOptions& options, RunContext& context, const FirstLook& look,
+                   const std::vector<Proposal>& proposals) {
   const fs::path folder = refusal_folder(context);
   fs::create_directories(folder);
-  write_preview(folder, look, options.images.texts, options);
-  std::string message =
-      fmt::format("{}: no beads: {}. See {}", look.path, survey.why_not, (folder / "preview.html").string());
-  if (const std::string without = seen_without_options(paths, options); !without.empty())
-    throw StageError(message + ". " + without);
-  const std::vector<std::string> proposals = proposed_options(survey);
-  message +=
-      proposals.empty()
-          ? ". No circles stand out, so no radius can be proposed. The program needs sharp photographs of round beads, "
-            "taken from the side. Each bead must be at least 10 pixels wide and brighter or darker than the "
-            "background. "
-            "If this is such a photograph, give the region of the beads (--roi) and their radius in pixels (--radius)"
-          : fmt::format(
-                ". If one of the pictures in preview.html marks your beads, limit the search to them with --roi, or "
-                "give {}",
-                fmt::join(proposals, " or "));
-  throw StageError(message);
+  write_preview(folder, look, options.images.texts, options, proposals);
+  return fmt::format("See {}. {}", (folder / "preview.html").string(), advice_of(proposals, options));
 }
 
-// The most credible beads; where their number is given, of what may be beads, the kind that is as numerous.
-const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options) {
-  const ingest::SurveyCandidate* chosen = &survey.candidates.front();
-  if (options.bead_number) {  // of what may be beads, the kind whose number is nearest to the one given
-    const auto off = [&](const ingest::SurveyCandidate& one) {
-      return std::abs(std::log(static_cast<double>(std::max<std::size_t>(1, one.disks.size())) /
-                               static_cast<double>(*options.bead_number)));
-    };
-    constexpr double clearly = 0.1;
-    for (const ingest::SurveyCandidate& other : survey.candidates)
-      if (other.credible && off(other) + clearly < off(*chosen)) chosen = &other;
-  }
-  return *chosen;
+// Says what the first frame shows instead of beads, or instead of those described.
+[[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
+                         const std::vector<std::string>& paths, const std::string& why) {
+  context.progress(0, "trying other options");
+  const std::vector<Proposal> proposals = proposals_for(look, options, RefusedBy::first_look);
+  const std::string what = fmt::format("{}: {}", look.path, why);
+  if (proposals.empty())
+    if (const std::string others = advice_of_other_pictures(paths, options); !others.empty())
+      throw StageError(fmt::format("{}. {}", what, others));
+  throw StageError(fmt::format("{}. {}", what, advice(options, context, look, proposals)));
 }
 
 // The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none. Whether
@@ -82,12 +65,13 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
   if (!look) return true;  // measure_bed() says which files cannot be read
-  if (!look->survey.found) refuse(options, context, *look, film.paths);
+  require_inside(options, *look);
+  if (!look->survey.found) refuse(options, context, *look, film.paths, "no beads: " + look->survey.why_not);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
   if (options.scale)
     if (const std::string why = ingest::why_not_scale(options.diameter, *options.scale, chosen->rims.radius_px);
         !why.empty())
-      throw StageError(fmt::format("{}: {}", look->path, why));
+      refuse(options, context, *look, film.paths, why);
   if (chosen->not_round)
     context.warning(fmt::format(
         "{}: the outlines are not those of disks ({}). They are measured because shape is \"any\". If these are your "
@@ -96,100 +80,12 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
   if (!chosen->why_drawn.empty())
     context.warning(
         fmt::format("{}: {}. The circles are measured because shape is \"any\".", look->path, chosen->why_drawn));
-  ingest::FrameSourceOptions& source = film.source;
-  source.channel = chosen->channel;
-  measure.find.seen = ingest::BeadsSeen{chosen->rims.polarity, chosen->rims.radius_px, chosen->one_sided};
-  source.reduction = measure.reduction =
-      ingest::reduction_for(look->width, look->height, chosen->rims.radius_px, chosen->by_rims);
-  if (const std::string why = ingest::why_reduced(look->width, look->height, source.reduction); !why.empty())
+  go_on_with(*chosen, *look, film.source, measure);
+  if (const std::string why = ingest::why_reduced(look->width, look->height, film.source.reduction); !why.empty())
     context.warning(why);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
                           options_for(*chosen), chosen->disks.size()));
   return !chosen->not_round;
-}
-
-// Refuses holes and printed dots.
-void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
-  const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
-  if (options.shape == BeadShape::round && found.contacts.far_apart(diameter_px))
-    throw StageError(fmt::format(
-        "Hardly any of the {} disks found touch: nearest centres are typically {:.1f} diameters apart. They may be "
-        "holes or printed dots, because beads of a bed touch. Look at the pictures of fit-images --preview. If they "
-        "are your beads, give --shape any, or --radius if a bead is larger than its circle",
-        found.disk_total, found.contacts.nearest_px / diameter_px));
-}
-
-// Refuses, or warns, when many beads seem to be missed.
-void judge_missed(const ExtractOptions& options, RunContext& context, double missed) {
-  const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
-  if (doubt == ingest::Doubt::little) return;
-  if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(
-        fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
-                    "where a bead fits. Look at the pictures of fit-images --preview, and give --radius, --polarity, "
-                    "--channel or --roi. Beads that touch and are narrower than 24 px need more pixels. To measure the "
-                    "disks found nevertheless, give --shape any",
-                    100 * missed));
-  context.warning(
-      fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
-                  "a bead fits. Look at the overlays (pictures with the disks found) before you use the density.",
-                  100 * missed));
-}
-
-// Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
-void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
-  constexpr double far_off = 0.2;
-  const double wrong = found.expected_wrong, missed = found.finder.expected_missed;
-  const ingest::Doubt doubt = ingest::doubt_of(wrong);
-  if (doubt == ingest::Doubt::too_many)
-    throw StageError(
-        fmt::format("{:.0f} % of the {} disks found may be wrong: too many for a measurement. Look at the pictures of "
-                    "fit-images --preview, and give --radius, --polarity, --channel or --roi",
-                    100 * wrong, found.disk_total));
-  if (doubt == ingest::Doubt::some)
-    context.warning(
-        fmt::format("{:.1f} % of the disks found may be wrong. Look at the overlays (pictures with the disks found) "
-                    "before you use the numbers.",
-                    100 * wrong));
-  judge_contacts(options, found);
-  judge_missed(options, context, missed);
-  for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
-  if (!options.bead_number) return;
-  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
-  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
-                                       found.disk_count_mean, *options.bead_number);
-  if (std::abs(ratio - 1) > far_off)
-    throw StageError(text +
-                     ". Other objects were probably found instead of the beads. Look at the pictures of fit-images "
-                     "--preview, and give --radius, --polarity, --channel or --roi; or correct --bead-number");
-  if (std::abs(ratio - 1) > 1e-3)
-    context.warning(text + (ratio < 1
-                                ? ": some beads are missed or out of view (see count.svg and the overlays)."
-                                : ": another object is taken for a bead (see the overlays), or there are more beads."));
-}
-
-// What the options ask of the measurement.
-ingest::MeasureOptions asked_for(const ExtractOptions& options) {
-  ingest::MeasureOptions measure;
-  measure.bead_diameter_m = options.diameter;
-  measure.scale_m_per_px = options.scale;
-  measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
-  measure.floor_amplitude_m = options.floor_amplitude;
-  measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
-  measure.second_diameter_m = options.second_diameter;
-  measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
-  measure.find.polarity = polarity_of(options.polarity);
-  measure.find.radius_px = options.radius;
-  measure.find.keep_half_hidden = options.keep_half_hidden;
-  if (options.roi.size() == 4) {
-    measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
-                                              static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
-  }
-  measure.kernel = options.kernel;
-  measure.bin_width = options.spacing;
-  measure.lowest = options.lowest, measure.highest = options.highest;
-  measure.shaking_frequency_hz = options.frequency;
-  return measure;
 }
 
 // What is named is used; of folders and patterns, what is a picture or a film.
@@ -245,12 +141,29 @@ class Extraction {
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
     DisksOnTheWay on_the_way(context_, options_, truth_file ? &*truth_file : nullptr);
     const ingest::Measurement found = measure(on_the_way);
-    if (rendered_ == nullptr) judge_disks(options_, context_, found);
+    if (rendered_ == nullptr) judge(found);
     warn(found);
     write(found, on_the_way);
   }
 
  private:
+  void judge(const ingest::Measurement& found) {
+    try {
+      for (const std::string& one : judge_disks(options_, found).warnings) context_.warning(one);
+    } catch (const StageError& error) {
+      refuse_measured(error.what());
+    }
+  }
+
+  // With options that were tried on the first picture.
+  [[noreturn]] void refuse_measured(const std::string& what) {
+    const std::optional<FirstLook> look = look_at_first(film_.paths, options_);
+    if (!look) throw StageError(what);
+    context_.progress(done_, "trying other options");
+    const std::vector<Proposal> proposals = proposals_for(*look, options_, RefusedBy::measurement);
+    throw StageError(fmt::format("{}. {}", what, advice(options_, context_, *look, proposals)));
+  }
+
   // Scale, floor and walls of a render stage, unless they are to be found.
   void use_rendered() {
     const FrameGeometry geometry = FrameGeometry::read(rendered_->file("geometry.json"));
@@ -314,11 +227,22 @@ class Extraction {
       on_the_way.take(frame, disks);
     };
     time_.begin(finding);
-    ingest::Measurement found = ingest::measure_bed(source, measure_);
+    ingest::Measurement found = measured(source);
     time_.end(finding);
     context_.check_interrupted();
     on_the_way.close();
     return found;
+  }
+
+  ingest::Measurement measured(ingest::FrameSource& source) {
+    try {
+      return ingest::measure_bed(source, measure_);
+    } catch (const ingest::InputError& error) {
+      if (!error.problem().starts_with("no disks")) throw;
+      const std::string what = fmt::format("{}: {}", error.problem(), error.why());
+      if (rendered_ == nullptr) refuse_measured(what);
+      throw StageError(what + ". Give the render stage less noise, or a finer scale");
+    }
   }
 
   void warn(const ingest::Measurement& found) {
@@ -352,7 +276,8 @@ class Extraction {
       all.push_back({"The outlines are not those of disks, but the theory describes disks.",
                      "Use only the positions and the number of the beads."});
     const double seen = 2 * found.calibration.radius_px, given = options_.diameter / found.calibration.scale_m_per_px;
-    if (found.calibration.scale_given && std::max(seen / given, given / seen) > 1 + most_off_scale)
+    if (found.calibration.scale_given && !found.calibration.scale_of_contacts &&
+        std::max(seen / given, given / seen) > 1 + most_off_scale)
       all.push_back({fmt::format("By the scale and the diameter given, a bead is {:.4g} px wide, but the beads found "
                                  "are {:.4g} px wide. The scale or the diameter is wrong, and with it every length.",
                                  given, seen),
@@ -362,8 +287,10 @@ class Extraction {
       all.push_back({fmt::format("A second diameter was given, but beads of only one size were found. It is unknown "
                                  "which of the two they are, so every length may be wrong by up to {:.0f} %.",
                                  100 * (std::max(ratio, 1 / ratio) - 1)),
-                     "Leave the second diameter out if all beads are alike, or give the region (--roi) and the radius "
-                     "of the first kind (--radius)."});
+                     options_.radius ? "Leave the second diameter out if all beads are alike. Else take photographs in "
+                                       "which both kinds are at least 12 px wide."
+                                     : "Leave the second diameter out if all beads are alike, or give the radius of "
+                                       "the first kind (--radius)."});
     }
     if (found.second_finder)
       all.push_back({"The bed contains beads of two diameters, but the theory describes equal disks.",

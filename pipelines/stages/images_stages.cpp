@@ -8,6 +8,7 @@
 
 #include "pipelines/stages/extract_images.hpp"
 #include "pipelines/stages/preview.hpp"
+#include "pipelines/stages/proposals.hpp"
 #include "pipelines/stages/render_images.hpp"
 #include "pipelines/version.hpp"
 
@@ -21,17 +22,17 @@ Previewed preview_images(const PreviewRequest& request) {
     if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
   const std::optional<FirstLook> look = look_at_first(paths, request.options);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
-  write_preview(request.folder, *look, request.files, request.options);
-  if (!look->survey.found) {
-    const std::string without = seen_without_options(paths, request.options);
-    return {false,
-            fmt::format("{}: no beads: {}{}", look->path, look->survey.why_not, without.empty() ? "" : ". " + without)};
-  }
+  require_inside(request.options, *look);
+  std::string why;
+  if (!look->survey.found)
+    why = "no beads: " + look->survey.why_not;
+  else if (const auto scale = request.options.scale)
+    why = ingest::why_not_scale(request.options.diameter, *scale, look->survey.candidates.front().rims.radius_px);
+  std::vector<Proposal> proposals;
+  if (!why.empty()) proposals = proposals_for(*look, request.options, RefusedBy::first_look);
+  write_preview(request.folder, *look, request.files, request.options, proposals);
+  if (!why.empty()) return {false, fmt::format("{}: {}. {}", look->path, why, advice_of(proposals, request.options))};
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
-  if (const auto scale = request.options.scale)
-    if (const std::string why = ingest::why_not_scale(request.options.diameter, *scale, best.rims.radius_px);
-        !why.empty())
-      return {false, fmt::format("{}: {}", look->path, why)};
   return {true, fmt::format("a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in "
                             "channel {}; expected share of false beads {:.1f} %. The run may find more",
                             best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",

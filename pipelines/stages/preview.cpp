@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "ingest/profile/candidate_picture.hpp"
 #include "pipelines/formats/files.hpp"
@@ -11,7 +12,7 @@
 namespace shakebed::pipelines {
 namespace {
 
-constexpr std::size_t most_shown = 3;  // candidates
+constexpr std::size_t most_shown = 3;  // candidates, or what was tried
 
 std::string escaped(std::string_view text) {
   std::string out;
@@ -45,22 +46,16 @@ bool same(const ingest::SurveyCandidate& one, const ingest::SurveyCandidate& oth
          ratio * another > 1;
 }
 
-// The candidates that differ, and of which the condition holds; the best of each first.
-template <class Condition>
-std::vector<const ingest::SurveyCandidate*> different(const ingest::Survey& survey, std::size_t most,
-                                                      const Condition& holds) {
-  std::vector<const ingest::SurveyCandidate*> out;
-  for (const ingest::SurveyCandidate& candidate : survey.candidates) {
-    if (out.size() == most) break;
-    if (holds(candidate) &&
-        std::none_of(out.begin(), out.end(), [&](const auto* one) { return same(candidate, *one); }))
-      out.push_back(&candidate);
-  }
-  return out;
+const char* name_of(ingest::Polarity polarity) {
+  return polarity == ingest::Polarity::bright_beads ? "bright" : "dark";
 }
 
-// What is given besides the option of a candidate, as on the command line.
-std::string given_besides(const ExtractOptions& options) {
+bool needs_any_shape(const ingest::SurveyCandidate& candidate) {
+  return candidate.not_round || !candidate.why_drawn.empty();
+}
+
+// What is given of where beads are and how they look, as on the command line.
+std::string words_of(const ExtractOptions& options) {
   std::string text = fmt::format(" --diameter \"{:g} mm\"", 1e3 * options.diameter);
   if (options.second_diameter) text += fmt::format(" --second-diameter \"{:g} mm\"", 1e3 * *options.second_diameter);
   if (options.scale) text += fmt::format(" --scale \"{:.6g} mm/px\"", 1e3 * *options.scale);
@@ -68,22 +63,35 @@ std::string given_besides(const ExtractOptions& options) {
   if (options.floor) text += fmt::format(" --floor {:g}", *options.floor);
   if (options.left_wall) text += fmt::format(" --left-wall {:g}", *options.left_wall);
   if (options.right_wall) text += fmt::format(" --right-wall {:g}", *options.right_wall);
+  if (options.pixel_aspect) text += fmt::format(" --pixel-aspect {:g}", *options.pixel_aspect);
+  if (options.lens_radial) text += fmt::format(" --lens {:g}", *options.lens_radial);
+  if (options.bead_number) text += fmt::format(" --bead-number {}", *options.bead_number);
+  if (options.channel != BeadChannel::automatic)
+    text += fmt::format(" --channel {}", ingest::name_of(channel_of(options.channel)));
+  if (options.polarity != BeadPolarity::automatic)
+    text += fmt::format(" --polarity {}", name_of(polarity_of(options.polarity)));
+  if (options.radius) text += fmt::format(" --radius {:g}", *options.radius);
+  if (options.shape == BeadShape::any) text += " --shape any";
   return text;
+}
+
+std::string picture_of(std::size_t number) {
+  return fmt::format("<p><img src=\"preview_{}.png\" alt=\"the beads found\"></p>\n", number);
 }
 
 std::string section_of(const ingest::SurveyCandidate& candidate, std::size_t number, const std::string& command) {
   return fmt::format(
       "<h2>{}. {} beads of about {:.1f} px radius, channel {}</h2>\n<p>{} beads; expected share of false beads {:.1f} "
-      "%; the beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}<p><img src=\"preview_{}.png\" alt=\"the "
-      "beads found\"></p>\n",
-      number, candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark", candidate.rims.radius_px,
-      ingest::name_of(candidate.channel), candidate.disks.size(), 100 * candidate.expected_wrong,
-      100 * candidate.explained_share,
+      "%; the beads' rims are {:.0f} % of the edges in the picture. {}</p>\n{}{}",
+      number, name_of(candidate.rims.polarity), candidate.rims.radius_px, ingest::name_of(candidate.channel),
+      candidate.disks.size(), 100 * candidate.expected_wrong, 100 * candidate.explained_share,
       candidate.credible ? "" : escaped(fmt::format("Not credible: {}.", candidate.why_not)),
-      candidate.plausible || candidate.credible
-          ? fmt::format("<pre>{}</pre>\n", escaped(fmt::format("{} {}", command, options_for(candidate))))
-          : "",
-      number);
+      command.empty() ? "" : fmt::format("<pre>{}</pre>\n", escaped(command)), picture_of(number));
+}
+
+std::string section_of(const Proposal& proposal, std::size_t number, const std::string& command) {
+  return fmt::format("<h2>{}. Tried: {}</h2>\n<pre>{}</pre>\n{}", number, proposal.seen, escaped(command),
+                     picture_of(number));
 }
 
 }  // namespace
@@ -103,60 +111,61 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
   return ingest::look_at_first(pictures, asked, source);
 }
 
-std::string seen_without_options(const std::vector<std::string>& paths, ExtractOptions options) {
-  std::vector<std::string> given;
-  if (options.polarity != BeadPolarity::automatic) given.emplace_back("polarity");
-  if (options.radius) given.emplace_back("radius");
-  if (options.channel != BeadChannel::automatic) given.emplace_back("channel");
-  if (given.empty()) return "";
-  options.polarity = BeadPolarity::automatic, options.channel = BeadChannel::automatic;
-  options.radius.reset();
-  const std::optional<FirstLook> look = look_at_first(paths, options);
-  if (!look || !look->survey.found) return "";
-  const ingest::SurveyCandidate& best = look->survey.candidates.front();
-  return fmt::format("Without the given {}, {} {} beads of {:.1f} px radius are found", fmt::join(given, " and "),
-                     best.disks.size(), best.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                     best.rims.radius_px);
-}
-
 std::string options_for(const ingest::SurveyCandidate& candidate) {
   std::string text;
   if (candidate.channel != ingest::Channel::automatic)
     text = fmt::format("--channel {} ", ingest::name_of(candidate.channel));
   return text +
-         fmt::format("--polarity {} --radius {:.2f}",
-                     candidate.rims.polarity == ingest::Polarity::bright_beads ? "bright" : "dark",
-                     candidate.rims.radius_px) +
-         (candidate.not_round || !candidate.why_drawn.empty() ? " --shape any" : "");
+         fmt::format("--polarity {} --radius {:.2f}", name_of(candidate.rims.polarity), candidate.rims.radius_px) +
+         (needs_any_shape(candidate) ? " --shape any" : "");
 }
 
-std::vector<std::string> proposed_options(const ingest::Survey& survey) {
-  constexpr std::size_t most = 2;
-  std::vector<std::string> options;
-  for (const auto* candidate : different(survey, most, [](const auto& one) { return one.plausible; }))
-    options.push_back(options_for(*candidate));
-  return options;
+void take_candidate(const ingest::SurveyCandidate& candidate, ExtractOptions& options) {
+  constexpr double digits = 100;  // as options_for() writes the radius
+  if (candidate.channel != ingest::Channel::automatic)
+    options.channel = static_cast<BeadChannel>(static_cast<int>(candidate.channel) + 1);
+  options.polarity =
+      candidate.rims.polarity == ingest::Polarity::bright_beads ? BeadPolarity::bright : BeadPolarity::dark;
+  options.radius = std::round(digits * candidate.rims.radius_px) / digits;
+  options.shape = needs_any_shape(candidate) ? BeadShape::any : options.shape;
+}
+
+std::vector<const ingest::SurveyCandidate*> different_candidates(const ingest::Survey& survey) {
+  std::vector<const ingest::SurveyCandidate*> out;
+  for (const ingest::SurveyCandidate& candidate : survey.candidates) {
+    if (out.size() == most_shown) break;
+    if (std::none_of(out.begin(), out.end(), [&](const auto* one) { return same(candidate, *one); }))
+      out.push_back(&candidate);
+  }
+  return out;
 }
 
 void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
-                   const ExtractOptions& options) {
-  std::string command = "shakebed fit-images";
-  for (const std::string& file : files) command += " " + quoted(file);
-  command += given_besides(options);
+                   const ExtractOptions& options, const std::vector<Proposal>& proposals) {
+  std::string program = "shakebed fit-images";
+  for (const std::string& file : files) program += " " + quoted(file);
   std::string body;
   const ingest::Survey& survey = look.survey;
   body += survey.found
               ? "<p>The first candidate is used unless options choose another. This is a first look, without a fit of "
-                "each bead. The run may find more beads, and it states their radius with its error.</p>\n"
+                "each bead. The run may find more beads, and it states their radius with its error. The commands were "
+                "not tried.</p>\n"
               : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const ingest::CandidatePictures pictures(look.path);
   std::size_t number = 0;
-  for (const auto* candidate : different(survey, most_shown, [](const auto&) { return true; })) {
-    ++number;
-    pictures.write(folder / fmt::format("preview_{}.png", number), candidate);
-    body += section_of(*candidate, number, command);
+  for (const Proposal& proposal : proposals) {
+    pictures.write(folder / fmt::format("preview_{}.png", ++number), &proposal.found);
+    body += section_of(proposal, number, program + words_of(proposal.options));
   }
-  if (survey.candidates.empty()) {
+  for (const auto* candidate : different_candidates(survey)) {
+    if (number == most_shown) break;
+    pictures.write(folder / fmt::format("preview_{}.png", ++number), candidate);
+    ExtractOptions taken = options;
+    take_candidate(*candidate, taken);
+    const bool possible = survey.found && proposals.empty() && (candidate->plausible || candidate->credible);
+    body += section_of(*candidate, number, possible ? program + words_of(taken) : "");
+  }
+  if (number == 0) {
     pictures.write(folder / "preview_1.png", nullptr);
     body += "<p><img src=\"preview_1.png\" alt=\"the picture\"></p>\n";
   }

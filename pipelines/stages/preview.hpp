@@ -26,18 +26,25 @@ inline ingest::Channel channel_of(BeadChannel channel) {
 using ingest::FirstLook;
 std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options);
 
-// preview.html and preview_1.png .. preview_3.png in `folder`. `files` are those of the command line. The commands
-// shown repeat what the options give.
-void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
-                   const ExtractOptions& options);
+// A change of the options with which the picture was measured, and not refused (proposals.hpp).
+struct Proposal {
+  std::vector<std::string> leave_out;  // options as on the command line: --radius
+  std::string give;                    // --polarity dark --radius 9.87; may be empty
+  std::string when;                    // condition of it, " where neighbouring beads touch"; may be empty
+  std::string seen;                    // "63 dark beads of 9.9 px radius"
+  ExtractOptions options;              // all that were tried
+  ingest::SurveyCandidate found;       // the disks, to be drawn
+};
 
-// What is seen where radius, polarity and channel are not given, a sentence; empty where none of them is given, or
-// nothing is seen either.
-std::string seen_without_options(const std::vector<std::string>& paths, ExtractOptions options);
+// preview.html and preview_1.png .. preview_3.png in `folder`. `files` are those of the command line. The commands
+// shown repeat what the options give. Of a picture that is refused, only the commands of the proposals are shown.
+void write_preview(const std::filesystem::path& folder, const FirstLook& look, const std::vector<std::string>& files,
+                   const ExtractOptions& options, const std::vector<Proposal>& proposals = {});
 
 // The options that take this candidate: --channel red --polarity dark --radius 22.9
 std::string options_for(const ingest::SurveyCandidate& candidate);
-// Those of the plausible candidates that differ, at most two.
-std::vector<std::string> proposed_options(const ingest::Survey& survey);
+void take_candidate(const ingest::SurveyCandidate& candidate, ExtractOptions& options);
+// Those that look for different beads, the best first, at most three.
+std::vector<const ingest::SurveyCandidate*> different_candidates(const ingest::Survey& survey);
 
 }  // namespace shakebed::pipelines

@@ -207,7 +207,7 @@ TEST_F(Images, FramesWithoutDisksAreRefusedAndUnreadableOnesAreAnInputError) {
       run_shakebed({"fit-images", "noise.pgm", "--diameter", "3 mm", "--preview", "--out", "p"}, folder_->path());
   EXPECT_EQ(preview.exit_code, 5) << preview.err;
   // Where nothing was seen, nothing is proposed.
-  EXPECT_THAT(result.err, HasSubstr("No circles stand out"));
+  EXPECT_THAT(result.err, HasSubstr("No option that was tried leads to beads"));
   EXPECT_THAT(result.err, HasSubstr("at least 10 pixels wide"));
   EXPECT_THAT(result.err, Not(HasSubstr("--radius ")));
   EXPECT_THAT(read_text(*folder_ / "p/preview.html"), Not(HasSubstr("--radius")));
@@ -252,7 +252,8 @@ TEST_F(Images, APreviewTakesTheScaleAsARunDoes) {
     const ProgramResult another_unit = ends("3 m/px", preview);
     EXPECT_EQ(another_unit.exit_code, 5) << preview;
     EXPECT_THAT(another_unit.err, HasSubstr("with the length of a pixel given (scale), a bead of 3 mm is 0.001 px"));
-    EXPECT_THAT(another_unit.err, HasSubstr("a pixel is 0.15")) << "the true scale is 0.15 mm/px";
+    EXPECT_THAT(another_unit.err, HasSubstr("a pixel is about 0.15")) << "the true scale is 0.15 mm/px";
+    EXPECT_THAT(another_unit.err, HasSubstr("leave out --scale (tried: 160 dark beads"));
   }
   EXPECT_EQ(ends("0.15 mm/px", true).exit_code, 0);
 }
@@ -286,7 +287,7 @@ TEST_F(Images, WrongPolarityIsNamedWhereBeadsAreSeenWithoutIt) {
     if (preview) arguments.emplace_back("--preview");
     const ProgramResult result = run_shakebed(arguments, folder_->path());
     EXPECT_EQ(result.exit_code, 5) << result.out;
-    EXPECT_THAT(result.err, testing::ContainsRegex("Without the given polarity, 1[0-9]+ dark beads of (9|10)"));
+    EXPECT_THAT(result.err, testing::ContainsRegex("leave out --polarity .tried: 1[0-9]+ dark beads of (9|10)"));
   }
 }
 

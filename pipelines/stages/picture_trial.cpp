@@ -1,0 +1,176 @@
+#include "pipelines/stages/picture_trial.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "ingest/profile/bed_doubts.hpp"
+#include "ingest/profile/photographs.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+// Holes and printed dots.
+void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
+  const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
+  if (options.shape == BeadShape::round && found.contacts.far_apart(diameter_px))
+    throw StageError(fmt::format(
+        "Hardly any of the {} disks found touch: nearest centres are typically {:.1f} diameters apart. They may be "
+        "holes or printed dots, because beads of a bed touch",
+        found.disk_total, found.contacts.nearest_px / diameter_px));
+}
+
+void judge_missed(const ExtractOptions& options, double missed, Judgement& judgement) {
+  const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
+  if (doubt == ingest::Doubt::little) return;
+  if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
+    throw StageError(
+        fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
+                    "where a bead fits. Beads that touch and are narrower than 24 px need more pixels",
+                    100 * missed));
+  judgement.warning(
+      fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
+                  "a bead fits. Look at the overlays (pictures with the disks found) before you use the density.",
+                  100 * missed));
+}
+
+void judge_number(const ExtractOptions& options, const ingest::Measurement& found, Judgement& judgement) {
+  constexpr double far_off = 0.2;
+  if (!options.bead_number) return;
+  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
+  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
+                                       found.disk_count_mean, *options.bead_number);
+  if (std::abs(ratio - 1) > far_off)
+    throw StageError(text + ". Other objects were found instead of the beads, or the number is wrong");
+  if (std::abs(ratio - 1) > 1e-3)
+    judgement.warning(
+        text + (ratio < 1 ? ": some beads are missed or out of view (see count.svg and the overlays)."
+                          : ": another object is taken for a bead (see the overlays), or there are more beads."));
+}
+
+ingest::SurveyCandidate circles_of(const ingest::Measurement& found) {
+  ingest::SurveyCandidate circles;
+  for (const ingest::MeasuredDisk& disk : found.disks) {
+    ingest::RimDisk& one = circles.disks.emplace_back();
+    one.circle.x = disk.x_px, one.circle.y = disk.y_px, one.circle.radius = disk.radius_px;
+    one.probability = disk.probability;
+  }
+  return circles;
+}
+
+}  // namespace
+
+ingest::MeasureOptions asked_for(const ExtractOptions& options) {
+  ingest::MeasureOptions measure;
+  measure.bead_diameter_m = options.diameter;
+  measure.scale_m_per_px = options.scale;
+  measure.floor_px = options.floor, measure.floor_slope = options.floor_slope;
+  measure.floor_amplitude_m = options.floor_amplitude;
+  measure.left_wall_px = options.left_wall, measure.right_wall_px = options.right_wall;
+  measure.second_diameter_m = options.second_diameter;
+  measure.pixel_aspect = options.pixel_aspect, measure.lens_radial = options.lens_radial;
+  measure.find.polarity = polarity_of(options.polarity);
+  measure.find.radius_px = options.radius;
+  measure.find.keep_half_hidden = options.keep_half_hidden;
+  if (options.roi.size() == 4) {
+    measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
+                                              static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
+  }
+  measure.kernel = options.kernel;
+  measure.bin_width = options.spacing;
+  measure.lowest = options.lowest, measure.highest = options.highest;
+  measure.shaking_frequency_hz = options.frequency;
+  return measure;
+}
+
+void require_inside(const ExtractOptions& options, const FirstLook& look) {
+  if (options.roi.size() == 4) {
+    const double left = options.roi[0], top = options.roi[1], right = left + options.roi[2],
+                 bottom = top + options.roi[3];
+    if (left >= look.width || top >= look.height || right <= 0 || bottom <= 0)
+      throw StageError(fmt::format(
+          "{}: the region of interest (--roi, \"roi\") lies outside the picture of {} x {} px. Give LEFT,TOP,WIDTH,"
+          "HEIGHT inside it, or leave --roi out to search the whole picture",
+          look.path, look.width, look.height));
+  }
+  if (!options.left_wall || !options.right_wall) return;
+  if (*options.left_wall >= look.width || *options.right_wall <= 0)
+    throw StageError(fmt::format(
+        "{}: the walls given at columns {:g} and {:g} enclose nothing of the picture, which is {} px wide. Correct "
+        "--left-wall and --right-wall, or leave both out: they are then found",
+        look.path, *options.left_wall, *options.right_wall, look.width));
+}
+
+const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options) {
+  const ingest::SurveyCandidate* chosen = &survey.candidates.front();
+  if (options.bead_number) {  // of what may be beads, the kind whose number is nearest to the one given
+    const auto off = [&](const ingest::SurveyCandidate& one) {
+      return std::abs(std::log(static_cast<double>(std::max<std::size_t>(1, one.disks.size())) /
+                               static_cast<double>(*options.bead_number)));
+    };
+    constexpr double clearly = 0.1;
+    for (const ingest::SurveyCandidate& other : survey.candidates)
+      if (other.credible && off(other) + clearly < off(*chosen)) chosen = &other;
+  }
+  return *chosen;
+}
+
+void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, ingest::FrameSourceOptions& source,
+                ingest::MeasureOptions& measure) {
+  source.channel = chosen.channel;
+  measure.find.seen = ingest::BeadsSeen{chosen.rims.polarity, chosen.rims.radius_px, chosen.one_sided};
+  source.reduction = measure.reduction =
+      ingest::reduction_for(look.width, look.height, chosen.rims.radius_px, chosen.by_rims);
+}
+
+Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& found) {
+  Judgement judgement;
+  const double wrong = found.expected_wrong;
+  const ingest::Doubt doubt = ingest::doubt_of(wrong);
+  if (doubt == ingest::Doubt::too_many)
+    throw StageError(fmt::format("{:.0f} % of the {} disks found may be wrong: too many for a measurement", 100 * wrong,
+                                 found.disk_total));
+  if (doubt == ingest::Doubt::some)
+    judgement.warning(
+        fmt::format("{:.1f} % of the disks found may be wrong. Look at the overlays (pictures with the disks found) "
+                    "before you use the numbers.",
+                    100 * wrong));
+  judge_contacts(options, found);
+  judge_missed(options, found.finder.expected_missed, judgement);
+  for (std::string& one : ingest::doubts_of_bed(found, options.diameter)) judgement.warning(std::move(one));
+  judge_number(options, found, judgement);
+  return judgement;
+}
+
+std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options) {
+  try {
+    const std::optional<FirstLook> look = look_at_first({picture}, options);
+    if (!look || !look->survey.found) return std::nullopt;
+    require_inside(options, *look);
+    const ingest::SurveyCandidate& chosen = chosen_of(look->survey, options);
+    if (options.scale && !ingest::why_not_scale(options.diameter, *options.scale, chosen.rims.radius_px).empty())
+      return std::nullopt;
+    ingest::MeasureOptions measure = asked_for(options);
+    measure.shaking_frequency_hz.reset();  // of one frame there is none
+    ingest::FrameSourceOptions source;
+    source.channel = channel_of(options.channel);
+    go_on_with(chosen, *look, source, measure);
+    ingest::FrameSource one =
+        ingest::FrameSource::from_generator(1, [&](std::size_t) { return ingest::read_frame(look->path, 0, source); });
+    const ingest::Measurement found = ingest::measure_bed(one, measure);
+    judge_disks(options, found);
+    if (found.disk_total == 0) return std::nullopt;
+    return Trial{found.disk_total, found.calibration.radius_px,
+                 found.calibration.polarity == ingest::Polarity::bright_beads, found.contacts, circles_of(found)};
+  } catch (const StageError&) {
+    return std::nullopt;
+  } catch (const ingest::InputError&) {
+    return std::nullopt;
+  } catch (const std::invalid_argument&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,47 @@
+// What a run makes of pictures: what it asks of the measurement, and whether it accepts the result. The same for one
+// picture, to try options on it. Part of the images module.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/profile/measure_bed.hpp"
+#include "pipelines/stages/preview.hpp"
+
+namespace shakebed::pipelines {
+
+// What the options ask of the measurement.
+ingest::MeasureOptions asked_for(const ExtractOptions& options);
+
+// Throws StageError where a region or a wall lies outside the picture.
+void require_inside(const ExtractOptions& options, const FirstLook& look);
+
+// The most credible beads; where their number is given, of what may be beads, the kind that is as numerous.
+const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options);
+
+// Channel, radius and polarity to go on with.
+void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, ingest::FrameSourceOptions& source,
+                ingest::MeasureOptions& measure);
+
+// Sentences, the most important first.
+struct Judgement {
+  std::vector<std::string> warnings;
+  void warning(std::string text) { warnings.push_back(std::move(text)); }
+};
+// Throws StageError where the disks found are no bed of beads, or not the one described. The message says what is
+// wrong, not what helps (proposals.hpp).
+Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& found);
+
+// The picture of a first look, measured by a run with these options.
+struct Trial {
+  std::size_t beads = 0;
+  double radius_px = 0;
+  bool bright = false;
+  ingest::Contacts contacts;
+  ingest::SurveyCandidate found;  // the disks, to be drawn
+};
+// Nothing where the run refuses it.
+std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options);
+
+}  // namespace shakebed::pipelines

@@ -1,0 +1,225 @@
+#include "pipelines/stages/proposals.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "ingest/find/nearby.hpp"
+#include "ingest/profile/photographs.hpp"
+
+namespace shakebed::pipelines {
+namespace {
+
+constexpr std::size_t most_proposed = 2, most_tries = 6;
+constexpr std::size_t most_other_pictures = 3;  // a survey takes seconds where pictures are large
+constexpr std::size_t fewest_of_region = 3;     // circles that a region of their own is proposed for
+constexpr double sure = 0.5;                    // probability of a circle that the region must hold
+constexpr double neighbours_radii = 20;         // between the centres of circles of one region
+constexpr double margin_radii = 2.5;            // around the centres: a bead and the light beside it
+
+// The options that restrict what is found.
+void leave_out(const std::string& name, ExtractOptions& options) {
+  if (name == "--polarity") options.polarity = BeadPolarity::automatic;
+  if (name == "--channel") options.channel = BeadChannel::automatic;
+  if (name == "--radius") options.radius.reset();
+  if (name == "--roi") options.roi.clear();
+  if (name == "--scale") options.scale.reset();
+  if (name == "--bead-number") options.bead_number.reset();
+  if (name == "--shape") options.shape = BeadShape::round;
+}
+
+std::vector<std::string> given_of(const ExtractOptions& options) {
+  std::vector<std::string> given;
+  if (options.polarity != BeadPolarity::automatic) given.emplace_back("--polarity");
+  if (options.channel != BeadChannel::automatic) given.emplace_back("--channel");
+  if (options.radius) given.emplace_back("--radius");
+  if (!options.roi.empty()) given.emplace_back("--roi");
+  if (options.scale) given.emplace_back("--scale");
+  if (options.bead_number) given.emplace_back("--bead-number");
+  if (options.shape != BeadShape::round) given.emplace_back("--shape");
+  return given;
+}
+
+// The largest group of circles that lie near one another, with a margin.
+std::optional<ingest::PixelRectangle> region_of(const ingest::SurveyCandidate& candidate, const FirstLook& look) {
+  std::vector<ingest::Circle> circles;
+  for (const ingest::RimDisk& disk : candidate.disks)
+    if (disk.probability > sure) circles.push_back(disk.circle);
+  std::vector<std::size_t> group(circles.size());
+  for (std::size_t k = 0; k < group.size(); ++k) group[k] = k;
+  const auto root = [&](std::size_t k) {
+    while (group[k] != k) k = group[k] = group[group[k]];
+    return k;
+  };
+  const double near = neighbours_radii * candidate.rims.radius_px;
+  ingest::Nearby(circles.size(), near, [&](std::size_t k) {
+    return std::pair(circles[k].x, circles[k].y);
+  }).pairs([&](std::size_t i, std::size_t j) {
+    if (std::hypot(circles[i].x - circles[j].x, circles[i].y - circles[j].y) < near) group[root(i)] = root(j);
+    return false;
+  });
+  std::vector<std::size_t> size(circles.size(), 0);
+  for (std::size_t k = 0; k < circles.size(); ++k) ++size[root(k)];
+  const auto largest = std::max_element(size.begin(), size.end());
+  if (largest == size.end() || *largest < fewest_of_region) return std::nullopt;
+  const auto of_region = static_cast<std::size_t>(largest - size.begin());
+  double left = look.width, top = look.height, right = 0, bottom = 0;
+  const double margin = margin_radii * candidate.rims.radius_px;
+  for (std::size_t k = 0; k < circles.size(); ++k) {
+    if (root(k) != of_region) continue;
+    left = std::min(left, circles[k].x - margin), right = std::max(right, circles[k].x + margin);
+    top = std::min(top, circles[k].y - margin), bottom = std::max(bottom, circles[k].y + margin);
+  }
+  ingest::PixelRectangle region;
+  region.left = static_cast<int>(std::max(0.0, std::floor(left)));
+  region.top = static_cast<int>(std::max(0.0, std::floor(top)));
+  region.width = static_cast<int>(std::min<double>(look.width, std::ceil(right))) - region.left;
+  region.height = static_cast<int>(std::min<double>(look.height, std::ceil(bottom))) - region.top;
+  return region;
+}
+
+class Proposer {
+ public:
+  Proposer(const FirstLook& look, const ExtractOptions& options, RefusedBy refused)
+      : look_(look), options_(options), refused_(refused), given_(given_of(options)) {}
+
+  std::vector<Proposal> find() {
+    leave_out_what_excludes_beads();
+    if (proposals_.empty()) give_what_candidates_need();
+    if (refused_ == RefusedBy::measurement) accept_what_was_found();
+    return std::move(proposals_);
+  }
+
+ private:
+  // The one option given that excludes the beads, else all of them.
+  void leave_out_what_excludes_beads() {
+    std::vector<std::string> restricting;
+    for (const std::string& name : given_)
+      if (name != "--bead-number" && name != "--shape") restricting.push_back(name);
+    if (refused_ == RefusedBy::measurement || restricting.empty()) return;
+    for (const std::string& name : restricting)
+      if (propose({name}, "", [&](ExtractOptions& o) { leave_out(name, o); })) return;
+    if (restricting.size() == 1) return;
+    propose(restricting, "", [&](ExtractOptions& o) {
+      for (const std::string& name : restricting) leave_out(name, o);
+    });
+  }
+
+  void give_what_candidates_need() {
+    for (const ingest::SurveyCandidate* candidate : different_candidates(look_.survey)) {
+      if (options_.roi.empty() && (candidate->few_edges || !candidate->why_drawn.empty())) give_region(*candidate);
+      if (candidate->plausible || candidate->credible) give_beads(*candidate);
+    }
+  }
+
+  void give_region(const ingest::SurveyCandidate& candidate) {
+    const auto region = region_of(candidate, look_);
+    if (!region) return;
+    propose({}, fmt::format("--roi {},{},{},{}", region->left, region->top, region->width, region->height),
+            [&](ExtractOptions& o) {
+              o.roi = {static_cast<double>(region->left), static_cast<double>(region->top),
+                       static_cast<double>(region->width), static_cast<double>(region->height)};
+            });
+  }
+
+  void give_beads(const ingest::SurveyCandidate& candidate) {
+    std::vector<std::string> instead;
+    for (const std::string& name : given_)
+      if (name == "--polarity" || name == "--radius" || name == "--shape" ||
+          (name == "--channel" && candidate.channel != ingest::Channel::automatic))
+        instead.push_back(name);
+    propose(instead, options_for(candidate), [&](ExtractOptions& o) { take_candidate(candidate, o); });
+  }
+
+  // What was measured may be right all the same.
+  void accept_what_was_found() {
+    ExtractOptions open = options_;
+    open.shape = BeadShape::any, open.bead_number.reset();
+    const std::optional<Trial> trial = try_options(look_.path, open);
+    if (!trial) return;
+    if (options_.bead_number) {
+      propose({"--bead-number"}, fmt::format("--bead-number {}", trial->beads),
+              [&](ExtractOptions& o) { o.bead_number = trial->beads; });
+      return;
+    }
+    if (trial->contacts.missing() && !options_.scale) {
+      const double scale = options_.diameter / trial->contacts.touching_px;
+      const std::string text = fmt::format("{:.4g} mm/px", 1e3 * scale);
+      if (propose({}, fmt::format("--scale \"{}\"", text),
+                  [&](ExtractOptions& o) { o.scale = 1e-3 * std::stod(text); }))
+        proposals_.back().when = " where neighbouring beads touch";
+    }
+    if (options_.shape == BeadShape::round)
+      propose({}, "--shape any", [](ExtractOptions& o) { o.shape = BeadShape::any; });
+  }
+
+  // Whether the run accepts the picture once the options are changed so.
+  template <class Change>
+  bool propose(std::vector<std::string> without, std::string give, const Change& change) {
+    if (proposals_.size() >= most_proposed || tries_ >= most_tries) return false;
+    ++tries_;
+    Proposal proposal;
+    proposal.options = options_;
+    change(proposal.options);
+    const std::optional<Trial> trial = try_options(look_.path, proposal.options);
+    if (!trial) return false;
+    proposal.leave_out = std::move(without);
+    proposal.give = std::move(give);
+    proposal.found = trial->found;
+    proposal.seen = fmt::format("{} {} bead{} of {:.1f} px radius", trial->beads, trial->bright ? "bright" : "dark",
+                                trial->beads == 1 ? "" : "s", trial->radius_px);
+    proposals_.push_back(std::move(proposal));
+    return true;
+  }
+
+  const FirstLook& look_;
+  const ExtractOptions& options_;
+  RefusedBy refused_;
+  std::vector<std::string> given_;
+  std::vector<Proposal> proposals_;
+  std::size_t tries_ = 0;
+};
+
+std::string words_of(const Proposal& proposal) {
+  const std::string without = fmt::format("{}", fmt::join(proposal.leave_out, " and "));
+  const std::string change = without.empty()         ? "give " + proposal.give
+                             : proposal.give.empty() ? "leave out " + without
+                                                     : fmt::format("instead of {} give {}", without, proposal.give);
+  return fmt::format("{} (tried: {}){}", change, proposal.seen, proposal.when);
+}
+
+}  // namespace
+
+std::vector<Proposal> proposals_for(const FirstLook& look, const ExtractOptions& options, RefusedBy refused) {
+  return Proposer(look, options, refused).find();
+}
+
+std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptions& options) {
+  if (!proposals.empty()) {
+    std::vector<std::string> each;
+    for (const Proposal& one : proposals) each.push_back(words_of(one));
+    return fmt::format("If a picture of preview.html marks your beads, {}", fmt::join(each, "; or "));
+  }
+  std::vector<std::string> left;
+  if (options.roi.empty()) left.emplace_back("the region of the beads (--roi)");
+  if (!options.radius) left.emplace_back("their radius in pixels (--radius)");
+  return "No option that was tried leads to beads. The program needs sharp photographs of round beads, taken from the "
+         "side and lit so that the whole rim of a bead is visible. Each bead must be at least 10 pixels wide and "
+         "brighter or darker than the background. " +
+         (left.empty() ? std::string("The region and the radius given do not help: take such a photograph")
+                       : fmt::format("If this is such a photograph, give {}", fmt::join(left, " and ")));
+}
+
+std::string advice_of_other_pictures(const std::vector<std::string>& paths, const ExtractOptions& options) {
+  for (std::size_t k = 1; k < std::min(paths.size(), 1 + most_other_pictures); ++k)
+    if (const std::optional<Trial> trial = try_options(paths[k], options))
+      return fmt::format("{} shows {} beads: leave out the picture{} before it",
+                         std::filesystem::path(paths[k]).filename().string(), trial->beads, k == 1 ? "" : "s");
+  return "";
+}
+
+}  // namespace shakebed::pipelines
