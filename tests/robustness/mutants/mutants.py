@@ -183,36 +183,46 @@ def choose(arguments):
 
 
 def read_named(path):
-    """Faults written by hand: 'name file', then lines of '- before' and '+ after', then an empty line."""
-    faults = []
-    for block in re.split(r"\n\s*\n", path.read_text()):
-        lines = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
-        if not lines:
-            continue
-        name, file = lines[0].split()
-        before = "\n".join(line[2:] for line in lines[1:] if line.startswith("- "))
-        after = "\n".join(line[2:] for line in lines[1:] if line.startswith("+ "))
-        faults.append((name, file, before, after))
+    """Faults written by hand: 'name file', then lines of '- before' and '+ after', then an empty line. Each with the
+    line where it begins."""
+    faults, block = [], []
+    for number, line in enumerate([*path.read_text().splitlines(), ""], 1):
+        if line.strip():
+            block += [] if line.startswith("#") else [(number, line)]
+        elif block:
+            name, file = block[0][1].split()
+            before = "\n".join(text[2:] for _, text in block[1:] if text.startswith("- "))
+            after = "\n".join(text[2:] for _, text in block[1:] if text.startswith("+ "))
+            faults.append((name, file, before, after, block[0][0]))
+            block = []
     return faults
 
 
 def named(arguments):
+    """Writes them into the table. Those whose text does not stand exactly once in its file are said, and the exit code
+    is then 1."""
     rows = read_table(arguments.table)
     known = {row["id"]: row for row in rows}
-    for name, file, before, after in read_named(arguments.file):
-        text = (SOURCE / file).read_text()
+    misplaced = 0
+    for name, file, before, after, at in read_named(arguments.file):
+        text = (SOURCE / file).read_text() if (SOURCE / file).exists() else ""
         placed = text.count(before) == 1
         offset = text.find(before)
         row = dict(id=name, room=file.split("/")[0], file=file, offset=str(offset),
                    line=str(text.count("\n", 0, max(0, offset)) + 1), kind="named", before=before, after=after,
                    state="waiting" if placed else "misplaced", noticed_by="", seconds="")
         if not placed:
-            print(f"{name}: its text stands {text.count(before)} times in {file}", file=sys.stderr)
+            misplaced += 1
+            print(f"{arguments.file}:{at}: {name} is misplaced: its text stands {text.count(before)} times in {file}, "
+                  "not once", file=sys.stderr)
         if name not in known:
             rows.append(row)
-        elif arguments.again and known[name]["state"] != "noticed" or known[name]["after"] != after:
+        elif (not placed or known[name]["state"] in ("waiting", "misplaced")
+              or arguments.again and known[name]["state"] != "noticed"
+              or any(known[name][column] != row[column] for column in ("file", "before", "after"))):
             known[name].update(row)
     write_table(arguments.table, rows)
+    sys.exit(1 if misplaced else 0)
 
 
 def read_table(path):
