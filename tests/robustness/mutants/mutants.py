@@ -31,6 +31,8 @@ SOURCE = Path(__file__).resolve().parents[3]
 ROOMS = ("statistics", "sim", "fit", "ingest", "pipelines")
 COLUMNS = ("id", "room", "file", "offset", "line", "kind", "before", "after", "state", "noticed_by", "seconds")
 
+RESULTS = SOURCE / "tests/robustness/results/mutants.csv"  # of earlier runs
+
 BUILD_TIMEOUT = 3600  # seconds, on a busy machine
 
 # Test programs by name: their place in the build. Those in tests/robustness/fuzz and the long ones are not used.
@@ -528,7 +530,7 @@ class Bench:
 
     def ask(self, row, times, part):
         spent = 0
-        for program, tests, usual in groups_of(row, times, part):
+        for program, tests, usual in groups_of(row, times, part, remembered_tests(row, self.remembered)):
             if self.limit and spent > self.limit:
                 return "survived", f"{program} and what follows were not asked"
             tests = [test for test in tests if test not in self.unfit]
@@ -611,10 +613,17 @@ def likely_suites(file):
     return found
 
 
-def groups_of(row, times, part):
-    """Lists of tests to be run one after the other, (program, tests, usual seconds). First the likely ones of the room
-    that take up to two seconds, the others of up to 0.3 s; then, unless only this part is wanted, the others of the
-    room, then those of the programs above, the quickest first."""
+def remembered_tests(row, rows):
+    """Tests that noticed this fault before, and those that noticed others in the same file."""
+    noticed = [other for other in rows if other["state"] == "noticed" and other["file"] == row["file"]]
+    same = {other["noticed_by"] for other in noticed if (other["before"], other["after"]) == (row["before"], row["after"])}
+    return same, {other["noticed_by"] for other in noticed} - same
+
+
+def groups_of(row, times, part, remembered=((), ())):
+    """Lists of tests to be run one after the other, (program, tests, usual seconds). First those that noticed this fault
+    or one of the same file before, the likely ones of the room that take up to two seconds, the others of up to 0.3 s;
+    then, unless only this part is wanted, the others of the room, then those of the programs above, the quickest first."""
     likely = likely_suites(row["file"])
     own = OWN[row["room"]]
     ranked = {}
@@ -625,9 +634,11 @@ def groups_of(row, times, part):
             band = next(number for number, limit in enumerate((0.3, 2, 8, 1e9)) if seconds <= limit)
             if program == "pipelines_images_test":
                 band = 3  # its tests share one run
-            first = program in own and band < (2 if likely_one else 1)
+            known = next((place for place, tests in enumerate(remembered) if test in tests), None)
+            first = program in own and band < (2 if likely_one else 1) or known is not None and band < 3
             if part in ("first", "all") and first or part in ("rest", "all") and not first:
-                rank = (0, not likely_one, band) if first else (1, program not in own, band)
+                rank = (-1, known, 0) if known is not None else (0, not likely_one, band) if first else \
+                    (1, program not in own, band)
                 ranked.setdefault((rank, place, program), []).append((test, seconds))
     return [(program, [test for test, _ in tests], sum(seconds for _, seconds in tests))
             for (_, _, program), tests in sorted(ranked.items())]
@@ -644,6 +655,7 @@ def run(arguments):
     benches = [Bench(arguments.work, arguments.build, number) for number in range(arguments.jobs)]
     for bench in benches:
         bench.limit = arguments.limit
+        bench.remembered = read_table(RESULTS) + rows
         bench.prepare()
     times = usual_times(benches[0])
 
@@ -658,6 +670,7 @@ def run(arguments):
             state, noticed_by = bench.judge(row, times, part)
             spent = float(row["seconds"] or 0) + bench.cpu
             print(f"{row['id']} {row['file']}:{row['line']} {state} {noticed_by} {bench.cpu:.0f} s", flush=True)
+            row.update(state=state, noticed_by=noticed_by)
             with lock:  # the table may have been changed meanwhile
                 now = read_table(arguments.table)
                 for other in now:
