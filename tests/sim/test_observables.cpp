@@ -295,6 +295,28 @@ TEST(Drift, IsTheLaterHalfLessTheEarlier) {
   EXPECT_LT(std::sqrt(squares), 1.15);
 }
 
+// Two disks with velocities of +-1 each way: m <v^2> = 1 in either direction. Their one free momentum has T = 2, and
+// Z = 1 + virial/(2 N T).
+TEST(Compressibility, AndItsErrorAreThoseOfTheVirialRateByHand) {
+  Scene scene = dropped(1);
+  scene.disks.species = {{2, 1, 1}};
+  scene.start = PlacedStart{{{1, 2, 1, 1, 0, 0}, {3, 2, -1, -1, 0, 0}}};
+  const auto simulation = simulate(scene);
+  Snapshot at;
+  simulation->snapshot(at);
+  BedObserver bed(scene, simulation->properties(), 1, {-2, 0.5, 40}, {KernelKind::gaussian, 0.5});
+  bed.observe(at, 0);
+  ASSERT_NEAR(bed.temperature_x().value, 1, 1e-14);
+  ASSERT_NEAR(bed.temperature_z().value, 1, 1e-14);
+  const Measured z = bed.compressibility_factor({4, 0.6});
+  EXPECT_NEAR(z.value, 1 + 4 / (2 * 2 * 2.0), 1e-14);
+  EXPECT_NEAR(z.std_error, 0.6 / (2 * 2 * 2.0), 1e-14);
+  // Equal disks cover pi/4 of their number density.
+  const Profile profile = bed.density(false);
+  for (std::size_t i = 0; i < profile.height.size(); ++i)
+    EXPECT_NEAR(profile.area_fraction[i], std::numbers::pi / 4 * profile.number_density[i], 1e-14) << profile.height[i];
+}
+
 // Saved in the middle and read into new ones, observers end as if nothing had happened.
 TEST(Observers, GoOnFromTheirBytes) {
   Scene scene;
