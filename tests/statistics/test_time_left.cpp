@@ -190,8 +190,8 @@ TEST(TimeLeft, TrustsWhatIsExpectedLikeAHundredthOfTheWhole) {
   EXPECT_NEAR(*time.seconds(), 10 * (20 + 0.2) / (10 + 0.2), 1e-12);
 }
 
-// Two equal parts on one thread, by pencil: the pace since the last report but one (reports count from twice the time on),
-// weighed against the pace so far as ten hundredths of a part are against what is done of it.
+// Two equal parts on one thread, by pencil: the pace since the last report but one (reports count from twice the time
+// on), weighed against the pace so far as ten hundredths of a part are against what is done of it.
 TEST(TimeLeft, OfAPartThatReportsIsDoneByHand) {
   double now = 100;
   TimeLeft time(2, 1, [&] { return now; });
