@@ -138,7 +138,6 @@ void judge_missed(const ExtractOptions& options, RunContext& context, double mis
 
 // Refuses, or warns first of all, when many disks may be wrong or the number given is contradicted.
 void judge_disks(const ExtractOptions& options, RunContext& context, const ingest::Measurement& found) {
-  constexpr double far_off = 0.2;
   const double wrong = found.expected_wrong, missed = found.finder.expected_missed;
   const ingest::Doubt doubt = ingest::doubt_of(wrong);
   if (doubt == ingest::Doubt::too_many)
@@ -154,18 +153,7 @@ void judge_disks(const ExtractOptions& options, RunContext& context, const inges
   judge_contacts(options, found);
   judge_missed(options, context, missed);
   for (const std::string& one : ingest::doubts_of_bed(found, options.diameter)) context.warning(one);
-  if (!options.bead_number) return;
-  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
-  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
-                                       found.disk_count_mean, *options.bead_number);
-  if (std::abs(ratio - 1) > far_off)
-    throw StageError(text +
-                     ". Other objects were probably found instead of the beads. Look at the pictures of fit-images "
-                     "--preview, and give --radius, --polarity, --channel or --roi; or correct --bead-number");
-  if (std::abs(ratio - 1) > 1e-3)
-    context.warning(text + (ratio < 1
-                                ? ": some beads are missed or out of view (see count.svg and the overlays)."
-                                : ": another object is taken for a bead (see the overlays), or there are more beads."));
+  if (options.bead_number) judge_bead_number(*options.bead_number, found.disk_count_mean, context);
 }
 
 // What the options ask of the measurement.
@@ -421,6 +409,20 @@ class Extraction {
 };
 
 }  // namespace
+
+void judge_bead_number(std::uint64_t given, double mean_found, RunContext& context) {
+  constexpr double far_off = 0.2, close = 1e-3;  // of the number given
+  const double ratio = mean_found / static_cast<double>(given);
+  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}", mean_found, given);
+  if (std::abs(ratio - 1) > far_off)
+    throw StageError(text +
+                     ". Other objects were probably found instead of the beads. Look at the pictures of fit-images "
+                     "--preview, and give --radius, --polarity, --channel or --roi; or correct --bead-number");
+  if (std::abs(ratio - 1) > close)
+    context.warning(text + (ratio < 1
+                                ? ": some beads are missed or out of view (see count.svg and the overlays)."
+                                : ": another object is taken for a bead (see the overlays), or there are more beads."));
+}
 
 void extract_disks(const ExtractOptions& options, RunContext& context) { Extraction(options, context).run(); }
 
