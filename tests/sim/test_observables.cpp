@@ -214,6 +214,30 @@ TEST(Velocities, OfAMaxwellianHaveNoFourthCumulantAndThoseOnACircleMinusOneHalf)
   EXPECT_NEAR(maxwellian.number_density(maxwellian.layer(3), false), n / 1e4, 0.003);
 }
 
+// With u = v^2/(2 T) of a Maxwellian, a2 = <u^2>/(2 <u>^2) - 1 changes by u^2/2 - 1 - 2 (u - 1), of which the variance
+// is 1: the error of a2 from N independent velocities is 1/sqrt(N), whatever T is.
+TEST(Velocities, KnowTheErrorOfTheFourthCumulant) {
+  constexpr std::uint32_t n = 100, looks = 1024;
+  const Scene scene = box_of(n);
+  const DiskProperties disks{std::vector<double>(n, 0.5), std::vector<double>(n, 1)};
+  Random random(7);
+  VelocityObserver velocities(scene, disks, 1, {0, 10, 10}, false);
+  Snapshot at;
+  at.x.resize(n), at.z.resize(n, 5), at.vx.resize(n), at.vz.resize(n);
+  for (std::uint32_t look = 0; look < looks; ++look) {
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const Random::Pair v = random.normal_pair();
+      at.vx[i] = 2 * v.first, at.vz[i] = 2 * v.second;  // T = 4
+    }
+    velocities.observe(at, 0);
+  }
+  // Its own scatter, from some hundred independent parts: a tenth.
+  const double expected = 1 / std::sqrt(double{n} * looks);
+  const Measured cumulant = velocities.fourth_cumulant_of_all();
+  EXPECT_NEAR(cumulant.value, 0, 4 * expected);
+  EXPECT_NEAR(cumulant.std_error / expected, 1, 0.3);
+}
+
 // In the frame of a floor that rises at 2, disks at rest in the lab fall at -2.
 TEST(Velocities, AreRelativeToTheFloorInItsFrame) {
   const Scene scene = box_of(1);
