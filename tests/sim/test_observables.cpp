@@ -133,6 +133,21 @@ TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
   EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 1e-12);
 }
 
+// Two equal rows d apart, smoothed by 0.06 D, have between them 2 t/(1 + t^4) of their peaks, t = exp(-d^2/(8 0.06^2)):
+// less than 0.8, and so two rows, from d = 0.16 D on.
+TEST(Rows, AreToldApartFromASixthOfADiameterOn) {
+  for (const double apart : {0.14, 0.18}) {
+    Lattice two = lattice(12, 10);
+    for (std::size_t i = 0; i < two.at.z.size(); ++i) two.at.z[i] = i < 40 ? 0.51 : i < 80 ? 0.51 + apart : 2.01;
+    OrderObserver order(two.scene, two.disks, {0, 1, 20});
+    order.observe(two.at);
+    const auto rows = order.rows();  // all but the last, of which nothing shows the end
+    ASSERT_EQ(rows.size(), apart < 0.16 ? 1u : 2u) << apart;
+    EXPECT_NEAR(rows[0].disks, apart < 0.16 ? 80 : 40, 1e-12);
+    EXPECT_NEAR(rows[0].height, apart < 0.16 ? 0.51 + apart / 2 : 0.51, 1e-12);
+  }
+}
+
 TEST(Rows, OfAGasThereAreNone) {
   Lattice gas = lattice(40, 40);
   for (std::size_t i = 0; i < gas.at.z.size(); ++i) gas.at.z[i] = 0.025 * static_cast<double>(i);  // evenly up to 40 D
