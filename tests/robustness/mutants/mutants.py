@@ -55,7 +55,7 @@ OWN = {
     "sim": ("test_sim",),
     "fit": ("test_fit",),
     "ingest": ("test_ingest", "extract_numbers_test"),
-    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test"),
+    "pipelines": ("test_numbers", "extract_numbers_test", "test_pipelines"),  # the first two start no program
 }
 # What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
 LAST = {
@@ -68,7 +68,7 @@ ORDER = {
     "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "test_robustness"),
     "fit": ("test_fit", "test_numbers", "test_pipelines", "digits_test"),
     "ingest": ("test_ingest", "extract_numbers_test", "pipelines_images_test"),
-    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test", "pipelines_images_test", "test_robustness"),
+    "pipelines": ("test_numbers", "extract_numbers_test", "test_pipelines", "pipelines_images_test", "test_robustness"),
 }
 
 
