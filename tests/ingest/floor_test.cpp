@@ -11,16 +11,16 @@
 namespace shakebed::ingest {
 namespace {
 
-constexpr double diameter_px = 20;
-constexpr int columns = 40, width = 1200;  // columns of 1.5 diameters
+constexpr double bead_diameter_px = 20;
+constexpr int floor_columns = 40, floor_width_px = 1200;  // columns of 1.5 diameters
 
 // One bead in each column of a frame, its bottom at y = 400 + slope (x - 600), off by `noise` at random.
 std::vector<FrameFindings> beads_on_a_floor(double slope, double noise, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   FrameFindings frame;
-  for (int column = 0; column < columns; ++column) {
+  for (int column = 0; column < floor_columns; ++column) {
     FoundDisk disk;
-    disk.x_px = 30 * (column + 0.5), disk.radius_px = diameter_px / 2;
+    disk.x_px = 30 * (column + 0.5), disk.radius_px = bead_diameter_px / 2;
     disk.y_px = 400 + slope * (disk.x_px - 600) - disk.radius_px + noise * normal(random);
     frame.disks.push_back(disk);
   }
@@ -29,7 +29,7 @@ std::vector<FrameFindings> beads_on_a_floor(double slope, double noise, std::mt1
 
 TEST(Floor, WithoutNoiseIsItsLine) {
   std::mt19937_64 random(1);
-  const Line line = find_floor(beads_on_a_floor(0.015, 0, random), diameter_px, width);
+  const Line line = find_floor(beads_on_a_floor(0.015, 0, random), bead_diameter_px, floor_width_px);
   EXPECT_NEAR(line.slope, 0.015, 1e-12);
   EXPECT_NEAR(line.offset, 400 - 0.015 * 600, 1e-9);
   EXPECT_NEAR(line.middle.first, 600, 1e-9);
@@ -43,7 +43,7 @@ TEST(Floor, AndItsTiltAreWithinTheirErrors) {
   double slopes = 0, middles = 0;
   constexpr int floors = 400;
   for (int i = 0; i < floors; ++i) {
-    const Line line = find_floor(beads_on_a_floor(0.015, 0.5, random), diameter_px, width);
+    const Line line = find_floor(beads_on_a_floor(0.015, 0.5, random), bead_diameter_px, floor_width_px);
     slopes += std::pow((line.slope - 0.015) / line.slope_std_error, 2) / floors;
     middles +=
         std::pow((line.middle.second - 400 - 0.015 * (line.middle.first - 600)) / line.middle_std_error, 2) / floors;
@@ -58,7 +58,8 @@ TEST(Floor, AndItsTiltAreWithinTheirErrors) {
 TEST(Floor, IsLevelWhereItsTiltIsWithinItsErrors) {
   std::mt19937_64 random(5);
   int tilted = 0;
-  for (int i = 0; i < 100; ++i) tilted += find_floor(beads_on_a_floor(0, 0.5, random), diameter_px, width).slope != 0;
+  for (int i = 0; i < 100; ++i)
+    tilted += find_floor(beads_on_a_floor(0, 0.5, random), bead_diameter_px, floor_width_px).slope != 0;
   EXPECT_EQ(tilted, 0);
 }
 
