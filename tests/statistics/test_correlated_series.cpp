@@ -68,8 +68,8 @@ TEST(CorrelatedSeries, ChoosesWindowsOfThreeMemoriesOfWhichSixFitIn) {
   EXPECT_EQ(half_window(1e300, 24), 2u);
 }
 
-// Fifteen samples are taken for independent, one a window, and nothing is corrected. From sixteen on a window holds two,
-// and 3/4 of the windows side by side count: (3 * 16/2 + 2)/4 of them, rounded down.
+// Fifteen samples are taken for independent, one a window, and nothing is corrected. From sixteen on a window holds
+// two, and 3/4 of the windows side by side count: (3 * 16/2 + 2)/4 of them, rounded down.
 TEST(CorrelatedSeries, OfFewerThanSixteenSamplesHasAWindowForEach) {
   std::vector<double> series;
   for (int i = 0; i < 15; ++i) series.push_back(i % 3);
