@@ -46,9 +46,9 @@ std::optional<Effort> next_pilot(const EffortReading& pilot, const EffortLimits&
                                  const Budget& budget);
 // What a finer model is worth. `cheap`: the systematic part falls by more than the number of events grows. `dear`: it
 // does not, but without the finer model the error asked for may be missed; no finer one is then tried. `useless`:
-// neither. In a bed that chatters (e = 0.6, friction 0.8, 11 layers) a contact duration of a tenth took 3.0 times the
-// events, and its estimated effect on T fell 1.9 times. In three others (e = 0.8 to 0.95) it was 1.2 times, and 6 to 11
-// times.
+// neither. An example is a contact duration of a tenth. In a bed that chatters (e = 0.6, friction 0.8, 11 layers) it
+// took 3.0 times the events, and its estimated effect on T fell 1.9 times. In three others (e = 0.8 to 0.95) it was 1.2
+// times, and 6 to 11 times.
 enum class Refinement { cheap, dear, useless };
 Refinement judged(const EffortReading& coarse, const EffortReading& fine, const Budget& budget);
 

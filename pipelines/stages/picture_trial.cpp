@@ -36,20 +36,6 @@ void judge_missed(const ExtractOptions& options, double missed, Judgement& judge
                   100 * missed));
 }
 
-void judge_number(const ExtractOptions& options, const ingest::Measurement& found, Judgement& judgement) {
-  constexpr double far_off = 0.2;
-  if (!options.bead_number) return;
-  const double ratio = found.disk_count_mean / static_cast<double>(*options.bead_number);
-  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}",
-                                       found.disk_count_mean, *options.bead_number);
-  if (std::abs(ratio - 1) > far_off)
-    throw StageError(text + ". Other objects were found instead of the beads, or the number is wrong");
-  if (std::abs(ratio - 1) > 1e-3)
-    judgement.warning(
-        text + (ratio < 1 ? ": some beads are missed or out of view (see count.svg and the overlays)."
-                          : ": another object is taken for a bead (see the overlays), or there are more beads."));
-}
-
 ingest::SurveyCandidate circles_of(const ingest::Measurement& found) {
   ingest::SurveyCandidate circles;
   for (const ingest::MeasuredDisk& disk : found.disks) {
@@ -61,6 +47,18 @@ ingest::SurveyCandidate circles_of(const ingest::Measurement& found) {
 }
 
 }  // namespace
+
+void judge_bead_number(std::uint64_t given, double mean_found, Judgement& judgement) {
+  constexpr double far_off = 0.2, close = 1e-3;  // of the number given
+  const double ratio = mean_found / static_cast<double>(given);
+  const std::string text = fmt::format("On average {:.2f} beads were found, but bead_number is {}", mean_found, given);
+  if (std::abs(ratio - 1) > far_off)
+    throw StageError(text + ". Other objects were found instead of the beads, or the number is wrong");
+  if (std::abs(ratio - 1) > close)
+    judgement.warning(
+        text + (ratio < 1 ? ": some beads are missed or out of view (see count.svg and the overlays)."
+                          : ": another object is taken for a bead (see the overlays), or there are more beads."));
+}
 
 ingest::MeasureOptions asked_for(const ExtractOptions& options) {
   ingest::MeasureOptions measure;
@@ -140,7 +138,7 @@ Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& 
   judge_contacts(options, found);
   judge_missed(options, found.finder.expected_missed, judgement);
   for (std::string& one : ingest::doubts_of_bed(found, options.diameter)) judgement.warning(std::move(one));
-  judge_number(options, found, judgement);
+  if (options.bead_number) judge_bead_number(*options.bead_number, found.disk_count_mean, judgement);
   return judgement;
 }
 

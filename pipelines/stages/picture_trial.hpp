@@ -2,6 +2,7 @@
 // picture, to try options on it. Part of the images module.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ struct Judgement {
   std::vector<std::string> warnings;
   void warning(std::string text) { warnings.push_back(std::move(text)); }
 };
+// Refuses where the mean number of beads found is more than a fifth from the number given; warns where it is more than
+// a thousandth from it.
+void judge_bead_number(std::uint64_t given, double mean_found, Judgement& judgement);
 // Throws StageError where the disks found are no bed of beads, or not the one described. The message says what is
 // wrong, not what helps (proposals.hpp).
 Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& found);

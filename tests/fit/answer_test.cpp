@@ -75,6 +75,45 @@ TEST(Answer, SaysWhatItsUncertaintyIsMadeOf) {
   EXPECT_NEAR(answer.interval.low * answer.interval.high, answer.temperature * answer.temperature, 1e-9);
 }
 
+// Also where the thermometers differ by more than their errors explain: rms of that, over those beside the chosen one.
+TEST(Answer, TakesInHowFarItsThermometersDiffer) {
+  double largest = 0;
+  for (const auto& [depth, temperature] : {std::pair{1.5, 0.4}, {1.5, 1.0}, {20.0, 0.4}}) {
+    const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {depth, close_packing_density});
+    const double top = synthetic::top_of(truth);
+    AnswerInput input;
+    input.kernel = usual_kernel;
+    input.base = 0.0;
+    input.profile = synthetic::profile_of(truth, usual_kernel, static_cast<int>(4 * top), top, 0.001, 11);
+    input.contact_duration_effect = 0.01;
+    input.width_between_walls = 30;
+    const Answer answer = find_answer(input);
+    ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+    const auto chosen = std::find_if(answer.readings.begin(), answer.readings.end(), [&](const auto& reading) {
+      return reading.thermometer == answer.thermometer && reading.model == answer.model;
+    });
+    ASSERT_NE(chosen, answer.readings.end());
+    double squares = 0, others = 0;
+    for (const ThermometerReading& reading : answer.readings) {
+      if (!reading.admissible || &reading == &*chosen) continue;
+      squares += std::max(0.0, std::pow(std::log(reading.temperature / chosen->temperature), 2) -
+                                   std::pow(reading.std_error / reading.temperature, 2) -
+                                   std::pow(chosen->std_error / chosen->temperature, 2));
+      others += 1;
+    }
+    ASSERT_GT(others, 0);
+    EXPECT_NEAR(answer.spread, answer.temperature * std::sqrt(squares / others), 1e-12) << depth << ", " << temperature;
+    EXPECT_NEAR(answer.contact_duration_uncertainty, 0.01 * answer.temperature, 1e-12);
+    double parts = 0;
+    for (const double part : {answer.statistical_error, answer.misfit_error, answer.bias_uncertainty, answer.spread,
+                              answer.contact_duration_uncertainty, answer.wall_uncertainty})
+      parts += part * part;
+    EXPECT_NEAR(answer.std_error, std::sqrt(parts), 1e-12) << depth << ", " << temperature;
+    largest = std::max(largest, answer.spread / answer.std_error);
+  }
+  EXPECT_GT(largest, 0.5);
+}
+
 // The known misfit is of beds that are dense at the floor. A model of a thin gas misses its densities by as much less,
 // so the statistics decide.
 TEST(Answer, OfAThinGasIsAsCertainAsItsStatistics) {

@@ -144,6 +144,15 @@ TEST(Frames, BootstrapScattersByTheCovarianceOfTheWindows) {
   ASSERT_EQ(average.profile.covariance_samples, 8);
   const Interval& interval = result.temperature_interval;
   EXPECT_NEAR((interval.high - interval.low) / (2.0 * 2.365 * result.temperature.std_error), 1.0, 4 * 0.019);
+  // By the percentiles themselves, which are read off 2,000 numbers that lie 0.2 % of the interval apart there.
+  ASSERT_EQ(result.temperatures.size(), std::size_t{resamples});
+  const double between = result.temperatures[resamples - 50] - result.temperatures[49];
+  EXPECT_NEAR((interval.high - interval.low) / (2.3646 / 1.95996 * between), 1.0, 0.006);
+  const Interval& of_shift = result.shift_interval;
+  EXPECT_EQ(of_shift.confidence, 0.95);
+  EXPECT_NEAR((of_shift.high - of_shift.low) / (2.0 * 2.365 * result.shift.std_error), 1.0, 4 * 0.019);
+  EXPECT_LT(of_shift.low, result.shift.value);
+  EXPECT_GT(of_shift.high, result.shift.value);
 }
 
 TEST(Frames, FullCovarianceOfFramesFits) {

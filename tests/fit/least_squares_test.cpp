@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fit/profile_fit/window.hpp"
 #include "fit/theory/expansion.hpp"
@@ -19,6 +21,22 @@ struct Problem {
   FitModel::Parameters start{0.12, 8.0, 1.10};
   std::unique_ptr<FitModel> model = make_fit_model("enskog-rectangle", 0.0, false, 0.25);
 };
+
+// A fit may end at the largest plateau itself, so these models have a curve there; none has one beyond it, nor of a
+// plateau or a temperature of 0, nor of what is no number.
+TEST(FitModel, HasACurveUpToItsLargestPlateau) {
+  for (const char* name : {"enskog-rectangle", "fermi", "rectangle"}) {
+    const auto model = make_fit_model(name, 0.0, false, 0.25);
+    ASSERT_NE(model, nullptr) << name;
+    const double most = model->largest_plateau(), none = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(model->set({0.2, 8, most})) << name;
+    EXPECT_FALSE(model->set({0.2, 8, most * (1 + 1e-12)})) << name;
+    EXPECT_FALSE(model->set({0.2, 8, 0})) << name;
+    EXPECT_FALSE(model->set({0.2, none, 1})) << name;
+    EXPECT_FALSE(model->set({0.2, 8, none})) << name;
+    EXPECT_EQ(model->set({0, 8, 1}), !model->uses_temperature()) << name;
+  }
+}
 
 // Distances 1, 1, 0 and 2: of those that are not zero the median.
 TEST(MeasuredProfile, KnowsItsSpacingAndSaysWhichHeightsAreRepeated) {
@@ -148,6 +166,29 @@ void expect_sandwich(const Problem& problem) {
 }
 
 TEST(LeastSquares, ErrorsComeThroughTheCorrelations) { expect_sandwich(correlated_problem(0.6)); }
+
+// Errors that are not known: the scale is 1.4826 of the median size of all residuals, also of the first, and beyond
+// robust_threshold of it the loss is linear.
+TEST(LeastSquares, UnknownErrorsAreTheMedianOfTheResiduals) {
+  Problem problem = correlated_problem(0.0);
+  problem.bins.density.front() += 0.05;  // far off
+  problem.options.robust = true;
+  problem.options.errors_known = false;
+  problem.options.max_iterations = 1000;  // of all rounds with a new scale
+  const Solution solution = least_squares(problem.bins, *problem.model, problem.start, problem.options);
+  ASSERT_TRUE(solution.converged);
+  const FitModel::Parameters& p = solution.parameters;
+  const std::vector<double> curve = evaluate_model({}, p[0], p[1], p[2], 0.0, problem.bins.height).densities;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < curve.size(); ++i)
+    sizes.push_back(std::abs(curve[i] - problem.bins.density[i]) * problem.bins.inverse_error[i]);
+  std::sort(sizes.begin(), sizes.end());
+  ASSERT_EQ(sizes.size(), 60u);
+  const double threshold = problem.options.robust_threshold * 1.482602218505602 * sizes[30];
+  double loss = 0;
+  for (const double size : sizes) loss += size < threshold ? size * size : threshold * (2 * size - threshold);
+  EXPECT_NEAR(solution.objective / loss, 1, 1e-4);
+}
 
 TEST(LeastSquares, RobustErrorsComeThroughTheCorrelationsWithHubersWeights) {
   Problem problem = correlated_problem(0.6);

@@ -62,6 +62,19 @@ TEST(SimulatedProfiles, MatchFindsTheTemperatureOfALayeredBed) {
   EXPECT_LE(held, 196);
 }
 
+// What is said of the interpolation is how far the temperature moves with one order less.
+TEST(SimulatedProfiles, InterpolationErrorIsTheStepToOneOrderLess) {
+  const auto library = make_library(0.0, 1);
+  const Profile measured = layered_bed(0.13, 0.0, 0.01, 5000);
+  const auto at_order = [&](int order) { return match_simulated(measured, library, {.order = order}); };
+  const MatchResult four = at_order(4), three = at_order(3), two = at_order(2);
+  const double step = std::abs(four.temperature.value - three.temperature.value);
+  ASSERT_GT(step, 1e-6);
+  ASSERT_GT(std::abs(four.temperature.value - two.temperature.value), 1.5 * step);
+  EXPECT_NEAR(four.interpolation_error / step, 1, 1e-3);
+  EXPECT_NEAR(two.interpolation_error, 0, 1e-12) << "there is no order below two";
+}
+
 // A measurement at heights between those of the library: densities are interpolated, T stays.
 TEST(SimulatedProfiles, AMeasurementAtOtherHeightsHasTheSameTemperature) {
   const auto smooth_bed = [](double temperature, double offset) {

@@ -246,6 +246,13 @@ TEST(MeasureBed, BadFramesAreReportedAndTheOthersUsed) {
   EXPECT_EQ(measured.frames[2].status, FrameStatus::good);
   EXPECT_THAT(measured.warnings,
               testing::Contains(testing::HasSubstr("1 of 5 frames differ from the first one in size")));
+  // Four frames count, the blank one with no bead.
+  double mean = 0, squares = 0;
+  for (std::size_t k = 0; k < 4; ++k) mean += static_cast<double>(measured.frames[k].disks) / 4;
+  for (std::size_t k = 0; k < 4; ++k) squares += std::pow(static_cast<double>(measured.frames[k].disks) - mean, 2);
+  EXPECT_EQ(measured.frames[1].disks, 0U);
+  EXPECT_NEAR(measured.disk_count_mean, mean, 1e-9);
+  EXPECT_NEAR(measured.disk_count_std, std::sqrt(squares / 3), 1e-9);
 }
 
 TEST(MeasureBed, AFilmWithoutBeadsIsAnErrorThatSaysWhy) {

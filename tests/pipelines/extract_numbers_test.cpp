@@ -10,6 +10,7 @@
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
+#include "pipelines/stages/picture_trial.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -270,7 +271,7 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   options.stride = 2, options.overlays = 0;
   std::istringstream truth(
       "frame,disk,x_px,y_px,radius_px\n0,0,10,20,5\n0,1,40,20,5\n0,2,70,20,5\n1,0,500,500,5\n2,0,10,80,5\n"
-      "2,1,40,80,5\n2,2,70,80,5\n");
+      "2,1,40,80,5\n2,2,70,80,5\n2,3,150,150,5\n");  // seven, of which five are among the six found
   DisksOnTheWay on_the_way(extract_, options, &truth);
   const auto disk = [](std::size_t frame, double x, double y, double quality) {
     ingest::MeasuredDisk one;
@@ -289,7 +290,7 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   on_the_way.take(frame, second);
   on_the_way.close();
   const Json found = *on_the_way.truth();
-  EXPECT_DOUBLE_EQ(found["recall"].get<double>(), 5.0 / 6);
+  EXPECT_DOUBLE_EQ(found["recall"].get<double>(), 5.0 / 7);
   EXPECT_DOUBLE_EQ(found["precision"].get<double>(), 5.0 / 6);
   EXPECT_NEAR(value(found["center_rms_error"]), 0.5, 1e-12);
   EXPECT_EQ(found["center_rms_error"]["unit"], "px");
@@ -326,6 +327,23 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   EXPECT_EQ(details("species", 5), 2);
   EXPECT_NEAR(details("probability", 4), 0.875, 1e-6);
   EXPECT_NEAR(details("probability", 0), 0.9, 1e-6);
+}
+
+// 100 beads: refused below 80 and above 120; from 0.1 bead on there is a warning, which says on which side.
+TEST(BeadNumber, IsHeldAgainstTheBeadsFound) {
+  Judgement judgement;
+  for (const double found : {79.0, 121.0}) EXPECT_THROW(judge_bead_number(100, found, judgement), StageError) << found;
+  for (const double found : {99.95, 100.0, 100.05}) judge_bead_number(100, found, judgement);
+  EXPECT_TRUE(judgement.warnings.empty());
+  for (const auto& [found, says] : {std::pair{81.0, "some beads are missed"},
+                                    {99.8, "some beads are missed"},
+                                    {100.2, "another object is taken for a bead"},
+                                    {119.0, "another object is taken for a bead"}}) {
+    judgement.warnings.clear();
+    judge_bead_number(100, found, judgement);
+    ASSERT_EQ(judgement.warnings.size(), 1U) << found;
+    EXPECT_NE(judgement.warnings[0].find(says), std::string::npos) << judgement.warnings[0];
+  }
 }
 
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,

@@ -476,6 +476,8 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
       "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
       "settle": "0.5 s", "measure": "0.3 s", "frames": { "count": 192, "phases": 64 } },
     { "stage": "render", "from": "bed", "scale": "0.25 mm/px", "noise": 2 },
+    { "stage": "render", "id": "low", "from": "bed", "scale": "0.25 mm/px", "frames": 1, "height": "30 mm" },
+    { "stage": "render", "id": "high", "from": "bed", "scale": "0.25 mm/px", "frames": 1, "height": "45 mm" },
     { "stage": "extract", "id": "all", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz" },
     { "stage": "extract", "id": "second", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz", "stride": 2 } ] })";
   write_text(folder / "r.json", recipe);
@@ -504,6 +506,8 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
   }
   const Json one = read_json(folder / "o/all/extract.json"), two = read_json(folder / "o/second/extract.json");
   EXPECT_NEAR(value(two["velocities"]["mean_step"]) / value(one["velocities"]["mean_step"]), 2, 0.4);
+  const auto rows = [&](const char* id) { return value(read_json(folder / "o" / id / "render.json")["height"]); };
+  EXPECT_EQ(rows("high") - rows("low"), 60) << "15 mm more to see, of 0.25 mm a pixel";
 }
 
 }  // namespace

@@ -171,7 +171,7 @@ TEST_P(Budgets, AreKeptOnNewBeds) {
     const std::optional<Judged> one = judge(draw.bed(), asked, 1000 * asked + k);
     ASSERT_FALSE(HasFailure());
     if (!one) continue;
-    if (one->reference_error < asked / 100.0)
+    if (one->reference_error < asked / 50.0)
       all.push_back(*one);
     else
       EXPECT_TRUE(one->warned) << "bed " << k << ": its reference is known to " << one->reference_error;

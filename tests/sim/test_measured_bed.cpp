@@ -66,6 +66,7 @@ TEST(MeasuredBed, WhatCannotBeMeasuredIsNamed) {
   const std::vector<Problem> all{Problem::settle, Problem::duration, Problem::phases, Problem::spacing,
                                  Problem::kernel};
   EXPECT_EQ((MeasureOptions{.settle = -1, .duration = 0, .phases = 0, .spacing = none, .kernel = {}}.problems(0)), all);
+  EXPECT_EQ((MeasureOptions{.duration = 1, .spacing = 0}.problems(0)), std::vector{Problem::spacing});
   EXPECT_EQ((MeasureOptions{.duration = 0.999}.problems(1)), std::vector{Problem::shorter_than_a_period});
   EXPECT_TRUE((MeasureOptions{.duration = 1}.problems(1).empty()));
   EXPECT_EQ((MeasureOptions{.duration = 1e13}.problems(1)), std::vector{Problem::too_many_periods});

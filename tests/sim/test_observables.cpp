@@ -133,6 +133,21 @@ TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
   EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 1e-12);
 }
 
+// Two equal rows d apart, smoothed by 0.06 D, have between them 2 t/(1 + t^4) of their peaks, t = exp(-d^2/(8 0.06^2)):
+// less than 0.8, and so two rows, from d = 0.16 D on.
+TEST(Rows, AreToldApartFromASixthOfADiameterOn) {
+  for (const double apart : {0.14, 0.18}) {
+    Lattice two = lattice(12, 10);
+    for (std::size_t i = 0; i < two.at.z.size(); ++i) two.at.z[i] = i < 40 ? 0.51 : i < 80 ? 0.51 + apart : 2.01;
+    OrderObserver order(two.scene, two.disks, {0, 1, 20});
+    order.observe(two.at);
+    const auto rows = order.rows();  // all but the last, of which nothing shows the end
+    ASSERT_EQ(rows.size(), apart < 0.16 ? 1u : 2u) << apart;
+    EXPECT_NEAR(rows[0].disks, apart < 0.16 ? 80 : 40, 1e-12);
+    EXPECT_NEAR(rows[0].height, apart < 0.16 ? 0.51 + apart / 2 : 0.51, 1e-12);
+  }
+}
+
 TEST(Rows, OfAGasThereAreNone) {
   Lattice gas = lattice(40, 40);
   for (std::size_t i = 0; i < gas.at.z.size(); ++i) gas.at.z[i] = 0.025 * static_cast<double>(i);  // evenly up to 40 D
@@ -214,6 +229,30 @@ TEST(Velocities, OfAMaxwellianHaveNoFourthCumulantAndThoseOnACircleMinusOneHalf)
   EXPECT_NEAR(maxwellian.number_density(maxwellian.layer(3), false), n / 1e4, 0.003);
 }
 
+// With u = v^2/(2 T) of a Maxwellian, a2 = <u^2>/(2 <u>^2) - 1 changes by u^2/2 - 1 - 2 (u - 1), of which the variance
+// is 1: the error of a2 from N independent velocities is 1/sqrt(N), whatever T is.
+TEST(Velocities, KnowTheErrorOfTheFourthCumulant) {
+  constexpr std::uint32_t n = 100, looks = 1024;
+  const Scene scene = box_of(n);
+  const DiskProperties disks{std::vector<double>(n, 0.5), std::vector<double>(n, 1)};
+  Random random(7);
+  VelocityObserver velocities(scene, disks, 1, {0, 10, 10}, false);
+  Snapshot at;
+  at.x.resize(n), at.z.resize(n, 5), at.vx.resize(n), at.vz.resize(n);
+  for (std::uint32_t look = 0; look < looks; ++look) {
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const Random::Pair v = random.normal_pair();
+      at.vx[i] = 2 * v.first, at.vz[i] = 2 * v.second;  // T = 4
+    }
+    velocities.observe(at, 0);
+  }
+  // Its own scatter, from some hundred independent parts: a tenth.
+  const double expected = 1 / std::sqrt(double{n} * looks);
+  const Measured cumulant = velocities.fourth_cumulant_of_all();
+  EXPECT_NEAR(cumulant.value, 0, 4 * expected);
+  EXPECT_NEAR(cumulant.std_error / expected, 1, 0.3);
+}
+
 // In the frame of a floor that rises at 2, disks at rest in the lab fall at -2.
 TEST(Velocities, AreRelativeToTheFloorInItsFrame) {
   const Scene scene = box_of(1);
@@ -293,6 +332,28 @@ TEST(Drift, IsTheLaterHalfLessTheEarlier) {
   EXPECT_NEAR(sum, 0, 3.3 / std::sqrt(trials));
   EXPECT_GT(std::sqrt(squares), 0.8);
   EXPECT_LT(std::sqrt(squares), 1.15);
+}
+
+// Two disks with velocities of +-1 each way: m <v^2> = 1 in either direction. Their one free momentum has T = 2, and
+// Z = 1 + virial/(2 N T).
+TEST(Compressibility, AndItsErrorAreThoseOfTheVirialRateByHand) {
+  Scene scene = dropped(1);
+  scene.disks.species = {{2, 1, 1}};
+  scene.start = PlacedStart{{{1, 2, 1, 1, 0, 0}, {3, 2, -1, -1, 0, 0}}};
+  const auto simulation = simulate(scene);
+  Snapshot at;
+  simulation->snapshot(at);
+  BedObserver bed(scene, simulation->properties(), 1, {-2, 0.5, 40}, {KernelKind::gaussian, 0.5});
+  bed.observe(at, 0);
+  ASSERT_NEAR(bed.temperature_x().value, 1, 1e-14);
+  ASSERT_NEAR(bed.temperature_z().value, 1, 1e-14);
+  const Measured z = bed.compressibility_factor({4, 0.6});
+  EXPECT_NEAR(z.value, 1 + 4 / (2 * 2 * 2.0), 1e-14);
+  EXPECT_NEAR(z.std_error, 0.6 / (2 * 2 * 2.0), 1e-14);
+  // Equal disks cover pi/4 of their number density.
+  const Profile profile = bed.density(false);
+  for (std::size_t i = 0; i < profile.height.size(); ++i)
+    EXPECT_NEAR(profile.area_fraction[i], std::numbers::pi / 4 * profile.number_density[i], 1e-14) << profile.height[i];
 }
 
 // Saved in the middle and read into new ones, observers end as if nothing had happened.

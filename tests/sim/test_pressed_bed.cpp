@@ -61,6 +61,20 @@ TEST(PressedBed, LosesInAContactWhatTheRestitutionSays) {
   }
 }
 
+// A contact across a periodic side is that of the same disks in the middle.
+TEST(PressedBed, HasContactsAcrossPeriodicSides) {
+  constexpr double contact_time = 0.005, step = contact_time / PressedBed::steps_a_contact;
+  const auto velocities = [](double left, double right) {
+    PressedBed bed = soft_disks(0.8, 10, 10);
+    bed.begin({{left, 20, 0.05, 0}, {right, 20.6, -0.05, 0.01}}, still, contact_time);
+    for (int k = 0; k < 20; ++k) bed.step(still, still, step);
+    return std::vector{bed.at(0, 0).vx, bed.at(0, 0).vz, bed.at(1, 0).vx, bed.at(1, 0).vz};
+  };
+  const std::vector<double> middle = velocities(4, 4.8002), across = velocities(9.5, 0.3002);
+  EXPECT_LT(middle[0], 0.04) << "they have touched";
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(across[i], middle[i], 1e-9) << i;
+}
+
 TEST(PressedBed, ConservesMomentumBetweenDisks) {
   Random random(3);
   std::vector<PressedBed::State> disks;

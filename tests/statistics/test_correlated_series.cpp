@@ -68,6 +68,22 @@ TEST(CorrelatedSeries, ChoosesWindowsOfThreeMemoriesOfWhichSixFitIn) {
   EXPECT_EQ(half_window(1e300, 24), 2u);
 }
 
+// Fifteen samples are taken for independent, one a window, and nothing is corrected. From sixteen on a window holds
+// two, and 3/4 of the windows side by side count: (3 * 16/2 + 2)/4 of them, rounded down.
+TEST(CorrelatedSeries, OfFewerThanSixteenSamplesHasAWindowForEach) {
+  std::vector<double> series;
+  for (int i = 0; i < 15; ++i) series.push_back(i % 3);
+  const Windows few = windows_for(0, series);
+  EXPECT_EQ(few.length, 1u);
+  EXPECT_EQ(few.correction, 1);
+  EXPECT_EQ(few.independent, 15u);
+  series.push_back(0);
+  const Windows enough = windows_for(0, series);
+  EXPECT_EQ(enough.length, 2u);
+  EXPECT_GE(enough.correction, 1);
+  EXPECT_EQ(enough.independent, 6u);
+}
+
 TEST(CorrelatedSeries, KnowsTheVarianceOfAMeanOfIndependentValuesExactly) {
   // Mean over 20,000 series of 30 values of the estimate, in units of the truth, whose scatter is that of the mean of
   // as many: 4 standard deviations, by the series themselves.

@@ -190,6 +190,28 @@ TEST(TimeLeft, TrustsWhatIsExpectedLikeAHundredthOfTheWhole) {
   EXPECT_NEAR(*time.seconds(), 10 * (20 + 0.2) / (10 + 0.2), 1e-12);
 }
 
+// Two equal parts on one thread, by pencil: the pace since the last report but one (reports count from twice the time
+// on), weighed against the pace so far as ten hundredths of a part are against what is done of it.
+TEST(TimeLeft, OfAPartThatReportsIsDoneByHand) {
+  double now = 100;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.begin(0);
+  const auto reaches = [&](double seconds, double fraction) {
+    now = 100 + seconds;
+    time.reached(0, fraction);
+  };
+  reaches(0, 0);
+  reaches(2, 0.2);
+  reaches(5, 0.4);  // 12.5 s a part so far, 15 s of late
+  now = 106;
+  EXPECT_NEAR(*time.seconds(), 0.8 * 15 * 0.6 + 0.2 * 12.5 * 0.6 - 1 + 12.5, 1e-12);
+  reaches(9, 0.5);  // 18 s a part so far; 9 s are not twice 5 s: of late is from 2 s on
+  EXPECT_NEAR(*time.seconds(), 5.0 / 6 * 7 / 0.3 * 0.5 + 1.0 / 6 * 18 * 0.5 + 18, 1e-12);
+  EXPECT_NEAR(time.fraction(), 9 / (9 + *time.seconds()), 1e-12);
+  reaches(10, 1.5);  // no more than all of it
+  EXPECT_NEAR(*time.seconds(), 10, 1e-12);
+}
+
 // Expected 10 s, and it goes on and on without a word: the time left never becomes zero.
 TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
   double now = 0;

@@ -31,6 +31,8 @@ SOURCE = Path(__file__).resolve().parents[3]
 ROOMS = ("statistics", "sim", "fit", "ingest", "pipelines")
 COLUMNS = ("id", "room", "file", "offset", "line", "kind", "before", "after", "state", "noticed_by", "seconds")
 
+RESULTS = SOURCE / "tests/robustness/results/mutants.csv"  # of earlier runs
+
 BUILD_TIMEOUT = 3600  # seconds, on a busy machine
 
 # Test programs by name: their place in the build. Those in tests/robustness/fuzz and the long ones are not used.
@@ -53,7 +55,7 @@ OWN = {
     "sim": ("test_sim",),
     "fit": ("test_fit",),
     "ingest": ("test_ingest", "extract_numbers_test"),
-    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test"),
+    "pipelines": ("test_numbers", "extract_numbers_test", "test_pipelines"),  # the first two start no program
 }
 # What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
 LAST = {
@@ -66,7 +68,7 @@ ORDER = {
     "sim": ("test_sim", "test_physics", "test_numbers", "test_pipelines", "digits_test", "test_robustness"),
     "fit": ("test_fit", "test_numbers", "test_pipelines", "digits_test"),
     "ingest": ("test_ingest", "extract_numbers_test", "pipelines_images_test"),
-    "pipelines": ("test_pipelines", "test_numbers", "extract_numbers_test", "pipelines_images_test", "test_robustness"),
+    "pipelines": ("test_numbers", "extract_numbers_test", "test_pipelines", "pipelines_images_test", "test_robustness"),
 }
 
 
@@ -183,36 +185,46 @@ def choose(arguments):
 
 
 def read_named(path):
-    """Faults written by hand: 'name file', then lines of '- before' and '+ after', then an empty line."""
-    faults = []
-    for block in re.split(r"\n\s*\n", path.read_text()):
-        lines = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
-        if not lines:
-            continue
-        name, file = lines[0].split()
-        before = "\n".join(line[2:] for line in lines[1:] if line.startswith("- "))
-        after = "\n".join(line[2:] for line in lines[1:] if line.startswith("+ "))
-        faults.append((name, file, before, after))
+    """Faults written by hand: 'name file', then lines of '- before' and '+ after', then an empty line. Each with the
+    line where it begins."""
+    faults, block = [], []
+    for number, line in enumerate([*path.read_text().splitlines(), ""], 1):
+        if line.strip():
+            block += [] if line.startswith("#") else [(number, line)]
+        elif block:
+            name, file = block[0][1].split()
+            before = "\n".join(text[2:] for _, text in block[1:] if text.startswith("- "))
+            after = "\n".join(text[2:] for _, text in block[1:] if text.startswith("+ "))
+            faults.append((name, file, before, after, block[0][0]))
+            block = []
     return faults
 
 
 def named(arguments):
+    """Writes them into the table. Those whose text does not stand exactly once in its file are said, and the exit code
+    is then 1."""
     rows = read_table(arguments.table)
     known = {row["id"]: row for row in rows}
-    for name, file, before, after in read_named(arguments.file):
-        text = (SOURCE / file).read_text()
+    misplaced = 0
+    for name, file, before, after, at in read_named(arguments.file):
+        text = (SOURCE / file).read_text() if (SOURCE / file).exists() else ""
         placed = text.count(before) == 1
         offset = text.find(before)
         row = dict(id=name, room=file.split("/")[0], file=file, offset=str(offset),
                    line=str(text.count("\n", 0, max(0, offset)) + 1), kind="named", before=before, after=after,
                    state="waiting" if placed else "misplaced", noticed_by="", seconds="")
         if not placed:
-            print(f"{name}: its text stands {text.count(before)} times in {file}", file=sys.stderr)
+            misplaced += 1
+            print(f"{arguments.file}:{at}: {name} is misplaced: its text stands {text.count(before)} times in {file}, "
+                  "not once", file=sys.stderr)
         if name not in known:
             rows.append(row)
-        elif arguments.again and known[name]["state"] != "noticed" or known[name]["after"] != after:
+        elif (not placed or known[name]["state"] in ("waiting", "misplaced")
+              or arguments.again and known[name]["state"] != "noticed"
+              or any(known[name][column] != row[column] for column in ("file", "before", "after"))):
             known[name].update(row)
     write_table(arguments.table, rows)
+    sys.exit(1 if misplaced else 0)
 
 
 def read_table(path):
@@ -518,7 +530,7 @@ class Bench:
 
     def ask(self, row, times, part):
         spent = 0
-        for program, tests, usual in groups_of(row, times, part):
+        for program, tests, usual in groups_of(row, times, part, remembered_tests(row, self.remembered)):
             if self.limit and spent > self.limit:
                 return "survived", f"{program} and what follows were not asked"
             tests = [test for test in tests if test not in self.unfit]
@@ -601,10 +613,17 @@ def likely_suites(file):
     return found
 
 
-def groups_of(row, times, part):
-    """Lists of tests to be run one after the other, (program, tests, usual seconds). First the likely ones of the room
-    that take up to two seconds, the others of up to 0.3 s; then, unless only this part is wanted, the others of the
-    room, then those of the programs above, the quickest first."""
+def remembered_tests(row, rows):
+    """Tests that noticed this fault before, and those that noticed others in the same file."""
+    noticed = [other for other in rows if other["state"] == "noticed" and other["file"] == row["file"]]
+    same = {other["noticed_by"] for other in noticed if (other["before"], other["after"]) == (row["before"], row["after"])}
+    return same, {other["noticed_by"] for other in noticed} - same
+
+
+def groups_of(row, times, part, remembered=((), ())):
+    """Lists of tests to be run one after the other, (program, tests, usual seconds). First those that noticed this fault
+    or one of the same file before, the likely ones of the room that take up to two seconds, the others of up to 0.3 s;
+    then, unless only this part is wanted, the others of the room, then those of the programs above, the quickest first."""
     likely = likely_suites(row["file"])
     own = OWN[row["room"]]
     ranked = {}
@@ -615,9 +634,11 @@ def groups_of(row, times, part):
             band = next(number for number, limit in enumerate((0.3, 2, 8, 1e9)) if seconds <= limit)
             if program == "pipelines_images_test":
                 band = 3  # its tests share one run
-            first = program in own and band < (2 if likely_one else 1)
+            known = next((place for place, tests in enumerate(remembered) if test in tests), None)
+            first = program in own and band < (2 if likely_one else 1) or known is not None and band < 3
             if part in ("first", "all") and first or part in ("rest", "all") and not first:
-                rank = (0, not likely_one, band) if first else (1, program not in own, band)
+                rank = (-1, known, 0) if known is not None else (0, not likely_one, band) if first else \
+                    (1, program not in own, band)
                 ranked.setdefault((rank, place, program), []).append((test, seconds))
     return [(program, [test for test, _ in tests], sum(seconds for _, seconds in tests))
             for (_, _, program), tests in sorted(ranked.items())]
@@ -634,6 +655,7 @@ def run(arguments):
     benches = [Bench(arguments.work, arguments.build, number) for number in range(arguments.jobs)]
     for bench in benches:
         bench.limit = arguments.limit
+        bench.remembered = read_table(RESULTS) + rows
         bench.prepare()
     times = usual_times(benches[0])
 
@@ -648,6 +670,7 @@ def run(arguments):
             state, noticed_by = bench.judge(row, times, part)
             spent = float(row["seconds"] or 0) + bench.cpu
             print(f"{row['id']} {row['file']}:{row['line']} {state} {noticed_by} {bench.cpu:.0f} s", flush=True)
+            row.update(state=state, noticed_by=noticed_by)
             with lock:  # the table may have been changed meanwhile
                 now = read_table(arguments.table)
                 for other in now:
