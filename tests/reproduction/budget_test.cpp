@@ -179,15 +179,18 @@ TEST_P(Budgets, AreKeptOnNewBeds) {
   ASSERT_GE(all.size(), static_cast<std::size_t>(least_run)) << "beds were too dear";
   const std::vector<double> events = sorted(all, &Judged::events), cpu = sorted(all, &Judged::cpu);
   const std::vector<double> pilots = sorted(all, &Judged::pilot_share);
-  const double error = rms(all, &Judged::error);
+  const double error = rms(all, &Judged::error), of_reference = rms(all, &Judged::reference_error);
   std::printf(
       "asked %d %%: %zu of %d beds: rms error %.2f %% (that of the references: %.2f %%), expected %.2f %%, stated %.2f "
       "%%; events over "
       "said: median %.2f, %.2f to %.2f; CPU: median %.2f, %.2f to %.2f; pilots over run: median %.2f, most %.2f\n",
-      asked, all.size(), beds_asked, 100 * error, 100 * rms(all, &Judged::reference_error),
-      100 * rms(all, &Judged::expected), 100 * rms(all, &Judged::stated), events[events.size() / 2], events.front(),
-      events.back(), cpu[cpu.size() / 2], cpu.front(), cpu.back(), pilots[pilots.size() / 2], pilots.back());
-  EXPECT_LE(100 * error, asked);
+      asked, all.size(), beds_asked, 100 * error, 100 * of_reference, 100 * rms(all, &Judged::expected),
+      100 * rms(all, &Judged::stated), events[events.size() / 2], events.front(), events.back(), cpu[cpu.size() / 2],
+      cpu.front(), cpu.back(), pilots[pilots.size() / 2], pilots.back());
+  // The difference to a reference has the errors of both.
+  const double own = std::sqrt(std::max(0.0, error * error - of_reference * of_reference));
+  std::printf("rms error of the runs, without that of the references: %.2f %%\n", 100 * own);
+  EXPECT_LE(100 * own, asked);
   EXPECT_GT(events.front(), 1 / 1.5);
   EXPECT_LT(events.back(), 1.5);
 }
