@@ -30,8 +30,8 @@ constexpr std::uint32_t beds_of_pilot = 8, most_beds = 10'000;
 constexpr int most_pilots = 6;
 // The blocks of one bed of a pilot count as so many independent samples, in the uncertainty of `within`.
 constexpr double blocks_of_bed = 1;
-// Beds of a pilot differ by more than they state, at this significance. Asked for 1 %, 18 beds had 1.1 % (rms); 17 others
-// had 1.2 % with a significance of 5 %.
+// Beds of a pilot differ by more than they state, at this significance. Asked for 1 %, 18 beds had 1.1 % (rms); 17
+// others had 1.2 % with a significance of 5 %.
 constexpr double differ_significance = 0.3;
 // A choice may be longer than its pilot by this factor; the next pilot is then shorter than the choice by the other.
 constexpr double most_extrapolation = 12, next_extrapolation = 6;
