@@ -165,12 +165,12 @@ BedMeasurement::BedMeasurement(const sim::Scene& scene, const sim::DiskPropertie
       flow_free_(disks, plan.phases),
       of_phases_(plan.named_phases.size(), frames_) {
   const sim::LayerGrid layers = coarse_layers(plan.grid);
-  if (plan.observe.order) order_.emplace(scene, disks, layers);
+  if (plan.observe.order) order_.emplace(scene, disks, plan.phases, layers);
   if (plan.observe.velocities || plan.observe.phases) lab_.emplace(scene, disks, plan.phases, layers, false);
   if (plan.observe.phases && floor_frame_) floor_.emplace(scene, disks, plan.phases, layers, true);
   if (plan.observe.displacement) displacement_.emplace(scene, disks.mass.size());
   if (plan.observe.pressure) flights_.emplace(scene, disks, fine_layers(plan.grid));
-  if (plan.observe.species) species_.emplace(scene, disks, layers);
+  if (plan.observe.species) species_.emplace(scene, disks, plan.phases, layers);
 }
 
 void BedMeasurement::begin(sim::Simulation& simulation) {

@@ -89,7 +89,7 @@ class BedMeasurement {
   sim::BedObserver bed_, frames_;
   sim::FlowFreeTemperature flow_free_;
   std::vector<sim::BedObserver> of_phases_;  // one a named phase
-  sim::BlockedMean virial_rate_, collision_rate_, lid_height_;
+  sim::CorrelatedMeans virial_rate_, collision_rate_, lid_height_;
   double lid_heights_ = 0;  // sum over the looks of this period
   double virial_ = 0;
   std::uint64_t collisions_ = 0;

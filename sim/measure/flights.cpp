@@ -13,8 +13,7 @@ FlightObserver::FlightObserver(const Scene& scene, const DiskProperties& disks, 
       grid_(layers),
       flights_(disks.mass.size()),
       sums_(layers.count),
-      means_(quantities * layers.count + 1),
-      covariance_(quantities * layers.count + 1) {}
+      means_(quantities * layers.count + 1) {}
 
 std::size_t FlightObserver::layer_of(double z) const {
   const double place = std::floor((z - grid_.lowest) / grid_.thickness);
@@ -138,7 +137,6 @@ void FlightObserver::end_block(double time) {
   }
   block.back() = floor_momentum_ / (width_ * duration);
   means_.add(block);
-  covariance_.add(block);
   begin(time);
 }
 
@@ -163,7 +161,8 @@ std::vector<FlightObserver::Layer> FlightObserver::layers() const {
     out.weight_above = plain(weight);
     out.collision_rate = plain(rate);
     if (n > nothing) {
-      const std::vector<double> covariance = covariance_.of_means(at, at + momentum + 1);
+      const std::vector<double> covariance =
+          means_.covariance(at, at + momentum + 1, means_.windows(at, at + momentum + 1));
       const double gx[] = {-kx / (n * n), 0, 1 / n, 0, 0};
       out.temperature_x = propagated(kx / n, gx, covariance);
       const double thermal = kz - p * p / m;

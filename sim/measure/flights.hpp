@@ -51,7 +51,7 @@ class FlightObserver final : public Watcher {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(flights_, sums_, floor_momentum_, block_start_, means_, covariance_);
+    archive(flights_, sums_, floor_momentum_, block_start_, means_);
   }
 
  private:
@@ -92,8 +92,7 @@ class FlightObserver final : public Watcher {
   std::vector<Sums> sums_;
   double floor_momentum_ = 0;
   double block_start_ = 0;
-  BlockedMean means_;
-  BlockedCovariance covariance_;
+  CorrelatedMeans means_;
 };
 
 }  // namespace shakebed::sim

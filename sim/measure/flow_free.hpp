@@ -41,7 +41,7 @@ class FlowFreeTemperature {
   std::uint32_t phases_;
   std::array<double, 2> period_sum_{};
   std::uint32_t period_looks_ = 0;
-  BlockedMean mean_{2};
+  CorrelatedMeans mean_{2};
   std::vector<Layer> layers_;  // kept to save allocations
 };
 

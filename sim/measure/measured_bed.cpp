@@ -97,7 +97,7 @@ class Observer final : public RunObserver {
   const LookPlan& plan_;
   MeasuredBed& out_;
   std::optional<BedObserver> bed_;
-  BlockedMean virial_rate_;
+  CorrelatedMeans virial_rate_;
   double virial_ = 0;
 };
 

@@ -5,7 +5,7 @@
 //   if (!bed.ok()) ... bed.message ...
 //   bed.temperature_x.value
 //
-// Errors include the correlation in time [FlyvbjergPetersen1989]. The same scene, options and seed give the same bytes.
+// Errors include the correlation in time [MeketonSchmeiser1984]. The same scene, options and seed give the same bytes.
 // Nothing is printed and no global state is kept: any number of threads may measure, each its own bed. The result owns
 // all of its arrays. For observers of one's own, states that are kept, and replicas: measure.hpp.
 #pragma once

@@ -81,7 +81,6 @@ BedObserver::BedObserver(const Scene& scene, const DiskProperties& disks, std::u
       layer_bottom_(std::floor(grid.lowest)),
       period_sum_(2 * grid.points + scalar_count),
       means_(2 * grid.points + scalar_count),
-      covariance_(grid.points),
       centre_by_phase_(phases),
       layers_(phases * layer_count_) {
   for (std::size_t i = 0; i < masses_.size(); ++i) {
@@ -157,7 +156,6 @@ void BedObserver::observe(const Snapshot& at, std::uint32_t phase) {
     means_.add(period_sum_);
     centre_series_.push_back(scalars[centre]);
     temperature_series_.push_back(scalars[t_x]);
-    covariance_.add(std::span(period_sum_).first(grid_.points));
     ++periods_;
   }
 }
@@ -207,7 +205,7 @@ Measured BedObserver::bottom_row_density() const {
 Measured BedObserver::temperature_z() const {
   std::vector<double> mean(phases_);
   for (std::size_t k = 0; k < periods_ * phases_; ++k) mean[k % phases_] += mean_vz_[k] / static_cast<double>(periods_);
-  BlockedMean blocks;
+  CorrelatedMeans blocks;
   double sum = 0;
   for (std::size_t k = 0; k < periods_ * phases_; ++k) {
     const double m = mean[k % phases_];

@@ -45,9 +45,9 @@ class BedObserver {
   Profile density(bool floor_frame) const;
   // Covariance of the lab frame's densities, points first to last-1 of the grid, row by row.
   std::vector<double> density_covariance(std::size_t first, std::size_t last) const {
-    return covariance_.of_means(first, last);
+    return means_.covariance(first, last, density_windows());
   }
-  std::size_t covariance_blocks() const { return covariance_.windows().independent; }
+  std::size_t covariance_blocks() const { return density_windows().independent; }
   Measured centre_of_mass() const;
   Measured temperature_x() const;        // m <v_x^2>
   Measured temperature_z() const;        // of v_z without the bed's mean velocity at each phase
@@ -73,8 +73,8 @@ class BedObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(periods_, period_sum_, area_sums_, means_, centre_series_, temperature_series_, covariance_, mean_vz_,
-            mean_vz2_, mean_mass_, centre_by_phase_, layers_);
+    archive(periods_, period_sum_, area_sums_, means_, centre_series_, temperature_series_, mean_vz_, mean_vz2_,
+            mean_mass_, centre_by_phase_, layers_);
   }
 
  private:
@@ -82,6 +82,7 @@ class BedObserver {
     double count = 0, mass = 0, vx2 = 0, vz = 0, vz2 = 0;  // velocities weighted with the masses
     double spin = 0;                                       // I w^2
   };
+  statistics::Windows density_windows() const { return means_.windows(0, grid_.points); }
   void add_area(const Snapshot& at);
   struct Size {
     double area;
@@ -101,10 +102,9 @@ class BedObserver {
   std::uint64_t periods_ = 0;
   std::vector<double> period_sum_;  // lab profile, floor profile, then scalars: see observe()
   std::vector<double> area_sums_;   // of covered fractions, lab and floor profile; none where all disks are of one size
-  BlockedMean means_;
+  CorrelatedMeans means_;
   std::vector<double> centre_series_, temperature_series_;  // a value a period
-  BlockedCovariance covariance_;
-  std::vector<double> mean_vz_, mean_vz2_;  // a value a phase and period; the second with the mass
+  std::vector<double> mean_vz_, mean_vz2_;                  // a value a phase and period; the second with the mass
   double mean_mass_ = 1;
   std::vector<double> centre_by_phase_;
   std::vector<LayerSums> layers_;

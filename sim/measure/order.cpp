@@ -169,9 +169,11 @@ BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double per
   return order;
 }
 
-OrderObserver::OrderObserver(const Scene& scene, const DiskProperties& disks, const LayerGrid& layers)
+OrderObserver::OrderObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases,
+                             const LayerGrid& layers)
     : disks_(disks),
       grid_(layers),
+      means_(4, phases),
       layers_(layers.count),
       width_(scene.box.width),
       bins_(row_bins(layers.lowest + layers.thickness * static_cast<double>(layers.count))) {

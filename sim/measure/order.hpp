@@ -30,10 +30,11 @@ struct BondOrder {
 // period_x, period_z: 0 where the box is not periodic.
 BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double period_x, double period_z);
 
-// Averages over snapshots; errors by blocking over them.
+// Averages over snapshots.
 class OrderObserver {
  public:
-  OrderObserver(const Scene& scene, const DiskProperties& disks, const LayerGrid& layers);
+  // `phases`: snapshots a period.
+  OrderObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const LayerGrid& layers);
   void observe(const Snapshot& at);
 
   Measured psi6_local() const { return {means_.mean(0), means_.std_error(0)}; }   // mean over disks of |psi_6|
@@ -68,7 +69,7 @@ class OrderObserver {
   DiskProperties disks_;
   double period_x_ = 0, period_z_ = 0;
   LayerGrid grid_;
-  BlockedMean means_{4};
+  CorrelatedMeans means_;
   std::vector<LayerSums> layers_;
   double width_ = 0;
   std::uint64_t looks_ = 0;

@@ -11,8 +11,9 @@ bool has_two_species(const Scene& scene) {
   return species.size() == 2 && (species[0].diameter != species[1].diameter || species[0].mass != species[1].mass);
 }
 
-SpeciesObserver::SpeciesObserver(const Scene& scene, const DiskProperties& disks, const LayerGrid& layers)
-    : width_(scene.box.width), masses_(disks.mass), grid_(layers), cells_(2 * layers.count) {
+SpeciesObserver::SpeciesObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases,
+                                 const LayerGrid& layers)
+    : width_(scene.box.width), masses_(disks.mass), grid_(layers), cells_(2 * layers.count), powers_(2, phases) {
   assert(has_two_species(scene));
   const Species& one = scene.disks.species[first];
   for (std::size_t i = 0; i < masses_.size(); ++i)
@@ -36,7 +37,6 @@ void SpeciesObserver::observe(const Snapshot& at) {
     temperatures[s] = m.count > 0 ? (m.vx2 / m.count + upwards) / 2 : 0;
   }
   powers_.add(temperatures);
-  covariance_.add(temperatures);
   ++snapshots_;
 }
 
@@ -44,7 +44,7 @@ Measured SpeciesObserver::temperature_ratio() const {
   const double one = powers_.mean(first), two = powers_.mean(second);
   if (!(one > 0)) return {NAN, NAN};
   const double gradient[] = {-two / (one * one), 1 / one};
-  return propagated(two / one, gradient, covariance_.of_means(0, 2));
+  return propagated(two / one, gradient, powers_.covariance(0, 2, powers_.windows(0, 2)));
 }
 
 double SpeciesObserver::number_density(std::size_t layer, std::size_t species) const {

@@ -22,7 +22,8 @@ class SpeciesObserver {
  public:
   static constexpr std::size_t first = 0, second = 1;
 
-  SpeciesObserver(const Scene& scene, const DiskProperties& disks, const LayerGrid& layers);
+  // `phases`: snapshots a period.
+  SpeciesObserver(const Scene& scene, const DiskProperties& disks, std::uint32_t phases, const LayerGrid& layers);
   void observe(const Snapshot& at);
 
   // Half the sum of <m v_x^2> and of the variance of v_z times m about the species' mean at the moment.
@@ -39,7 +40,7 @@ class SpeciesObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(cells_, snapshots_, powers_, covariance_);
+    archive(cells_, snapshots_, powers_);
   }
 
  private:
@@ -49,8 +50,7 @@ class SpeciesObserver {
   LayerGrid grid_;
   std::vector<VelocityMoments> cells_;  // layer by layer, both species
   std::uint64_t snapshots_ = 0;
-  BlockedMean powers_{2};  // temperature of each species at each moment
-  BlockedCovariance covariance_{2};
+  CorrelatedMeans powers_;  // temperature of each species at each moment
 };
 
 }  // namespace shakebed::sim

@@ -8,47 +8,12 @@
 
 namespace shakebed::sim {
 
-void BlockedMean::add(std::span<const double> sample) {
-  assert(sample.size() == size_);
-  std::vector<double> block(sample.begin(), sample.end());
-  for (std::size_t depth = 0;; ++depth) {
-    if (depth == levels_.size())
-      levels_.push_back({0, false, std::vector<double>(size_), std::vector<double>(size_), std::vector<double>(size_)});
-    Level& level = levels_[depth];
-    ++level.blocks;
-    for (std::size_t i = 0; i < size_; ++i) {
-      const double difference = block[i] - level.mean[i];
-      level.mean[i] += difference / static_cast<double>(level.blocks);
-      level.sum_of_squares[i] += difference * (block[i] - level.mean[i]);
-    }
-    if (!level.waiting) {
-      level.half = block;
-      level.waiting = true;
-      return;
-    }
-    level.waiting = false;
-    for (std::size_t i = 0; i < size_; ++i) block[i] = 0.5 * (block[i] + level.half[i]);
-  }
-}
-
-double BlockedMean::mean(std::size_t i) const {
-  return levels_.empty() ? std::numeric_limits<double>::quiet_NaN() : levels_[0].mean[i];
-}
-
-double BlockedMean::std_error(std::size_t i) const {
-  if (samples() < 2) return std::numeric_limits<double>::quiet_NaN();
-  double largest = 0;
-  for (const Level& level : levels_) {
-    if (&level != &levels_[0] && level.blocks < 16) break;
-    const auto blocks = static_cast<double>(level.blocks);
-    largest = std::max(largest, std::sqrt(level.sum_of_squares[i] / (blocks * (blocks - 1))));
-  }
-  return largest;
-}
-
-void BlockedCovariance::add(std::span<const double> sample) {
+void CorrelatedMeans::add(std::span<const double> sample) {
   constexpr std::size_t most_blocks = 512;
   assert(sample.size() == size_);
+  if (samples_ == 0) mean_.assign(size_, 0.0);
+  ++samples_;
+  for (std::size_t i = 0; i < size_; ++i) mean_[i] += (sample[i] - mean_[i]) / static_cast<double>(samples_);
   if (in_block_ == 0) sum_.assign(size_, 0.0);
   for (std::size_t i = 0; i < size_; ++i) sum_[i] += sample[i];
   if (++in_block_ < block_length_) return;
@@ -63,26 +28,29 @@ void BlockedCovariance::add(std::span<const double> sample) {
   block_length_ *= 2;
 }
 
-std::vector<double> BlockedCovariance::first_moment() const {
-  std::vector<double> moment(blocks_.size());
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    for (std::size_t i = 0; i < size_; ++i) moment[b] += static_cast<double>(i) * blocks_[b][i];
-  }
-  return statistics::from_mean(std::move(moment));
+double CorrelatedMeans::mean(std::size_t i) const {
+  return samples_ == 0 ? std::numeric_limits<double>::quiet_NaN() : mean_[i];
 }
 
-statistics::Windows BlockedCovariance::windows() const {
-  std::vector<double> sum(blocks_.size());
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    for (const double x : blocks_[b]) sum[b] += x;
-  }
-  const std::vector<double> moment = first_moment();
-  return statistics::windows_for(
-      std::max(statistics::memory_of(statistics::from_mean(std::move(sum))), statistics::memory_of(moment)), moment);
+double CorrelatedMeans::std_error(std::size_t i) const {
+  if (blocks() < 2) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> series(blocks());
+  for (std::size_t b = 0; b < blocks(); ++b) series[b] = blocks_[b][i];
+  return statistics::mean_of(series).std_error;
 }
 
-std::vector<double> BlockedCovariance::of_means(std::size_t first, std::size_t last) const {
-  return statistics::covariance_by_windows(blocks_, first, last, windows());
+statistics::Windows CorrelatedMeans::windows(std::size_t first, std::size_t last) const {
+  std::vector<double> sum(blocks()), moment(blocks());
+  for (std::size_t b = 0; b < blocks(); ++b) {
+    for (std::size_t i = first; i < last; ++i) {
+      sum[b] += blocks_[b][i];
+      moment[b] += static_cast<double>(i - first) * blocks_[b][i];
+    }
+  }
+  sum = statistics::from_mean(std::move(sum));
+  if (last - first == 1) return statistics::windows_for(statistics::memory_of(sum), sum);
+  moment = statistics::from_mean(std::move(moment));
+  return statistics::windows_for(std::max(statistics::memory_of(sum), statistics::memory_of(moment)), moment);
 }
 
 Measured propagated(double value, std::span<const double> gradient, std::span<const double> covariance) {

@@ -1,4 +1,8 @@
-// Means of correlated samples with honest errors: blocking [FlyvbjergPetersen1989], as the samples stream past.
+// Means of correlated samples, as the samples stream past, with errors that allow for the correlation: by overlapping
+// windows, corrected for what windows of their length still miss (statistics/correlated_series.hpp). Blocking alone
+// [FlyvbjergPetersen1989] needs series of hundreds of correlation times. Of the variance of the mean of 106 samples
+// with a correlation time of 3 it found 0.45, windows 0.99. Of 1,000 samples with one of 10 it found 0.75, windows
+// 0.95.
 //
 // An accumulator owns its sums. One thread at a time may use one; different ones share nothing.
 #pragma once
@@ -16,64 +20,41 @@ struct Measured {
   double value = 0, std_error = 0;
 };
 
-// Means of `size` quantities sampled together. Memory: 3 numbers a quantity and level, log2(samples) levels.
-class BlockedMean {
+// The means of `size` quantities sampled together, with their errors and covariances. Keeps block means, at most 512,
+// and doubles the block length when there are more, so memory does not grow with the samples.
+class CorrelatedMeans {
  public:
-  explicit BlockedMean(std::size_t size = 1) : size_(size) {}
+  // `first_block`: samples in a block at first; a period of what repeats, so that no block holds a part of one.
+  explicit CorrelatedMeans(std::size_t size = 1, std::size_t first_block = 1)
+      : size_(size), block_length_(first_block) {}
 
   void add(std::span<const double> sample);  // of `size` values
   void add(double value) { add(std::span(&value, 1)); }
 
-  std::uint64_t samples() const { return levels_.empty() ? 0 : levels_[0].blocks; }
-  double mean(std::size_t i = 0) const;
-  // The largest of the estimates over all block lengths that leave at least 16 blocks: grows to the plateau where
-  // neighbouring blocks are independent. With fewer than 16 samples, the uncorrelated estimate; NaN with fewer than 2.
-  double std_error(std::size_t i = 0) const;
-
-  template <class Archive>
-  void visit(Archive& archive) {
-    archive(size_, levels_);
-  }
-
- private:
-  struct Level {
-    std::uint64_t blocks = 0;
-    bool waiting = false;
-    std::vector<double> half;                  // a block that waits for its partner
-    std::vector<double> mean, sum_of_squares;  // running (Welford)
-    template <class Archive>
-    void visit(Archive& archive) {
-      archive(blocks, waiting, half, mean, sum_of_squares);
-    }
-  };
-  std::size_t size_;
-  std::vector<Level> levels_;
-};
-
-// The covariance of means of correlated quantities: keeps block means, at most 512, and doubles the block length when
-// there are more, so memory does not grow with the samples.
-class BlockedCovariance {
- public:
-  explicit BlockedCovariance(std::size_t size = 1) : size_(size) {}
-  void add(std::span<const double> sample);  // of `size` values
+  std::uint64_t samples() const { return samples_; }
   std::size_t blocks() const { return blocks_.size(); }
-  // Of the means of the quantities first to last-1, row by row, by windows of blocks.
-  std::vector<double> of_means(std::size_t first, std::size_t last) const;
-  // From the more slowly decaying of two series, and corrected for it: the sum of the quantities and their first moment
-  // (sum of i x_i).
-  statistics::Windows windows() const;
+  double mean(std::size_t i = 0) const;  // of all samples; NaN without any
+  // By windows of blocks, as long as this quantity is correlated over. With fewer than 16 blocks, the estimate for
+  // uncorrelated ones; NaN with fewer than 2.
+  double std_error(std::size_t i = 0) const;
+  // Of the means of the quantities first to last-1, row by row.
+  std::vector<double> covariance(std::size_t first, std::size_t last, const statistics::Windows& windows) const {
+    return statistics::covariance_by_windows(blocks_, first, last, windows);
+  }
+  // From the more slowly decaying of two series, and corrected for it: the sum of the quantities first to last-1 and
+  // their first moment (sum of (i - first) x_i). Of one quantity: from its series.
+  statistics::Windows windows(std::size_t first, std::size_t last) const;
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(size_, block_length_, in_block_, sum_, blocks_);
+    archive(size_, block_length_, in_block_, samples_, mean_, sum_, blocks_);
   }
 
  private:
-  std::vector<double> first_moment() const;  // of every block, from its mean
-
-  std::size_t size_;
-  std::size_t block_length_ = 1, in_block_ = 0;
-  std::vector<double> sum_;
+  std::size_t size_, block_length_;
+  std::size_t in_block_ = 0;
+  std::uint64_t samples_ = 0;
+  std::vector<double> mean_, sum_;  // of all samples, running; of the block
   std::vector<std::vector<double>> blocks_;
 };
 

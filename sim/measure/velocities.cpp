@@ -52,6 +52,7 @@ VelocityObserver::VelocityObserver(const Scene& scene, const DiskProperties& dis
       grid_(layers),
       floor_frame_(floor_frame),
       cells_(phases * layers.count),
+      powers_(2, phases),
       histogram_x_(histogram_bins),
       histogram_z_(histogram_bins) {
   for (std::size_t i = 0; i < masses_.size(); ++i)
@@ -89,7 +90,6 @@ void VelocityObserver::observe(const Snapshot& at, std::uint32_t phase) {
   double fourth = all.xxxx + 2 * all.xxzz + all.z4;
   const double powers[] = {n > 0 ? (all.xx + all.z2) / all.count : 0, n > 0 ? fourth / all.count : 0};
   powers_.add(powers);
-  powers_covariance_.add(powers);
   ++snapshots_;
 }
 
@@ -97,7 +97,7 @@ Measured VelocityObserver::fourth_cumulant_of_all() const {
   const double square = powers_.mean(0), fourth = powers_.mean(1);
   if (!(square > 0)) return {};
   const double gradient[] = {-fourth / (square * square * square), 1 / (2 * square * square)};
-  return propagated(fourth_cumulant(square, fourth), gradient, powers_covariance_.of_means(0, 2));
+  return propagated(fourth_cumulant(square, fourth), gradient, powers_.covariance(0, 2, powers_.windows(0, 2)));
 }
 
 double VelocityObserver::fourth_cumulant_local() const {
@@ -181,7 +181,7 @@ void DisplacementObserver::observe(const Snapshot& at) {
 std::vector<DisplacementObserver::Lag> DisplacementObserver::lags() const {
   std::vector<Lag> result;
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    const BlockedMean& squares = levels_[level].squares;
+    const CorrelatedMeans& squares = levels_[level].squares;
     if (squares.samples() == 0) break;
     result.push_back({std::uint64_t{1} << level,
                       {squares.mean(0), squares.std_error(0)},

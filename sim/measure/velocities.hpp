@@ -73,7 +73,7 @@ class VelocityObserver {
 
   template <class Archive>
   void visit(Archive& archive) {
-    archive(cells_, snapshots_, powers_, powers_covariance_, histogram_unit_, histogram_x_, histogram_z_);
+    archive(cells_, snapshots_, powers_, histogram_unit_, histogram_x_, histogram_z_);
   }
 
  private:
@@ -84,8 +84,7 @@ class VelocityObserver {
   bool floor_frame_;
   std::vector<VelocityMoments> cells_;
   std::uint64_t snapshots_ = 0;
-  BlockedMean powers_{2};  // <c^2>, <c^4> of each snapshot
-  BlockedCovariance powers_covariance_{2};
+  CorrelatedMeans powers_;  // <c^2>, <c^4> of each snapshot
   double histogram_unit_ = 0;
   std::vector<double> histogram_x_, histogram_z_;
 };
@@ -113,7 +112,7 @@ class DisplacementObserver {
  private:
   struct Level {
     std::vector<double> x, z;  // where the disks were at the last origin
-    BlockedMean squares{2};
+    CorrelatedMeans squares{2};
     template <class Archive>
     void visit(Archive& archive) {
       archive(x, z, squares);

@@ -34,7 +34,7 @@ void expect_compressibility(std::uint32_t rows, double phi, double expected, dou
   const double n = scene.count();
   simulation->advance_to(settle);
   double virial = simulation->counters().virial;
-  BlockedMean z;
+  CorrelatedMeans z;
   for (int i = 1; i <= blocks; ++i) {
     simulation->advance_to(settle + interval * i);
     const double now = simulation->counters().virial;

@@ -67,7 +67,7 @@ TEST(ElasticGas, CollidesAsOftenAsEnskogSays) {
     const auto simulation = simulate(gas(32, area_fraction, 1, 51));
     const double count = 1024, per_time = collision_frequency(area_fraction, count), step = 20 / per_time;
     simulation->advance_to(step);
-    BlockedMean rate;
+    CorrelatedMeans rate;
     double before = static_cast<double>(simulation->counters().disk_collisions);
     const double temperature = simulation->energy().kinetic / (count - 1);
     for (int k = 0; k < 64; ++k) {
@@ -90,7 +90,7 @@ TEST(ElasticGas, CollidesAsOftenAsEnskogSays) {
 // -0.0118(1), -0.0104(1) by the same Monte Carlo. A gas of 256 has 0.0314(7) at 0.6: its size does nothing.
 Measured boltzmann_a2(double e, int gases) {
   constexpr std::uint32_t count = 100'000;
-  BlockedMean a2;
+  CorrelatedMeans a2;
   for (int gas = 0; gas < gases; ++gas) {
     Random random(static_cast<std::uint64_t>(gas) + 5);
     std::vector<double> vx(count), vz(count);
@@ -133,7 +133,7 @@ Measured boltzmann_a2(double e, int gases) {
 void expect_haff(double e, double area_fraction, std::uint32_t rows, int runs, int boltzmann_gases) {
   const double count = rows * rows, free_momenta = (count - 1) / count;
   const double loss = (1 - e * e) / 4, w = collision_frequency(area_fraction, count);
-  BlockedMean rate, a2, per_collision;
+  CorrelatedMeans rate, a2, per_collision;
   Snapshot at;
   for (int run = 1; run <= runs; ++run) {
     const auto simulation = simulate(gas(rows, area_fraction, e, 1000 + static_cast<std::uint64_t>(run)));
@@ -184,7 +184,7 @@ void expect_heated(double e, double area_fraction, std::uint32_t rows, int looks
   Scene scene = gas(rows, area_fraction, e, 77);
   scene.bath = WhiteNoiseBath{heating * count / (count - 1), interval, true};
   const auto simulation = simulate(scene);
-  BlockedMean temperature, a2;
+  CorrelatedMeans temperature, a2;
   Snapshot at;
   const int settle = 200;
   for (int k = 0; k < settle + looks; ++k) {

@@ -44,7 +44,7 @@ void expect_weight_carried(std::initializer_list<double> temperatures) {
     FlightObserver flights(scene, simulation->properties(), {0, row, 400});
     simulation->watch(&flights);
     flights.begin(settle);
-    BlockedMean temperature;
+    CorrelatedMeans temperature;
     for (int k = 1; k <= blocks; ++k) {
       simulation->advance_to(settle + length * k);
       flights.end_block(settle + length * k);
@@ -101,8 +101,8 @@ void expect_enskog_profile(double reduced, double from, double length) {
   constexpr double depth = 2;
   const double lowest = std::fmod(from, depth);
   const auto middle = [&](std::size_t k) { return lowest + (static_cast<double>(k) + 0.5) * depth; };
-  std::vector<BlockedMean> density(layers);
-  BlockedMean ratio, weighted_ratio, true_t;
+  std::vector<CorrelatedMeans> density(layers);
+  CorrelatedMeans ratio, weighted_ratio, true_t;
   // Mean over the layer of exp-like profiles, over their value in the middle.
   const auto layer_mean = [&](double constant, double height) {
     const auto at = [&](double z) { return density_at(constant - z / t); };

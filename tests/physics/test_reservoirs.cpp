@@ -60,7 +60,7 @@ void expect_equilibrium(const char* name, const Bath& bath, std::uint32_t count 
   scene.bath = bath;
   const auto simulation = simulate(scene);
   VelocityObserver velocities(scene, simulation->properties(), 1, {0, 0.5, 400}, false);
-  BlockedMean x, z;
+  CorrelatedMeans x, z;
   Snapshot at;
   simulation->advance_to(200);
   for (int look = 0; look < looks; ++look) {

@@ -73,7 +73,8 @@ TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
   EXPECT_NEAR(design("center_of_mass_rise", 0), number(bed["center_of_mass_rise"]), 0.05);
   const Json fit = Json::parse(read_text(found().folder / "s/fit/fit.json"));
   EXPECT_NEAR(design("temperature_over_mg", 0) / number(fit["temperature"]), 1, 0.1);
-  EXPECT_NEAR(design("shift", 0), number(fit["shift"]), 0.3);
+  // The shift moves with the temperature, and looks at other moments change both.
+  EXPECT_NEAR(design("shift", 0), number(fit["shift"]), fit["shift"]["std_error"].get<double>() / 2);
   EXPECT_NEAR(design("solid_height_by_sum_rule", 0), number(fit["solid_height_by_sum_rule"]), 0.5);
   const NumberTable profile(found().folder / "s/bed/profile.csv");
   double greatest = 0;

@@ -206,17 +206,17 @@ Row covariance() {
   sim::Random random(6);
   for (int trial = 0; trial < 60; ++trial) {
     const double offset = std::pow(10, 6 * random.uniform());
-    sim::BlockedCovariance found(3);
+    sim::CorrelatedMeans found(3);
     std::vector<std::array<double, 3>> samples;
     for (int i = 0; i < 500; ++i) {
       const auto pair = random.normal_pair();
       samples.push_back({offset + pair.first, offset + 0.5 * pair.first + pair.second, offset - pair.second});
       found.add(samples.back());
     }
-    const std::vector<double> matrix = found.of_means(0, 3);
-    // What of_means() says it does: means over overlapping windows, larger by what the halves of the windows say of the
+    const std::vector<double> matrix = found.covariance(0, 3, found.windows(0, 3));
+    // What covariance() says it does: means over overlapping windows, larger by what the halves of the windows say of the
     // first moment.
-    const std::size_t n = samples.size(), window = found.windows().length;
+    const std::size_t n = samples.size(), window = found.windows(0, 3).length;
     std::array<Real, 3> mean{};
     for (const auto& sample : samples) {
       for (std::size_t k = 0; k < 3; ++k) mean[k] += Real(sample[k]) / n;

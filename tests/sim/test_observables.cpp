@@ -106,7 +106,7 @@ Lattice lattice(int n, int rows, const std::vector<int>& left_out = {}) {
 
 TEST(BondOrder, OfAPerfectCrystalIsOne) {
   const Lattice crystal = lattice(12, 10);
-  OrderObserver order(crystal.scene, crystal.disks, {0, 1, 20});
+  OrderObserver order(crystal.scene, crystal.disks, 1, {0, 1, 20});
   order.observe(crystal.at);
   EXPECT_NEAR(order.psi6_local().value, 1, 1e-12);
   EXPECT_NEAR(order.psi6_global().value, 1, 1e-12);
@@ -118,7 +118,7 @@ TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
   // 9 rows of 12, each row but the last has a valley above it.
   Lattice crystal = lattice(12, 10);
   for (double& z : crystal.at.z) z += 0.5;
-  OrderObserver order(crystal.scene, crystal.disks, {0, 1, 20});
+  OrderObserver order(crystal.scene, crystal.disks, 1, {0, 1, 20});
   for (int look = 0; look < 3; ++look) {
     crystal.at.floor_position = 0.1 * look;  // heights count from the moving floor
     for (double& z : crystal.at.z) z += look > 0 ? 0.1 : 0;
@@ -139,7 +139,7 @@ TEST(Rows, AreToldApartFromASixthOfADiameterOn) {
   for (const double apart : {0.14, 0.18}) {
     Lattice two = lattice(12, 10);
     for (std::size_t i = 0; i < two.at.z.size(); ++i) two.at.z[i] = i < 40 ? 0.51 : i < 80 ? 0.51 + apart : 2.01;
-    OrderObserver order(two.scene, two.disks, {0, 1, 20});
+    OrderObserver order(two.scene, two.disks, 1, {0, 1, 20});
     order.observe(two.at);
     const auto rows = order.rows();  // all but the last, of which nothing shows the end
     ASSERT_EQ(rows.size(), apart < 0.16 ? 1u : 2u) << apart;
@@ -151,7 +151,7 @@ TEST(Rows, AreToldApartFromASixthOfADiameterOn) {
 TEST(Rows, OfAGasThereAreNone) {
   Lattice gas = lattice(40, 40);
   for (std::size_t i = 0; i < gas.at.z.size(); ++i) gas.at.z[i] = 0.025 * static_cast<double>(i);  // evenly up to 40 D
-  OrderObserver order(gas.scene, gas.disks, {0, 1, 60});
+  OrderObserver order(gas.scene, gas.disks, 1, {0, 1, 60});
   order.observe(gas.at);
   EXPECT_TRUE(order.rows().empty());
   EXPECT_TRUE(std::isnan(order.bottom_density()));
@@ -383,7 +383,7 @@ TEST(Observers, GoOnFromTheirBytes) {
   };
   const auto make = [&] {
     return All{{scene, disks, 4, {-1, 0.25, 100}, {KernelKind::gaussian, 0.5}},
-               {scene, disks, layers},
+               {scene, disks, 4, layers},
                {scene, disks, 4, layers, false},
                {scene, disks.mass.size()},
                {scene, disks, layers}};

@@ -33,7 +33,7 @@ TEST(Species, AreKnownApartByDiameterOrMass) {
 TEST(SpeciesTemperatures, AreThoseOfAStateByHand) {
   const Scene scene = two_species(2, 2);
   const DiskProperties disks{{0.5, 0.5, 0.5, 0.5}, {3, 1, 3, 1}};
-  SpeciesObserver observer(scene, disks, {0, 1, 4});
+  SpeciesObserver observer(scene, disks, 1, {0, 1, 4});
   Snapshot at;
   at.x = {1, 2, 3, 4}, at.z = {0.5, 0.5, 2.5, 2.5};
   at.vx = {2, 1, -2, -1}, at.vz = {0, 4, 2, 6};
@@ -58,7 +58,7 @@ TEST(SpeciesTemperatures, AreThoseOfAStateByHand) {
 // In a layer at rest in the mean T is half of <m v_x^2> + <m v_z^2>: 1 (v = +-1) and 3.
 TEST(SpeciesTemperatures, OfALayerAreWithoutItsMean) {
   const Scene scene = two_species(1, 1);
-  SpeciesObserver observer(scene, {{0.5, 0.5}, {1, 3}}, {0, 1, 1});
+  SpeciesObserver observer(scene, {{0.5, 0.5}, {1, 3}}, 1, {0, 1, 1});
   Snapshot at;
   at.x = {1, 2}, at.z = {0.5, 0.5};
   for (const double sign : {1.0, -1.0}) {
@@ -80,7 +80,7 @@ TEST(SpeciesTemperatures, HaveErrorsAsTheyScatter) {
   std::normal_distribution<double> normal;
   double sums[3] = {}, squares[3] = {};
   for (int run = 0; run < runs; ++run) {
-    SpeciesObserver observer(scene, disks, {0, 1, 1});
+    SpeciesObserver observer(scene, disks, 1, {0, 1, 1});
     Snapshot at;
     at.x.assign(2 * disks_each, 1), at.z.assign(2 * disks_each, 0.5);
     at.vx.resize(2 * disks_each), at.vz.resize(2 * disks_each);

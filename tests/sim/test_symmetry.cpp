@@ -156,7 +156,7 @@ TEST(OrderLayers, CountTheNeighboursOfTheirOwnDisks) {
   at.z = {5.5, 0.5, 0.5, 9.5, 0.5, 5.5};
   disks.radius.assign(6, 0.5), disks.mass.assign(6, 1);
   at.vx.resize(6), at.vz.resize(6);
-  OrderObserver order(scene, disks, {0, 1, 11});
+  OrderObserver order(scene, disks, 1, {0, 1, 11});
   order.observe(at);
   const auto layers = order.layers();
   ASSERT_EQ(layers.size(), 3U);
@@ -176,7 +176,7 @@ TEST(OrderRows, ReachToTheEndOfTheirHistogram) {
   }
   disks.radius.assign(12, 0.5), disks.mass.assign(12, 1);
   at.vx.resize(12), at.vz.resize(12);
-  OrderObserver order(scene, disks, {0, 0.5, 4});
+  OrderObserver order(scene, disks, 1, {0, 0.5, 4});
   for (int look = 0; look < 100; ++look) order.observe(at);
   const auto rows = order.rows();
   ASSERT_EQ(rows.size(), 2U) << "the highest is not closed by one above it";
@@ -196,7 +196,7 @@ TEST(OrderLayers, StandAtTheMiddleOfWhatTheyCover) {
     disks.radius.push_back(0.5), disks.mass.push_back(1);
   }
   at.vx.resize(at.x.size()), at.vz.resize(at.x.size());
-  OrderObserver order(scene, disks, {0.25, 0.5, 8});
+  OrderObserver order(scene, disks, 1, {0.25, 0.5, 8});
   order.observe(at);
   const auto layers = order.layers();
   const std::pair<double, double> expected[] = {{0.5, 3}, {1.0, 1}, {1.5, 2}, {4.0, 1}};  // the last holds all above
