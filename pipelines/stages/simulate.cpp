@@ -38,10 +38,10 @@ namespace {
 // errors that hold the mean of further beds: the study is in docs/thermometer.md.
 constexpr std::uint32_t replicas_of_shaken = 4;
 
-// For --budget. Lengths are in periods of the floor, or as many times of 4 sqrt(D/g) where it stands still. Pilots of
-// 16 periods alone find too little scatter: asked for 2 %, 16 beds that were measured for 16 to 84 periods had errors
-// of 2.0 % (rms) where 1.5 % was expected. With up to 64 periods the same beds had 1.6 % where 1.4 % was expected.
-constexpr double shortest_measure = 16, telling_measure = 64, time_of_still_bed = 4;
+// For --budget. Lengths are in periods of the floor, or as many times of 4 sqrt(D/g) where it stands still. With pilots
+// of 16 beds for up to 32 periods 20 beds each, asked for 5, 2 and 1 %, had rms errors of 2.5, 1.5 and 0.9 %,
+// where 2.6, 1.5 and 0.8 % was expected. With 8 beds for up to 64 periods one of 20 beds asked for 2 % was off by 9 %.
+constexpr double shortest_measure = 16, telling_measure = 32, time_of_still_bed = 4;
 // Contact durations [sqrt(D/g)] are shortened by tens down to this one. At 1e-6 the effect on T was at most 0.03 % in
 // three beds (e = 0.8 to 0.95, 0 and 0.3 friction, Gamma = 3 and 4), for up to 1.2 times the time of 1e-4. At 1e-7 a
 // dense bed took 10 times as long.

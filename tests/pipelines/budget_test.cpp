@@ -190,15 +190,28 @@ TEST(NextPilot, IsAsLongAsTheChoiceUpToWhatTells) {
     EffortLimits given = limits();
     given.telling = telling;
     EffortChoice chosen;
-    chosen.effort = {choice, 4, 0};
+    chosen.effort = {choice, 8, 0};
     return next_pilot(pilot, given, chosen, error_of(0.01));
   };
   ASSERT_TRUE(next(30, 40));
   EXPECT_EQ(next(30, 40)->length, 30);
+  EXPECT_EQ(next(30, 40)->beds, 16U);
   ASSERT_TRUE(next(60, 40));
   EXPECT_EQ(next(60, 40)->length, 40);
   EXPECT_FALSE(next(14, 40)) << "hardly longer";
-  EXPECT_FALSE(next(60, 10));
+  ASSERT_TRUE(next(60, 10));
+  EXPECT_EQ(*next(60, 10), (Effort{10, 16, 0})) << "more beds";
+}
+
+TEST(NextPilot, IsTheLastWhereItHasTheBedsAndTheLengthThatTell) {
+  EffortReading pilot = eight_beds();
+  EffortLimits given = limits();
+  given.telling = pilot.effort.length;
+  EffortChoice chosen;
+  chosen.effort = {20, 20, 0};
+  ASSERT_TRUE(next_pilot(pilot, given, chosen, error_of(0.01)));
+  pilot.effort = *next_pilot(pilot, given, chosen, error_of(0.01));
+  EXPECT_FALSE(next_pilot(pilot, given, chosen, error_of(0.01)));
 }
 
 TEST(NextPilot, IsNoneWhereTheModelAloneMissesTheError) {
@@ -233,7 +246,7 @@ TEST(NextPilot, HasAFinerModelWhereTheSystematicPartIsLarge) {
   pilot.systematic = 0.01;
   EffortLimits fine = limits();
   const EffortChoice choice = choose_effort(pilot, fine, error_of(0.02), 1);
-  EXPECT_FALSE(next_pilot(pilot, fine, choice, error_of(0.02))) << "there is none";
+  EXPECT_EQ(next_pilot(pilot, fine, choice, error_of(0.02)).value_or(pilot.effort).refinement, 0) << "there is none";
   fine.most_refinement = 2;
   const auto next = next_pilot(pilot, fine, choice, error_of(0.02));
   ASSERT_TRUE(next);
@@ -357,7 +370,7 @@ TEST(BudgetOfABed, ChangesItsTimeItsReplicasAndItsContactDuration) {
   EXPECT_DOUBLE_EQ(bed.limits().settling, 9);
   EXPECT_NEAR(bed.limits().shortest, 16 / 20.0, 1e-12) << "periods";
   EXPECT_NEAR(bed.limits().pilot, 16 / 20.0, 1e-12);
-  EXPECT_NEAR(bed.limits().telling, 64 / 20.0, 1e-12);
+  EXPECT_NEAR(bed.limits().telling, 32 / 20.0, 1e-12);
   // 1 us is 5.7e-5 sqrt(D/g); a tenth of it is allowed, and in place of the hundredth 1e-6.
   EXPECT_EQ(bed.limits().most_refinement, 2);
   const auto contact_duration = [&](int refinement) {

@@ -25,7 +25,7 @@ namespace {
 using namespace shakebed::tests;
 using shakebed::pipelines::Json;
 
-constexpr std::uint64_t seed_of_beds = 20261141;
+constexpr std::uint64_t seed_of_beds = 20261150;
 constexpr int beds_asked = 20, least_run = 12;
 constexpr double most_cpu_seconds = 10, cpu_seconds_of_long_reference = 2;
 constexpr double contact_duration_of_reference = 1e-5;
