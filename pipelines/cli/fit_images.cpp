@@ -10,6 +10,7 @@
 
 #include "pipelines/cli/arguments.hpp"
 #include "pipelines/cli/commands.hpp"
+#include "pipelines/cli/frame_budget.hpp"
 #include "pipelines/cli/image_arguments.hpp"
 #include "pipelines/cli/run_plan.hpp"
 #include "pipelines/formats/quantity.hpp"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 namespace {
 
 struct FitImagesArguments : ImageArguments {
-  std::optional<std::string> model, initial_height;
+  std::optional<std::string> model, initial_height, budget;
   bool preview = false;
 };
 
@@ -105,10 +106,33 @@ Json recipe_of(const FitImagesArguments& image) {
   return recipe;
 }
 
+// --budget: a part of the frames.
+int fit_some_images(const Call& call, const FitImagesArguments& image) {
+  if (image.frame_rate)
+    throw UsageError("--budget: velocities need successive frames, so it cannot be combined with --frame-rate");
+  Console console(level_of(call));
+  FitImagesArguments some = image;
+  const auto plan = [&some](std::uint64_t stride) {
+    some.stride = stride;
+    return plan_of(recipe_of(some), some);
+  };
+  install_interrupt_handler();
+  const fs::path out = out_of(call, plan(1).name);
+  const BudgetedFrames chosen =
+      frames_by_budget({parse_budget(*image.budget), image.files, out, image.run.jobs, image.run.force, plan}, console);
+  some.run.chosen = chosen.record;
+  Json answer;
+  const int code = run_plan_command(call, some.run, plan(chosen.stride), console, call.json ? &answer : nullptr);
+  if (code == exit_ok && !image.run.dry_run) say_reached_by_frames(out, chosen.record, console);
+  if (call.json) print(dump(answer));
+  return code;
+}
+
 int fit_images(const Call& call, const FitImagesArguments& image) {
   check_arguments(image);
   Plan plan = plan_of(recipe_of(image), image);  // a preview accepts what a run accepts
   if (image.preview) return preview_images(call, image);
+  if (image.budget) return fit_some_images(call, image);
   return run_plan_command(call, image.run, std::move(plan));
 }
 
@@ -140,6 +164,11 @@ void add_fit_images(Program& program) {
   command.add_flag(
       "--preview", given->preview,
       "draw only the disks found in the first frame, with the command for each alternative; nothing else runs");
+  command
+      .add_option("--budget", given->budget,
+                  "wanted statistical error of T (\"1 %\") or wanted wall time (\"30 s\"). A short pilot run then "
+                  "chooses how many of the frames are measured. With --dry-run only the pilot runs")
+      ->type_name("ERROR|TIME");
   add_bed_options(command, *given);
   add_film_options(command, *given);
   add_run_options(command, given->run);

@@ -32,6 +32,7 @@ RunOptions run_options(const Call& call, const RunArguments& run, const Plan& pl
   options.jobs = run.jobs;
   options.command_line = call.command_line;
   options.settings = settings_of(run);
+  options.budget = run.chosen;
   return options;
 }
 

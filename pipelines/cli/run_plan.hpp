@@ -18,6 +18,7 @@ struct RunArguments {
   std::optional<std::string> preset, only, from, until, shard, data, budget;
   bool force = false, dry_run = false, gather = false;
   int jobs = 0;
+  Json chosen;  // for the manifest: what a budget of the command's own has chosen; null: none
 };
 // --preset; and --set, --only, --force ...
 void add_preset(CLI::App& command, RunArguments& run);

@@ -82,6 +82,8 @@ class ImagesModule {
   virtual ~ImagesModule() = default;
   virtual void render(const RenderOptions& options, RunContext& context) const = 0;
   virtual void extract(const ExtractOptions& options, RunContext& context) const = 0;
+  // Of files and folders as on the command line. Films are stepped through, not decoded.
+  virtual std::uint64_t count_frames(const std::vector<std::string>& files) const = 0;
   virtual Previewed preview(const PreviewRequest& request) const = 0;
 };
 

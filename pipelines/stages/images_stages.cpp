@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 
 #include "pipelines/stages/extract_images.hpp"
@@ -58,6 +59,15 @@ class Module : public ImagesModule {
   }
   void extract(const ExtractOptions& options, RunContext& context) const override {
     translated([&] { extract_disks(options, context); });
+  }
+  std::uint64_t count_frames(const std::vector<std::string>& files) const override {
+    std::uint64_t count = 0;
+    translated([&] {
+      ingest::FrameSource source = ingest::FrameSource::open(files, {});
+      const auto known = source.count_if_known();
+      count = known ? *known : source.first_origins(std::numeric_limits<std::size_t>::max()).size();
+    });
+    return count;
   }
   Previewed preview(const PreviewRequest& request) const override {
     Previewed previewed;

@@ -14,7 +14,7 @@ namespace shakebed::pipelines {
 
 namespace {
 
-constexpr std::size_t most_heights = 60;  // of a profile: time grows with their third power
+constexpr std::size_t most_target_heights = 60;  // of a profile: time grows with their third power
 constexpr double nothing = 0.01;          // a profile that ends with less holds nothing above [1/D^2]
 constexpr double of_a_step = 1e-9;        // by which heights may miss the end of their range
 
@@ -65,8 +65,8 @@ void describe_profile(Fields& f, ProfileTarget& profile) {
   f.require(profile.file.paths.size() <= 1, "file", "one profile is compared, but several files are named");
   f.require(profile.low < profile.high, "low", "\"low\" must be below \"high\"");
   if (!(profile.low < profile.high)) return;
-  f.require(profile.heights().size() <= most_heights, "spacing",
-            fmt::format("the profile is compared at {} heights at most, but these are {}", most_heights,
+  f.require(profile.heights().size() <= most_target_heights, "spacing",
+            fmt::format("the profile is compared at {} heights at most, but these are {}", most_target_heights,
                         profile.heights().size()),
             "Give a larger \"spacing\", or a smaller range of heights");
   const auto& from = f.from();

@@ -510,4 +510,48 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
   EXPECT_EQ(rows("high") - rows("low"), 60) << "15 mm more to see, of 0.25 mm a pixel";
 }
 
+// 96 frames of a bed, of which a part is measured: for an error, and for a time.
+TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "film", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 4, "replicas": 1, "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.9 },
+      "box": { "width": "24.9 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "1 s", "measure": "10 s", "frames": { "count": 96 } },
+    { "stage": "render", "from": "bed", "scale": "0.3 mm/px", "noise": 2 } ] })");
+  ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
+  const auto fit = [&](const char* out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"fit-images", "o/render/frames", "--diameter", "3 mm", "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_shakebed(arguments, folder.path());
+  };
+  const ProgramResult some = fit("some", {"--budget", "6 %"});
+  ASSERT_EQ(some.exit_code, 0) << some.err;
+  const Json said = read_json(folder / "some/manifest.json")["budget"];
+  EXPECT_EQ(said["asked"], "6 %");
+  const Json& frames = said["frames"];
+  EXPECT_EQ(frames["of"], 96);
+  EXPECT_EQ(frames["pilot"]["frames"], 16);
+  const auto stride = frames["stride"].get<std::uint64_t>(), measured = frames["measured"].get<std::uint64_t>();
+  EXPECT_EQ(measured, (96 + stride - 1) / stride);
+  EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured);
+  EXPECT_THAT(some.err, HasSubstr("chooses " + std::to_string(measured) + " of 96 frames"));
+  EXPECT_THAT(some.err, HasSubstr("statistical error of T: "));
+  const Json result = read_json(folder / "some/fit/fit.json");
+  const double reached = value(result["statistical_error"]) / value(result["temperature"]);
+  EXPECT_NEAR(reached / frames["expected_error"].get<double>(), 1, 0.6) << "the pilot's error is known to a fifth";
+
+  const ProgramResult all = fit("some", {"--budget", "0.1 %", "--dry-run"});
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_THAT(all.err, HasSubstr("all 96 frames together leave a statistical error of T of about"));
+  EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured) << "nothing ran";
+
+  const ProgramResult short_time = fit("some", {"--budget", "1 ms"});
+  EXPECT_EQ(short_time.exit_code, 5) << short_time.err;
+  EXPECT_THAT(short_time.err, HasSubstr("Allow more time"));
+  const ProgramResult velocities = fit("velocities", {"--budget", "5 %", "--frame-rate", "100 Hz"});
+  EXPECT_EQ(velocities.exit_code, 2);
+  EXPECT_THAT(velocities.err, HasSubstr("velocities need successive frames"));
+}
+
 }  // namespace
