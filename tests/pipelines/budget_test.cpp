@@ -408,6 +408,21 @@ TEST(BudgetRun, IsNotForSweeps) {
   EXPECT_THAT(ran.err, HasSubstr("sweep"));
 }
 
+// A shipped figure, of which only the pilot runs.
+TEST(BudgetOfAReproduction, ChoosesForTheBedOfTheFigure) {
+  const ScratchFolder folder;
+  const auto reproduce = [&](const char* budget) {
+    return run_shakebed({"reproduce", "brey-2001", "--preset", "quick", "--budget", budget, "--dry-run", "--out", "o"},
+                        folder.path());
+  };
+  const ProgramResult ran = reproduce("50 %");
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("bed: --budget \"50 %\" chooses \"measure\": "));
+  EXPECT_THAT(ran.out, HasSubstr("bed: runs: it has not run yet"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "o/bed"));
+  EXPECT_EQ(reproduce("3 kg").exit_code, 2);
+}
+
 // ------------------------------------------------------------------------------------------------ the bed
 
 // 40 disks of 3 mm at 20 Hz: sqrt(D/g) is 17.487 ms.
