@@ -50,6 +50,10 @@ TEST(BedGeometry, LowestPointsAreThoseOfNearlyAllFrames) {
   EXPECT_EQ(points[1], (std::pair<double, double>{50, 126 - 1}));
   EXPECT_EQ(points[2], (std::pair<double, double>{70, 100}));
   EXPECT_TRUE(lowest_points({}, 20, 100).empty());
+  // A frame narrower than two columns is one.
+  EXPECT_EQ(lowest_points(frames, 20, 59).size(), 1U);
+  EXPECT_EQ(lowest_bottoms(frames[0], 0, 20, 25).y.size(), 1U);
+  EXPECT_EQ(lowest_bottoms(frames[0], 0, 20, 60).y.size(), 2U);
   const LowestBottoms bottoms = lowest_bottoms(frames[4], 0.5, 20, 100);
   EXPECT_EQ(bottoms.frame, 4U);
   EXPECT_EQ(bottoms.y, (std::vector<double>{214 - 6, 122 - 25, 70 + 30 - 35}));

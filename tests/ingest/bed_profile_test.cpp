@@ -317,6 +317,14 @@ TEST(BedProfile, AMeterAveragesItsStretches) {
   EXPECT_EQ(static_cast<double>(mean.links), links);
   EXPECT_NEAR(mean.linked_share, 1, 0.05);
   EXPECT_TRUE(any_holds(VelocityMeter(2e-3, {.frame_rate_hz = 100}).result().warnings, "No two successive frames"));
+  // Of five stretches in which hardly a disk is followed three say so.
+  VelocityMeter poor(2e-3, {.frame_rate_hz = 100}, 3);
+  for (std::size_t f = 0; f < 11; ++f) {
+    std::vector<MeasuredDisk> disks = {measured_at(f, 1, 1)};
+    for (int k = 0; k < 8; ++k) disks.push_back(measured_at(f, 3.0 * k + (f % 2 == 0 ? 0 : 1.2), 5));
+    poor.add(disks);
+  }
+  EXPECT_EQ(poor.result().warnings.size(), 3U);
   VelocityMeter once(2e-3, {.frame_rate_hz = 100});
   once.add(frames[0]), once.add(frames[1]);
   EXPECT_GT(once.result().horizontal.displacement_m, 0) << "a few frames count if they are all";

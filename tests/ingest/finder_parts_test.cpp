@@ -130,8 +130,17 @@ TEST(FinderParts, CensusFindsTheRadiusThatExplainsMost) {
   ASSERT_FALSE(two.hypotheses.empty());
   EXPECT_EQ(two.hypotheses.front().channel, 1U);
   EXPECT_EQ(two.hypotheses.front().polarity, Polarity::bright_beads);
-  for (std::size_t k = 1; k < census.hypotheses.size(); ++k)
-    EXPECT_LE(census.hypotheses[k].gain_px, census.hypotheses[k - 1].gain_px);
+  // Best first, each another radius or polarity.
+  EXPECT_GE(census.hypotheses.size(), 2U);
+  for (std::size_t k = 1; k < census.hypotheses.size(); ++k) {
+    const CircleHypothesis& one = census.hypotheses[k];
+    EXPECT_LE(one.gain_px, census.hypotheses[k - 1].gain_px);
+    for (std::size_t i = 0; i < k; ++i) {
+      const CircleHypothesis& other = census.hypotheses[i];
+      const double ratio = one.radius_px / other.radius_px;
+      EXPECT_TRUE(one.polarity != other.polarity || std::max(ratio, 1 / ratio) >= 1.15) << i << ' ' << k;
+    }
+  }
 }
 
 TEST(FinderParts, SurveyWeighsItsCandidates) {
@@ -350,6 +359,13 @@ TEST(FinderParts, RadiusIsThatOfTheVotes) {
   // To the second nearest of its neighbours each is 24.1 or 24.3 px.
   EXPECT_NEAR(best->spacing.median, 24.3, 0.8);
   EXPECT_LT(best->spacing.scatter, 0.6);
+  // Between the radii that are voted for, 4 % apart, a parabola leads to the one that is there.
+  const auto voted = [](double radius) {
+    std::vector<RenderedDisk> disks = twenty_disks();
+    for (RenderedDisk& disk : disks) disk.radius_px = radius;
+    return vote_for_radii(drawn(disks), 1, {7, 12}).front().radius;
+  };
+  for (const double radius : {9.1, 9.2, 9.3}) EXPECT_NEAR(voted(radius) / voted(9), radius / 9, 0.009) << radius;
   const auto twice = vote_for_radii(frame, 2, {7, 12});
   EXPECT_NEAR(twice.front().radius, 2 * votes.front().radius, 1e-9);
   EXPECT_NEAR(twice.front().spacing.median, 2 * votes.front().spacing.median, 1e-9);
