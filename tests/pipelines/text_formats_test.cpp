@@ -126,7 +126,7 @@ TEST(Markup, SymbolsHaveTheirIndices) {
   EXPECT_EQ(prose("\u03b6_F"), "\u03b6<sub>F</sub>");
   EXPECT_EQ(prose("above_launch, xT_c, 2_a"), "above_launch, xT_c, 2_a");
   EXPECT_EQ(prose("(T_c)"), "(T<sub>c</sub>)");
-  EXPECT_EQ(prose("xT_x_y, T_"), "xT_x_y, T_");
+  EXPECT_EQ(prose("T_, xy_z"), "T_, xy_z");
   EXPECT_EQ(prose("T^2, D^-2, \u03b6^3, 10^12"), "T<sup>2</sup>, D<sup>-2</sup>, \u03b6<sup>3</sup>, 10<sup>12</sup>");
   EXPECT_EQ(prose("^2 (^3"), "^2 (^3");
 }
