@@ -365,7 +365,8 @@ TEST(FinderParts, RadiusIsThatOfTheVotes) {
     for (RenderedDisk& disk : disks) disk.radius_px = radius;
     return vote_for_radii(drawn(disks), 1, {7, 12}).front().radius;
   };
-  for (const double radius : {9.1, 9.2, 9.3}) EXPECT_NEAR(voted(radius) / voted(9), radius / 9, 0.015) << radius;  // without it: 0.02
+  for (const double radius : {9.1, 9.2, 9.3})
+    EXPECT_NEAR(voted(radius) / voted(9), radius / 9, 0.015) << radius;  // without it: 0.02
   const auto twice = vote_for_radii(frame, 2, {7, 12});
   EXPECT_NEAR(twice.front().radius, 2 * votes.front().radius, 1e-9);
   EXPECT_NEAR(twice.front().spacing.median, 2 * votes.front().spacing.median, 1e-9);
