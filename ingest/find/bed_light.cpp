@@ -51,8 +51,8 @@ void add_tile_sums(const GrayFrame& flat, const JointFit& fit, double spread, st
     for (int left = 0; left < flat.width; left += side) {
       const int bottom = std::min(flat.height, top + side), right = std::min(flat.width, left + side);
       TileSums tile;
-      tile.u = (static_cast<double>(left + right - 1)) / flat.width - 1;
-      tile.v = (static_cast<double>(top + bottom - 1)) / flat.height - 1;
+      tile.u = static_cast<double>(left + right) / flat.width - 1;
+      tile.v = static_cast<double>(top + bottom) / flat.height - 1;
       for (int row = top; row < bottom; ++row) {
         const float* residual = fit.residual_row(row);
         const float* level = flat.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(flat.width);

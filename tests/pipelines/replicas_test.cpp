@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include "pipelines/stages/bed_measurement.hpp"
+#include "sim/measure/measured_bed.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace shakebed::pipelines {
@@ -67,6 +69,47 @@ TEST(Replicas, AndSingleBedsThatStillChangeAreNamed) {
                   "T_x is lower by 0.5 (25 %) in the second half of the time, which is 5.0 times the error")));
   EXPECT_THAT(warnings_of({bed(2, 0.1, 0.39, 0.1)}), IsEmpty());
   EXPECT_THAT(warnings_of({bed(2, 0.1, 0, 0)}), IsEmpty());
+}
+
+// The same bed twice agrees better than chance: what both show of their densities by themselves is halved, and no less.
+// Where the errors of the mean are larger, all of it grows until its trace is the sum of their squares.
+TEST(Replicas, ThatAgreeHaveTheCovarianceOfWhatEachShows) {
+  sim::Scene scene;
+  scene.gravity = sim::UniformGravity{};
+  scene.disks = {.species = {{.count = 30}}, .contact = {.restitution = 0.9}};
+  scene.box.width = 8.3;
+  scene.box.sides = sim::PeriodicSides{};
+  scene.box.floor = sim::SinusoidalFloor{.amplitude = 0.55, .frequency = 0.37};
+  const auto simulation = sim::simulate(scene);
+  BedMeasurement bed(
+      scene, simulation->properties(),
+      {.phases = 1, .period = 1 / 0.37, .grid = {0.5, 0.5, 12}, .kernel = measuring_kernel, .observe = {}});
+  simulation->advance_to(20 / 0.37);
+  bed.begin(*simulation);
+  sim::Snapshot at;
+  for (int period = 0; period < 80; ++period) {
+    simulation->snapshot(at);
+    bed.look(*simulation, at, 0, false);
+    simulation->advance_to((21 + period) / 0.37);
+  }
+  bed.end(*simulation);
+  sim::Profile joined = bed.bed().density(false);
+  const sim::FilledHeights rows = sim::filled_heights(joined);
+  const std::size_t n = rows.last - rows.first;
+  ASSERT_GE(n, 3U);
+  const std::vector<double> own = bed.bed().density_covariance(rows.first, rows.last);
+  std::size_t blocks = 0;
+  joined.std_error.assign(joined.std_error.size(), 0.0);
+  const auto agreeing = joined_covariance({&bed, &bed}, joined, blocks);
+  ASSERT_EQ(agreeing.size(), n * n);
+  EXPECT_EQ(blocks, 2 * bed.bed().covariance_blocks());
+  double trace = 0;
+  for (std::size_t i = 0; i < n * n; ++i) EXPECT_DOUBLE_EQ(agreeing[i], own[i] / 2) << i;
+  for (std::size_t i = 0; i < n; ++i) trace += agreeing[i * n + i];
+  EXPECT_GT(trace, 0);
+  joined.std_error.assign(joined.std_error.size(), std::sqrt(3 * trace / static_cast<double>(n)));
+  const auto scattered = joined_covariance({&bed, &bed}, joined, blocks);
+  for (std::size_t i = 0; i < n * n; ++i) EXPECT_NEAR(scattered[i], 3 * agreeing[i], 1e-12 * trace) << i;
 }
 
 // A shaken bed that dissipates: four beds by default, half of them filled at random.

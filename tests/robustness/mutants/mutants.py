@@ -295,6 +295,9 @@ class Bench:
             sys.exit(f"{command}\n{output[-3000:]}")
 
     def prepare(self):
+        log, first = self.base / ".ninja_log", self.work / "prepared"
+        if first.exists() and log.exists() and first.stat().st_mtime < log.stat().st_mtime:
+            shutil.rmtree(self.work)  # linked from the objects of an earlier build
         for name in ("bin", "lib/shakebed", "objects"):
             (self.work / name).mkdir(parents=True, exist_ok=True)
         shutil.rmtree(self.overlay, ignore_errors=True)
@@ -318,6 +321,7 @@ class Bench:
         for output in self.links:
             if output in targets or output.endswith("/libshakebed_images.so"):
                 self.link(output)
+        first.touch()
 
     def read_links(self, targets):
         """How the build makes archives and links programs."""

@@ -1,0 +1,320 @@
+// Films of a few small frames: what is measured of them by pencil and paper.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/find_disks.hpp"
+#include "ingest/find/learn_beads.hpp"
+#include "ingest/find/learned_beads.hpp"
+#include "ingest/profile/film_calibration.hpp"
+#include "ingest/profile/measure_bed.hpp"
+#include "ingest/profile/photographs.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
+#include "tests/ingest/by_hand.hpp"
+
+namespace shakebed::ingest {
+namespace {
+
+// 6 x 4 disks of 8 px: their lowest row rests at y = 110, the others 22 px above one another. `moved` px up.
+std::vector<RenderedDisk> four_rows(double moved = 0) {
+  std::vector<RenderedDisk> disks;
+  for (int k = 0; k < 24; ++k) disks.push_back({20.4 + 20.3 * (k % 6), 102 - 22.0 * (k / 6) - moved, 8, 0, 0});
+  return disks;
+}
+GrayFrame small_frame(const std::vector<RenderedDisk>& disks, double light = 1) {
+  Camera camera;
+  camera.width = 144, camera.height = 130;
+  camera.background_level = 160 * light, camera.bead_level = 60 * light;
+  camera.blur_px = 0.8, camera.read_noise = 1.5;
+  return render_frame(disks, camera);
+}
+MeasureOptions small_options() {
+  MeasureOptions options;
+  options.bead_diameter_m = 1.6e-3;
+  options.find.seen = BeadsSeen{Polarity::dark_beads, 8, false};
+  options.pixel_aspect = 1, options.lens_radial = 0;
+  return options;
+}
+Measurement measured(std::vector<GrayFrame> frames, const MeasureOptions& options) {
+  FrameSource source = FrameSource::from_frames(std::move(frames));
+  return measure_bed(source, options);
+}
+
+// Floor, walls and scale given: x and z of each disk, numbers, densities and what is said.
+TEST(SmallFilm, HasThePlacesOfItsDisks) {
+  MeasureOptions options = small_options();
+  options.floor_px = 112, options.floor_slope = 0.02;
+  options.left_wall_px = 9, options.right_wall_px = 119;
+  options.scale_m_per_px = 1e-4;
+  options.kernel = {KernelKind::top_hat, 0.5}, options.bin_width = 0.5;
+  std::vector<RenderedDisk> fewer = four_rows();
+  fewer.pop_back();
+  GrayFrame empty = test::even_frame(144, 130, 160);
+  const Measurement found =
+      measured({small_frame(four_rows()), small_frame(fewer), empty, test::even_frame(100, 90, 160)}, options);
+  ASSERT_EQ(found.disks.size(), 47U);
+  EXPECT_EQ(found.disk_total, 47U);
+  const double cosine = 1 / std::sqrt(1 + 0.02 * 0.02);
+  for (const MeasuredDisk& disk : found.disks) {
+    EXPECT_NEAR(disk.z, (112 + 0.02 * disk.x_px - disk.y_px) * cosine / 16, 1e-9);
+    // Along the floor, from where it meets the left wall's perpendicular.
+    EXPECT_NEAR(disk.x, ((disk.x_px - 9) + 0.02 * (disk.y_px - 112 - 0.02 * disk.x_px)) * cosine / 16, 1e-9);
+    EXPECT_NEAR(disk.std_error_px, std::sqrt(0.5 * (disk.variance_x + disk.variance_y)), 1e-12);
+    EXPECT_EQ(disk.species, 1);
+    EXPECT_EQ(disk.probability, 1);
+  }
+  EXPECT_EQ(found.disks.front().frame, 0U);
+  EXPECT_EQ(found.disks.back().frame, 1U);
+  ASSERT_EQ(found.frames.size(), 4U);
+  EXPECT_EQ(found.frames[0].status, FrameStatus::good);
+  EXPECT_EQ(found.frames[0].disks, 24U);
+  EXPECT_EQ(found.frames[2].status, FrameStatus::nothing_found);
+  EXPECT_EQ(found.frames[3].status, FrameStatus::size_changed);
+  EXPECT_TRUE(test::holds(found.frames[3].why, "100 x 90 px, but the first one is 144 x 130"));
+  // 24, 23 and 0 disks in the three frames that could be used; of the first six columns five lie between the walls.
+  EXPECT_NEAR(found.disk_count_mean, 47.0 / 3, 1e-9);
+  EXPECT_NEAR(found.disk_count_std,
+              std::sqrt((std::pow(24 - 47.0 / 3, 2) + std::pow(23 - 47.0 / 3, 2) + std::pow(47.0 / 3, 2)) / 2), 1e-9);
+  EXPECT_NEAR(found.count_in_width_mean, 40.0 / 3, 1e-9);
+  EXPECT_NEAR(found.calibration.width, 110.0 / 16, 1e-9);
+  EXPECT_NEAR(*found.column_number(), 40.0 / 3 / (110.0 / 16), 1e-9);
+  EXPECT_NEAR(found.calibration.floor_tilt_degrees, std::atan(0.02) * 180 / std::numbers::pi, 1e-9);
+  EXPECT_EQ(found.profile.samples, 3U);
+  double sum = 0;
+  for (const double density : found.profile.number_density) sum += density * 0.5 * 110.0 / 16;
+  EXPECT_NEAR(sum, 40.0 / 3, 1e-6);
+  EXPECT_EQ(found.profile.bins.lowest, 0);
+  EXPECT_EQ(found.profile.bins.count, 12U);  // a diameter above the highest disk, at z = 4.9: up to 6
+  EXPECT_TRUE(test::any_holds(found.warnings, "1 of 4 frames differ from the first one in size"));
+  EXPECT_TRUE(test::any_holds(found.warnings, "2 of 4 frames could not be used"));
+  EXPECT_TRUE(test::any_holds(found.warnings, "The number of disks found varies by 13.6"));
+  EXPECT_TRUE(test::any_holds(found.warnings, "The floor is tilted by 1.15 +- 0.00 degrees"));
+  EXPECT_FALSE(found.floor_out_of_view || found.surface_out_of_view);
+}
+
+// Beads cut by the upper border: the profile ends below them. By the lower one: the floor is not in view.
+TEST(SmallFilm, EndsWhereItsBordersCutBeads) {
+  MeasureOptions options = small_options();
+  options.kernel = {KernelKind::top_hat, 0.5}, options.bin_width = 0.5;
+  std::vector<RenderedDisk> disks = four_rows();
+  for (int k = 0; k < 4; ++k) disks.push_back({30.0 + 26 * k, 2, 8, 0, 0});
+  const std::vector<GrayFrame> frames = {small_frame(disks), small_frame(disks)};
+  const Measurement above = measured(frames, options);
+  EXPECT_TRUE(above.surface_out_of_view);
+  EXPECT_FALSE(above.column_known);
+  EXPECT_FALSE(above.column_number());
+  const double diameter = options.bead_diameter_m / above.calibration.scale_m_per_px;
+  // A radius below the border, and half of the kernel: (110 - 8)/16 - 0.25 = 6.1, so 12 bins.
+  EXPECT_EQ(
+      above.profile.bins.count,
+      static_cast<std::size_t>(std::floor(((above.calibration.floor_px - 0.5 * diameter) / diameter - 0.25) / 0.5)));
+  EXPECT_EQ(above.profile.bins.count, 12U);
+  EXPECT_TRUE(test::any_holds(above.warnings, "the profile ends at 6.0 D"));
+  EXPECT_TRUE(test::any_holds(above.warnings, "Their number is unknown"));
+  options.highest = 8;
+  const Measurement higher = measured(frames, options);
+  EXPECT_EQ(higher.profile.bins.count, 16U);
+  EXPECT_TRUE(test::any_holds(higher.warnings, "above 6.1 D beads are missing")) << higher.warnings.front();
+  options = small_options();
+  const std::vector<RenderedDisk> low = four_rows(-24);
+  const Measurement below = measured({small_frame(low), small_frame(low)}, options);
+  EXPECT_TRUE(below.floor_out_of_view);
+  EXPECT_TRUE(test::any_holds(below.warnings, "the floor is not in view"));
+  options.floor_px = 134;
+  EXPECT_FALSE(measured({small_frame(low), small_frame(low)}, options).floor_out_of_view);
+  options.floor_px = 261;
+  EXPECT_THROW(measured({small_frame(low)}, options), std::invalid_argument);
+}
+
+// A bed that goes up and down by 4 px, without a frame rate: half of the range is the floor's error, or half of the
+// amplitude given raises it.
+TEST(SmallFilm, ThatMovesDoubtsItsFloor) {
+  std::vector<GrayFrame> frames;
+  for (int k = 0; k < 5; ++k) frames.push_back(small_frame(four_rows(k % 2 == 0 ? 0 : 4)));
+  MeasureOptions options = small_options();
+  const Measurement seen = measured(frames, options);
+  EXPECT_EQ(seen.calibration.floor_reference, FloorReference::lowest_seen);
+  EXPECT_NEAR(seen.calibration.floor_px, 110, 0.2);
+  EXPECT_NEAR(seen.calibration.floor_std_error_px, 2, 0.1);
+  EXPECT_TRUE(test::any_holds(seen.warnings, "The lowest beads move by 0.25 D"));
+  EXPECT_TRUE(is_shaken(seen) == (seen.calibration.floor_std_error_px > 0.25 * 16));
+  options.floor_amplitude_m = 3e-4;  // 3 px
+  const Measurement raised = measured(frames, options);
+  EXPECT_EQ(raised.calibration.floor_reference, FloorReference::mean_by_amplitude);
+  EXPECT_NEAR(raised.calibration.floor_px, seen.calibration.floor_px - 1.5, 0.02);
+  EXPECT_NEAR(raised.calibration.floor_std_error_px, 1.5, 0.05);
+  EXPECT_LT(raised.profile.bins.lowest, 0);
+  EXPECT_TRUE(is_shaken(raised));
+  options.floor_amplitude_m = 6e-4;  // farther than the beads move
+  const Measurement ignored = measured(frames, options);
+  EXPECT_EQ(ignored.calibration.floor_reference, FloorReference::lowest_seen);
+  EXPECT_TRUE(test::any_holds(ignored.warnings, "but the lowest beads move by only 0.25 D: the amplitude is not used"));
+  // By the phase of a shaking of half the frame rate the two positions are apart.
+  options.floor_amplitude_m.reset();
+  options.frame_rate_hz = 100, options.shaking_frequency_hz = 50, options.phase_bins = 4;
+  const Measurement phases = measured(frames, options);
+  ASSERT_EQ(phases.phases.size(), 2U);
+  EXPECT_NEAR(phases.phases[0].phase, 0.125, 1e-12);
+  EXPECT_NEAR(phases.phases[1].phase, 0.625, 1e-12);
+  EXPECT_EQ(phases.phases[0].profile.samples, 3U);
+  EXPECT_EQ(phases.phases[1].profile.samples, 2U);
+  EXPECT_TRUE(phases.calibration.frequency_given);
+}
+
+// Light that changes by a tenth from frame to frame.
+TEST(SmallFilm, KnowsHowItsLightFlickers) {
+  const Measurement found = measured({small_frame(four_rows()), small_frame(four_rows(), 1.2)}, small_options());
+  EXPECT_NEAR(found.frames[1].light.gain / found.frames[0].light.gain, 1.2, 0.01);
+  const double a = found.frames[0].light.gain, b = found.frames[1].light.gain;
+  EXPECT_NEAR(found.calibration.flicker, 0.5 * std::abs(b - a), 1e-6);
+  EXPECT_TRUE(test::any_holds(found.warnings, "The light flickers"));
+  EXPECT_TRUE(found.coverage_profile);
+  EXPECT_LT(found.coverage_disagreement, 0.06);
+  MeasureOptions options = small_options();
+  options.profile_from_coverage = false;
+  EXPECT_FALSE(measured({small_frame(four_rows())}, options).coverage_profile);
+}
+
+// Frames averaged over 2 x 2 px: all lengths are px of the frames as they were.
+TEST(SmallFilm, ReducedHasTheLengthsOfItsFrames) {
+  Camera camera;
+  camera.width = 288, camera.height = 260;
+  camera.background_level = 160, camera.bead_level = 60, camera.blur_px = 1.5, camera.read_noise = 2;
+  std::vector<RenderedDisk> disks = four_rows();
+  for (RenderedDisk& disk : disks)
+    disk.x_px = 2 * disk.x_px + 0.5, disk.y_px = 2 * disk.y_px + 0.5, disk.radius_px = 16;
+  const GrayFrame large = render_frame(disks, camera);
+  GrayFrame half = test::even_frame(144, 130, 0);
+  for (int row = 0; row < 130; ++row)
+    for (int column = 0; column < 144; ++column)
+      test::set(half, column, row,
+                0.25 * static_cast<double>(large.at(2 * column, 2 * row) + large.at(2 * column + 1, 2 * row) +
+                                           large.at(2 * column, 2 * row + 1) + large.at(2 * column + 1, 2 * row + 1)));
+  MeasureOptions options = small_options();
+  options.find.seen = BeadsSeen{Polarity::dark_beads, 16, false};
+  options.floor_px = 222, options.floor_slope = 0.01, options.left_wall_px = 20, options.right_wall_px = 270;
+  options.find.roi = PixelRectangle{0, 0, 288, 260};
+  options.reduction = 2;
+  std::vector<MeasuredDisk> sunk;
+  const Measurement reduced = measured({half}, options);
+  options.disk_sink = [&](const FrameReport&, const std::vector<MeasuredDisk>& some) { sunk = some; };
+  measured({half}, options);
+  ASSERT_EQ(reduced.disks.size(), 24U);
+  ASSERT_EQ(sunk.size(), 24U);
+  for (std::size_t k = 0; k < 24; ++k) {
+    const auto nearest = std::min_element(disks.begin(), disks.end(), [&](const auto& a, const auto& b) {
+      return std::hypot(a.x_px - reduced.disks[k].x_px, a.y_px - reduced.disks[k].y_px) <
+             std::hypot(b.x_px - reduced.disks[k].x_px, b.y_px - reduced.disks[k].y_px);
+    });
+    EXPECT_NEAR(reduced.disks[k].x_px, nearest->x_px, 0.2);
+    EXPECT_NEAR(reduced.disks[k].y_px, nearest->y_px, 0.2);
+    EXPECT_NEAR(reduced.disks[k].radius_px, 16, 0.2);
+    EXPECT_EQ(sunk[k].x_px, reduced.disks[k].x_px);
+    EXPECT_EQ(sunk[k].std_error_px, reduced.disks[k].std_error_px);
+    EXPECT_NEAR(reduced.disks[k].std_error_px,
+                std::sqrt(0.5 * (reduced.disks[k].variance_x + reduced.disks[k].variance_y)), 1e-9);
+  }
+  const BedCalibration& bed = reduced.calibration;
+  EXPECT_NEAR(bed.radius_px, 16, 0.2);
+  EXPECT_NEAR(bed.floor_px, 222, 1e-9);
+  EXPECT_EQ(bed.floor_slope, 0.01);
+  EXPECT_NEAR(bed.left_wall_px, 20, 1e-9);
+  EXPECT_NEAR(bed.right_wall_px, 270, 1e-9);
+  EXPECT_NEAR(bed.scale_m_per_px, 1.6e-3 / (2 * bed.radius_px), 1e-9);
+  EXPECT_NEAR(bed.width, 250 / (2 * bed.radius_px), 1e-6);
+  EXPECT_NEAR(bed.edge_width_px, std::hypot(1.5, 0.6), 0.35);
+  EXPECT_NEAR(reduced.contacts.nearest_px, 40.6, 0.3);
+  EXPECT_EQ(reduced.bed_region.width, 288);
+  EXPECT_EQ(reduced.bed_region.height, 260);
+}
+
+// Bands of the beads' level along each side are not seen, those of the background's are.
+TEST(SmallFilm, WallsOnEachSideAreNotSeen) {
+  for (const double level : {60.0, 160.0})
+    for (const FrameSide side : {FrameSide::bottom, FrameSide::top, FrameSide::left, FrameSide::right}) {
+      GrayFrame frame = small_frame(four_rows());
+      const auto depth = [&](int column, int row) {
+        return side == FrameSide::bottom  ? 129 - row
+               : side == FrameSide::top   ? row
+               : side == FrameSide::right ? 143 - column
+                                          : column;
+      };
+      for (int row = 0; row < 130; ++row)
+        for (int column = 0; column < 144; ++column)
+          if (depth(column, row) < 8) test::set(frame, column, row, level);
+      const GrayFrame open = without_walls(frame, Polarity::dark_beads, 8);
+      for (const auto& [column, row] : {std::array{72, 2}, {72, 127}, {2, 65}, {141, 65}})
+        EXPECT_EQ(unseen(open.at(column, row)), level < 100 && depth(column, row) < 8)
+            << level << ' ' << static_cast<int>(side) << ' ' << column << ' ' << row;
+      EXPECT_FALSE(unseen(open.at(71, 58)));
+    }
+}
+
+// By their rims alone: what is known of beads then, and what is not.
+TEST(SmallFilm, BeadsByTheirRims) {
+  const GrayFrame frame = small_frame(four_rows());
+  const CalibrationResult rims = learn_by_rims(frame, {Polarity::dark_beads, 8, false});
+  ASSERT_TRUE(rims.found);
+  const FinderCalibration& finder = rims.calibration;
+  EXPECT_TRUE(finder.by_rims);
+  EXPECT_NEAR(finder.radius_px, 8, 0.15);
+  EXPECT_EQ(finder.radius_px, finder.rim_radius_px);
+  EXPECT_NEAR(finder.radius_std_error_px, std::hypot(finder.rims->radius_std_error_px, 0.2), 1e-12);
+  EXPECT_EQ(finder.contrast_level, -finder.rims->contrast);
+  EXPECT_EQ(finder.width, 144);
+  EXPECT_EQ(finder.height, 130);
+  EXPECT_EQ(finder.disks_used, 24U);
+  EXPECT_EQ(finder.frames_used, 1U);
+  EXPECT_LT(finder.expected_missed, 0.02);
+  EXPECT_TRUE(finder.warnings.empty());
+  const FindResult found = find_beads(frame, finder, {});
+  EXPECT_EQ(found.disks.size(), 24U);
+  for (const FoundDisk& disk : found.disks) {
+    EXPECT_GT(disk.probability, 0.95);
+    EXPECT_FALSE(disk.other_size || disk.cut);
+  }
+  EXPECT_FALSE(learn_by_rims(test::even_frame(144, 130, 160), {Polarity::dark_beads, 8, false}).found);
+  // By faces and rims together nothing is missed and nothing is left out.
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 8, false};
+  const CalibrationResult both = learn_beads({&frame}, options);
+  ASSERT_TRUE(both.found);
+  EXPECT_FALSE(both.calibration.by_rims);
+  EXPECT_FALSE(both.calibration.rims_to_be_checked);
+  EXPECT_FALSE(both.calibration.left_out);
+  EXPECT_LT(both.calibration.expected_missed, 0.02);
+  EXPECT_EQ(find_beads(frame, both.calibration, options).disks.size(), 24U);
+}
+
+// One call for a photograph in memory: what it says, and what it says of one without beads.
+TEST(SmallFilm, APhotographInMemoryIsFound) {
+  const GrayFrame frame = small_frame(four_rows());
+  std::vector<std::uint8_t> bytes;
+  for (const float level : frame.pixels) bytes.push_back(static_cast<std::uint8_t>(level));
+  const ImageView view{144, 130, bytes.data(), PixelType::u8, 0};
+  FindOptions seen;
+  seen.seen = BeadsSeen{Polarity::dark_beads, 8, false};
+  const DisksFound found = find_disks(view, seen);
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.disks.size(), 24U);
+  EXPECT_LT(found.expected_wrong, 0.02);
+  EXPECT_TRUE(test::holds(found.brief(), "24 dark disks of radius 8.0")) << found.brief();
+  EXPECT_TRUE(test::holds(found.full(), "edge width"));
+  EXPECT_TRUE(test::holds(found.full(), "expected missed"));
+  const std::vector<std::uint8_t> even(bytes.size(), 100);
+  EXPECT_EQ(find_disks({144, 130, even.data(), PixelType::u8, 0}).status, FindStatus::no_beads);
+  EXPECT_EQ(find_disks({0, 130, even.data(), PixelType::u8, 0}).status, FindStatus::bad_input);
+  seen.radius_px = -1;
+  EXPECT_EQ(find_disks(view, seen).status, FindStatus::bad_input);
+}
+
+}  // namespace
+}  // namespace shakebed::ingest
