@@ -156,8 +156,8 @@ class FilmLearner {
     if (read == 0)
       throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
                        "check the files");
-    throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
-                     "check that sharp beads, at least 10 px wide, are visible");
+    throw NoDisksError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
+                       "check that sharp beads, at least 10 px wide, are visible");
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
