@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "statistics/text.hpp"
 
@@ -262,6 +263,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   tell_radius(learned);
   out.calibration = std::move(learned.calibration);
   FindResult found = find_beads(frame, out.calibration, find);
+  learn_other_shade(frame, options, out.calibration, found);
   out.message = found.why_nothing;
   if (found.empty()) return out;
   out.status = FindStatus::ok;
