@@ -2,8 +2,8 @@
 // Beads of another shade than those found: fainter ones, or darker than the background where the others are brighter.
 //
 // The beads found are painted over with what is behind them. What is left is searched for beads as any picture is. A
-// circle counts when edges that belong to none of the beads found make up its rim: between beads that touch, the place
-// of a missing one looks round, too, but by the rims of its neighbours alone.
+// circle counts when edges that belong to none of the beads found make up its rim. The place of a missing bead between
+// others looks round, too, but by the rims of its neighbours alone.
 
 #include "ingest/find/find_disks.hpp"
 

@@ -9,6 +9,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/profile/bed_doubts.hpp"
+#include "ingest/profile/candidate_picture.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
@@ -191,7 +192,9 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
       const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, most_surveyed_pixels, source);
-      return FirstLook{pictures[k].path, frames.width, frames.height, take_survey(frames, options)};
+      FirstLook look{pictures[k].path, frames.width, frames.height, take_survey(frames, options), nullptr};
+      if (source.channel == Channel::automatic) look.picture = std::make_shared<const CandidatePictures>(frames);
+      return look;
     } catch (const InputError&) {
       continue;  // measure_bed() names the files that cannot be read
     }
