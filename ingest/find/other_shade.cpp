@@ -35,9 +35,8 @@ constexpr double nearest_centres = 0.8;
 // Radii of the bead found: a rim that is so near to it is no evidence. Share of the rest in which edges must be met,
 // and share of the whole rim that the rest must be.
 constexpr double near_rim = 0.12, least_own_support = 0.6, least_open = 0.15;
-// Beads of another shade are accepted when at least this number is expected, and this share of the beads found: that of
-// missed beads which is worth a warning.
-constexpr double fewest_others = 3, least_share_of_others = 0.02;
+// Beads of another shade are accepted when at least this number is expected, and this share of the beads found.
+constexpr double fewest_others = 3, least_share_of_others = 0.03;
 // Radii of the beads found: sizes of the others, and how many are looked for.
 constexpr double smallest_other = 0.4, largest_other = 2.5;
 constexpr double same_size = 0.06;  // of the radius: drawn beds of one size differ by up to 0.03 between their shades
