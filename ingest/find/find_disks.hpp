@@ -85,9 +85,10 @@ struct FinderCalibration {
   std::vector<std::string> warnings;  // plain sentences
   // Of a film that was surveyed (learn_beads.hpp):
   std::optional<RimModel> rims;
-  double expected_missed = 0;       // share of the beads that are not reported (missed_beads.hpp)
-  bool by_rims = false;             // beads are found by rims alone: light and profile are empty
-  bool rims_to_be_checked = false;  // faces without a rim occur, and are dropped
+  double expected_missed = 0;                            // share of the beads that are not reported (missed_beads.hpp)
+  bool by_rims = false;                                  // beads are found by rims alone: light and profile are empty
+  bool rims_to_be_checked = false;                       // faces without a rim occur, and are dropped
+  std::shared_ptr<const FinderCalibration> other_shade;  // of beads brighter or darker than these (other_shade.hpp)
   // Where faces fit, but none has a rim, as in surroundings as bright as the beads: 1 for each pixel that is left out.
   std::shared_ptr<const std::vector<std::uint8_t>> left_out;
 };
@@ -111,7 +112,8 @@ struct CalibrationResult {
   bool found = false;
   FinderCalibration calibration;
   std::string why_not;
-  std::shared_ptr<LearnedBeads> beads;  // for tell_radius()
+  std::shared_ptr<LearnedBeads> beads;      // for tell_radius()
+  std::optional<FindResult> in_last_frame;  // by learn_beads(), as far as it looked
 };
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});
 

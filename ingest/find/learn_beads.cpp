@@ -12,6 +12,7 @@
 
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
 
 namespace shakebed::ingest {
@@ -163,6 +164,7 @@ class FacesAndRims {
         faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
         // Rims of a packed bed that blur has closed say nothing against its faces.
         if (agreement.rimless > 0 && !left_out_) use_packing(faces, found, agreement.all);
+        if (!faces.calibration.rims_to_be_checked) faces.in_last_frame = found;
         return faces;
       }
       if (round == most_left_out_rounds || agreement.rimless <= most_rimless) return std::nullopt;
@@ -226,6 +228,7 @@ std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*
     FinderCalibration& calibration = bed.faces.calibration;
     calibration.rims = rims_of(calibration);
     calibration.expected_missed = share_missed(*frames.back(), *calibration.rims, found, 0, options.roi);
+    bed.faces.in_last_frame.emplace().disks = std::move(bed.disks);
     return std::move(bed.faces);
   }
   return std::nullopt;
@@ -272,6 +275,41 @@ double share_missed_of(const GrayFrame& frame, const RimModel& model, const Rims
   return share_missed(frame, model, found, seen.expected_missed, region);
 }
 
+FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {
+  FoundDisk disk;
+  disk.x_px = rim.circle.x;
+  disk.y_px = rim.circle.y;
+  const RimModel& rims = *calibration.rims;
+  disk.radius_px = rim.other_size ? rim.circle.radius * calibration.radius_px / rims.radius_px : calibration.radius_px;
+  disk.other_size = rim.other_size;
+  disk.variance_x = disk.variance_y = rim.variance_px2;
+  disk.quality = disk.probability = rim.probability;
+  disk.contrast = rim.circle.contrast / std::max(1e-6, calibration.rims->contrast);
+  const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;
+  const double right = options.roi ? left + options.roi->width : calibration.width;
+  const double bottom = options.roi ? top + options.roi->height : calibration.height;
+  disk.cut = disk.x_px - disk.radius_px < left - 0.5 || disk.y_px - disk.radius_px < top - 0.5 ||
+             disk.x_px + disk.radius_px > right - 0.5 || disk.y_px + disk.radius_px > bottom - 0.5;
+  constexpr double half = 0.5;
+  disk.half_hidden = rim.circle.support < half;
+  return disk;
+}
+
+FindResult disks_of(const RimsFound& rims, const FinderCalibration& calibration, const FindOptions& options) {
+  FindResult result;
+  for (const RimDisk& rim : rims.disks) {
+    const FoundDisk disk = found_disk(rim, calibration, options);
+    const bool outside = options.roi && (disk.x_px < options.roi->left - 0.5 || disk.y_px < options.roi->top - 0.5 ||
+                                         disk.x_px >= options.roi->left + options.roi->width - 0.5 ||
+                                         disk.y_px >= options.roi->top + options.roi->height - 0.5);
+    if (!outside) result.disks.push_back(disk);
+  }
+  if (result.disks.empty())
+    result.why_nothing =
+        "no rim of radius " + std::to_string(calibration.radius_px * calibration.recorded_px) + " px is seen";
+  return result;
+}
+
 CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims, const FindOptions& options) {
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
@@ -294,6 +332,7 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.expected_missed = share_missed_of(frame, rims.model, seen, options.roi);
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
+  result.in_last_frame = disks_of(seen, calibration, options);
   if (!result.found)
     result.why_not = "no rim of radius " + std::to_string(rims.model.radius_px * options.recorded_px) + " px is seen";
   return result;
@@ -322,39 +361,8 @@ LearnedRims most_telling(const GrayFrame& frame, LearnedRims quick, const FindOp
   return by_thorough > clearly_more * expected_beads(by_quick.disks) ? thorough : quick;
 }
 
-FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {
-  FoundDisk disk;
-  disk.x_px = rim.circle.x;
-  disk.y_px = rim.circle.y;
-  const RimModel& rims = *calibration.rims;
-  disk.radius_px = rim.other_size ? rim.circle.radius * calibration.radius_px / rims.radius_px : calibration.radius_px;
-  disk.other_size = rim.other_size;
-  disk.variance_x = disk.variance_y = rim.variance_px2;
-  disk.quality = disk.probability = rim.probability;
-  disk.contrast = rim.circle.contrast / std::max(1e-6, calibration.rims->contrast);
-  const double left = options.roi ? options.roi->left : 0, top = options.roi ? options.roi->top : 0;
-  const double right = options.roi ? left + options.roi->width : calibration.width;
-  const double bottom = options.roi ? top + options.roi->height : calibration.height;
-  disk.cut = disk.x_px - disk.radius_px < left - 0.5 || disk.y_px - disk.radius_px < top - 0.5 ||
-             disk.x_px + disk.radius_px > right - 0.5 || disk.y_px + disk.radius_px > bottom - 0.5;
-  constexpr double half = 0.5;
-  disk.half_hidden = rim.circle.support < half;
-  return disk;
-}
-
 FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
-  FindResult result;
-  for (const RimDisk& rim : find_rims(frame, *calibration.rims).disks) {
-    const FoundDisk disk = found_disk(rim, calibration, options);
-    const bool outside = options.roi && (disk.x_px < options.roi->left - 0.5 || disk.y_px < options.roi->top - 0.5 ||
-                                         disk.x_px >= options.roi->left + options.roi->width - 0.5 ||
-                                         disk.y_px >= options.roi->top + options.roi->height - 0.5);
-    if (!outside) result.disks.push_back(disk);
-  }
-  if (result.disks.empty())
-    result.why_nothing =
-        "no rim of radius " + std::to_string(calibration.radius_px * calibration.recorded_px) + " px is seen";
-  return result;
+  return disks_of(find_rims(frame, *calibration.rims), calibration, options);
 }
 
 }  // namespace
@@ -380,9 +388,11 @@ CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
-  if (calibration.by_rims) return find_by_rims(frame, calibration, options);
-  FindResult found = find_disks(frame, calibration, options);
-  if (calibration.rims && calibration.rims_to_be_checked) check_by_rims(frame, *calibration.rims, found);
+  FindResult found =
+      calibration.by_rims ? find_by_rims(frame, calibration, options) : find_disks(frame, calibration, options);
+  if (!calibration.by_rims && calibration.rims && calibration.rims_to_be_checked)
+    check_by_rims(frame, *calibration.rims, found);
+  add_other_shade(frame, calibration, options, found);
   return found;
 }
 

@@ -162,9 +162,16 @@ class FreePlaces {
 
   // Of the directions from a place that are not covered, the share in which an edge is met.
   [[nodiscard]] double share_met(double x, double y, double radius) const {
+    static const std::array<std::array<double, 2>, directions> units = [] {
+      std::array<std::array<double, 2>, directions> all{};
+      for (std::size_t k = 0; k < directions; ++k) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(k) / directions;
+        all[k] = {std::cos(angle), std::sin(angle)};
+      }
+      return all;
+    }();
     int open = 0, met = 0;
-    for (int k = 0; k < directions; ++k) {
-      const double angle = 2 * std::numbers::pi * k / directions, cosine = std::cos(angle), sine = std::sin(angle);
+    for (const auto& [cosine, sine] : units) {
       bool edge = false, uncovered = false;
       for (double away = nearest_edge * radius; away <= farthest_edge * radius; away += 1) {
         const int column = static_cast<int>(x + away * cosine + 0.5), row = static_cast<int>(y + away * sine + 0.5);

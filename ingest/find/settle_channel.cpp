@@ -14,7 +14,7 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double trial_radius_px = 12;                          // frames are averaged down to it for the trials
+constexpr double trial_radius_px = 9;                           // frames are averaged down to it for the trials
 constexpr double clearly_more = 1.03;                           // times as many beads, for a change of channel
 constexpr double inside = 0.8, outside = 1.15, farthest = 1.3;  // radii: where a face and what is behind it are seen
 constexpr double least_contrast = 4;                            // grey levels between the two
@@ -38,7 +38,8 @@ Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<P
   Trial trial;
   if (!learned.found) return trial;
   trial.by_rims = learned.calibration.by_rims;
-  const FindResult found = find_beads(frame, learned.calibration, find);
+  const FindResult found =
+      learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
   for (const FoundDisk& disk : found.disks) trial.expected += disk.probability;
   trial.missed = learned.calibration.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
@@ -106,7 +107,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   const ChannelTrials trials(frames, best, options);
   const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
-  const bool large = static_cast<double>(frames.width) * frames.height > large_frame_pixels;
+  const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
   if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
   const Trial here = trials.trial_in(first->frame, best.rims.polarity);
   SurveyCandidate settled = best;

@@ -44,7 +44,8 @@ struct SurveyOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;  // px of the full frame
   std::optional<PixelRectangle> roi;
-  bool any_shape = false;  // outlines that are not round, and marks of a drawing, may be beads
+  bool any_shape = false;      // outlines that are not round, and marks of a drawing, may be beads
+  bool channel_alone = false;  // SurveyCandidate::by_rims is of no interest: it costs a trial of large pictures
 };
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options = {});

@@ -15,9 +15,8 @@ namespace {
 // Twice the pixels drawn: enough for a second reduction without streaks.
 constexpr std::size_t pixels_to_draw = 4'000'000;
 
-// Red, green and blue of the source, or its grey three times, reduced for drawing. Decoded once.
-cv::Mat colours_of(const std::filesystem::path& source, std::size_t page, int most_px, double& scale) {
-  const ChannelFrames frames = read_channels(source, page, pixels_to_draw);
+// Red, green and blue, or grey three times, reduced for drawing.
+cv::Mat colours_of(const ChannelFrames& frames, int most_px, double& scale) {
   std::vector<cv::Mat> planes;
   for (const Channel channel : {Channel::blue, Channel::green, Channel::red}) {
     const auto its = std::find_if(frames.channels.begin(), frames.channels.end(),
@@ -43,10 +42,11 @@ struct CandidatePictures::State {
   cv::Mat picture;
 };
 
-CandidatePictures::CandidatePictures(const std::filesystem::path& source, std::size_t page, int most_px)
-    : state_(std::make_unique<State>()) {
-  state_->picture = colours_of(source, page, most_px, state_->scale);
+CandidatePictures::CandidatePictures(const ChannelFrames& frames, int most_px) : state_(std::make_unique<State>()) {
+  state_->picture = colours_of(frames, most_px, state_->scale);
 }
+CandidatePictures::CandidatePictures(const std::filesystem::path& source, std::size_t page, int most_px)
+    : CandidatePictures(read_channels(source, page, pixels_to_draw), most_px) {}
 CandidatePictures::~CandidatePictures() = default;
 
 void CandidatePictures::write(const std::filesystem::path& path, const SurveyCandidate* candidate) const {

@@ -9,10 +9,12 @@
 
 namespace shakebed::ingest {
 
-// Picture number `page` of `source`, decoded once, in its own colours, at most `most_px` wide and high. Throws
-// InputError.
+// A picture in its own colours, at most `most_px` wide and high.
 class CandidatePictures {
  public:
+  // Of a picture that was read already. Without its colours, as one channel alone has it, it is drawn in grey.
+  explicit CandidatePictures(const ChannelFrames& frames, int most_px = 1400);
+  // Picture number `page` of `source`, decoded once. Throws InputError.
   explicit CandidatePictures(const std::filesystem::path& source, std::size_t page = 0, int most_px = 1400);
   ~CandidatePictures();
   CandidatePictures(const CandidatePictures&) = delete;

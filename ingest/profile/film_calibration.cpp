@@ -7,6 +7,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/missed_beads.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
 #include "ingest/find/two_kinds.hpp"
 
@@ -33,7 +34,7 @@ BothKinds find_both_kinds(const GrayFrame& frame, const FilmCalibration& film, c
 namespace {
 
 // One full frame is enough to learn the bead from, sparse ones are taken together; so many are tried.
-constexpr std::size_t enough_disks = 150, most_tried = 40;
+constexpr std::size_t enough_disks = 150, most_frames_tried = 40;
 constexpr int lens_rounds = 5;
 // Of aspect and radial term: below a few thousandths it may as well be streaks or shading, and does no harm; once in
 // use, smaller corrections are followed; no lens bends more than the last.
@@ -81,6 +82,7 @@ class FilmLearner {
       tell_radius(calibrated_);
       if (calibrated_.calibration.by_rims) film_.options.profile_from_coverage = false;
       calibrated_.beads.reset();
+      learn_shades();
       if (film_.options.second_diameter_m) learn_second();
     }
     if (enlargement_ > 1) {
@@ -112,7 +114,7 @@ class FilmLearner {
     std::string first_reason, first_error;
     std::size_t read = 0;
     source_.rewind();
-    for (std::size_t tried = 0; tried < most_tried; ++tried) {
+    for (std::size_t tried = 0; tried < most_frames_tried; ++tried) {
       auto item = source_.next_item();
       if (!item) break;
       GrayFrame frame;
@@ -156,8 +158,8 @@ class FilmLearner {
     if (read == 0)
       throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
                        "check the files");
-    throw InputError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
-                     "check that sharp beads, at least 10 px wide, are visible");
+    throw NoDisksError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
+                       "check that sharp beads, at least 10 px wide, are visible");
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
@@ -215,6 +217,16 @@ class FilmLearner {
     }
     calibrated_ = std::move(again);
     return true;
+  }
+
+  // Beads of another shade cover area as these do, but not by their contrast.
+  void learn_shades() {
+    FinderCalibration& calibration = calibrated_.calibration;
+    if (film_.options.second_diameter_m || !calibration.rims) return;
+    FindResult found = calibrated_.in_last_frame ? std::move(*calibrated_.in_last_frame)
+                                                 : find_beads(straight_.back(), calibration, find_);
+    learn_other_shade(straight_.back(), find_, calibration, found);
+    if (calibration.other_shade) film_.options.profile_from_coverage = false;
   }
 
   // What was seen first may be of either kind, or of both.

@@ -21,7 +21,7 @@ struct FilmCalibration {
   std::vector<std::string> warnings;
 };
 
-// Reads the first frames. Throws InputError when none can be read or none shows a disk.
+// Reads the first frames. Throws InputError when none can be read, NoDisksError when none shows a disk.
 FilmCalibration calibrate_film(FrameSource& source, const MeasureOptions& options);
 
 // The beads of both diameters in a frame.

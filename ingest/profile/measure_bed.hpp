@@ -184,9 +184,15 @@ struct Measurement {
   std::vector<std::string> warnings;  // plain sentences
 };
 
-// Reads the stream once (its first frames twice). Throws std::invalid_argument for options that make no sense. Throws
-// InputError when no frame at all could be read or no frame shows a disk. Single bad frames are reported in `frames`
-// instead.
+// Frames could be read, but none of the first ones shows a disk.
+class NoDisksError : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+// Reads the stream once (its first frames twice). Throws std::invalid_argument for options that make no sense,
+// InputError when no frame at all could be read, and NoDisksError when none shows a disk. Single bad frames are
+// reported in `frames` instead.
 Measurement measure_bed(FrameSource& source, const MeasureOptions& options);
 
 // What the frames show against reading a temperature from their profile: why, and what to do; a sentence or more each.

@@ -7,7 +7,9 @@
 #include <stdexcept>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/profile/bed_doubts.hpp"
+#include "ingest/profile/candidate_picture.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
@@ -190,7 +192,9 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
       const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, most_surveyed_pixels, source);
-      return FirstLook{pictures[k].path, frames.width, frames.height, take_survey(frames, options)};
+      FirstLook look{pictures[k].path, frames.width, frames.height, take_survey(frames, options), nullptr};
+      if (source.channel == Channel::automatic) look.picture = std::make_shared<const CandidatePictures>(frames);
+      return look;
     } catch (const InputError&) {
       continue;  // measure_bed() names the files that cannot be read
     }
@@ -262,6 +266,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   tell_radius(learned);
   out.calibration = std::move(learned.calibration);
   FindResult found = find_beads(frame, out.calibration, find);
+  learn_other_shade(frame, options, out.calibration, found);
   out.message = found.why_nothing;
   if (found.empty()) return out;
   out.status = FindStatus::ok;

@@ -9,6 +9,7 @@
 // call only. Method: [ShattuckChiSquared] and find_disks.hpp.
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@
 #include "ingest/profile/measure_bed.hpp"
 
 namespace shakebed::ingest {
+
+class CandidatePictures;  // candidate_picture.hpp
 
 enum class PixelType { u8, u16, f32, f64 };
 
@@ -60,6 +63,7 @@ struct FirstLook {
   std::string path;
   int width = 0, height = 0;  // of the picture itself
   Survey survey;
+  std::shared_ptr<const CandidatePictures> picture;  // to draw candidates into; none where one channel was asked for
 };
 // The first `most_tried` of `pictures` are tried; nothing when none of them can be read.
 inline constexpr std::size_t most_tried = 10;

@@ -237,8 +237,7 @@ class Extraction {
   ingest::Measurement measured(ingest::FrameSource& source) {
     try {
       return ingest::measure_bed(source, measure_);
-    } catch (const ingest::InputError& error) {
-      if (!error.problem().starts_with("no disks")) throw;
+    } catch (const ingest::NoDisksError& error) {
       const std::string what = fmt::format("{}: {}", error.problem(), error.why());
       if (rendered_ == nullptr) refuse_measured(what);
       throw StageError(what + ". Give the render stage less noise, or a finer scale");

@@ -21,7 +21,7 @@ Previewed preview_images(const PreviewRequest& request) {
   std::vector<std::string> paths;
   for (const ingest::FrameOrigin& origin : source.first_origins(ingest::most_tried))
     if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
-  const std::optional<FirstLook> look = look_at_first(paths, request.options);
+  const std::optional<FirstLook> look = look_at_first(paths, request.options, LookFor::preview);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
   require_inside(request.options, *look);
   std::string why;

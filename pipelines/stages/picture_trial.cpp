@@ -12,6 +12,9 @@
 namespace shakebed::pipelines {
 namespace {
 
+// px: the radius of beads in a picture that is reduced for trials. At 10 px drawn beads are found as in the picture.
+constexpr double enough_radius_px = 10;
+
 // Holes and printed dots.
 void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
   const double diameter_px = options.diameter / found.calibration.scale_m_per_px;
@@ -34,6 +37,28 @@ void judge_missed(const ExtractOptions& options, double missed, Judgement& judge
       fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
                   "a bead fits. Look at the overlays (pictures with the disks found) before you use the density.",
                   100 * missed));
+}
+
+// Of the channel, or of the only one.
+const ingest::GrayFrame& frame_in(const ingest::ChannelFrames& frames, ingest::Channel channel) {
+  const auto its = std::find_if(frames.channels.begin(), frames.channels.end(),
+                                [&](const auto& one) { return one.channel == channel; });
+  return (its != frames.channels.end() ? *its : frames.channels.front()).frame;
+}
+
+FirstLook look_at_reduced(const std::string& picture, const ExtractOptions& options,
+                          const ingest::ChannelFrames& reduced) {
+  FirstLook look{picture, reduced.width, reduced.height, {}, nullptr};
+  const ingest::SurveyOptions asked = survey_asked_for(options);
+  if (options.channel == BeadChannel::automatic) {
+    look.survey = ingest::take_survey(reduced, asked);
+  } else {
+    const ingest::Channel channel = channel_of(options.channel);
+    ingest::ChannelFrames one = reduced;
+    one.channels = {{channel, frame_in(reduced, channel)}};
+    look.survey = ingest::take_survey(one, asked);
+  }
+  return look;
 }
 
 ingest::SurveyCandidate circles_of(const ingest::Measurement& found) {
@@ -142,9 +167,22 @@ Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& 
   return judgement;
 }
 
-std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options) {
+std::optional<ingest::ChannelFrames> reduced_for_trials(const FirstLook& look, double radius_px) {
+  const int factor = static_cast<int>(radius_px / enough_radius_px);
+  if (factor < 2) return std::nullopt;
   try {
-    const std::optional<FirstLook> look = look_at_first({picture}, options);
+    const std::size_t pixels = static_cast<std::size_t>(look.width) * static_cast<std::size_t>(look.height);
+    return ingest::read_channels(look.path, 0, pixels / static_cast<std::size_t>(factor * factor));
+  } catch (const ingest::InputError&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+                                 const ingest::ChannelFrames* reduced) {
+  try {
+    const std::optional<FirstLook> look =
+        reduced != nullptr ? look_at_reduced(picture, options, *reduced) : look_at_first({picture}, options);
     if (!look || !look->survey.found) return std::nullopt;
     require_inside(options, *look);
     const ingest::SurveyCandidate& chosen = chosen_of(look->survey, options);
@@ -155,8 +193,10 @@ std::optional<Trial> try_options(const std::string& picture, const ExtractOption
     ingest::FrameSourceOptions source;
     source.channel = channel_of(options.channel);
     go_on_with(chosen, *look, source, measure);
-    ingest::FrameSource one =
-        ingest::FrameSource::from_generator(1, [&](std::size_t) { return ingest::read_frame(look->path, 0, source); });
+    if (reduced != nullptr) measure.reduction = reduced->reduction;
+    ingest::FrameSource one = ingest::FrameSource::from_generator(1, [&](std::size_t) {
+      return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look->path, 0, source);
+    });
     const ingest::Measurement found = ingest::measure_bed(one, measure);
     judge_disks(options, found);
     if (found.disk_total == 0) return std::nullopt;

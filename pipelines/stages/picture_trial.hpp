@@ -45,7 +45,10 @@ struct Trial {
   ingest::Contacts contacts;
   ingest::SurveyCandidate found;  // the disks, to be drawn
 };
-// Nothing where the run refuses it.
-std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options);
+// Nothing where the run refuses it. `reduced`: the picture for a quick trial, which may be wrong.
+std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+                                 const ingest::ChannelFrames* reduced = nullptr);
+// The picture, averaged until beads of this radius are just large enough; nothing where they hardly are.
+std::optional<ingest::ChannelFrames> reduced_for_trials(const FirstLook& look, double radius_px);
 
 }  // namespace shakebed::pipelines

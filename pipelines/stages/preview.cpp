@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "ingest/profile/candidate_picture.hpp"
 #include "pipelines/formats/files.hpp"
@@ -96,7 +97,7 @@ std::string section_of(const Proposal& proposal, std::size_t number, const std::
 
 }  // namespace
 
-std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options) {
+ingest::SurveyOptions survey_asked_for(const ExtractOptions& options) {
   ingest::SurveyOptions asked;
   asked.polarity = polarity_of(options.polarity);
   asked.radius_px = options.radius;
@@ -104,6 +105,13 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
   if (options.roi.size() == 4)
     asked.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
                                        static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
+  return asked;
+}
+
+std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options,
+                                       LookFor purpose) {
+  ingest::SurveyOptions asked = survey_asked_for(options);
+  asked.channel_alone = purpose == LookFor::preview;
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
   std::vector<ingest::FrameOrigin> pictures;
@@ -151,7 +159,9 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
                 "each bead. The run may find more beads, and it states their radius with its error. The commands were "
                 "not tried.</p>\n"
               : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
-  const ingest::CandidatePictures pictures(look.path);
+  const std::shared_ptr<const ingest::CandidatePictures> drawn =
+      look.picture ? look.picture : std::make_shared<const ingest::CandidatePictures>(std::filesystem::path(look.path));
+  const ingest::CandidatePictures& pictures = *drawn;
   std::size_t number = 0;
   for (const Proposal& proposal : proposals) {
     pictures.write(folder / fmt::format("preview_{}.png", ++number), &proposal.found);

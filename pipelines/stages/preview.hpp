@@ -22,9 +22,14 @@ inline ingest::Channel channel_of(BeadChannel channel) {
   return static_cast<ingest::Channel>(static_cast<int>(channel) - 1);
 }
 
-// The first readable picture of `paths`, surveyed as the options ask.
+// What the options ask of a survey.
+ingest::SurveyOptions survey_asked_for(const ExtractOptions& options);
+
+// The first readable picture of `paths`, surveyed as the options ask. What only a run needs to know takes time.
 using ingest::FirstLook;
-std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options);
+enum class LookFor { run, preview };
+std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options,
+                                       LookFor purpose = LookFor::run);
 
 // A change of the options with which the picture was measured, and not refused (proposals.hpp).
 struct Proposal {

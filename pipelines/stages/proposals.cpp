@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "ingest/find/nearby.hpp"
@@ -165,6 +166,7 @@ class Proposer {
     Proposal proposal;
     proposal.options = options_;
     change(proposal.options);
+    if (excluded_at_a_glance(proposal.options)) return false;
     const std::optional<Trial> trial = try_options(look_.path, proposal.options);
     if (!trial) return false;
     proposal.leave_out = std::move(without);
@@ -176,9 +178,24 @@ class Proposer {
     return true;
   }
 
+  // By a trial on a reduced picture, where the beads looked for are large. What it accepts is tried on the picture.
+  bool excluded_at_a_glance(const ExtractOptions& options) {
+    double radius = options.radius.value_or(HUGE_VAL);
+    if (!options.radius)
+      for (const ingest::SurveyCandidate& one : look_.survey.candidates) radius = std::min(radius, one.rims.radius_px);
+    if (std::isinf(radius)) return false;
+    if (!reduced_ || radius != reduced_for_px_) {
+      reduced_ = reduced_for_trials(look_, radius);
+      reduced_for_px_ = radius;
+    }
+    return reduced_ && !try_options(look_.path, options, &*reduced_);
+  }
+
   const FirstLook& look_;
   const ExtractOptions& options_;
   RefusedBy refused_;
+  std::optional<ingest::ChannelFrames> reduced_;
+  double reduced_for_px_ = 0;
   std::vector<std::string> given_;
   std::vector<Proposal> proposals_;
   std::size_t tries_ = 0;

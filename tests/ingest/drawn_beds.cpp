@@ -259,6 +259,90 @@ DrawnBed strewn_of_two_sizes(std::mt19937& random, double ratio, double share_of
   return photographed(random, scene, strewn(random, scene, radius_of, 1.03, 150));
 }
 
+namespace {
+
+// As an atmosphere: most touch none, some touch one.
+std::vector<DrawnBead> loose(std::mt19937& random, const Scene& scene, const RadiusOf& radius_of, std::size_t count) {
+  constexpr double side = 20, floor = 15, height = 0.3, at_floor = 0.2, at_another = 0.3;
+  std::vector<DrawnBead> beads;
+  double radius = radius_of(random);
+  for (int tries = 0; tries < 100000 && beads.size() < count; ++tries) {
+    const double lowest = scene.height - floor - radius, kind = uniform(random, 0, 1);
+    double x = uniform(random, side + radius, scene.width - side - radius);
+    double y = lowest + height * scene.height * std::log(1 - uniform(random, 0, 1));
+    if (kind < at_floor) y = lowest;
+    if (kind > 1 - at_another && !beads.empty()) {
+      const DrawnBead& other = beads[random() % beads.size()];
+      const double angle = uniform(random, 0, 2 * std::numbers::pi), away = other.radius + radius + 0.05;
+      x = other.x + away * std::cos(angle), y = other.y + away * std::sin(angle);
+    }
+    if (x < side + radius || x > scene.width - side - radius || y > lowest || y < radius + 6) continue;
+    if (std::any_of(beads.begin(), beads.end(), [&](const DrawnBead& other) {
+          return std::hypot(other.x - x, other.y - y) < other.radius + radius;
+        }))
+      continue;
+    beads.push_back({x, y, radius, true});
+    radius = radius_of(random);
+  }
+  return beads;
+}
+
+std::vector<DrawnBead> laid_out(std::mt19937& random, const Scene& scene, const Shaded& shaded,
+                                const RadiusOf& radius_of) {
+  if (shaded.layout == Shaded::Layout::strewn) return strewn(random, scene, radius_of, 1.03, shaded.count);
+  if (shaded.layout == Shaded::Layout::loose) return loose(random, scene, radius_of, shaded.count);
+  Packing packing(20, scene.width - 20, scene.height - 15);
+  for (std::size_t k = 0; k < shaded.count && packing.beads_.size() == k; ++k) packing.add(radius_of(random), random);
+  return packing.beads_;
+}
+
+// The sharp beads, and behind them those that are out of focus.
+DrawnBed with_defocused(std::mt19937& random, const Scene& scene, const Shaded& shaded,
+                        const std::vector<DrawnBead>& beads, const std::function<bool(const DrawnBead&)>& is_other) {
+  Scene quiet = scene;
+  quiet.noise = 0, quiet.blur_px = shaded.defocus_of_others * shaded.radius_px;
+  std::vector<DrawnBead> sharp, soft;
+  for (const DrawnBead& bead : beads) (is_other(bead) ? soft : sharp).push_back(bead);
+  const DrawnBed behind = photographed(random, quiet, soft);
+  quiet.blur_px = scene.blur_px;
+  const DrawnBed before = photographed(random, quiet, sharp);
+  DrawnBed drawn = before;
+  for (std::size_t k = 0; k < drawn.frame.pixels.size(); ++k) {
+    const double seen = static_cast<double>(before.frame.pixels[k] + behind.frame.pixels[k]) - scene.background;
+    drawn.frame.pixels[k] =
+        static_cast<float>(std::clamp(std::round(seen + scene.noise * gaussian(random)), 0.0, 255.0));
+  }
+  drawn.beads.insert(drawn.beads.end(), behind.beads.begin(), behind.beads.end());
+  return drawn;
+}
+
+}  // namespace
+
+DrawnBed bed_of_shades(std::mt19937& random, const Shaded& shaded) {
+  Scene scene;
+  const double filled = shaded.layout == Shaded::Layout::strewn ? 0.3 : 0.45;
+  const double side = std::sqrt(static_cast<double>(shaded.count) * 4 * shaded.radius_px * shaded.radius_px / filled);
+  scene.width = static_cast<int>(side) + 40, scene.height = static_cast<int>(side) + 40;
+  scene.background = shaded.background, scene.blur_px = shaded.blur_px, scene.noise = shaded.noise;
+  scene.slope_x = 2 * (shaded.light_ratio - 1) / (shaded.light_ratio + 1);
+  // Sizes are drawn before places: which bead is of which kind follows from its size, told apart by a millionth.
+  const double tag = 1e-6;
+  const RadiusOf radius_of = [&](std::mt19937& r) {
+    const bool other = uniform(r, 0, 1) < shaded.share_of_others, second = r() % 2 == 0;
+    return shaded.radius_px * (other ? shaded.size_of_others * (1 + tag) : 1) * (second ? shaded.second_size : 1);
+  };
+  const auto is_other = [&](const DrawnBead& bead) {
+    for (const double size : {1.0, shaded.second_size})
+      if (std::abs(bead.radius / (shaded.radius_px * size * shaded.size_of_others * (1 + tag)) - 1) < 0.1 * tag)
+        return true;
+    return false;
+  };
+  scene.face = [&](const DrawnBead& bead, double, double) { return is_other(bead) ? shaded.other : shaded.common; };
+  const std::vector<DrawnBead> beads = laid_out(random, scene, shaded, radius_of);
+  if (shaded.defocus_of_others > 0) return with_defocused(random, scene, shaded, beads, is_other);
+  return photographed(random, scene, beads);
+}
+
 const std::vector<BedKind>& drawn_beds() {
   using Random = std::mt19937;
   static const std::vector<BedKind> kinds = {

@@ -33,6 +33,22 @@ DrawnBed bed_of_two_sizes(std::mt19937& random, double ratio, double share_of_sm
 // The same beads, of which few touch.
 DrawnBed strewn_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px);
 
+// Beads of two shades, or a part of them out of focus or clear, or uneven light.
+struct Shaded {
+  enum class Layout { pile, loose, strewn };
+  Layout layout = Layout::pile;
+  std::size_t count = 63;
+  double radius_px = 14;
+  double background = 30, common = 210, other = 210;  // grey levels: behind the beads, of most beads, of the others
+  double share_of_others = 0.4;
+  double size_of_others = 1;     // of the radius
+  double second_size = 1;        // of the radius, of every second bead of either shade
+  double defocus_of_others = 0;  // radii: standard deviation of their blur
+  double light_ratio = 1;        // from the left side of the frame to the right
+  double blur_px = 0.8, noise = 2;
+};
+DrawnBed bed_of_shades(std::mt19937& random, const Shaded& shaded);
+
 // Found disks beside the truth. A disk is right when its centre lies within a quarter of the radius of a bead's. Beads
 // that the border cuts count neither as missed nor, when they are found, as wrong.
 struct BedScore {

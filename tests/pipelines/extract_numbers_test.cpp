@@ -4,14 +4,17 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
 #include "pipelines/stages/picture_trial.hpp"
 #include "tests/pipelines/lone_stage.hpp"
+#include "tests/pipelines/painted_picture.hpp"
 #include "tests/pipelines/read_table.hpp"
 
 namespace {
@@ -344,6 +347,28 @@ TEST(BeadNumber, IsHeldAgainstTheBeadsFound) {
     ASSERT_EQ(judgement.warnings.size(), 1U) << found;
     EXPECT_NE(judgement.warnings[0].find(says), std::string::npos) << judgement.warnings[0];
   }
+}
+
+// Large beads are tried on a reduced copy: as many, and as large, as in the picture itself.
+TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
+  constexpr double radius = 25;
+  const std::vector<Place> places = lattice(radius, 4, 20, 480, 370, 0.03);
+  const std::string path = (std::filesystem::path(testing::TempDir()) / "large_beads.pgm").string();
+  write_text(path, PaintedPicture(500, 400).disks(places, radius, 60).noise(2).pgm());
+  ExtractOptions options = some_options();
+  options.bead_number.reset();
+  const std::optional<FirstLook> look = look_at_first({path}, options);
+  ASSERT_TRUE(look);
+  const auto reduced = reduced_for_trials(*look, radius);
+  ASSERT_TRUE(reduced);
+  EXPECT_EQ(reduced->reduction, 2);
+  const std::optional<Trial> trial = try_options(path, options, &*reduced);
+  ASSERT_TRUE(trial);
+  EXPECT_EQ(trial->beads, places.size());
+  EXPECT_NEAR(trial->radius_px, radius, 0.5);
+  EXPECT_FALSE(reduced_for_trials(*look, 19)) << "such beads would be too small";
+  options.roi = {0, 0, 500, 60};
+  EXPECT_FALSE(try_options(path, options, &*reduced)) << "no bead lies there";
 }
 
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
