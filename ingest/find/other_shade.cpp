@@ -362,6 +362,8 @@ void count_missed(const GrayFrame& frame, const FindOptions& options, FinderCali
 void learn_other_shade(const GrayFrame& frame, const FindOptions& options, FinderCalibration& calibration,
                        FindResult& found) {
   if (found.disks.empty() || !calibration.rims || calibration.other_shade) return;
+  // The noise of an enlarged picture is smooth, and what is painted is not: beads would be seen in it.
+  if (frame.enlargement > 1) return;
   std::optional<Seen> best;
   for (const Polarity polarity : {Polarity::bright_beads, Polarity::dark_beads}) {
     if (options.polarity != Polarity::automatic && options.polarity != polarity) continue;

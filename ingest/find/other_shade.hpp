@@ -11,6 +11,7 @@ namespace shakebed::ingest {
 
 // Looks for beads of another shade in this frame, in which `found` are the beads of the calibration. When there are
 // some, they become the calibration's `other_shade`, `found` holds them, too, and a warning tells their number.
+// Pictures that were enlarged by repeating pixels are not searched.
 void learn_other_shade(const GrayFrame& frame, const FindOptions& options, FinderCalibration& calibration,
                        FindResult& found);
 
