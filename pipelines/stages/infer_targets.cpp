@@ -15,8 +15,8 @@ namespace shakebed::pipelines {
 namespace {
 
 constexpr std::size_t most_target_heights = 60;  // of a profile: time grows with their third power
-constexpr double nothing = 0.01;          // a profile that ends with less holds nothing above [1/D^2]
-constexpr double of_a_step = 1e-9;        // by which heights may miss the end of their range
+constexpr double nothing = 0.01;                 // a profile that ends with less holds nothing above [1/D^2]
+constexpr double of_a_step = 1e-9;               // by which heights may miss the end of their range
 
 const char* includes_scatter_help =
     "whether the standard error includes the scatter between beds with the same parameters, as that of a film or of a "

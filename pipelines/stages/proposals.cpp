@@ -154,8 +154,8 @@ class Proposer {
                   [&](ExtractOptions& o) { o.scale = 1e-3 * std::stod(text); }))
         proposals_.back().when = " where neighbouring beads touch";
     }
-    if (options_.shape == BeadShape::round)
-      propose({}, "--shape any", [](ExtractOptions& o) { o.shape = BeadShape::any; });
+    if (options_.shape == BeadShape::round && proposals_.size() < most_proposed)
+      add(std::move(open), *trial, {}, "--shape any");
   }
 
   // Whether the run accepts the picture once the options are changed so.
@@ -163,19 +163,25 @@ class Proposer {
   bool propose(std::vector<std::string> without, std::string give, const Change& change) {
     if (proposals_.size() >= most_proposed || tries_ >= most_tries) return false;
     ++tries_;
-    Proposal proposal;
-    proposal.options = options_;
-    change(proposal.options);
-    if (excluded_at_a_glance(proposal.options)) return false;
-    const std::optional<Trial> trial = try_options(look_.path, proposal.options);
+    ExtractOptions options = options_;
+    change(options);
+    if (excluded_at_a_glance(options)) return false;
+    const std::optional<Trial> trial = try_options(look_.path, options);
     if (!trial) return false;
+    add(std::move(options), *trial, std::move(without), std::move(give));
+    return true;
+  }
+
+  // Options that a trial on the picture has accepted.
+  void add(ExtractOptions options, const Trial& trial, std::vector<std::string> without, std::string give) {
+    Proposal proposal;
+    proposal.options = std::move(options);
     proposal.leave_out = std::move(without);
     proposal.give = std::move(give);
-    proposal.found = trial->found;
-    proposal.seen = fmt::format("{} {} bead{} of {:.1f} px radius", trial->beads, trial->bright ? "bright" : "dark",
-                                trial->beads == 1 ? "" : "s", trial->radius_px);
+    proposal.found = trial.found;
+    proposal.seen = fmt::format("{} {} bead{} of {:.1f} px radius", trial.beads, trial.bright ? "bright" : "dark",
+                                trial.beads == 1 ? "" : "s", trial.radius_px);
     proposals_.push_back(std::move(proposal));
-    return true;
   }
 
   // By a trial on a reduced picture, where the beads looked for are large. What it accepts is tried on the picture.

@@ -455,7 +455,7 @@ TEST(RimChoice, HasAnErrorThatFollowsTheNoise) {
   const double bound = 0.1 * std::sqrt(2 * std::sqrt(std::numbers::pi) * 1.04 / (100 * 2 * std::numbers::pi * 10));
   EXPECT_GT(one, bound);
   EXPECT_NEAR(error_of(0.2, 400) / one, 1, 0.02);
-  EXPECT_LT(error_of(0.1, 400), 0.55 * one);  // other shadings can be told from it, too
+  EXPECT_LT(error_of(0.1, 400), 0.55 * one);  // four times as many rims: about half
   EXPECT_GT(error_of(0.2, 100), 1.9 * one);
   EXPECT_LT(error_of(0.01, 1e4), 2e-3);
 }
@@ -475,7 +475,7 @@ TEST(RimChoice, UsesWhatIsKnownAndRefusesWhatNoDiskExplains) {
   EXPECT_EQ(choose_rim(profile, conditions).rim.radius_px, 0);
 }
 
-// Levels encoded for display are told from linear ones; where that is not to be tried they are not.
+// Levels encoded for display are distinguished from linear ones, but only where this is asked for.
 TEST(RimChoice, TriesTheToneCurveUnlessTold) {
   BeadProfile profile = test::blurred_profile(10, 1.3, 15, 0.05);
   const auto encoded = [](double light) { return 255 * std::pow(light, 0.45); };

@@ -1,4 +1,4 @@
-// Maps of places that look like a bead, against the same sums pixel by pixel; what is told of the noise of a frame.
+// Maps of places that look like a bead, against the same sums pixel by pixel; the estimated noise of a frame.
 #include "ingest/find/disk_map.hpp"
 
 #include <gtest/gtest.h>

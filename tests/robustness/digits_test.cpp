@@ -214,8 +214,8 @@ Row covariance() {
       found.add(samples.back());
     }
     const std::vector<double> matrix = found.covariance(0, 3, found.windows(0, 3));
-    // What covariance() says it does: means over overlapping windows, larger by what the halves of the windows say of the
-    // first moment.
+    // What covariance() says it does: means over overlapping windows, larger by what the halves of the windows say of
+    // the first moment.
     const std::size_t n = samples.size(), window = found.windows(0, 3).length;
     std::array<Real, 3> mean{};
     for (const auto& sample : samples) {
