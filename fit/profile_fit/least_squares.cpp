@@ -334,12 +334,14 @@ class Solver {
         weighted.row(i) *= std::min(1.0, threshold_ / std::max(std::abs(residual_[i]), 1e-300));
     }
     const Matrix& r = bins_.correlation;
-    inverse = (inverse * (weighted.transpose() * r * weighted) * inverse).eval();
+    const Matrix correlated = r * weighted, middle = weighted.transpose() * correlated, half = inverse * middle;
+    inverse = half * inverse;
     if (naive > 0.0) solution.inflation = inverse(0, 0) / naive;
-    const Matrix q =
-        Eigen::HouseholderQR<Matrix>(jacobian_).householderQ() * Matrix::Identity(jacobian_.rows(), jacobian_.cols());
-    Matrix projected = r - q * (q.transpose() * r);
-    projected = (projected - (projected * q) * q.transpose()).eval();
+    const Matrix along = tangent_plane(), across = along.transpose();
+    Matrix seen = across * r, projected = r;
+    projected.noalias() -= along * seen;
+    seen = projected * along;
+    projected.noalias() -= seen * across;
     const double trace = projected.trace();
     double trace2 = projected.squaredNorm();
     const double v = (bins_.whitening.size() > 0 ? 1.0 : 2.0) * static_cast<double>(bins_.samples) - 1.0;
@@ -348,6 +350,17 @@ class Solver {
     trace2 = std::max(trace2, trace * trace / static_cast<double>(residual_.size()));
     solution.expected_chi2 = trace;
     solution.chi2_variance = 2.0 * trace2;
+  }
+
+  // Orthonormal columns that span those of J, by the Cholesky factor of J^T J, whose diagonal is scaled to 1. What is
+  // added to it keeps the factor of dependent columns finite.
+  [[nodiscard]] Matrix tangent_plane() const {
+    Matrix columns = jacobian_;
+    for (Eigen::Index i = 0; i < columns.cols(); ++i) columns.col(i).normalize();
+    Matrix gram = columns.transpose() * columns;
+    gram.diagonal().array() += 1e-14;
+    const Eigen::LLT<Matrix> factor(gram);
+    return factor.matrixL().solve(columns.transpose()).transpose();
   }
 
   // A Huber estimate of normal data is less certain than least squares by E psi^2/(E psi')^2; J^T W J already has E

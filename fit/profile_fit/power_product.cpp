@@ -1,17 +1,26 @@
 #include "fit/profile_fit/power_product.hpp"
 
-#include <Eigen/Dense>
+#include <gsl/gsl_multifit.h>
+
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "fit/profile_fit/straight_line.hpp"
 
 namespace shakebed::fit {
 namespace {
 
-// Columns of the design count as dependent where their part that no other column explains is below this share of
-// their length: 1e-8 leaves 8 of the 16 digits of a double.
+// Columns of the design, scaled to one length, count as dependent where a singular value is below this share of the
+// largest: 1e-8 leaves 8 of the 16 digits of a double.
 constexpr double independent_share = 1e-8;
+
+using OwnedVector = std::unique_ptr<gsl_vector, decltype(&gsl_vector_free)>;
+using OwnedMatrix = std::unique_ptr<gsl_matrix, decltype(&gsl_matrix_free)>;
+OwnedVector zero_vector(std::size_t size) { return {gsl_vector_calloc(size), gsl_vector_free}; }
+OwnedMatrix zero_matrix(std::size_t rows, std::size_t columns) {
+  return {gsl_matrix_calloc(rows, columns), gsl_matrix_free};
+}
 
 bool all_positive(std::span<const double> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double number) { return number > 0 && std::isfinite(number); });
@@ -30,37 +39,36 @@ PowerProduct fit_power_product(const std::vector<std::vector<double>>& x, std::s
   PowerProduct fit;
   const std::size_t groups = group.empty() ? 1 : 1 + *std::max_element(group.begin(), group.end());
   const auto group_of = [&](std::size_t point) { return group.empty() ? 0 : group[point]; };
-  const auto points = static_cast<Eigen::Index>(y.size()), first = static_cast<Eigen::Index>(groups),
-             unknowns = static_cast<Eigen::Index>(x.size()) + first;
-  fit.dof = static_cast<int>(points - unknowns);
+  const std::size_t points = y.size(), unknowns = x.size() + groups;
+  fit.dof = static_cast<int>(points) - static_cast<int>(unknowns);
   if (fit.dof < 1 || !all_positive(y) || !all_positive(error)) return fit;
   for (const std::vector<double>& column : x) {
     if (!all_positive(column)) return fit;
   }
-  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(points, unknowns);  // each row divided by the error of ln y
-  Eigen::VectorXd target(points);
-  for (Eigen::Index i = 0; i < points; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const double weight = y[at] / error[at];
-    target(i) = weight * std::log(y[at]);
-    design(i, static_cast<Eigen::Index>(group_of(at))) = weight;
-    for (std::size_t k = 0; k < x.size(); ++k)
-      design(i, first + static_cast<Eigen::Index>(k)) = weight * std::log(x[k][at]);
+  const OwnedVector target = zero_vector(points), weight = zero_vector(points), solution = zero_vector(unknowns);
+  const OwnedMatrix design = zero_matrix(points, unknowns), covariance = zero_matrix(unknowns, unknowns);
+  for (std::size_t i = 0; i < points; ++i) {
+    gsl_vector_set(target.get(), i, std::log(y[i]));
+    gsl_vector_set(weight.get(), i, std::pow(y[i] / error[i], 2));
+    gsl_matrix_set(design.get(), i, group_of(i), 1);
+    for (std::size_t k = 0; k < x.size(); ++k) gsl_matrix_set(design.get(), i, groups + k, std::log(x[k][i]));
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(design);
-  solver.setThreshold(independent_share);
-  if (solver.rank() < unknowns) return fit;
-  const Eigen::VectorXd solution = solver.solve(target);
-  const Eigen::MatrixXd covariance = (design.transpose() * design).inverse();
+  const std::unique_ptr<gsl_multifit_linear_workspace, decltype(&gsl_multifit_linear_free)> work(
+      gsl_multifit_linear_alloc(points, unknowns), gsl_multifit_linear_free);
+  std::size_t rank = 0;
+  gsl_multifit_wlinear_tsvd(design.get(), weight.get(), target.get(), independent_share, solution.get(),
+                            covariance.get(), &fit.chi2, &rank, work.get());
+  if (rank < unknowns) return fit;
+  const auto found = [&](std::size_t k) { return gsl_vector_get(solution.get(), k); };
   fit.ok = true;
-  fit.chi2 = (design * solution - target).squaredNorm();
   fit.p_value = chance_of_chi2(fit.chi2, fit.dof);
   const double widened = std::sqrt(std::max(1.0, fit.chi2 / fit.dof));
-  fit.group_log_amplitude.assign(solution.begin(), solution.begin() + first);
-  fit.log_amplitude = solution(0), fit.log_amplitude_error = widened * std::sqrt(covariance(0, 0));
-  for (Eigen::Index k = first; k < unknowns; ++k) {
-    fit.exponents.push_back(solution(k));
-    fit.exponent_errors.push_back(widened * std::sqrt(covariance(k, k)));
+  const auto error_of = [&](std::size_t k) { return widened * std::sqrt(gsl_matrix_get(covariance.get(), k, k)); };
+  for (std::size_t k = 0; k < groups; ++k) fit.group_log_amplitude.push_back(found(k));
+  fit.log_amplitude = found(0), fit.log_amplitude_error = error_of(0);
+  for (std::size_t k = groups; k < unknowns; ++k) {
+    fit.exponents.push_back(found(k));
+    fit.exponent_errors.push_back(error_of(k));
   }
   double squares = 0;
   std::vector<double> place(x.size());

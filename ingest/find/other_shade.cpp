@@ -42,7 +42,7 @@ constexpr double smallest_other = 0.4, largest_other = 2.5;
 constexpr double same_size = 0.06;  // of the radius: drawn beds of one size differ by up to 0.03 between their shades
 constexpr std::size_t most_other_sizes = 2;
 // Of a rim, the share in which edges are met, at least. And of the weakest edges, those that noise does not make.
-constexpr double least_rim = 0.5;
+constexpr double least_rim = 0.5, faintest_rim = 0.35;
 constexpr float plain_edge = 1.5F;
 
 double margin_of(const FinderCalibration& finder) {
@@ -252,27 +252,37 @@ void look_with(double radius_px, const std::vector<FoundDisk>& found, Seen& seen
   if (expected > seen.expected) seen.expected = expected, seen.beads.radius_px = rims.model.radius_px;
 }
 
-// Whether edges that belong to none of the beads found are as long as the rims of a few beads.
-bool leaves_edges(const GrayFrame& painted, double radius_px, const std::vector<FoundDisk>& found) {
+// Whether edges that belong to none of the beads found are as long as the rims of a few beads, and make up as many
+// circles: those of walls do not. Beads of all sizes that are looked for are asked for at one scale, so that this is
+// quick.
+bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, const std::vector<FoundDisk>& found) {
   const ScaledPicture at = scaled_for(painted, radius_px);
-  const EdgeMap edges = find_edges(at.picture);
+  EdgeMap edges = find_edges(at.picture);
   const float plain = plain_edge * edges.threshold;
   const FreeOf free(found);
-  double length = 0;
-  for (const RidgePixel& pixel : edges.ridge) {
-    if (edges.slope(edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y))) < plain) continue;
-    const double x = at.to_frame_x(static_cast<double>(pixel.x)), y = at.to_frame_y(static_cast<double>(pixel.y));
-    if (free.beside_rims(x, y)) length += at.scale;
-  }
+  std::erase_if(edges.ridge, [&](const RidgePixel& pixel) {
+    return edges.slope(edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y))) < plain ||
+           !free.beside_rims(at.to_frame_x(static_cast<double>(pixel.x)), at.to_frame_y(static_cast<double>(pixel.y)));
+  });
   const double beads = std::max(fewest_others, least_share_of_others * static_cast<double>(found.size()));
-  return length > least_rim * 2 * std::numbers::pi * smallest_other * radius_px * beads;
+  const double length = at.scale * static_cast<double>(edges.ridge.size());
+  if (length <= least_rim * 2 * std::numbers::pi * smallest_other * radius_px * beads) return false;
+  CirclesAsked asked{smallest_other * radius_px / at.scale, largest_other * radius_px / at.scale, polarity,
+                     faintest_rim};
+  std::vector<Circle> circles = find_circles(edges, asked);
+  for (Circle& circle : circles)
+    circle.x = at.to_frame_x(circle.x), circle.y = at.to_frame_y(circle.y), circle.radius *= at.scale;
+  std::erase_if(circles, [&](const Circle& circle) {
+    return free.overlapped(circle.x, circle.y, circle.radius) || !free.has_own_rim(circle);
+  });
+  return static_cast<double>(without_doubles(std::move(circles), nearest_centres).size()) >= beads;
 }
 
 // Of the same size as the beads found, else of the size of which most circles are seen.
 std::optional<Seen> seen_of(const GrayFrame& frame, const FinderCalibration& calibration,
                             const std::vector<FoundDisk>& found, Polarity polarity) {
   std::optional<GrayFrame> painted = painted_over(frame, found, margin_of(calibration), polarity);
-  if (!painted || !leaves_edges(*painted, calibration.radius_px, found)) return std::nullopt;
+  if (!painted || !leaves_rims(*painted, calibration.radius_px, polarity, found)) return std::nullopt;
   Seen seen{std::move(*painted), {polarity, calibration.radius_px}};
   look_with(calibration.radius_px, found, seen);
   if (enough(seen.expected, found)) return seen;

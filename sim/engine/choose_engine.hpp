@@ -2,6 +2,7 @@
 // a scene that needs another is refused. run_scene.cpp holds all.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -14,8 +15,8 @@
 
 namespace shakebed::sim {
 
-// All of them: 4 spaces x 3 rules x 2 sizes, and one for cells with sloped sides or a free lid, with the most general
-// rule.
+// All of them: 4 spaces x 3 rules x 2 sizes but for three, and one for cells with sloped sides or a free lid, with the
+// most general rule.
 struct EveryEngine {
   static constexpr bool weightless = true, two_sizes = true, cells = true;
 };
@@ -74,14 +75,23 @@ class ChooseEngine {
     const Needs needs = needs_of(scene_);
     if (needs.spins) return with_sizes<Space, RoughRule>();
     if (needs.dissipates) return with_sizes<Space, DissipativeRule>();
-    return with_sizes<Space, ElasticRule>();
+    // Elastic disks of two sizes between walls are rare: they take the rule of dissipation, and lose nothing.
+    if constexpr (Space::has_walls) {
+      if (!equal_sizes()) return with_sizes<Space, DissipativeRule>();
+      return std::make_unique<Engine<Space, ElasticRule, EqualSizes>>(scene_, floor_, disks_);
+    } else {
+      return with_sizes<Space, ElasticRule>();
+    }
+  }
+
+  bool equal_sizes() const {
+    return std::all_of(scene_.disks.species.begin(), scene_.disks.species.end(),
+                       [](const Species& s) { return s.diameter == 1 && s.mass == 1; });
   }
 
   template <class Space, class Rule>
   std::unique_ptr<Simulation> with_sizes() const {
-    bool equal = true;
-    for (const Species& s : scene_.disks.species) equal = equal && s.diameter == 1 && s.mass == 1;
-    if (equal) return std::make_unique<Engine<Space, Rule, EqualSizes>>(scene_, floor_, disks_);
+    if (equal_sizes()) return std::make_unique<Engine<Space, Rule, EqualSizes>>(scene_, floor_, disks_);
     if constexpr (Offered::two_sizes) return std::make_unique<Engine<Space, Rule, TwoSizes>>(scene_, floor_, disks_);
     throw std::invalid_argument("/disks: this program was built without the engine for two sizes of disks");
   }

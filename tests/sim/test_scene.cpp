@@ -111,7 +111,7 @@ TEST(Start, IsTheSameForTheSameSeedAndAnotherForAnother) {
 
 // Every choice with every other: what cannot be is refused with a sentence, all else runs, keeps its ledger and lets
 // nothing overlap. Only what is hot makes an engine of its own: 4 spaces x 3 rules x 2 sizes.
-TEST(EveryChoice, RunsWithEveryOtherOnAtMost24Engines) {
+TEST(EveryChoice, RunsWithEveryOtherOnAtMost21Engines) {
   std::set<std::string> engines;
   int ran = 0, refused = 0;
   const std::vector<double> wave{0, 0.3, 0, -0.3, 0.1};
@@ -170,7 +170,7 @@ TEST(EveryChoice, RunsWithEveryOtherOnAtMost24Engines) {
                   ASSERT_LE(simulation->largest_overlap(), 1e-12) << ran;
                 }
   std::printf("  %d combinations ran on %zu engines, %d were refused\n", ran, engines.size(), refused);
-  EXPECT_EQ(engines.size(), 24u);
+  EXPECT_EQ(engines.size(), 21u);
   EXPECT_GT(ran, 1000);
   EXPECT_GT(refused, 100);
 }
