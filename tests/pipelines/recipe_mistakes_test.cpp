@@ -89,31 +89,34 @@ TEST(RecipeMistakes, OfKindsAndArrowsAreNamed) {
   EXPECT_EQ(told(with(R"({ "stage": "mapp" })")), "/stages/0/stage: there is no stage \"mapp\". Did you mean \"map\"?");
   EXPECT_THAT(told(with(R"({ "stage": "qqqqqqq" })")),
               HasSubstr("/stages/0/stage: there is no stage \"qqqqqqq\". Choose from: simulate, "));
-  const std::string fit = R"({ "stage": "fit", "id": "f", "profile": "p.csv", "from": )";
-  const auto of_figure = [&](const std::string& from) {
+  const auto of_critical = [&](const std::string& from) {
     return told(with(map_stage(", \"id\": \"m\"") + R"(, { "stage": "critical", "id": "c", "temperature": "T")" +
                      (from.empty() ? "" : ", \"from\": " + from) + " }"));
   };
-  EXPECT_EQ(of_figure("\"nobody\""), "/stages/1/from: there is no stage with the id \"nobody\". Choose from: m, c");
-  EXPECT_EQ(of_figure("[\"mm\"]"), "/stages/1/from/0: there is no stage with the id \"mm\". Did you mean \"m\"?");
-  EXPECT_THAT(of_figure("\"m\""),
+  EXPECT_EQ(of_critical("\"nobody\""), "/stages/1/from: there is no stage with the id \"nobody\". Choose from: m, c");
+  EXPECT_EQ(of_critical("[\"mm\"]"), "/stages/1/from/0: there is no stage with the id \"mm\". Did you mean \"m\"?");
+  EXPECT_THAT(of_critical("\"m\""),
               HasSubstr("/stages/1/from: \"m\" is a stage of kind map, and critical does not read its results. "
                         "It reads the results of these kinds of stages: study"));
   EXPECT_THAT(
-      of_figure(""),
+      of_critical(""),
       HasSubstr(
           "/stages/1/from: critical needs the results of one stage. Name a stage of these kinds by its id: study"));
-  EXPECT_THAT(of_figure("[\"c\", \"c\"]"), HasSubstr("critical"));
+  EXPECT_EQ(told(with(map_stage(", \"id\": \"m\"") +
+                      R"(, { "stage": "check", "from": ["m", "m"], "expect": { "/m/gamma": { "least": 1 } } })")),
+            "/stages/1/from/1: \"from\" names \"m\" twice");
+  EXPECT_THAT(told(with(map_stage(", \"id\": \"m\"") + R"(, { "stage": "study", "from": "m" })")),
+              HasSubstr("/stages/1/from: study does not read the results of other stages"));
   EXPECT_THAT(told(with(R"({ "stage": "figure", "id": "g" })")),
               HasSubstr("/stages/0/from: figure needs the results of at least one stage"));
   // A stage of a misspelt kind is not missed by those that read it.
   EXPECT_EQ(told(with(R"({ "stage": "fitt", "id": "f" }, { "stage": "figure", "from": "f" })")),
             "/stages/0/stage: there is no stage \"fitt\". Did you mean \"fit\"?");
   // Simulations that go on from one another.
-  const std::string bed =
+  const std::string simulation =
       R"({ "stage": "simulate", "disks": { "count": 9, "diameter": "3 mm" }, "settle": "1 s", "measure": "1 s")";
-  const std::string in_a_circle =
-      told(with(map_stage() + "," + bed + R"(, "id": "a", "from": "b" }, )" + bed + R"(, "id": "b", "from": "a" })"));
+  const std::string in_a_circle = told(with(map_stage() + "," + simulation + R"(, "id": "a", "from": "b" }, )" +
+                                            simulation + R"(, "id": "b", "from": "a" })"));
   EXPECT_THAT(in_a_circle,
               HasSubstr("/stages/1/from: these stages need one another in a circle, so none of them can run first: a, "
                         "b. Remove one of their \"from\""));

@@ -3,8 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <mutex>
-#include <set>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -59,11 +58,11 @@ class StudyByHand : public LoneStage {
     std::filesystem::create_directories(folder / "map");
     const double g = stage["gamma"].get<double>(), d = std::stod(stage["diameter"].get<std::string>());
     const int run = ++runs_[{g, d}] - 1;
-    const Json result = failing == static_cast<int>(chains.size())
-                            ? Json{{"status", "failed"}, {"critical_temperature", {{"value", 1e6}}}}
-                            : Json{{"critical_temperature", {{"value", 10 * g + d + run}, {"std_error", 0.5}}},
-                                   {"equation_of_state", "enskog"}};
-    write_text(folder / "map/map.json", dump(result));
+    const Json found = failing == static_cast<int>(chains.size())
+                           ? Json{{"status", "failed"}, {"critical_temperature", {{"value", 1e6}}}}
+                           : Json{{"critical_temperature", {{"value", 10 * g + d + run}, {"std_error", 0.5}}},
+                                  {"equation_of_state", "enskog"}};
+    write_text(folder / "map/map.json", dump(found));
     // Rows in no order; the second is missing in the second run.
     write_text(folder / "map/map.csv", "name,jump,rise\nb,2," + number_text(g + 1) + "\na,1," + number_text(g - run) +
                                            "\n" + (run == 0 ? "c,3,7\n" : "") + "d,,5\n");
