@@ -158,6 +158,47 @@ TEST_F(ReportPage, GroupsItsWarnings) {
   EXPECT_THAT(page_, Not(HasSubstr("<section class=\"warnings\"")));
 }
 
+// Of two fits the first gives the answer and the solid's height beside it; each has its section, in the order of the
+// recipe.
+TEST_F(ReportPage, BeginsWithTheFirstAnswer) {
+  write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.2\n");
+  std::vector<Problem> problems;
+  plan_ = make_plan(*parse_json(R"({ "name": "two", "stages": [ { "stage": "fit", "id": "f", "profile": "p.csv" },
+      { "stage": "fit", "id": "g", "profile": "p.csv" }, { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })",
+                                "r.json", problems),
+                    "r.json", folder_.path());
+  outcome_.out = folder_.path();
+  for (const PlannedStage& stage : plan_.stages) {
+    outcome_.stages.emplace_back().id = stage.id;
+    outcome_.stages.back().record.emplace();
+    std::filesystem::create_directories(folder_ / stage.id);
+    write_text(folder_ / (stage.id + "/" + std::string(stage.row->result)),
+               stage.id == "map"
+                   ? R"({"gamma": {"value": 4}, "readings": []})"
+                   : R"({"model": "m", "solid_height": {"value": 4, "unit": "D"}, "answer": {"why": "of )" + stage.id +
+                         R"("}, "window": {"low": 1, "high": 2}})");
+  }
+  write();
+  const auto count = [&](const std::string& words) {
+    std::size_t found = 0;
+    for (std::size_t at = page_.find(words); at != std::string::npos; at = page_.find(words, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("aria-label=\"the answer\""), 1U);
+  EXPECT_THAT(between("aria-label=\"the answer\"", "</section>"), HasSubstr("<p>Of f</p>"));
+  EXPECT_EQ(count("<dt>height of the solid, by m alone</dt>"), 1U);
+  EXPECT_EQ(count("<h2>Fit (f)</h2>"), 1U);
+  EXPECT_EQ(count("<h2>Fit (g)</h2>"), 1U);
+  EXPECT_EQ(count("<h2>Γ → T/T_c (map)</h2>"), 1U);
+  EXPECT_LT(page_.find("the answer"), page_.find("<h2>Fit (f)</h2>"));
+  EXPECT_LT(page_.find("<h2>Fit (f)</h2>"), page_.find("<h2>Fit (g)</h2>"));
+  EXPECT_LT(page_.find("<h2>Fit (g)</h2>"), page_.find("<h2>Γ → T/T_c (map)</h2>"));
+  EXPECT_LT(page_.find("<h2>Γ → T/T_c (map)</h2>"), page_.find("<h2>Stages</h2>"));
+  EXPECT_THAT(summary_, HasSubstr("**f**: No temperature can be determined: of f \n\n**g**: "));
+  EXPECT_EQ(terminal_text(plan_, outcome_),
+            "f: No temperature can be determined: of f \ng: No temperature can be determined: of g \n");
+}
+
 TEST_F(ReportPage, SaysHowTheRunEnded) {
   for (const auto& [code, line, word] :
        {std::tuple(exit_ok, "<p class=\"soft\">finished</p>", "**Finished**"),
