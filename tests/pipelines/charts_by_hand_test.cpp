@@ -265,6 +265,23 @@ TEST(ScalingMistakes, AreNamed) {
       "/fits/1/name: two fits are named \"f\"");
 }
 
+TEST(CriticalMistakes, AreNamed) {
+  const auto critical = [](const std::string& keys) {
+    return told("critical", R"({ "temperature": "T", )" + keys + " }", {{"beds", "study", nullptr}});
+  };
+  EXPECT_EQ(critical(R"("densities": [0.001, 1.1547005], "orders": [0.001, 0.999])"), "");
+  for (const char* density : {"0", "1.1548"})
+    EXPECT_EQ(
+        critical("\"densities\": [1, " + std::string(density) + "]"),
+        std::string("/densities: a threshold must be above 0 and at most 1.1547 (close packing), got ") + density);
+  for (const char* order : {"0", "1"})
+    EXPECT_EQ(critical("\"orders\": [" + std::string(order) + "]"),
+              std::string("/orders: a threshold of psi_6 must be between 0 and 1, got ") + order);
+  EXPECT_EQ(critical(R"("density": "", "order": "")"),
+            "/density: neither \"density\" nor \"order\" names a column: give one of them");
+  EXPECT_EQ(critical(R"("density": "", "order": "x")"), "");
+}
+
 // y = 3 x^2 exactly, with errors of a tenth: ratios of 1 with errors of a tenth; in two groups of "z" amplitudes 3
 // and 6.
 TEST(ScalingByHand, WritesItsPoints) {
