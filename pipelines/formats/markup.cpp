@@ -138,6 +138,7 @@ std::string shown(const Json& quantity) {
   if (quantity.is_boolean()) return quantity.get<bool>() ? "yes" : "no";
   if (quantity.is_string()) return escape_markup(quantity.get<std::string>());
   if (quantity.is_number()) return fmt::format("{:.5g}", quantity.get<double>());
+  if (quantity.is_object() && quantity.contains("value") && quantity["value"].is_null()) return "–";
   if (!quantity.is_object() || !quantity.contains("value") || !quantity["value"].is_number())
     return escape_markup(dump_canonical(quantity));
   double value = quantity["value"].get<double>(), error = stated_error(quantity);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <ctime>
 #include <optional>
+#include <set>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/runner/cache.hpp"
@@ -120,14 +121,13 @@ Json manifest_json(const Plan& plan, const RunOptions& options, const RunOutcome
   return out;
 }
 
-// Of the points of a sweep: what their stages have recorded.
+// Of the points of a sweep: what their stages have recorded; of a stage that points share, once.
 void verify_points(const fs::path& out, VerifyResult& result) {
-  std::vector<fs::path> stages;
+  std::set<fs::path> stages;
   std::error_code error;
   for (const fs::directory_entry& point : fs::directory_iterator(out / "points", error))
     for (const fs::directory_entry& stage : fs::directory_iterator(point.path(), error))
-      if (stage.is_directory(error)) stages.push_back(stage.path());
-  std::sort(stages.begin(), stages.end());
+      if (stage.is_directory(error)) stages.insert(fs::canonical(stage.path(), error));
   for (const fs::path& stage : stages) {
     const std::optional<StageRecord> record = read_record(stage);
     if (!record) continue;

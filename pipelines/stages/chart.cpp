@@ -319,7 +319,9 @@ void add_residuals(const CurveOptions& curve, const Series& series, Picture& pic
 }
 
 void add_curve(const CurveOptions& curve, Picture& picture) {
-  Series series{curve.label, style_of(curve.look), curve.color, {}, {}, {}, true};
+  Series series{
+      .label = curve.label, .style = style_of(curve.look), .color = curve.color, .x = {}, .y = {}, .error = {}};
+  series.markup = true;
   for (int i = 0; i <= 200; ++i) {
     const double x = curve.from + (curve.to - curve.from) * i / 200;
     series.x.push_back(x), series.y.push_back(value_at(curve, x));
@@ -608,13 +610,13 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
     if (data.has_errors) data.error = pooled(data.error, options.pool);
     if (options.look != Look::none) {
       const bool bars = data.has_errors && options.look == Look::points;
-      const Series series{options.label,
-                          style_of(options.look),
-                          options.color >= 0 ? options.color : color++,
-                          data.x,
-                          data.y,
-                          bars ? data.error : std::vector<double>{},
-                          true};
+      const Series series{.label = options.label,
+                          .style = style_of(options.look),
+                          .color = options.color >= 0 ? options.color : color++,
+                          .x = data.x,
+                          .y = data.y,
+                          .error = bars ? data.error : std::vector<double>{},
+                          .markup = true};
       picture.series.push_back(series);
       if (options.residuals) add_residuals(curve_named(chart, options.against), series, picture);
     }

@@ -301,6 +301,18 @@ TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {
   EXPECT_EQ(on_the_way.half_hidden(), 2U);
   EXPECT_DOUBLE_EQ(on_the_way.quality()["lowest_percent"].get<double>(), 0.12) << "the class from 0.10 to 0.12";
   EXPECT_DOUBLE_EQ(on_the_way.quality()["median"].get<double>(), 0.96);
+  // Bars 560/50 px apart; that of three disks is 200 px high, that of one log 2/log 4 of it.
+  const std::string figure = on_the_way.quality_figure();
+  EXPECT_NE(
+      figure.find("<rect x=\"586.4\" y=\"20.0\" width=\"10.2\" height=\"200.0\" fill=\"#1f6fb4\"><title>3</title>"),
+      std::string::npos);
+  EXPECT_NE(
+      figure.find("<rect x=\"116.0\" y=\"120.0\" width=\"10.2\" height=\"100.0\" fill=\"#1f6fb4\"><title>1</title>"),
+      std::string::npos);
+  EXPECT_NE(
+      figure.find("<text x=\"60\" y=\"240\">0</text>\n<text x=\"620\" y=\"240\" text-anchor=\"end\">1</text>\n<text "
+                  "x=\"340\" y=\"262\""),
+      std::string::npos);
   on_the_way.quality_table(extract_.table("quality.csv")).write(extract_.output("quality.csv"));
   const NumberTable quality = table("quality.csv"), disks = table("disks.csv"), details = table("disk_details.csv");
   ASSERT_EQ(quality.rows(), 50U);
@@ -373,6 +385,36 @@ TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
 
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
 // every second frame of the film as well; half of g makes twice the length T/(m g).
+// Of a film of unknown length the first four good frames, then every second, then every fourth; two of them, the first
+// among them, are drawn.
+TEST_F(ExtractTables, ChooseTheFramesThatAreDrawn) {
+  ExtractOptions options = some_options();
+  options.overlays = 2;
+  DisksOnTheWay on_the_way(extract_, options, nullptr);
+  const auto drawn = [&] {
+    std::vector<std::size_t> found;
+    for (const auto& [index, disks] : on_the_way.to_draw()) found.push_back(index);
+    return found;
+  };
+  ingest::FrameReport frame;
+  const auto take = [&](std::size_t index, bool good) {
+    frame.index = index, frame.status = good ? ingest::FrameStatus::good : ingest::FrameStatus::unreadable;
+    on_the_way.take(frame, {});
+  };
+  using Chosen = std::vector<std::size_t>;
+  EXPECT_EQ(drawn(), Chosen{});
+  take(0, true);
+  EXPECT_EQ(drawn(), Chosen{0});
+  for (std::size_t index = 1; index < 4; ++index) take(index, true);
+  EXPECT_EQ(drawn(), (Chosen{0, 2}));
+  for (std::size_t index = 4; index < 8; ++index) take(index, index != 6);  // kept: 0, 2, 4
+  EXPECT_EQ(drawn(), (Chosen{0, 4}));
+  for (std::size_t index = 8; index < 11; ++index) take(index, true);  // 0, 2, 4, 8; with 10 those of every fourth
+  EXPECT_EQ(drawn(), (Chosen{0, 8}));
+  EXPECT_FALSE(on_the_way.truth());
+  EXPECT_EQ(on_the_way.marks(0), nullptr);
+}
+
 TEST_F(ExtractTables, HoldTemperaturesByTheFramesReadAndByGravity) {
   const auto temperature = [&](double rate, std::uint32_t stride, double gravity) {
     ExtractOptions options = some_options();

@@ -461,6 +461,12 @@ TEST(Commands, UsageMistakesEndWith2) {
     EXPECT_FALSE(result.err.empty());
   }
   EXPECT_THAT(run_shakebed({"rnu"}, folder.path()).err, HasSubstr("did you mean \"run\""));
+  write_text(folder / "p.png", "");
+  EXPECT_THAT(
+      run_shakebed({"infer-bed", "p.png", "--diameter", "3 mm", "--frequency", "20 Hz", "--restitution", "0.9,0.8"},
+                   folder.path())
+          .err,
+      HasSubstr("--restitution: expected LOW,HIGH with LOW below HIGH, both from 0 to 1; got 0.9,0.8"));
   EXPECT_EQ(run_shakebed({"--help"}, folder.path()).exit_code, 0);
   EXPECT_EQ(run_shakebed({"--version"}, folder.path()).exit_code, 0);
 }

@@ -489,12 +489,21 @@ class Bench:
                 replaced[str(self.work / "objects" / name.replace("/", "+"))
                          if "-DSHAKEBED_PROGRAM=" in self.compiled[name] else name] = changed
             self.changed_programs.append(output)
+            os.replace(self.program(output), self.sound(Path(output).name))
             self.link(output, tuple(replaced.items()))
         return None
 
-    def start(self, program, tests, usual):
+    def program(self, output):
+        return self.work / "bin" / Path(output).name
+
+    def sound(self, name):
+        """Where a program is kept meanwhile whose own objects hold the fault."""
+        return self.work / "objects" / f"{name}.sound"
+
+    def start(self, program, tests, usual, sound=False):
         """The CPU may be used for several times what is usual; the machine may be busy with other things."""
-        return run_limited([str(self.work / "bin" / program), "--gtest_fail_fast", "--gtest_brief=1",
+        path = self.sound(program) if sound and self.sound(program).exists() else self.work / "bin" / program
+        return run_limited([str(path), "--gtest_fail_fast", "--gtest_brief=1",
                             "--gtest_filter=" + ":".join(tests)], 600 + 60 * usual, cpu_seconds=20 + int(4 * usual),
                            cwd=self.work / "bin")
 
@@ -504,7 +513,7 @@ class Bench:
             aside = self.fault.with_suffix(".aside")
             os.replace(self.fault, aside)
             self.no_fault()
-            code, _, cpu = self.start(program, [test], usual)
+            code, _, cpu = self.start(program, [test], usual, sound=True)
             self.cpu += cpu
             os.replace(aside, self.fault)
             (self.fit if code == 0 else self.unfit).add(test)
@@ -529,8 +538,7 @@ class Bench:
             shutil.rmtree(self.overlay)
             self.no_fault()
             for output in self.changed_programs:
-                (self.work / "bin" / Path(output).name).unlink(missing_ok=True)
-                self.link(output)
+                os.replace(self.sound(Path(output).name), self.program(output))
 
     def ask(self, row, times, part):
         spent = 0

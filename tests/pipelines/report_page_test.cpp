@@ -1,0 +1,264 @@
+// The page of a run, of stages whose records are made by hand: its parts, their order, numbers and drawings.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "pipelines/report/report.hpp"
+#include "tests/pipelines/program.hpp"
+
+namespace {
+
+using namespace shakebed::pipelines;
+using namespace shakebed::tests;
+using testing::HasSubstr;
+using testing::Not;
+
+class ReportPage : public testing::Test {
+ protected:
+  void read(const std::string& top = "") {
+    std::vector<Problem> problems;
+    plan_ = make_plan(*parse_json(R"({ "name": "a_bed", )" + top + R"( "stages": [
+        { "stage": "map", "id": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 },
+        { "stage": "simulate", "id": "a-bed-of-14-xx", "seed": 7, "disks": { "count": 50, "diameter": "3 mm" },
+          "box": { "width": "19 mm" }, "settle": "0.5 s", "measure": "0.5 s",
+          "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz" } },
+        { "stage": "fit", "id": "a-fit-of-15-xxx", "from": "a-bed-of-14-xx" },
+        { "stage": "figure", "from": ["a-bed-of-14-xx", "a-fit-of-15-xxx"] } ] })",
+                                  "folder/r.json", problems),
+                      "folder/r.json", folder_.path());
+    outcome_ = {};
+    outcome_.out = folder_.path();
+    for (const PlannedStage& stage : plan_.stages) {
+      outcome_.stages.emplace_back().id = stage.id;
+      outcome_.stages.back().kind = stage.row->name;
+    }
+  }
+  void write() {
+    report_pages().write(plan_, outcome_);
+    page_ = read_text(folder_ / "report.html");
+    summary_ = read_text(folder_ / "summary.md");
+  }
+  std::string between(const std::string& from, const std::string& to) const {
+    const std::size_t begin = page_.find(from);
+    return begin == std::string::npos ? "" : page_.substr(begin, page_.find(to, begin) - begin);
+  }
+  ScratchFolder folder_;
+  Plan plan_;
+  RunOutcome outcome_;
+  std::string page_, summary_;
+};
+
+// A stage stands one column right of the last that it reads from, below the others of its column. Boxes of 124 x 54, a
+// column every 166, a row every 74, 8 from the border: three columns and two rows are 472 x 144.
+TEST_F(ReportPage, DrawsItsStages) {
+  read();
+  outcome_.stages[0].state = StageState::kept;
+  outcome_.stages[1].state = StageState::ran;
+  outcome_.stages[1].cost.emplace().wall_seconds = 2.5;
+  outcome_.stages[2].state = StageState::failed;
+  write();
+  const std::string graph = between("<svg class=\"graph\"", "</svg>");
+  EXPECT_THAT(graph, HasSubstr("viewBox=\"0 0 472 144\" width=\"472\" height=\"144\""));
+  EXPECT_THAT(
+      graph, HasSubstr("<rect class=\"\" x=\"8\" y=\"8\" width=\"124\" height=\"54\" rx=\"6\"/><text x=\"18\" y=\"31\">"
+                       "map</text><text class=\"small\" x=\"18\" y=\"50\">kept</text>"));
+  EXPECT_THAT(
+      graph,
+      HasSubstr("<rect class=\"\" x=\"8\" y=\"82\" width=\"124\" height=\"54\" rx=\"6\"/><text x=\"18\" y=\"105\">"
+                "a-bed-of-14-xx</text><text class=\"small\" x=\"18\" y=\"124\">ran<!-- times -->, 2.5 s<!-- "
+                "/times --></text>"));
+  EXPECT_THAT(
+      graph, HasSubstr("<rect class=\"failed\" x=\"174\" y=\"8\" width=\"124\" height=\"54\" rx=\"6\"/><text x=\"184\" "
+                       "y=\"31\">a-fit-of-15-x…</text>"));
+  EXPECT_THAT(graph, HasSubstr("<rect class=\"\" x=\"340\" y=\"8\" width=\"124\""));
+  // From the middle of the right side of one box to that of the left side of the next.
+  EXPECT_THAT(graph, HasSubstr("<path d=\"M132 109C156 109 150 35 174 35\"/>"));
+  EXPECT_THAT(graph, HasSubstr("<path d=\"M132 109C156 109 316 35 340 35\"/>"));
+  EXPECT_THAT(graph, HasSubstr("<path d=\"M298 35C322 35 316 35 340 35\"/>"));
+}
+
+// 24 files of a stage are named; text of up to 120 kB is inside the page as long as this holds 600 kB.
+TEST_F(ReportPage, OffersItsFiles) {
+  read();
+  const auto add = [&](std::size_t stage, const std::string& name, std::size_t bytes) {
+    if (!outcome_.stages[stage].record) outcome_.stages[stage].record.emplace();
+    const auto path = folder_ / (outcome_.stages[stage].id + "/" + name);
+    std::filesystem::create_directories(path.parent_path());
+    write_text(path, std::string(bytes, 'x'));
+    outcome_.stages[stage].record->outputs.push_back(
+        {.file = name, .bytes = bytes, .fast = "", .sha256 = "sha-" + name});
+  };
+  add(0, "sub/t.csv", 3), add(0, "u.svg", 4), add(0, "v.json", 5), add(0, "w.gp", 6), add(0, "x.png", 7);
+  add(0, "y.plot.json", 8);
+  add(1, "a.csv", 120'000), add(1, "b.csv", 120'001), add(1, "c.csv", 120'000), add(1, "d.csv", 120'000);
+  add(1, "e.csv", 120'000), add(1, "f.csv", 120'000), add(1, "g.dat", 1000);
+  for (int k = 0; k < 26; ++k) add(2, std::string(1, static_cast<char>('a' + k)) + ".png", 1);
+  write();
+  const std::string inside = between("inside this page</summary>", "</ul>");
+  EXPECT_THAT(inside, HasSubstr("<a download=\"a_bed-recipe.json\" href=\"data:application/json;base64,"));
+  EXPECT_THAT(inside,
+              HasSubstr("<li><a download=\"map-sub-t.csv\" href=\"data:text/csv;base64,eHh4\">map-sub-t.csv</a> "
+                        "<span class=\"soft\">3 bytes</span></li>"));
+  EXPECT_THAT(inside, HasSubstr("<a download=\"map-u.svg\" href=\"data:image/svg+xml;base64,eHh4eA==\">"));
+  EXPECT_THAT(inside, HasSubstr("<a download=\"map-v.json\" href=\"data:application/json;"));
+  EXPECT_THAT(inside, HasSubstr("<a download=\"map-w.gp\" href=\"data:text/plain;"));
+  EXPECT_THAT(inside, HasSubstr("a-bed-of-14-xx-a.csv</a> <span class=\"soft\">120 kB<"));
+  EXPECT_THAT(inside, HasSubstr("a-bed-of-14-xx-e.csv"));
+  EXPECT_THAT(inside, Not(HasSubstr("a-bed-of-14-xx-b.csv"))) << "too large";
+  EXPECT_THAT(inside, Not(HasSubstr("a-bed-of-14-xx-f.csv"))) << "the recipe and four times 120 kB are there already";
+  EXPECT_THAT(inside, HasSubstr("a-bed-of-14-xx-g.dat"));
+  const std::string beside = between("in the folder of this page</summary>", "</ul>");
+  EXPECT_THAT(beside, HasSubstr("<li><a href=\"map/x.png\">map/x.png</a> <span class=\"soft\">7 bytes</span></li>"));
+  EXPECT_THAT(beside, HasSubstr("<a href=\"a-bed-of-14-xx/b.csv\">"));
+  EXPECT_THAT(beside, HasSubstr("<a href=\"a-bed-of-14-xx/f.csv\">"));
+  EXPECT_THAT(beside, HasSubstr("a-fit-of-15-xxx/x.png"));
+  EXPECT_THAT(beside, Not(HasSubstr("a-fit-of-15-xxx/y.png")));
+  EXPECT_THAT(page_, Not(HasSubstr("map/y.plot.json\">"))) << "it is inside the figure";
+  const std::string files = between("Files with their SHA-256", "</table>");
+  EXPECT_THAT(
+      files,
+      HasSubstr("<tr><td>map/sub/t.csv</td><td class=\"number\">3</td><td><code>sha-sub/t.csv</code></td></tr>"));
+  EXPECT_THAT(files, HasSubstr("a-fit-of-15-xxx/x.png"));
+  EXPECT_THAT(files, Not(HasSubstr("a-fit-of-15-xxx/y.png")));
+  EXPECT_THAT(files, HasSubstr("<td>a-fit-of-15-xxx: 2 more files, listed in manifest.json</td>"));
+  EXPECT_THAT(files, Not(HasSubstr("a-bed-of-14-xx: ")));
+  const std::string provenance = between("<h2>Provenance</h2>", "</table>");
+  EXPECT_THAT(provenance, HasSubstr("<td>recipe</td><td><code>r.json</code>"));
+  EXPECT_THAT(provenance, HasSubstr("<td>seed of a-bed-of-14-xx</td><td><code>7</code>"));
+  EXPECT_THAT(provenance, Not(HasSubstr("seed of map")));
+}
+
+// A warning of a stage is folded at the end of its first sentence of at least 25 letters.
+TEST_F(ReportPage, GroupsItsWarnings) {
+  read();
+  outcome_.warnings = {"nobody: short. Said of the recipe",
+                       "figure: This is a sentence of many words. And more follow; here",
+                       "figure: twenty-four letters here; the rest", "figure: 23 letters are one less: the rest",
+                       "figure: ends with a stop, but nothing follows it. "};
+  write();
+  const std::string own = between("<section class=\"warnings\"", "</section>");
+  EXPECT_THAT(
+      own,
+      HasSubstr("<h2>5 warnings</h2>\n<h3>Warnings about the recipe: the bed may not be the one that you want</h3>\n"
+                "<p>nobody: short. Said of the recipe</p>\n<h3>Warnings that do not concern the answer</h3>\n"));
+  EXPECT_THAT(
+      own, HasSubstr("<details><summary><span class=\"soft\">figure:</span> This is a sentence of many words.</summary>"
+                     "<p>And more follow; here</p></details>\n"));
+  EXPECT_THAT(own, HasSubstr("<details><summary><span class=\"soft\">figure:</span> twenty-four letters here</summary>"
+                             "<p>the rest</p></details>\n"));
+  EXPECT_THAT(own, HasSubstr("<p><span class=\"soft\">figure:</span> 23 letters are one less: the rest</p>\n"));
+  EXPECT_THAT(own,
+              HasSubstr("<p><span class=\"soft\">figure:</span> ends with a stop, but nothing follows it. </p>\n"));
+  outcome_.warnings = {"one"};
+  write();
+  EXPECT_THAT(page_, HasSubstr("<h2>1 warning</h2>"));
+  outcome_.warnings.clear();
+  write();
+  EXPECT_THAT(page_, Not(HasSubstr("<section class=\"warnings\"")));
+}
+
+// Of two fits the first gives the answer and the solid's height beside it; each has its section, in the order of the
+// recipe.
+TEST_F(ReportPage, BeginsWithTheFirstAnswer) {
+  write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.2\n");
+  std::vector<Problem> problems;
+  plan_ = make_plan(*parse_json(R"({ "name": "two", "stages": [ { "stage": "fit", "id": "f", "profile": "p.csv" },
+      { "stage": "fit", "id": "g", "profile": "p.csv" }, { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })",
+                                "r.json", problems),
+                    "r.json", folder_.path());
+  outcome_.out = folder_.path();
+  for (const PlannedStage& stage : plan_.stages) {
+    outcome_.stages.emplace_back().id = stage.id;
+    outcome_.stages.back().record.emplace();
+    std::filesystem::create_directories(folder_ / stage.id);
+    write_text(folder_ / (stage.id + "/" + std::string(stage.row->result)),
+               stage.id == "map"
+                   ? R"({"gamma": {"value": 4}, "readings": []})"
+                   : R"({"model": "m", "solid_height": {"value": 4, "unit": "D"}, "answer": {"why": "of )" + stage.id +
+                         R"("}, "window": {"low": 1, "high": 2}})");
+  }
+  write();
+  const auto count = [&](const std::string& words) {
+    std::size_t found = 0;
+    for (std::size_t at = page_.find(words); at != std::string::npos; at = page_.find(words, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("aria-label=\"the answer\""), 1U);
+  EXPECT_THAT(between("aria-label=\"the answer\"", "</section>"), HasSubstr("<p>Of f</p>"));
+  EXPECT_EQ(count("<dt>height of the solid, by m alone</dt>"), 1U);
+  EXPECT_EQ(count("<h2>Fit (f)</h2>"), 1U);
+  EXPECT_EQ(count("<h2>Fit (g)</h2>"), 1U);
+  EXPECT_EQ(count("<h2>Γ → T/T_c (map)</h2>"), 1U);
+  EXPECT_LT(page_.find("the answer"), page_.find("<h2>Fit (f)</h2>"));
+  EXPECT_LT(page_.find("<h2>Fit (f)</h2>"), page_.find("<h2>Fit (g)</h2>"));
+  EXPECT_LT(page_.find("<h2>Fit (g)</h2>"), page_.find("<h2>Γ → T/T_c (map)</h2>"));
+  EXPECT_LT(page_.find("<h2>Γ → T/T_c (map)</h2>"), page_.find("<h2>Stages</h2>"));
+  EXPECT_THAT(summary_, HasSubstr("**f**: No temperature can be determined: of f \n\n**g**: "));
+  EXPECT_EQ(terminal_text(plan_, outcome_),
+            "f: No temperature can be determined: of f \ng: No temperature can be determined: of g \n");
+}
+
+TEST_F(ReportPage, SaysHowTheRunEnded) {
+  for (const auto& [code, line, word] :
+       {std::tuple(exit_ok, "<p class=\"soft\">finished</p>", "**Finished**"),
+        {exit_check_failed, "<p class=\"bad\">finished, but a check failed</p>", "**A check failed**"},
+        {exit_interrupted, "<p class=\"bad\">interrupted</p>", "**Interrupted**"},
+        {exit_stage_failed, "<p class=\"bad\">stopped</p>", "**Stopped**"}}) {
+    read();
+    outcome_.code = code;
+    if (code == exit_stage_failed) outcome_.error = "no <disk>";
+    write();
+    EXPECT_THAT(page_, HasSubstr(line));
+    EXPECT_THAT(summary_, HasSubstr(std::string("# a\\_bed\n\n") + word + "\n\n"));
+    EXPECT_EQ(page_.find("Why the run stopped</strong>no &lt;disk&gt;") != std::string::npos,
+              code == exit_stage_failed);
+    EXPECT_EQ(summary_.find("> no &lt;disk>\n") != std::string::npos, code == exit_stage_failed);
+  }
+}
+
+// Without results of its stages: published numbers are not measured, and the table of the terminal has columns that are
+// as wide as its longest label, 24 and 14 letters.
+TEST_F(ReportPage, HasPublishedAndAssumedNumbers) {
+  read(R"("description": "why & what", "report": { "title": "T_c", "published": [
+      { "number": "/map/gamma", "label": "a long label", "value": "1.5 mm", "place": "Fig. 2" },
+      { "number": "/map/gamma", "label": "b", "value": "2", "beside_answer": true },
+      { "number": "/map/gamma", "label": "c", "value": "3" } ],
+    "assumed": [ { "input": "/stages/map/frequency", "why": "not printed" },
+                 { "input": "/stages/map/restitution", "why": "none" }, { "input": "/stages/map/gamma", "why": "a guess" } ] },)");
+  outcome_.wall_seconds = 100;
+  outcome_.stages[1].state = StageState::ran;
+  outcome_.stages[1].cost.emplace().wall_seconds = 2.5;
+  outcome_.warnings = {"one"};
+  write();
+  EXPECT_EQ(terminal_text(plan_, outcome_),
+            "\nnumber       ours                     published      verdict\n"
+            "a long label –                        1.5 mm         not measured\n"
+            "b            –                        2              not measured\n"
+            "c            –                        3              not measured\n\n");
+  const std::string beside = between("numbers beside the answer", "</section>");
+  EXPECT_THAT(beside,
+              HasSubstr("<dt>a long label</dt><dd>– <span class=\"tag computed\">computed</span></dd></div>\n<div><dt>"
+                        "published value</dt><dd>1.5 mm <span class=\"tag published\">published</span> <span class=\""
+                        "verdict bad\">not measured</span></dd>"));
+  EXPECT_THAT(beside, HasSubstr("<dt>b</dt>"));
+  EXPECT_THAT(beside, Not(HasSubstr("<dt>c</dt>")));
+  EXPECT_THAT(between("<h2>Comparison with published numbers</h2>", "</table>"), HasSubstr(">Fig. 2</td>"));
+  const std::string assumed = between("<h2>Assumed inputs</h2>", "</table>");
+  EXPECT_THAT(assumed,
+              HasSubstr("<code>/stages/map/frequency</code></td><td data-label=\"value\" class=\"number\">20 Hz "));
+  EXPECT_THAT(assumed,
+              HasSubstr("<code>/stages/map/restitution</code></td><td data-label=\"value\" class=\"number\">– "));
+  EXPECT_THAT(assumed, HasSubstr("<code>/stages/map/gamma</code></td><td data-label=\"value\" class=\"number\">4 "));
+  EXPECT_THAT(page_, HasSubstr("<h2>What was done</h2>\n<p>why &amp; what</p>\n"));
+  EXPECT_THAT(page_, HasSubstr("<title>T_c</title>"));
+  EXPECT_THAT(page_, HasSubstr("<h1>T<sub>c</sub></h1>"));
+  EXPECT_THAT(summary_, HasSubstr("# T\\_c\n\n**Finished**\n\n\n## Comparison with published numbers\n\n"
+                                  "| number | ours | published | verdict |\n|---|---|---|---|\n"
+                                  "| a long label | – | 1.5 mm | not measured |\n"));
+  EXPECT_THAT(summary_,
+              HasSubstr("\n## Warnings\n\n- one\n\n## Stages\n\n| stage | kind | |\n|---|---|---|\n| map | map | "));
+  EXPECT_THAT(summary_, HasSubstr("\n<!-- times -->\nTime: 1 min 40 s; a-bed-of-14-xx 2.5 s\n<!-- /times -->\n"));
+}
+
+}  // namespace
