@@ -11,8 +11,8 @@
 namespace shakebed::pipelines {
 
 // At most two, the best first. `measured`: what was found and refused, with the disks of its first frame; none where
-// the first look was refused, or where nothing was found. A refusal may cost a few times what the search of the picture
-// costs: the picture is searched again a few times only, and never for what was found in it.
+// the first look was refused, or where nothing was found. What was found is not searched for again, and the picture is
+// searched a few times at most.
 enum class RefusedBy { first_look, measurement };
 std::vector<Proposal> proposals_for(const FirstLook& look, const ExtractOptions& options, RefusedBy refused,
                                     const ingest::Measurement* measured = nullptr);
