@@ -344,6 +344,13 @@ double expected_beads(const std::vector<RimDisk>& disks) {
   return expected;
 }
 
+LearnedRims learn_quickly(const GrayFrame& frame, const BeadsSeen& seen, bool one_size) {
+  PictureMaps maps(frame, quick_search.wanted_px);
+  LearnedRims rims = learn_rims(maps, seen.polarity, seen.radius_px, Known::beads);
+  learn_gaps(maps, rims, one_size);
+  return rims;
+}
+
 // Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
 // clearly more of them. It takes several times as long, and where hardly any bead is missed it has little to add. (The
 // share below which it is left out was set for its time, not by a measurement of what is found.)
@@ -351,12 +358,13 @@ LearnedRims most_telling(const GrayFrame& frame, LearnedRims quick, const FindOp
   constexpr double clearly_more = 1.03, hardly_any = 0.05;
   const RimsFound by_quick = find_rims(frame, quick.model);
   if (share_missed_of(frame, quick.model, by_quick, options.roi) < hardly_any) return quick;
+  PictureMaps maps(frame, thorough_search.wanted_px);
   const auto learned = [&](Polarity polarity) {
-    return learn_rims(frame, polarity, quick.model.radius_px, Known::beads, thorough_search);
+    return learn_rims(maps, polarity, quick.model.radius_px, Known::beads, thorough_search);
   };
   LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
   if (expected_beads(either.disks) > clearly_more * expected_beads(thorough.disks)) thorough = std::move(either);
-  learn_gaps(frame, thorough, options.one_size || options.rims_of_one_size);
+  learn_gaps(maps, thorough, options.one_size || options.rims_of_one_size);
   const double by_thorough = expected_beads(find_rims(frame, thorough.model).disks);
   return by_thorough > clearly_more * expected_beads(by_quick.disks) ? thorough : quick;
 }
@@ -370,21 +378,19 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
   const GrayFrame& frame = *frames.back();
-  LearnedRims rims = learn_rims(frame, options.seen->polarity, options.seen->radius_px, Known::beads);
-  learn_gaps(frame, rims, options.one_size);
+  LearnedRims rims = learn_quickly(frame, *options.seen, options.one_size);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
-  return calibration_by_rims(frame, most_telling(frame, std::move(rims), options), options);
+  if (!options.quick_rims_only) rims = most_telling(frame, std::move(rims), options);
+  return calibration_by_rims(frame, rims, options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
-  LearnedRims rims = learn_rims(frame, seen.polarity, seen.radius_px, Known::beads);
-  learn_gaps(frame, rims, true);
-  return calibration_by_rims(frame, rims, {});
+  return calibration_by_rims(frame, learn_quickly(frame, seen, true), {});
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

@@ -91,6 +91,7 @@ class FreePlaces {
         for (int x = std::max(0, column - 1); x <= std::min(edges.width - 1, column + 1); ++x)
           edge_[edges.at(x, y)] = 1;
     }
+    sum_edges();
   }
 
   // Places of this radius, the fullest first; each covers what it lies on.
@@ -118,6 +119,32 @@ class FreePlaces {
   [[nodiscard]] bool is_straight(const RidgePixel& pixel) const {
     const double one = straight_share(pixel, 1), other = straight_share(pixel, -1);
     return std::max(one, other) >= least_to_one_side || (one + other) / 2 >= least_to_both;
+  }
+
+  // edges_before_: pixels of edges above a row and left of a column.
+  void sum_edges() {
+    const auto width = static_cast<std::size_t>(edges_.width) + 1;
+    edges_before_.assign(width * (static_cast<std::size_t>(edges_.height) + 1), 0);
+    for (int row = 0; row < edges_.height; ++row) {
+      std::uint32_t along = 0;
+      std::uint32_t* above = edges_before_.data() + static_cast<std::size_t>(row) * width;
+      for (int column = 0; column < edges_.width; ++column) {
+        along += edge_[edges_.at(column, row)];
+        above[width + static_cast<std::size_t>(column) + 1] = above[static_cast<std::size_t>(column) + 1] + along;
+      }
+    }
+  }
+
+  // Whether there are edges in the square around a place of this radius in which they are looked for.
+  [[nodiscard]] bool has_edges_near(double x, double y, double radius) const {
+    const double reach = farthest_edge * radius + 1;
+    const auto column = [&](double at) { return static_cast<std::size_t>(std::clamp(at, 0.0, 1.0 * edges_.width)); };
+    const auto row = [&](double at) { return static_cast<std::size_t>(std::clamp(at, 0.0, 1.0 * edges_.height)); };
+    const std::size_t left = column(x - reach), right = column(x + reach + 1);
+    const std::size_t width = static_cast<std::size_t>(edges_.width) + 1;
+    const std::size_t above = row(y - reach) * width, below = row(y + reach + 1) * width;
+    return edges_before_[below + right] + edges_before_[above + left] !=
+           edges_before_[below + left] + edges_before_[above + right];
   }
 
   // Along the tangent, to the side of this sign; 0 where the picture ends.
@@ -170,6 +197,7 @@ class FreePlaces {
       }
       return all;
     }();
+    if (!has_edges_near(x, y, radius)) return 0;  // most places
     int open = 0, met = 0;
     for (const auto& [cosine, sine] : units) {
       bool edge = false, uncovered = false;
@@ -191,6 +219,7 @@ class FreePlaces {
   std::vector<float> clearance_;    // px to the nearest disk or place taken, below 0 inside
   std::vector<float> to_disk_;      // the same, to disks alone
   std::vector<std::uint8_t> edge_;  // 1 within a pixel of an edge that is no disk's
+  std::vector<std::uint32_t> edges_before_;
 };
 
 }  // namespace

@@ -386,6 +386,8 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   find.seen = best->beads;
   find.radius_px.reset();
   find.hold_radius = false;
+  // Once a picture is enough for the thorough search, which took most of the time where it found nothing.
+  find.quick_rims_only = calibration.by_rims;
   CalibrationResult learned = learn_beads({&best->painted}, find);
   if (!learned.found || !learned.calibration.rims) return;
   tell_radius(learned);

@@ -14,10 +14,10 @@ double copy_angle(std::size_t copy) {
 PictureMaps::One& PictureMaps::made_for(double radius_px, float threshold) {
   const double scale = scale_for(radius_px, wanted_px_);
   for (One& one : made_)
-    if (one.scale == scale && one.threshold == threshold) return one;
+    if (one.scale == scale && (threshold > 0 ? one.map.edges.threshold == threshold : one.own_threshold)) return one;
   ScaledPicture at = ingest::scaled_for(frame_, radius_px, wanted_px_);
   EdgeMap edges = find_edges(at.picture, threshold);
-  made_.push_back({scale, threshold, {std::move(at), std::move(edges), {}}});
+  made_.push_back({scale, !(threshold > 0), {std::move(at), std::move(edges), {}}});
   return made_.back();
 }
 

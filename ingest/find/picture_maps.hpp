@@ -1,5 +1,5 @@
 #pragma once
-// Maps of a picture's edges, each scaled for the beads that are searched in it; each is made once.
+// Maps of a picture's edges, each scaled for the beads that are searched in it; each is made once, whoever asks for it.
 
 #include <cstddef>
 #include <list>
@@ -25,21 +25,22 @@ class PictureMaps {
  public:
   // `wanted_px` as in scale_for().
   PictureMaps(const GrayFrame& frame, double wanted_px) : frame_(frame), wanted_px_(wanted_px) {}
-  // `threshold` as in find_edges().
+  // `threshold` as in find_edges(). Asked for by the threshold that it found, a map is the same one.
   const PictureMap& scaled_for(double radius_px, float threshold = 0);
+  [[nodiscard]] double wanted_px() const { return wanted_px_; }
   // The same, with its copies.
   const PictureMap& with_copies(double radius_px, float threshold = 0);
 
  private:
   struct One {
     double scale;
-    float threshold;
+    bool own_threshold;  // found in the map itself
     PictureMap map;
   };
   One& made_for(double radius_px, float threshold);
 
   const GrayFrame& frame_;
-  double wanted_px_;
+  const double wanted_px_;
   std::list<One> made_;
 };
 

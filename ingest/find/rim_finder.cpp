@@ -156,17 +156,14 @@ std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPi
   return circles;
 }
 
-// Learns at the scale of this radius, on the copies too.
-LearnedRims learn_rims_at(const GrayFrame& frame, const RimModel& start, Known known) {
+// Learns at the scale of this radius, on the copies too: in four directions, so that what is oval in one of them is
+// round in another.
+LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known) {
   LearnedRims learned;
   RimModel& model = learned.model;
   model = start;
-  const ScaledPicture at = scaled_for(frame, model.radius_px, model.search.wanted_px);
-  const EdgeMap edges = find_edges(at.picture);
+  const auto& [at, edges, copies] = maps.with_copies(model.radius_px);
   model.threshold = edges.threshold;
-  std::vector<EdgeMap> copies;  // in four directions, so that what is oval in one of them is round in another
-  for (const double turn : {0.0, 0.25, 0.5, 0.75})
-    copies.push_back(find_edges(stretched(at.picture, decoy_stretch, turn * std::numbers::pi), edges.threshold));
   std::vector<Circle> circles;
   // Until the radius settles: with beads of several sizes it starts between two of them.
   constexpr int fewest_rounds = 2, most_rounds = 6;
@@ -194,20 +191,29 @@ double RimModel::probability_of(double support) const { return probability_at(pr
 
 LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known,
                        const RimSearch& search) {
+  PictureMaps maps(frame, search.wanted_px);
+  return learn_rims(maps, polarity, radius_px, known, search);
+}
+
+LearnedRims learn_rims(PictureMaps& maps, Polarity polarity, double radius_px, Known known, const RimSearch& search) {
   RimModel start;
   start.polarity = polarity;
   start.radius_px = radius_px;
   start.search = search;
-  LearnedRims learned = learn_rims_at(frame, start, known);
+  LearnedRims learned = learn_rims_at(maps, start, known);
   // Frames are searched at the scale of the radius that was learned: what was learned must be of that scale, too.
   start.radius_px = learned.model.radius_px;
   if (scale_for(start.radius_px, search.wanted_px) != scale_for(radius_px, search.wanted_px))
-    learned = learn_rims_at(frame, start, known);
+    learned = learn_rims_at(maps, start, known);
   return learned;
 }
 
 void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
   PictureMaps maps(frame, learned.model.search.wanted_px);
+  learn_gaps(maps, learned, one_size);
+}
+
+void learn_gaps(PictureMaps& maps, LearnedRims& learned, bool one_size) {
   std::vector<Circle> beads;
   for (const RimDisk& disk : learned.disks) beads.push_back(disk.circle);
   learned.model.gaps = chances_in_gaps(maps, beads, learned.model, one_size);

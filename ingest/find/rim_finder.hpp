@@ -11,6 +11,7 @@
 
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/outline.hpp"
+#include "ingest/find/picture_maps.hpp"
 #include "ingest/find/picture_scale.hpp"
 #include "ingest/find/rim_probability.hpp"
 
@@ -76,6 +77,9 @@ struct LearnedRims {
 // chance, as the copies of beads of another size make, say nothing against circles that are seen well.
 LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_px, Known known = Known::nothing,
                        const RimSearch& search = quick_search);
+// The same with maps that were made before, or will be used again; they must be those of the search.
+LearnedRims learn_rims(PictureMaps& maps, Polarity polarity, double radius_px, Known known = Known::nothing,
+                       const RimSearch& search = quick_search);
 
 // Whether the outlines of the disks are round.
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);
@@ -83,6 +87,7 @@ Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std:
 // Looks again beside the beads found: chance makes up few circles there, so poorer rims are enough. Beads of other
 // sizes are looked for unless `one_size`.
 void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size);
+void learn_gaps(PictureMaps& maps, LearnedRims& learned, bool one_size);
 
 struct RimsFound {
   std::vector<RimDisk> disks;  // from top to bottom

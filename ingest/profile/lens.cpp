@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 
 #include "ingest/frames/smooth_field.hpp"
@@ -118,77 +120,180 @@ GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
   return frame;
 }
 
-LensEstimate estimate_lens(const std::vector<const GrayFrame*>& frames, const std::vector<FindResult>& found,
-                           const FinderCalibration& calibration) {
-  // A bead at d from the middle, turned by phi: its rim in the frame is at R + dR(theta),
-  // dR = common - R a cos^2(theta) - R k (d/h)^2 (2 + cos 2(theta - phi)) to first order, and its level changes by
-  // -p'(r) dR.
-  LensEstimate estimate;
-  const double radius = calibration.rim_radius_px, reach = calibration.profile.reach_px();
-  const double step = calibration.profile.step_px;
-  const std::vector<float>& level = calibration.profile.level;
-  const double contrast = calibration.contrast_level;
-  std::vector<double> matrix(9, 0.0), right(3, 0.0);
-  double square = 0;
-  std::size_t disks = 0, pixels = 0;
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    const GrayFrame residual = residual_frame(*frames[f], found[f], calibration);
-    const double middle_x = 0.5 * (residual.width - 1), middle_y = 0.5 * (residual.height - 1);
-    const double half_diagonal = std::hypot(middle_x + 0.5, middle_y + 0.5);
-    // What each pixel would gain by the three together, from all beads it belongs to.
-    std::vector<std::array<float, 3>> gain(residual.pixels.size(), {0, 0, 0});
-    for (const FoundDisk& disk : found[f].disks) {
-      disks += !disk.cut && !disk.half_hidden;
-      const double away_x = (disk.x_px - middle_x) / half_diagonal, away_y = (disk.y_px - middle_y) / half_diagonal;
-      const double away = away_x * away_x + away_y * away_y;
-      const int top = std::max(0, static_cast<int>(std::ceil(disk.y_px - reach))),
-                bottom = std::min(residual.height - 1, static_cast<int>(std::floor(disk.y_px + reach)));
-      const int left = std::max(0, static_cast<int>(std::ceil(disk.x_px - reach))),
-                right_column = std::min(residual.width - 1, static_cast<int>(std::floor(disk.x_px + reach)));
-      for (int row = top; row <= bottom; ++row)
-        for (int column = left; column <= right_column; ++column) {
-          const double dx = column - disk.x_px, dy = row - disk.y_px, r = std::sqrt(dx * dx + dy * dy);
-          const auto cell = static_cast<std::size_t>(r / step);
-          if (cell + 1 >= level.size() || r < 1e-9) continue;
-          const double slope = (static_cast<double>(level[cell + 1]) - static_cast<double>(level[cell])) / step;
-          const double along = (dx * away_x + dy * away_y) / r;  // |d|/h cos(theta - phi)
-          auto& here = gain[static_cast<std::size_t>(row) * static_cast<std::size_t>(residual.width) +
-                            static_cast<std::size_t>(column)];
-          here[0] += static_cast<float>(-slope);
-          here[1] += static_cast<float>(slope * radius * dx * dx / (r * r));
-          here[2] += static_cast<float>(slope * radius * (away + 2 * along * along));
-        }
+namespace {
+
+// The rims of all beads, seen through a lens that is a little off. A bead at d from the middle, turned by phi: its rim
+// in the frame is at R + dR(theta), dR = common - R a cos^2(theta) - R (d/h)^2 (2 k + l cos 2(theta - phi)) to first
+// order, and its level changes by -p'(r) dR. Of a lens, k = l: beads away from the middle grow, and their shape
+// changes, as one.
+class LensFit {
+ public:
+  explicit LensFit(const FinderCalibration& calibration)
+      : calibration_(calibration), radius_(calibration.rim_radius_px), reach_(calibration.profile.reach_px()) {}
+
+  void add(const GrayFrame& frame, const FindResult& found) {
+    const GrayFrame residual = residual_frame(frame, found, calibration_);
+    RimPixels rims(residual);
+    for (std::size_t k = 0; k < found.disks.size(); ++k) {
+      const FoundDisk& disk = found.disks[k];
+      disks_ += !disk.cut && !disk.half_hidden;
+      add_rim(disk, beads_.size() + k, rims);
     }
-    for (std::size_t k = 0; k < gain.size(); ++k) {
-      if (gain[k][0] == 0) continue;
-      const double e = static_cast<double>(residual.pixels[k]) / contrast;
-      constexpr double no_rim = 0.5;  // dirt, a bead of another kind
-      if (std::abs(e) > no_rim) continue;
-      square += e * e;
-      ++pixels;
-      for (std::size_t a = 0; a < 3; ++a) {
-        right[a] += static_cast<double>(gain[k][a]) * e;
-        for (std::size_t b = 0; b < 3; ++b)
-          matrix[a * 3 + b] += static_cast<double>(gain[k][a]) * static_cast<double>(gain[k][b]);
+    beads_.resize(beads_.size() + found.disks.size());
+    take_pixels(residual, rims);
+  }
+
+  [[nodiscard]] LensEstimate estimate() const {
+    const Model lens = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 1}},
+                apart = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+    constexpr std::size_t fewest = 20;
+    LensEstimate estimate;
+    if (disks_ < fewest) return estimate;
+    const auto best = solved(lens, all_), both = solved(apart, all_);
+    if (!best || !both) return estimate;
+    estimate.known = true;
+    estimate.lens.pixel_aspect = 1 + (*best)[1];
+    estimate.lens.radial = (*best)[2];
+    estimate.aspect_std_error = std_error_of({0, 1, 0, 0}, lens, *best);
+    estimate.radial_std_error = std_error_of({0, 0, 0.5, 0.5}, lens, *best);
+    estimate.radial_by_size = (*both)[2];
+    estimate.radial_by_shape = (*both)[3];
+    estimate.difference_std_error = std_error_of({0, 0, 1, -1}, apart, *both);
+    return estimate;
+  }
+
+ private:
+  using Terms = std::array<double, 4>;  // common, a, k, l
+  using Model = std::vector<Terms>;     // what is fitted: each in these terms
+  // Over the pixels that are nearest to one bead, or over all.
+  struct Sums {
+    std::array<double, 16> matrix{};
+    Terms right{};
+  };
+  // What each pixel gains by the terms, from all beads it belongs to, and which of them is nearest.
+  struct RimPixels {
+    explicit RimPixels(const GrayFrame& frame)
+        : width(frame.width),
+          height(frame.height),
+          gain(frame.pixels.size(), {0, 0, 0, 0}),
+          nearest(frame.pixels.size(), {0, HUGE_VALF}) {}
+    struct Nearest {
+      std::uint32_t bead;
+      float away;
+    };
+    int width, height;
+    std::vector<std::array<float, 4>> gain;
+    std::vector<Nearest> nearest;
+  };
+
+  void add_rim(const FoundDisk& disk, std::size_t bead, RimPixels& rims) const {
+    const double step = calibration_.profile.step_px;
+    const std::vector<float>& level = calibration_.profile.level;
+    const double middle_x = 0.5 * (rims.width - 1), middle_y = 0.5 * (rims.height - 1);
+    const double half_diagonal = std::hypot(middle_x + 0.5, middle_y + 0.5);
+    const double away_x = (disk.x_px - middle_x) / half_diagonal, away_y = (disk.y_px - middle_y) / half_diagonal;
+    const double away = away_x * away_x + away_y * away_y;
+    const int top = std::max(0, static_cast<int>(std::ceil(disk.y_px - reach_))),
+              bottom = std::min(rims.height - 1, static_cast<int>(std::floor(disk.y_px + reach_)));
+    const int left = std::max(0, static_cast<int>(std::ceil(disk.x_px - reach_))),
+              right = std::min(rims.width - 1, static_cast<int>(std::floor(disk.x_px + reach_)));
+    for (int row = top; row <= bottom; ++row)
+      for (int column = left; column <= right; ++column) {
+        const double dx = column - disk.x_px, dy = row - disk.y_px, r = std::sqrt(dx * dx + dy * dy);
+        const auto cell = static_cast<std::size_t>(r / step);
+        if (cell + 1 >= level.size() || r < 1e-9) continue;
+        const double slope = (static_cast<double>(level[cell + 1]) - static_cast<double>(level[cell])) / step;
+        const double along = (dx * away_x + dy * away_y) / r;  // |d|/h cos(theta - phi)
+        const std::size_t at =
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(rims.width) + static_cast<std::size_t>(column);
+        auto& here = rims.gain[at];
+        here[0] += static_cast<float>(-slope);
+        here[1] += static_cast<float>(slope * radius_ * dx * dx / (r * r));
+        here[2] += static_cast<float>(slope * radius_ * 2 * away);
+        here[3] += static_cast<float>(slope * radius_ * (2 * along * along - away));
+        if (const auto distance = static_cast<float>(r); distance < rims.nearest[at].away)
+          rims.nearest[at] = {static_cast<std::uint32_t>(bead), distance};
+      }
+  }
+
+  void take_pixels(const GrayFrame& residual, const RimPixels& rims) {
+    constexpr double no_rim = 0.5;  // dirt, a bead of another kind
+    for (std::size_t k = 0; k < rims.gain.size(); ++k) {
+      const auto& gain = rims.gain[k];
+      const double e = static_cast<double>(residual.pixels[k]) / calibration_.contrast_level;
+      if (gain[0] == 0 || std::abs(e) > no_rim) continue;
+      Sums& bead = beads_[rims.nearest[k].bead];
+      for (std::size_t a = 0; a < 4; ++a) {
+        const auto one = static_cast<double>(gain[a]);
+        bead.right[a] += one * e, all_.right[a] += one * e;
+        for (std::size_t b = 0; b < 4; ++b) {
+          const double both = one * static_cast<double>(gain[b]);
+          bead.matrix[4 * a + b] += both, all_.matrix[4 * a + b] += both;
+        }
       }
     }
   }
-  constexpr std::size_t fewest = 20;
-  if (disks < fewest || pixels == 0) return estimate;
-  std::vector<double> factor = matrix;
-  if (!solve_symmetric(factor, right, 3)) return estimate;
-  const double variance = square / static_cast<double>(pixels);
-  const auto std_error = [&](std::size_t k) {
-    std::vector<double> again = matrix, unit(3, 0.0);
-    unit[k] = 1;
-    return solve_symmetric(again, unit, 3) ? std::sqrt(std::max(0.0, variance * unit[k])) : 1e9;
-  };
-  estimate.known = true;
-  estimate.lens.pixel_aspect = 1 + right[1];
-  estimate.lens.radial = right[2];
-  estimate.aspect_std_error = std_error(1);
-  estimate.radial_std_error = std_error(2);
-  return estimate;
+
+  static double dot(const Terms& one, const Terms& other) {
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2] + one[3] * other[3];
+  }
+  static Terms times(const std::array<double, 16>& matrix, const Terms& terms) {
+    Terms out{};
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t b = 0; b < 4; ++b) out[a] += matrix[4 * a + b] * terms[b];
+    return out;
+  }
+
+  // The terms of the model that best explain the sums.
+  static std::optional<Terms> solved(const Model& model, const Sums& sums) {
+    std::vector<double> matrix, right;
+    for (const Terms& one : model) {
+      right.push_back(dot(one, sums.right));
+      for (const Terms& other : model) matrix.push_back(dot(one, times(sums.matrix, other)));
+    }
+    if (!solve_symmetric(matrix, right, model.size())) return std::nullopt;
+    Terms terms{};
+    for (std::size_t k = 0; k < model.size(); ++k)
+      for (std::size_t a = 0; a < 4; ++a) terms[a] += right[k] * model[k][a];
+    return terms;
+  }
+
+  // Of a sum of terms, by the jackknife: what each bead changes when it is left out. Of the radial term a few beads in
+  // the corners tell most.
+  [[nodiscard]] double std_error_of(const Terms& sum, const Model& model, const Terms& best) const {
+    double variance = 0;
+    for (const Sums& bead : beads_) {
+      Sums others = all_;
+      for (std::size_t k = 0; k < 16; ++k) others.matrix[k] -= bead.matrix[k];
+      for (std::size_t k = 0; k < 4; ++k) others.right[k] -= bead.right[k];
+      const std::optional<Terms> without = solved(model, others);
+      if (!without) return HUGE_VAL;
+      variance += std::pow(dot(sum, *without) - dot(sum, best), 2);
+    }
+    return std::sqrt(variance);
+  }
+
+  const FinderCalibration& calibration_;
+  double radius_, reach_;  // px
+  std::size_t disks_ = 0;  // whole ones
+  std::vector<Sums> beads_;
+  Sums all_;
+};
+
+}  // namespace
+
+bool LensEstimate::by_size_and_shape() const {
+  // Drawn lenses: the two differ by up to a sixth of the term, where the first order is not enough.
+  constexpr double sigmas = 3, share = 0.25;
+  return std::abs(radial_by_size - radial_by_shape) <=
+         std::max(sigmas * difference_std_error, share * std::abs(lens.radial));
+}
+
+LensEstimate estimate_lens(const std::vector<const GrayFrame*>& frames, const std::vector<FindResult>& found,
+                           const FinderCalibration& calibration) {
+  LensFit fit(calibration);
+  for (std::size_t f = 0; f < frames.size(); ++f) fit.add(*frames[f], found[f]);
+  return fit.estimate();
 }
 
 }  // namespace shakebed::ingest

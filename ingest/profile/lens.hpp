@@ -49,11 +49,16 @@ class LensMap {
 };
 
 // The remaining aspect and radial term in frames that were assumed undistorted, from the beads' own rims. Least
-// squares, over all whole disks, of the residual on the shift of the rims that each term would cause.
+// squares, over all whole disks, of the residual on the shift of the rims that each term would cause. Standard errors
+// follow from how much the beads differ: pixels of one bead are not independent.
 struct LensEstimate {
   bool known = false;  // enough disks
   Lens lens;
   double aspect_std_error = 0, radial_std_error = 0;
+  // The radial term by the beads' sizes alone and by their shapes alone, and the standard error of the difference.
+  double radial_by_size = 0, radial_by_shape = 0, difference_std_error = 0;
+  // Of a lens both are the same; of light, or of sides of thick disks that come into view, they are not.
+  [[nodiscard]] bool by_size_and_shape() const;
 };
 LensEstimate estimate_lens(const std::vector<const GrayFrame*>& frames, const std::vector<FindResult>& found,
                            const FinderCalibration& calibration);

@@ -59,12 +59,16 @@ std::string advice(const ExtractOptions& options, RunContext& context, const Fir
 
 // The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none. Whether
 // their outlines are those of disks.
-bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
-                    ingest::MeasureOptions& measure) {
-  const std::optional<FirstLook> look = look_at_first(film.paths, options);
+struct UsedLook {
+  std::optional<FirstLook> look;  // without its picture; none where no file can be read
+  bool round = true;
+};
+UsedLook use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
+                        ingest::MeasureOptions& measure) {
+  std::optional<FirstLook> look = look_at_first(film.paths, options);
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
-  if (!look) return true;  // measure_bed() says which files cannot be read
+  if (!look) return {};  // measure_bed() says which files cannot be read
   require_inside(options, *look);
   if (!look->survey.found) refuse(options, context, *look, film.paths, "no beads: " + look->survey.why_not);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
@@ -85,7 +89,9 @@ bool use_first_look(const ExtractOptions& options, RunContext& context, FilmFile
     context.warning(why);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
                           options_for(*chosen), chosen->disks.size()));
-  return !chosen->not_round;
+  const bool round = !chosen->not_round;
+  look->picture.reset();
+  return {std::move(look), round};
 }
 
 // What is named is used; of folders and patterns, what is a picture or a film.
@@ -135,7 +141,7 @@ class Extraction {
     } else {
       film_.paths = named_pictures(options_.images);
       read_sides();
-      round_ = use_first_look(options_, context_, film_, measure_);
+      first_look_ = use_first_look(options_, context_, film_, measure_);
     }
     std::optional<std::ifstream> truth_file;
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
@@ -151,16 +157,18 @@ class Extraction {
     try {
       for (const std::string& one : judge_disks(options_, found).warnings) context_.warning(one);
     } catch (const StageError& error) {
-      refuse_measured(error.what());
+      ingest::Measurement refused = found;
+      refused.disks = first_disks_;
+      refuse_measured(error.what(), &refused);
     }
   }
 
   // With options that were tried on the first picture.
-  [[noreturn]] void refuse_measured(const std::string& what) {
-    const std::optional<FirstLook> look = look_at_first(film_.paths, options_);
+  [[noreturn]] void refuse_measured(const std::string& what, const ingest::Measurement* found) {
+    const std::optional<FirstLook>& look = first_look_.look;
     if (!look) throw StageError(what);
     context_.progress(done_, "trying other options");
-    const std::vector<Proposal> proposals = proposals_for(*look, options_, RefusedBy::measurement);
+    const std::vector<Proposal> proposals = proposals_for(*look, options_, RefusedBy::measurement, found);
     throw StageError(fmt::format("{}. {}", what, advice(options_, context_, *look, proposals)));
   }
 
@@ -224,6 +232,7 @@ class Extraction {
       ingest::StopQuestion::ask();
     };
     measure_.disk_sink = [&](const ingest::FrameReport& frame, const std::vector<ingest::MeasuredDisk>& disks) {
+      if (frame.index == 0) first_disks_ = disks;
       on_the_way.take(frame, disks);
     };
     time_.begin(finding);
@@ -239,7 +248,7 @@ class Extraction {
       return ingest::measure_bed(source, measure_);
     } catch (const ingest::NoDisksError& error) {
       const std::string what = fmt::format("{}: {}", error.problem(), error.why());
-      if (rendered_ == nullptr) refuse_measured(what);
+      if (rendered_ == nullptr) refuse_measured(what, nullptr);
       throw StageError(what + ". Give the render stage less noise, or a finer scale");
     }
   }
@@ -271,7 +280,7 @@ class Extraction {
   // The fit takes them into its answer.
   void add_objections(const ingest::Measurement& found, Json& result) const {
     std::vector<ingest::Objection> all = ingest::objections_to(found);
-    if (!round_)
+    if (!first_look_.round)
       all.push_back({"The outlines are not those of disks, but the theory describes disks.",
                      "Use only the positions and the number of the beads."});
     const double seen = 2 * found.calibration.radius_px, given = options_.diameter / found.calibration.scale_m_per_px;
@@ -340,8 +349,9 @@ class Extraction {
   const Input* rendered_;  // the render stage, if the frames are its
   ingest::MeasureOptions measure_;
   FilmFiles film_;
-  bool round_ = true;             // the outlines are those of disks
-  std::atomic<double> done_ = 0;  // share of the frames
+  UsedLook first_look_;
+  std::vector<ingest::MeasuredDisk> first_disks_;  // of the first frame
+  std::atomic<double> done_ = 0;                   // share of the frames
   enum Part : std::size_t { finding, drawing };
   TimeLeft time_;
 };

@@ -61,9 +61,9 @@ FirstLook look_at_reduced(const std::string& picture, const ExtractOptions& opti
   return look;
 }
 
-ingest::SurveyCandidate circles_of(const ingest::Measurement& found) {
+ingest::SurveyCandidate circles_of(const std::vector<ingest::MeasuredDisk>& disks) {
   ingest::SurveyCandidate circles;
-  for (const ingest::MeasuredDisk& disk : found.disks) {
+  for (const ingest::MeasuredDisk& disk : disks) {
     ingest::RimDisk& one = circles.disks.emplace_back();
     one.circle.x = disk.x_px, one.circle.y = disk.y_px, one.circle.radius = disk.radius_px;
     one.probability = disk.probability;
@@ -178,6 +178,18 @@ std::optional<ingest::ChannelFrames> reduced_for_trials(const FirstLook& look, d
   }
 }
 
+std::optional<Trial> judged(const ExtractOptions& options, const ingest::Measurement& found,
+                            const std::vector<ingest::MeasuredDisk>& disks) {
+  try {
+    judge_disks(options, found);
+  } catch (const StageError&) {
+    return std::nullopt;
+  }
+  if (found.disk_total == 0) return std::nullopt;
+  return Trial{found.disk_total, found.calibration.radius_px,
+               found.calibration.polarity == ingest::Polarity::bright_beads, found.contacts, circles_of(disks)};
+}
+
 std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
                                  const ingest::ChannelFrames* reduced) {
   try {
@@ -198,10 +210,7 @@ std::optional<Trial> try_options(const std::string& picture, const ExtractOption
       return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look->path, 0, source);
     });
     const ingest::Measurement found = ingest::measure_bed(one, measure);
-    judge_disks(options, found);
-    if (found.disk_total == 0) return std::nullopt;
-    return Trial{found.disk_total, found.calibration.radius_px,
-                 found.calibration.polarity == ingest::Polarity::bright_beads, found.contacts, circles_of(found)};
+    return judged(options, found, found.disks);
   } catch (const StageError&) {
     return std::nullopt;
   } catch (const ingest::InputError&) {

@@ -48,6 +48,9 @@ struct Trial {
 // Nothing where the run refuses it. `reduced`: the picture for a quick trial, which may be wrong.
 std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
                                  const ingest::ChannelFrames* reduced = nullptr);
+// The same of what is measured already. `disks`: of its first frame.
+std::optional<Trial> judged(const ExtractOptions& options, const ingest::Measurement& found,
+                            const std::vector<ingest::MeasuredDisk>& disks);
 // The picture, averaged until beads of this radius are just large enough; nothing where they hardly are.
 std::optional<ingest::ChannelFrames> reduced_for_trials(const FirstLook& look, double radius_px);
 

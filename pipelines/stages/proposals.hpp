@@ -10,9 +10,12 @@
 
 namespace shakebed::pipelines {
 
-// At most two, the best first. `refused`: by what was measured, not by the first look.
+// At most two, the best first. `measured`: what was found and refused, with the disks of its first frame; none where
+// the first look was refused, or where nothing was found. What was found is not searched for again, and the picture is
+// searched a few times at most.
 enum class RefusedBy { first_look, measurement };
-std::vector<Proposal> proposals_for(const FirstLook& look, const ExtractOptions& options, RefusedBy refused);
+std::vector<Proposal> proposals_for(const FirstLook& look, const ExtractOptions& options, RefusedBy refused,
+                                    const ingest::Measurement* measured = nullptr);
 
 // "give --roi 1,2,3,4 (tried: 63 dark beads of 9.9 px radius)", each of them; without any, what is needed.
 std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptions& options);

@@ -10,6 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "ingest/find/learn_beads.hpp"
+#include "ingest/find/survey.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "tests/ingest/drawn_beds.hpp"
@@ -109,6 +112,31 @@ TEST(Shades, AreFoundInEachFrameOfAFilm) {
   for (std::size_t k = 0; k < 2; ++k)
     EXPECT_NEAR(static_cast<double>(measured.frames[k].disks), static_cast<double>(beds[k].beads.size()), 1);
   EXPECT_FALSE(measured.coverage_profile.has_value());  // each shade covers area by another contrast
+}
+
+// By how often it asks whether to stop. In five drawn beds the thorough search takes two to five times as long.
+TEST(Shades, ByQuickRimsTakeLessThanHalfOfAThoroughSearch) {
+  const auto& kinds = test::drawn_beds();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [](const test::BedKind& one) {
+    return one.name == "two sizes, packed beyond the frame, fringes";
+  });
+  ASSERT_NE(kind, kinds.end());
+  std::mt19937 random(static_cast<unsigned>(kind - kinds.begin()) + 1);
+  const GrayFrame frame = kind->draw(random).frame;
+  const Survey survey = take_survey({1, frame.width, frame.height, {{Channel::automatic, frame}}}, {});
+  ASSERT_TRUE(survey.found);
+  const RimModel& rims = survey.candidates.front().rims;
+  FindOptions find;
+  find.seen = BeadsSeen{rims.polarity, rims.radius_px};
+  std::size_t asked = 0;
+  const StopQuestion counted([&] { ++asked; });
+  const CalibrationResult thorough = learn_beads({&frame}, find);
+  const std::size_t by_thorough = asked;
+  find.quick_rims_only = true;
+  const CalibrationResult quick = learn_beads({&frame}, find);
+  ASSERT_TRUE(thorough.found && thorough.calibration.by_rims && quick.found);
+  EXPECT_EQ(quick.calibration.rims->search.wanted_px, quick_radius_px);
+  EXPECT_LT(2 * (asked - by_thorough), by_thorough);
 }
 
 // Every kind: an F1 of 0.9, or said aloud.

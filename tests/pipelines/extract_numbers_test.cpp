@@ -9,10 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "ingest/frames/stop_question.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/disks_on_the_way.hpp"
 #include "pipelines/stages/extract_files.hpp"
 #include "pipelines/stages/picture_trial.hpp"
+#include "pipelines/stages/proposals.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/painted_picture.hpp"
 #include "tests/pipelines/read_table.hpp"
@@ -381,6 +383,39 @@ TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
   EXPECT_FALSE(reduced_for_trials(*look, 19)) << "such beads would be too small";
   options.roi = {0, 0, 500, 60};
   EXPECT_FALSE(try_options(path, options, &*reduced)) << "no bead lies there";
+}
+
+// Disks two diameters apart are refused. Searching is counted by how often it asks whether to stop: what was found is
+// not searched for again, and the whole takes less than two searches of the picture. It took three and more.
+TEST(PictureTrial, OfWhatWasMeasuredIsNoSearch) {
+  std::vector<Place> places;
+  for (int column = 0; column < 9; ++column)
+    for (int row = 0; row < 9; ++row)
+      places.push_back({32.0 + 33 * column + (column * 7 + row * 3) % 3, 30.0 + 33 * row + (column + row * 5) % 3});
+  const std::string path = (std::filesystem::path(testing::TempDir()) / "holes.pgm").string();
+  write_text(path, PaintedPicture(330, 330).disks(places, 10, 60).noise(3).pgm());
+  ExtractOptions options = some_options(), any = options;
+  options.bead_number.reset(), any.bead_number.reset();
+  any.shape = BeadShape::any;
+  std::size_t asked = 0;
+  const ingest::StopQuestion counted([&] { ++asked; });
+  const std::optional<FirstLook> look = look_at_first({path}, options);
+  ASSERT_TRUE(look && look->survey.found);
+  ingest::MeasureOptions measure = asked_for(options);
+  ingest::FrameSourceOptions source;
+  go_on_with(chosen_of(look->survey, options), *look, source, measure);
+  ingest::FrameSource picture = ingest::FrameSource::open({path}, source);
+  const ingest::Measurement measured = ingest::measure_bed(picture, measure);
+  const std::size_t once = asked;
+  EXPECT_THROW(judge_disks(options, measured), StageError);
+  const std::vector<Proposal> proposals = proposals_for(*look, options, RefusedBy::measurement, &measured);
+  EXPECT_LT(asked - once, 2 * once);
+  ASSERT_EQ(proposals.size(), 2U);  // a scale is one of them, and was tried
+  EXPECT_EQ(proposals[1].give, "--shape any");
+  EXPECT_EQ(proposals[1].found.disks.size(), places.size());
+  const std::optional<Trial> trial = try_options(path, any);
+  ASSERT_TRUE(trial);
+  EXPECT_EQ(trial->beads, places.size());
 }
 
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
