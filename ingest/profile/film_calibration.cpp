@@ -37,9 +37,11 @@ namespace {
 constexpr std::size_t enough_disks = 150, most_frames_tried = 40;
 constexpr int lens_rounds = 5;
 // Of aspect and radial term: below a few thousandths it may as well be streaks or shading, and does no harm; once in
-// use, smaller corrections are followed, down to their standard error; no lens bends more than the last. And by how
-// many standard errors a term must differ from none.
-constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25, sigmas = 5;
+// use, smaller corrections are followed, down to their standard error; no lens bends more than the last.
+constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25;
+// Standard errors by which a term must differ from none. In drawn beds without a lens those of the aspect are right,
+// and those of the radial term up to 1.5 times too small.
+constexpr double sigmas_of_aspect = 4, sigmas_of_radial = 5;
 // Of aspect and radial term: a smaller correction needs no new search for the beads.
 constexpr double small_correction = 0.01;
 // Of the expected radius: what is found by faces is the second species when it is nearer than this.
@@ -195,15 +197,15 @@ class FilmLearner {
     film_.aspect_std_error = options.pixel_aspect ? 0 : left.aspect_std_error;
     film_.lens_radial_std_error = options.lens_radial ? 0 : left.radial_std_error;
     if (!left.known) return std::nullopt;
-    const auto clear = [](double value, double std_error, bool in_use) {
+    const auto clear = [](double value, double std_error, bool in_use, double sigmas) {
       return std::abs(value) > (in_use ? std::max(settled, std_error) : std::max(worth_it, sigmas * std_error));
     };
     Lens better = lens_;
     const bool bent = lens_.radial != 0, wide = lens_.pixel_aspect != 1;
-    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error, wide))
+    if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error, wide, sigmas_of_aspect))
       better.pixel_aspect = std::clamp(lens_.pixel_aspect * left.lens.pixel_aspect, 1 - most_bend, 1 + most_bend);
     if (!options.lens_radial && (bent || left.by_size_and_shape()) &&
-        clear(left.lens.radial, left.radial_std_error, bent))
+        clear(left.lens.radial, left.radial_std_error, bent, sigmas_of_radial))
       better.radial = std::clamp(lens_.radial + left.lens.radial, -most_bend, most_bend);
     if (better.pixel_aspect == lens_.pixel_aspect && better.radial == lens_.radial) return std::nullopt;
     return better;
