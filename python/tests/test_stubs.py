@@ -24,6 +24,7 @@ def mypy(*arguments, cache):
                           env={"PATH": "/usr/bin:/bin", "MYPYPATH": str(BUILT), "MYPY_CACHE_DIR": str(cache)})
 
 
+@pytest.mark.long
 def test_the_package_is_typed_strictly(cache):
     done = mypy("--strict", "-p", "shakebed", cache=cache)
     assert done.returncode == 0, done.stdout

@@ -25,17 +25,17 @@ using testing::HasSubstr;
 using testing::Not;
 namespace fs = std::filesystem;
 
-// A bed of 160 disks, 64 frames.
+// A bed of 100 disks, 32 frames.
 std::string image_recipe() {
   return R"({
   "name": "camera",
   "stages": [
     { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1,
-      "disks": { "count": 160, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
+      "disks": { "count": 100, "diameter": "3 mm", "restitution": 0.9, "friction": 0.1, "contact_duration": "20 us" },
       "gravity": "9.81 m/s^2",
-      "box": { "width": "48 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "box": { "width": "30 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
-      "settle": "1 s", "measure": "3.2 s", "frames": { "count": 64, "phases": 32 } },
+      "settle": "1 s", "measure": "1.6 s", "frames": { "count": 32, "phases": 32 } },
     { "stage": "render", "from": "bed", "scale": "0.15 mm/px", "noise": 5, "exposure": "0.2 ms" },
     { "stage": "extract", "from": "render", "diameter": "3 mm" },
     { "stage": "fit", "from": "extract", "plateau_density": 1.1 },
@@ -100,7 +100,7 @@ TEST_F(Images, EveryDisksCsvRowIsADiskOfTheBed) {
     EXPECT_LT(std::stod(cells[4]), 16.0);
     ++rows;
   }
-  EXPECT_NEAR(static_cast<double>(rows), 64 * 160, 64);
+  EXPECT_NEAR(static_cast<double>(rows), 32 * 100, 32);
 }
 
 TEST_F(Images, TheReportIsOneFileThatAsksForNothing) {
@@ -253,7 +253,7 @@ TEST_F(Images, APreviewTakesTheScaleAsARunDoes) {
     EXPECT_EQ(another_unit.exit_code, 5) << preview;
     EXPECT_THAT(another_unit.err, HasSubstr("with the length of a pixel given (scale), a bead of 3 mm is 0.001 px"));
     EXPECT_THAT(another_unit.err, HasSubstr("a pixel is about 0.15")) << "the true scale is 0.15 mm/px";
-    EXPECT_THAT(another_unit.err, HasSubstr("leave out --scale (tried: 160 dark beads"));
+    EXPECT_THAT(another_unit.err, HasSubstr("leave out --scale (tried: 100 dark beads"));
   }
   EXPECT_EQ(ends("0.15 mm/px", true).exit_code, 0);
 }
@@ -327,7 +327,7 @@ TEST_F(Images, SameSeedGivesTheSameFrames) {
   ASSERT_EQ(
       run_shakebed({"run", "r.json", "--out", "again", "--until", "extract", "--jobs", "1"}, folder_->path()).exit_code,
       0);
-  for (const char* name : {"render/frames/000000.png", "render/frames/000063.png", "render/truth.csv",
+  for (const char* name : {"render/frames/000000.png", "render/frames/000031.png", "render/truth.csv",
                            "extract/disks.csv", "extract/profile.csv", "extract/extract.json"}) {
     EXPECT_EQ(shakebed::pipelines::sha256_of_file(*folder_ / "o" / name),
               shakebed::pipelines::sha256_of_file(*folder_ / "again" / name))
@@ -351,18 +351,18 @@ double deviation_of(const std::vector<double>& values) {
 TEST_F(Images, NumbersOfARenderedBedAreThoseOfItsGeometry) {
   ASSERT_EQ(result_->exit_code, 0);
   const Json render = read_json(*folder_ / "o/render/render.json");
-  EXPECT_EQ(render["frames"], 64);
+  EXPECT_EQ(render["frames"], 32);
   EXPECT_DOUBLE_EQ(value(render["scale"]), 0.15e-3);
   EXPECT_DOUBLE_EQ(value(render["radius"]), 10) << "3 mm are 20 px";
   const NumberTable truth(*folder_ / "o/render/truth.csv");
-  ASSERT_EQ(truth.rows(), 64U * 160U);
+  ASSERT_EQ(truth.rows(), 32U * 100U);
   for (std::size_t r = 0; r < truth.rows(); r += 997) EXPECT_NEAR(truth("radius_px", r), 10, 1e-6);
-  EXPECT_GE(value(render["width"]), 48 / 0.15);
+  EXPECT_GE(value(render["width"]), 30 / 0.15);
   const Json extract = read_json(*folder_ / "o/extract/extract.json");
   EXPECT_DOUBLE_EQ(value(extract["scale"]), 0.15e-3);
   EXPECT_DOUBLE_EQ(value(extract["diameter"]), 3e-3);
-  EXPECT_NEAR(value(extract["width"]), 16, 1e-9);
-  EXPECT_NEAR(value(extract["right_wall"]) - value(extract["left_wall"]), 320, 1e-9);
+  EXPECT_NEAR(value(extract["width"]), 10, 1e-9);
+  EXPECT_NEAR(value(extract["right_wall"]) - value(extract["left_wall"]), 200, 1e-9);
   EXPECT_NEAR(value(extract["radius"]), 10, 0.05);
   EXPECT_NEAR(value(extract["noise"]), 5, 0.5) << "drawn with 5 grey levels";
   EXPECT_TRUE(extract["scale_given"] && extract["floor_given"] && extract["walls_given"]);
@@ -374,13 +374,14 @@ TEST_F(Images, CountsAreThoseOfTheTables) {
   const NumberTable frames(*folder_ / "o/extract/frames.csv"), quality(*folder_ / "o/extract/quality.csv"),
       details(*folder_ / "o/extract/disk_details.csv"), disks(*folder_ / "o/extract/disks.csv");
   const std::vector<double> counts = frames.column("disks");
-  ASSERT_EQ(counts.size(), 64U);
-  EXPECT_EQ(extract["frames"], 64);
-  EXPECT_EQ(extract["frames_used"], 64);
+  ASSERT_EQ(counts.size(), 32U);
+  EXPECT_EQ(extract["frames"], 32);
+  EXPECT_EQ(extract["frames_used"], 32);
   EXPECT_NEAR(value(extract["disks_per_frame"]), mean_of(counts), 1e-9);
   EXPECT_NEAR(extract["disks_per_frame_scatter"].get<double>(), deviation_of(counts), 1e-9);
-  EXPECT_NEAR(value(extract["column_number"]), mean_of(counts) / 16, 1e-9);
-  EXPECT_NEAR(error(extract["column_number"]), deviation_of(counts) / 16 / 8, 1e-12) << "of the mean of 64 frames";
+  EXPECT_NEAR(value(extract["column_number"]), mean_of(counts) / 10, 1e-9);
+  EXPECT_NEAR(error(extract["column_number"]), deviation_of(counts) / 10 / std::sqrt(32), 1e-12)
+      << "of the mean of 32 frames";
   double all = 0, cut = 0, hidden = 0, best = 0;
   for (const double one : quality.column("disks")) all += one;
   EXPECT_EQ(all, static_cast<double>(disks.rows()));
@@ -398,14 +399,14 @@ TEST_F(Images, CountsAreThoseOfTheTables) {
     const double density = profile("number_density", r);
     best = std::max(best, density), area += density * spacing;
     EXPECT_NEAR(profile("area_fraction", r), M_PI / 4 * density, 1e-9);
-    EXPECT_NEAR(profile("samples", r), density * 16 * spacing * 64, 0.5 + 1e-6);
+    EXPECT_NEAR(profile("samples", r), density * 10 * spacing * 32, 0.5 + 1e-6);
   }
-  EXPECT_NEAR(area * 16, mean_of(counts), 0.002 * mean_of(counts));
+  EXPECT_NEAR(area * 10, mean_of(counts), 0.002 * mean_of(counts));
   EXPECT_DOUBLE_EQ(value(extract["profile"]["greatest_density"]), best);
-  EXPECT_EQ(extract["profile"]["frames"], 64);
+  EXPECT_EQ(extract["profile"]["frames"], 32);
 }
 
-// Each disk's own errors: 64 frames of 160 disks, centres found against the true ones, in units of the stated errors.
+// Each disk's own errors: 32 frames of 100 disks, centres found against the true ones, in units of the stated errors.
 TEST_F(Images, CentresScatterByTheirStatedErrors) {
   ASSERT_EQ(result_->exit_code, 0);
   const Json truth = read_json(*folder_ / "o/extract/extract.json")["truth"];
@@ -510,14 +511,14 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
   EXPECT_EQ(rows("high") - rows("low"), 60) << "15 mm more to see, of 0.25 mm a pixel";
 }
 
-// 96 frames of a bed, of which a part is measured: for an error, and for a time.
+// 48 frames of a bed, of which a part is measured: for an error, and for a time.
 TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   const ScratchFolder folder;
   write_text(folder / "r.json", R"({ "name": "film", "stages": [
     { "stage": "simulate", "id": "bed", "seed": 4, "replicas": 1, "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.9 },
       "box": { "width": "24.9 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
-      "settle": "1 s", "measure": "10 s", "frames": { "count": 96 } },
+      "settle": "1 s", "measure": "5 s", "frames": { "count": 48 } },
     { "stage": "render", "from": "bed", "scale": "0.3 mm/px", "noise": 2 } ] })");
   ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
   const auto fit = [&](const char* out, const std::vector<std::string>& more) {
@@ -530,12 +531,12 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   const Json said = read_json(folder / "some/manifest.json")["budget"];
   EXPECT_EQ(said["asked"], "6 %");
   const Json& frames = said["frames"];
-  EXPECT_EQ(frames["of"], 96);
+  EXPECT_EQ(frames["of"], 48);
   EXPECT_EQ(frames["pilot"]["frames"], 16);
   const auto stride = frames["stride"].get<std::uint64_t>(), measured = frames["measured"].get<std::uint64_t>();
-  EXPECT_EQ(measured, (96 + stride - 1) / stride);
+  EXPECT_EQ(measured, (48 + stride - 1) / stride);
   EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured);
-  EXPECT_THAT(some.err, HasSubstr("chooses " + std::to_string(measured) + " of 96 frames"));
+  EXPECT_THAT(some.err, HasSubstr("chooses " + std::to_string(measured) + " of 48 frames"));
   EXPECT_THAT(some.err, HasSubstr("statistical error of T: "));
   const Json result = read_json(folder / "some/fit/fit.json");
   const double reached = value(result["statistical_error"]) / value(result["temperature"]);
@@ -543,7 +544,7 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
 
   const ProgramResult all = fit("some", {"--budget", "0.1 %", "--dry-run"});
   ASSERT_EQ(all.exit_code, 0) << all.err;
-  EXPECT_THAT(all.err, HasSubstr("all 96 frames together leave a statistical error of T of about"));
+  EXPECT_THAT(all.err, HasSubstr("all 48 frames together leave a statistical error of T of about"));
   EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured) << "nothing ran";
 
   const ProgramResult short_time = fit("some", {"--budget", "1 ms"});
