@@ -49,6 +49,7 @@ def test_the_stubs_name_what_the_compiled_modules_have():
                 assert members == stated, f"{name}.{key}"
 
 
+@pytest.mark.long
 def test_a_users_mistake_is_found(tmp_path, cache):
     (tmp_path / "good.py").write_text(
         "import shakebed\n"
