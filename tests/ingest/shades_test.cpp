@@ -11,10 +11,12 @@
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/drawn_beds.hpp"
 
 namespace shakebed::ingest {
@@ -137,6 +139,31 @@ TEST(Shades, ByQuickRimsTakeLessThanHalfOfAThoroughSearch) {
   ASSERT_TRUE(thorough.found && thorough.calibration.by_rims && quick.found);
   EXPECT_EQ(quick.calibration.rims->search.wanted_px, quick_radius_px);
   EXPECT_LT(2 * (asked - by_thorough), by_thorough);
+}
+
+// What is left of a bed of one shade are the straight edges of its walls: no circles are searched for at length.
+TEST(Shades, AreNotSearchedForWhereOnlyWallsAreLeft) {
+  const auto disks = make_synthetic_bed(
+      {.left_wall_px = 20, .right_wall_px = 280, .floor_px = 220, .radius_px = 10, .rows = 6, .seed = 305});
+  GrayFrame frame = render_frame(disks, {.width = 300, .height = 240, .blur_px = 0.8, .read_noise = 4});
+  const float behind = frame.pixels.front();
+  for (std::size_t at = 0; at < frame.pixels.size(); ++at) {
+    const std::size_t row = at / 300, column = at % 300;
+    if (column < 18 || column > 281 || row > 221) frame.pixels[at] -= 0.4F * behind;
+  }
+  FindOptions find;
+  find.seen = BeadsSeen{Polarity::dark_beads, 10};
+  std::size_t asked = 0;
+  const StopQuestion counted([&] { ++asked; });
+  CalibrationResult learned = learn_beads({&frame}, find);
+  ASSERT_TRUE(learned.found && learned.calibration.rims);
+  const std::size_t for_the_beads = asked;
+  FindResult found = find_beads(frame, learned.calibration, find);
+  ASSERT_GE(found.disks.size(), disks.size() - 3);
+  asked = 0;
+  learn_other_shade(frame, find, learned.calibration, found);
+  EXPECT_EQ(learned.calibration.other_shade, nullptr);
+  EXPECT_LT(asked, for_the_beads) << "questions whether to go on: 81; without a look at what is left 23,736";
 }
 
 // Every kind: an F1 of 0.9, or said aloud.
