@@ -40,7 +40,7 @@ GrayFrame seen_by(const LensCamera& camera, const std::vector<RenderedDisk>& dis
   }
   for (int row = 0; row < height; ++row)
     for (int column = 0; column < width; ++column) {
-      const auto true_place = [&](double x, double y) {
+      const auto true_place = [&, aspect = aspect, radial = radial](double x, double y) {
         const double dx = x * aspect - middle_x, dy = y - middle_y, s = 1 + radial * (dx * dx + dy * dy) / h2;
         return PixelPlace{middle_x + s * dx - 0.5, middle_y + s * dy - 0.5};
       };

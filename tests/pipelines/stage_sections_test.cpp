@@ -300,13 +300,13 @@ TEST_F(StageSections, OfAnInferenceHaveItsParameters) {
 
 // A line of the difference where the printed number is not the one recomputed.
 TEST(AuditText, HasADifferenceWhereThereIsOne) {
-  std::size_t numeric = 0, different = 0, lines = 0, explained = 0;
+  std::size_t different = 0, lines = 0, explained = 0;
   const std::string text = audit_text();
   const Json json = audit_json();
   const auto rows = shakebed::fit::audit();
   ASSERT_EQ(json["rows"].size(), rows.size());
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    numeric += rows[k].is_numeric, different += rows[k].is_numeric && rows[k].difference != 0;
+    different += rows[k].is_numeric && rows[k].difference != 0;
     explained += !rows[k].explanation.empty();
     EXPECT_EQ(json["rows"][k].contains("difference"), rows[k].is_numeric);
     EXPECT_THAT(text, HasSubstr(rows[k].quantity + " ["));
