@@ -286,7 +286,8 @@ Sheets sheets_of(const Picture& picture) {
     longest = std::max(longest, letters(series.label));
   }
   const bool many = entries > 4, two = !picture.lower.empty();
-  const std::size_t svg_columns = many && longest <= 27 ? 3 : 2;
+  // gnuplot leaves out the columns that do not fit: two of 46 letters do, two of 48 do not.
+  const std::size_t svg_columns = many && longest <= 27 ? 3 : longest <= 44 ? 2 : 1;
   const std::size_t pdf_columns = many && longest <= 14 ? 3 : longest <= 26 ? 2 : 1;
   return {picture_sheet(entries, svg_columns, svg_columns == 3 && longest > 18 ? -3 : 0, two ? 640 : 480, 24, 0.14),
           picture_sheet(entries, pdf_columns, 0, two ? 200 : 150, 9.2, 0.17)};

@@ -127,7 +127,26 @@ TEST(PictureScript, HasAsManyColumnsInItsKeyAsItsLabelsAllow) {
   EXPECT_EQ(rows(7, 19), "3n 4 ");
   EXPECT_EQ(rows(7, 27), "3n 7 ");
   EXPECT_EQ(rows(7, 28), "4 7 ");
+  EXPECT_EQ(rows(7, 44), "4 7 ");
+  EXPECT_EQ(rows(7, 45), "7 7 ");
   ::setenv("PATH", path.c_str(), 1);
+}
+
+// gnuplot leaves out columns of the key that it finds too wide. A label stands in the file as a title and as a text.
+TEST(PictureKey, HasEveryEntry) {
+  for (const std::size_t letters : {27U, 28U, 44U, 45U, 60U}) {
+    const ScratchFolder folder;
+    Picture picture{.x_label = "x", .y_label = "y", .x_low = 0.0, .x_high = 2.0};
+    const auto label = [&](std::size_t k) { return std::to_string(k) + std::string(letters - 1, k == 2 ? 'e' : 'a'); };
+    for (std::size_t k = 0; k < 6; ++k) picture.series.push_back({label(k), Style::line, 0, {0, 1}, {0, 1}, {}});
+    draw_picture(picture, folder.path(), "p");
+    const std::string svg = read_text(folder / "p.svg");
+    for (std::size_t k = 0; k < 6; ++k) {
+      const std::size_t title = svg.find(label(k));
+      ASSERT_NE(title, std::string::npos);
+      EXPECT_NE(svg.find(label(k), title + 1), std::string::npos) << letters << " letters, entry " << k;
+    }
+  }
 }
 
 TEST(PictureScript, NeedsSomethingToDraw) {
