@@ -1,4 +1,4 @@
-// What gnuplot is told to draw, line by line.
+// The script that gnuplot draws, line by line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Mistakes in recipes, their places and the words they are told in; sweeps as they are read; options of every kind.
+// Mistakes in recipes: their places and messages; sweeps as they are read; options of every kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
