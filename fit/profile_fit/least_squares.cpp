@@ -12,6 +12,7 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 constexpr double first_damping = 1e-3;  // of Fletcher's scaling, at which a fit begins
+constexpr double ridge = 1e-14;         // added to a diagonal of ones: 50 times the rounding of a double
 
 // Between the solver's coordinates and the model's parameters.
 struct Coordinates {
@@ -352,13 +353,13 @@ class Solver {
     solution.chi2_variance = 2.0 * trace2;
   }
 
-  // Orthonormal columns that span those of J, by the Cholesky factor of J^T J, whose diagonal is scaled to 1. What is
-  // added to it keeps the factor of dependent columns finite.
+  // Orthonormal columns that span those of J, by the Cholesky factor of J^T J, whose diagonal is scaled to 1. The
+  // ridge keeps the factor of dependent columns finite.
   [[nodiscard]] Matrix tangent_plane() const {
     Matrix columns = jacobian_;
     for (Eigen::Index i = 0; i < columns.cols(); ++i) columns.col(i).normalize();
     Matrix gram = columns.transpose() * columns;
-    gram.diagonal().array() += 1e-14;
+    gram.diagonal().array() += ridge;
     const Eigen::LLT<Matrix> factor(gram);
     return factor.matrixL().solve(columns.transpose()).transpose();
   }

@@ -56,11 +56,13 @@ PowerProduct fit_power_product(const std::vector<std::vector<double>>& x, std::s
   const std::unique_ptr<gsl_multifit_linear_workspace, decltype(&gsl_multifit_linear_free)> work(
       gsl_multifit_linear_alloc(points, unknowns), gsl_multifit_linear_free);
   std::size_t rank = 0;
+  double chi2 = 0;
   gsl_multifit_wlinear_tsvd(design.get(), weight.get(), target.get(), independent_share, solution.get(),
-                            covariance.get(), &fit.chi2, &rank, work.get());
+                            covariance.get(), &chi2, &rank, work.get());
   if (rank < unknowns) return fit;
   const auto found = [&](std::size_t k) { return gsl_vector_get(solution.get(), k); };
   fit.ok = true;
+  fit.chi2 = chi2;
   fit.p_value = chance_of_chi2(fit.chi2, fit.dof);
   const double widened = std::sqrt(std::max(1.0, fit.chi2 / fit.dof));
   const auto error_of = [&](std::size_t k) { return widened * std::sqrt(gsl_matrix_get(covariance.get(), k, k)); };

@@ -41,7 +41,8 @@ constexpr double fewest_others = 3, least_share_of_others = 0.03;
 constexpr double smallest_other = 0.4, largest_other = 2.5;
 constexpr double same_size = 0.06;  // of the radius: drawn beds of one size differ by up to 0.03 between their shades
 constexpr std::size_t most_other_sizes = 2;
-// Of a rim, the share in which edges are met, at least. And of the weakest edges, those that noise does not make.
+// Of a rim, the share in which edges are met, at least; and of one that is worth a longer search, of which straight
+// edges make up an eighth each. And of the weakest edges, those that noise does not make.
 constexpr double least_rim = 0.5, faintest_rim = 0.35;
 constexpr float plain_edge = 1.5F;
 

@@ -27,7 +27,6 @@ class PictureMaps {
   PictureMaps(const GrayFrame& frame, double wanted_px) : frame_(frame), wanted_px_(wanted_px) {}
   // `threshold` as in find_edges(). Asked for by the threshold that it found, a map is the same one.
   const PictureMap& scaled_for(double radius_px, float threshold = 0);
-  [[nodiscard]] double wanted_px() const { return wanted_px_; }
   // The same, with its copies.
   const PictureMap& with_copies(double radius_px, float threshold = 0);
 
@@ -40,7 +39,7 @@ class PictureMaps {
   One& made_for(double radius_px, float threshold);
 
   const GrayFrame& frame_;
-  const double wanted_px_;
+  double wanted_px_;
   std::list<One> made_;
 };
 

@@ -75,7 +75,8 @@ class ChooseEngine {
     const Needs needs = needs_of(scene_);
     if (needs.spins) return with_sizes<Space, RoughRule>();
     if (needs.dissipates) return with_sizes<Space, DissipativeRule>();
-    // Elastic disks of two sizes between walls are rare: they take the rule of dissipation, and lose nothing.
+    // Elastic disks of two sizes between walls are rare. They take the rule of dissipation: the same bytes, with 1.9 %
+    // more instructions a collision.
     if constexpr (Space::has_walls) {
       if (!equal_sizes()) return with_sizes<Space, DissipativeRule>();
       return std::make_unique<Engine<Space, ElasticRule, EqualSizes>>(scene_, floor_, disks_);
