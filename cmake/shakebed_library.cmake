@@ -23,11 +23,12 @@ function(shakebed_finds_libraries target destination)
   endif()
 endfunction()
 
-# shakebed_public_library(ROOM HEADERS headers... [REQUIRES rooms...] [PRIVATE_PACKAGES names...])
+# shakebed_public_library(ROOM HEADERS headers... [REQUIRES rooms...] [PRIVATE_PACKAGES names...] [PRIVATE_LIBRARIES names...])
 # Makes shakebed_<room> a library for others. HEADERS: as they stand in the tree. REQUIRES: rooms whose headers its
-# headers include. PRIVATE_PACKAGES: what pkg-config must add to link the static library.
+# headers include. PRIVATE_PACKAGES, PRIVATE_LIBRARIES: what pkg-config must add to link the static library, by its name
+# for pkg-config or for the linker.
 function(shakebed_public_library room)
-  cmake_parse_arguments(ARG "" "" "HEADERS;REQUIRES;PRIVATE_PACKAGES" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "HEADERS;REQUIRES;PRIVATE_PACKAGES;PRIVATE_LIBRARIES" ${ARGN})
   set(target shakebed_${room})
   add_library(shakebed::${room} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${room} VERSION ${PROJECT_VERSION}
@@ -57,6 +58,8 @@ function(shakebed_public_library room)
     string(APPEND pc_requires "shakebed-${required} ")
   endforeach()
   string(REPLACE ";" " " pc_private "${ARG_PRIVATE_PACKAGES}")
+  list(TRANSFORM ARG_PRIVATE_LIBRARIES PREPEND "-l")
+  string(REPLACE ";" " " pc_libraries "${ARG_PRIVATE_LIBRARIES}")
   set(pc_room "${room}")
   file(RELATIVE_PATH pc_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
   string(REGEX REPLACE "/$" "" pc_prefix "${pc_prefix}")
@@ -101,6 +104,7 @@ function(shakebed_finish_libraries)
                                 INSTALL_DESTINATION "${shakebed_package_directory}")
   write_basic_package_version_file("${PROJECT_BINARY_DIR}/shakebedConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
   install(FILES "${PROJECT_BINARY_DIR}/shakebedConfig.cmake" "${PROJECT_BINARY_DIR}/shakebedConfigVersion.cmake"
+                "${PROJECT_SOURCE_DIR}/cmake/FindOpenCV.cmake"
           DESTINATION "${shakebed_package_directory}" COMPONENT development)
   install(DIRECTORY "${PROJECT_BINARY_DIR}/include/shakebed" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
           COMPONENT development)

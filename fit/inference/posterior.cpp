@@ -1,6 +1,5 @@
 #include "fit/inference/posterior.hpp"
 
-#include <gsl/gsl_cdf.h>
 #include <gsl/gsl_qrng.h>
 
 #include <Eigen/Dense>
@@ -27,7 +26,7 @@ constexpr std::size_t mixture_centres = 64;
 constexpr double prior_share = 0.1;
 constexpr double mixture_width = 0.5;  // of a normal distribution, in standard deviations of the weighted points
 
-double normal(std::mt19937_64& generator) { return gsl_cdf_ugaussian_Pinv(even_number(generator)); }
+double normal(std::mt19937_64& generator) { return normal_quantile(even_number(generator)); }
 
 std::vector<double> likelihoods(std::size_t dimensions, const std::vector<double>& points,
                                 const LogLikelihood& log_likelihood, int threads) {
@@ -299,10 +298,5 @@ double expected_reduction(const std::vector<double>& parameter, const std::vecto
   const double total = pp * (qq + measurement_variance);
   return total > 0 ? pq * pq / total : 0;
 }
-
-double normal_chance(double value) { return gsl_cdf_ugaussian_P(value); }
-double normal_quantile(double chance) { return gsl_cdf_ugaussian_Pinv(chance); }
-
-double as_deviations(double chance) { return chance >= 1 ? 0 : gsl_cdf_ugaussian_Qinv(std::max(chance, 1e-300) / 2); }
 
 }  // namespace shakebed::fit

@@ -97,10 +97,4 @@ std::vector<double> correlation_of(std::size_t count, const std::vector<double>&
 double expected_reduction(const std::vector<double>& parameter, const std::vector<double>& prediction,
                           const std::vector<double>& weights, double measurement_variance);
 
-// The normal distribution: chance of a value below, and the value that a chance lies below.
-double normal_chance(double value);
-double normal_quantile(double chance);
-// A two-sided chance as a number of standard deviations; at most 38, where a double ends.
-double as_deviations(double chance);
-
 }  // namespace shakebed::fit

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "fit/profile_fit/straight_line.hpp"
+#include "fit/profile_fit/chances.hpp"
 
 namespace shakebed::fit {
 namespace {

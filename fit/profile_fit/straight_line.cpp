@@ -1,18 +1,13 @@
 #include "fit/profile_fit/straight_line.hpp"
 
-#include <gsl/gsl_cdf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
-namespace shakebed::fit {
+#include "fit/profile_fit/chances.hpp"
 
-double chance_of_chi2(double chi2, int dof) {
-  if (dof <= 0) return 1.0;
-  return std::isfinite(chi2) ? gsl_cdf_chisq_Q(chi2, dof) : 0.0;
-}
+namespace shakebed::fit {
 
 StraightLine fit_straight_line(std::span<const double> x, std::span<const double> y, std::span<const double> error) {
   StraightLine line;

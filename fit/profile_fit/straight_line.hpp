@@ -2,11 +2,8 @@
 
 #include <span>
 
-// Straight lines and powers through points with errors, and how well a given curve describes points.
+// Straight lines and powers through points with errors.
 namespace shakebed::fit {
-
-// Chance of a chi2 at least as large, were the model true and the errors right. 1 for dof <= 0.
-[[nodiscard]] double chance_of_chi2(double chi2, int dof);
 
 // y = intercept + slope x by weighted least squares [Press et al., Numerical Recipes, 15.2]; the errors of y are taken
 // as they are. At least two points at different x with positive errors, else ok is false.

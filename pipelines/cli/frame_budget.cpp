@@ -28,7 +28,7 @@ constexpr double miss_factor = 1.2;
 std::optional<double> fitted_error(const fs::path& out) {
   const fs::path file = out / "fit" / "fit.json";
   if (!fs::exists(file)) return std::nullopt;
-  const Json fit = Json::parse(read_file(file));
+  const Json fit = parse_own_json(read_file(file));
   const Json *t = find_pointer(fit, "/temperature/value"), *error = find_pointer(fit, "/statistical_error/value");
   if (t == nullptr || error == nullptr || !t->is_number() || !error->is_number()) return std::nullopt;
   const double relative = error->get<double>() / t->get<double>();

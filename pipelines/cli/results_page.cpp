@@ -19,12 +19,12 @@ struct ShownRecipe {
 };
 
 ShownRecipe shown(const ShippedRecipe& recipe) {
-  const Json document = Json::parse(recipe.file->text);
+  const Json document = parse_own_json(recipe.file->text);
   const Json report = document.value("report", Json::object());
   ShownRecipe out{recipe.name, report.value("title", recipe.name), {}, Json()};
   if (report.contains("text")) out.text = report["text"].get<std::vector<std::string>>();
   if (const EmbeddedFile* record = find_embedded("results/" + recipe.name + ".json"))
-    out.record = Json::parse(record->text);
+    out.record = parse_own_json(record->text);
   return out;
 }
 

@@ -59,6 +59,10 @@ JsonNode read_json_node(const std::filesystem::path& path);
 // Reads a result file, written by shakebed or by the user. Throws InputError.
 Json read_json(const std::filesystem::path& path);
 
+// A document that the program wrote or ships, without places. Throws Json::parse_error. Elsewhere Json::parse would be
+// compiled once more in every unit.
+Json parse_own_json(std::string_view text);
+
 JsonNode to_node(const Json& json);
 
 // JSON pointers (RFC 6901).

@@ -263,6 +263,8 @@ class TreeBuilder {
 
 }  // namespace
 
+Json parse_own_json(std::string_view text) { return Json::parse(text); }
+
 std::optional<JsonNode> parse_json(std::string_view text, const std::string& file, std::vector<Problem>& problems) {
   return TreeBuilder(text, file, problems).build();
 }

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "fit/profile_fit/chances.hpp"
 #include "pipelines/formats/duration.hpp"
 #include "pipelines/formats/quantity.hpp"
 #include "pipelines/runner/folder_lock.hpp"
@@ -55,8 +55,6 @@ constexpr std::uint64_t pilot_stream = 0x70696c6f74;  // its seeds are none of t
 
 constexpr const char* pilot_folder = ".pilot";
 
-using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-
 double squared(double value) { return value * value; }
 
 // Upwards, to three digits.
@@ -80,9 +78,8 @@ BedVariance variance_of(const EffortReading& pilot) {
   const double between = static_cast<double>(pilot.effort.beds) - 1;
   const double of_blocks = blocks_of_bed * static_cast<double>(pilot.effort.beds);
   if (between < 1) return {0, within * length, of_blocks};
-  const boost::math::chi_squared_distribution<double, InDouble> chi2(between);
-  const bool differ =
-      within > 0 && boost::math::cdf(boost::math::complement(chi2, between * spread / within)) < differ_significance;
+  const double chi2 = between * spread / within;
+  const bool differ = within > 0 && fit::chance_of_chi2(chi2, static_cast<int>(between)) < differ_significance;
   if (differ) return {spread - within, within * length, between};
   const double pooled = (between * spread + of_blocks * within) / (between + of_blocks);
   return {0, std::max(within, pooled) * length, between + of_blocks};
@@ -463,9 +460,8 @@ BudgetedPlan choose_by_budget(const Plan& plan, const Budget& budget, const RunO
 
 bool misses(double stated, double asked, std::uint32_t beds) {
   if (beds < 2) return stated > asked;
-  const boost::math::chi_squared_distribution<double, InDouble> chi2(beds - 1.0);
-  return (beds - 1.0) * squared(stated / asked) >
-         boost::math::quantile(boost::math::complement(chi2, miss_significance));
+  const double chi2 = (beds - 1.0) * squared(stated / asked);
+  return chi2 > fit::chi2_exceeded(miss_significance, static_cast<int>(beds) - 1);
 }
 
 void say_reached(const Plan& plan, const Json& record, const RunOutcome& outcome, Console& console) {

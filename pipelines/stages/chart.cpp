@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/straight_line.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/csv.hpp"

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "fit/profile_fit/chances.hpp"
 #include "pipelines/formats/embedded.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/replica_seed.hpp"
@@ -337,7 +338,7 @@ std::vector<RunBed> Infer::earlier_beds() const {
   if (options_.beds.empty()) {
     const EmbeddedFile* file = find_embedded("reference-data/" + options_.stored + ".json");
     if (file == nullptr) throw InputError("there is no file of stored beds named \"" + options_.stored + "\"");
-    return beds_in(Json::parse(file->text), options_.stored);
+    return beds_in(parse_own_json(file->text), options_.stored);
   }
   std::vector<RunBed> all;
   for (const std::string& path : options_.beds.paths) {
@@ -647,7 +648,7 @@ void Infer::run(RunContext& context) const {
   }
   found.best = best_beds(context, found, ahead);
   found.calibration = calibrate(context, found, ahead);
-  Json stored{{"made_from", Json::parse(made_from())}, {"beds", Json::array()}};
+  Json stored{{"made_from", parse_own_json(made_from())}, {"beds", Json::array()}};
   for (const RunBed& bed : found.beds)
     stored["beds"].push_back(Json{{"round", bed.round}, {"values", bed.values}, {"numbers", bed.numbers}});
   write_file(context.output("beds.json"), dump(stored));

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fit/inference/posterior.hpp"
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
 #include "sim/measure/flow_free.hpp"
 #include "sim/measure/measure.hpp"

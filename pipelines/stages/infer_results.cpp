@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "fit/profile_fit/straight_line.hpp"
+#include "fit/profile_fit/chances.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/stages/infer.hpp"
 

@@ -41,7 +41,7 @@ PublishedLookup find_published(const std::string& name) {
   }
   if (file == nullptr) return not_found("paper", paper, names);
   try {
-    const Json document = Json::parse(file->text);
+    const Json document = parse_own_json(file->text);
     const Json& numbers = document.at("numbers");
     if (!numbers.contains(own)) {
       names.clear();

@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <string_view>
 #include <utility>
 
+#include "fit/profile_fit/chances.hpp"
 #include "statistics/rest.hpp"
 
 namespace shakebed::pipelines {
@@ -21,9 +19,6 @@ constexpr double notable_ratio = 2, spread_significance = 0.01;
 // A drift counts from so many of its standard errors on; they come from few samples, each run being cut in halves.
 constexpr double notable_drift = 4;
 constexpr double two_sided_95 = 0.975;
-
-// In double precision: what is prepared at start-up in long double overflows where that has no more digits (valgrind).
-using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
 
 // Mean and spread of a number over the replicas.
 struct Spread {
@@ -93,19 +88,15 @@ std::string by_start(const std::vector<Json>& results, const char* key) {
 
 bool differ(double spread, double within, std::size_t n) {
   if (!(within > 0) || !(spread > notable_ratio * within)) return false;
-  const auto freedom = static_cast<double>(n - 1);
-  const boost::math::chi_squared_distribution<double, InDouble> chi2(freedom);
-  return boost::math::cdf(boost::math::complement(chi2, freedom * spread * spread / (within * within))) <
-         spread_significance;
+  const auto freedom = static_cast<int>(n - 1);
+  return fit::chance_of_chi2(freedom * spread * spread / (within * within), freedom) < spread_significance;
 }
 
 }  // namespace
 
 double few_beds_factor(std::size_t n) {
   if (n < 2) return 1;
-  const boost::math::students_t_distribution<double, InDouble> student(static_cast<double>(n - 1));
-  return boost::math::quantile(student, two_sided_95) /
-         boost::math::quantile(boost::math::normal_distribution<double, InDouble>(), two_sided_95);
+  return fit::student_quantile(two_sided_95, static_cast<int>(n - 1)) / fit::normal_quantile(two_sided_95);
 }
 
 // A quantity that some beds do not have has no mean; one without an error that is the same in all of them stays as it

@@ -8,7 +8,7 @@
 
 #include "fit/inference/posterior.hpp"
 #include "fit/inference/surrogate.hpp"
-#include "fit/profile_fit/straight_line.hpp"
+#include "fit/profile_fit/chances.hpp"
 
 namespace shakebed::fit {
 namespace {

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
+
+#include "fit/profile_fit/chances.hpp"
 
 namespace shakebed::fit {
 namespace {
@@ -78,6 +81,15 @@ TEST(ChanceOfChi2, IsExponentialForTwoDegrees) {
   EXPECT_NEAR(chance_of_chi2(3, 2), std::exp(-1.5), 1e-14);
   EXPECT_EQ(chance_of_chi2(3, 0), 1);
   EXPECT_EQ(chance_of_chi2(INFINITY, 3), 0);
+  EXPECT_NEAR(chi2_exceeded(0.05, 2), -2 * std::log(0.05), 1e-13);
+}
+
+// Student's t of one degree of freedom is Cauchy's distribution, of two a power; of many the normal one.
+TEST(StudentQuantile, IsThatOfTheKnownCases) {
+  EXPECT_NEAR(student_quantile(0.75, 1), 1, 1e-12);
+  EXPECT_NEAR(student_quantile(0.975, 1), std::tan(0.475 * std::numbers::pi), 1e-10);
+  EXPECT_NEAR(student_quantile(0.975, 2), 0.95 * std::sqrt(2 / (1 - 0.95 * 0.95)), 1e-12);
+  EXPECT_NEAR(student_quantile(0.975, 1'000'000), normal_quantile(0.975), 1e-5);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // The figures of Quinn and Hong (2000): what their quick recipes find against laws that hold whatever the paper says.
 #include <gtest/gtest.h>
 
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -9,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/profile_fit/chances.hpp"
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
 #include "pipelines/formats/json.hpp"
@@ -61,7 +61,7 @@ Table run_quick(const std::string& recipe, const std::string& study, const std::
 // Replicas were two at each of `points` parameters: a pooled error has one degree of freedom a point. How many errors
 // may the largest of `comparisons` differences have, if one test in a thousand may fail?
 double allowed_errors(int points, int comparisons) {
-  return boost::math::quantile(boost::math::complement(boost::math::students_t(points), 1e-3 / 2 / comparisons));
+  return fit::student_quantile(1 - 1e-3 / 2 / comparisons, points);
 }
 
 // Equipartition: elastic disks in a reservoir have its temperature. Disks that lose energy in collisions are colder.

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "fit/inference/posterior.hpp"
-#include "fit/profile_fit/straight_line.hpp"
+#include "fit/profile_fit/chances.hpp"
 #include "pipelines/formats/json.hpp"
 #include "statistics/parallel.hpp"
 #include "tests/pipelines/program.hpp"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "fit/profile_fit/straight_line.hpp"
+#include "fit/profile_fit/chances.hpp"
 
 namespace shakebed::pipelines::bench {
 
