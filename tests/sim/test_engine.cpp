@@ -303,6 +303,59 @@ TEST(Engine, TellsWatchersWhatARestingBedWeighs) {
   expect_same(*bed, *unwatched);
 }
 
+// What lies on the floor follows it in short flights. Each ends where the next begins, on the floor as high as at
+// first, and leaves the floor's motion by no more than a fall of that duration does: (1 + Gamma) g (length/2)^2/2.
+class FlightsOnAFloor final : public Watcher {
+ public:
+  void flies(double time, std::uint32_t disk, double x, double z, double vx, double vz) override {
+    if (disk >= last_.size()) last_.resize(disk + 1, Flight{-1, 0, 0, 0, 0});
+    const Flight& last = last_[disk];
+    if (last.time >= 0 && time > last.time && x == last.x && vx == 0 && last.vx == 0) {
+      const double t = time - last.time;
+      largest_jump = std::max(largest_jump, std::abs(last.z + last.vz * t - t * t / 2 - z));
+      longest = std::max(longest, t);
+      ++flights;
+    }
+    last_[disk] = {time, x, z, vx, vz};
+  }
+  void touched(double, double, double, double, double, double, double) override {}
+  void pressed(double, double, double, double, double, double, double) override {}
+  void touched_wall(double, std::uint32_t, bool, double, double, double) override {}
+  double height(std::uint32_t disk, double time) const {
+    const double t = time - last_[disk].time;
+    return last_[disk].z + last_[disk].vz * t - t * t / 2;
+  }
+  double largest_jump = 0, longest = 0;
+  int flights = 0;
+
+ private:
+  struct Flight {
+    double time, x, z, vx, vz;
+  };
+  std::vector<Flight> last_;
+};
+
+TEST(Engine, FollowsTheFloorInFlightsThatJoin) {
+  const double gamma = 0.8, end = 30 + 2 / 0.35;
+  const auto bed = simulate(resting_bed(gamma));
+  bed->advance_to(30);
+  FlightsOnAFloor flights;
+  bed->watch(&flights);
+  Snapshot at;
+  double furthest = 0;
+  for (double time = 30 + 0.1 / 0.35; time < end; time += 0.00317 / 0.35) {
+    bed->advance_to(time);
+    bed->snapshot(at);
+    for (std::uint32_t i = 0; i < at.z.size(); ++i)
+      furthest = std::max(furthest, std::abs(flights.height(i, time) - at.z[i]));
+  }
+  EXPECT_GT(flights.flights, 120 * 100);
+  EXPECT_LT(flights.largest_jump, 1e-12);
+  const double deepest = (1 + gamma) * flights.longest * flights.longest / 8;
+  EXPECT_LT(furthest, 1.01 * deepest);
+  EXPECT_GT(furthest, 0.9 * deepest) << "snapshots show the disks where they lie, not on their flights";
+}
+
 TEST(Engine, RefusesACheckpointOfAnotherScene) {
   const Scene scene = shaken_bed();
   Scene other = scene;
