@@ -93,15 +93,65 @@ void look_inwards(const View& view, float tolerance, Strip& strip) {
   strip.through = true;
 }
 
+constexpr double steepest = 0.14, same_line = 1.5;  // 8 degrees; px
+constexpr int thinnest = 2;
+constexpr std::size_t fewest_strips = 4;
+
+struct Member {
+  std::size_t strip;
+  Strip::End end;
+};
+
+// The line of one level through as many ends as there is.
+std::vector<Member> longest_line(const std::vector<Strip>& strips, const std::vector<Member>& ends, double tolerance) {
+  std::vector<Member> best;
+  for (const Member& one : ends)
+    for (const Member& other : ends) {
+      if (other.strip <= one.strip || std::abs(other.end.level - one.end.level) > 2 * tolerance) continue;
+      const double from = strips[one.strip].middle();
+      const double slope = (other.end.depth - one.end.depth) / (strips[other.strip].middle() - from);
+      if (std::abs(slope) > steepest) continue;
+      std::vector<Member> members;
+      for (const Member& member : ends) {
+        const double line = one.end.depth + slope * (strips[member.strip].middle() - from);
+        if (std::abs(member.end.depth - line) <= same_line &&
+            std::abs(member.end.level - one.end.level) <= 2 * tolerance &&
+            (members.empty() || members.back().strip != member.strip))
+          members.push_back(member);
+      }
+      if (members.size() > best.size()) best = std::move(members);
+    }
+  return best;
+}
+
+// The border along a line by least squares, with the strips beside it that are even right through: they belong to it. A
+// strip between that ends earlier holds something.
+SolidBorder border_along(const std::vector<Strip>& strips, const std::vector<Member>& line, FrameSide side) {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  std::vector<float> levels;
+  for (const Member& member : line) {
+    const double place = strips[member.strip].middle(), depth = member.end.depth;
+    n += 1, x += place, y += depth, xx += place * place, xy += place * depth;
+    levels.push_back(member.end.level);
+  }
+  SolidBorder border;
+  border.side = side;
+  border.slope = (n * xy - x * y) / (n * xx - x * x);
+  border.depth_px = (y - border.slope * x) / n;
+  border.level = static_cast<double>(quantile_of(levels, 0.5));
+  border.from = strips[line.front().strip].from;
+  border.to = strips[line.back().strip].to;
+  if (std::all_of(strips.begin(), strips.begin() + static_cast<std::ptrdiff_t>(line.front().strip),
+                  [](const Strip& strip) { return strip.through; }))
+    border.from = strips.front().from;
+  if (std::all_of(strips.begin() + static_cast<std::ptrdiff_t>(line.back().strip), strips.end(),
+                  [&](const Strip& strip) { return strip.through || &strip == &strips[line.back().strip]; }))
+    border.to = strips.back().to;
+  return border;
+}
+
 // The straight lines on which even areas of one level end in most strips, outermost first.
 std::vector<SolidBorder> borders_of(const View& view, const std::vector<Strip>& strips, double tolerance) {
-  constexpr double steepest = 0.14, same_line = 1.5;  // 8 degrees; px
-  constexpr int thinnest = 2;
-  constexpr std::size_t fewest_strips = 4;
-  struct Member {
-    std::size_t strip;
-    Strip::End end;
-  };
   std::vector<Member> ends;
   std::size_t telling = 0;
   for (std::size_t k = 0; k < strips.size(); ++k) {
@@ -112,58 +162,20 @@ std::vector<SolidBorder> borders_of(const View& view, const std::vector<Strip>& 
   const std::size_t enough = std::max(fewest_strips, (telling + 1) / 2);
   std::vector<SolidBorder> borders;
   for (;;) {
-    std::vector<Member> best;
-    for (const Member& one : ends)
-      for (const Member& other : ends) {
-        if (other.strip <= one.strip || std::abs(other.end.level - one.end.level) > 2 * tolerance) continue;
-        const double from = strips[one.strip].middle();
-        const double slope = (other.end.depth - one.end.depth) / (strips[other.strip].middle() - from);
-        if (std::abs(slope) > steepest) continue;
-        std::vector<Member> members;
-        for (const Member& member : ends) {
-          const double line = one.end.depth + slope * (strips[member.strip].middle() - from);
-          if (std::abs(member.end.depth - line) <= same_line &&
-              std::abs(member.end.level - one.end.level) <= 2 * tolerance &&
-              (members.empty() || members.back().strip != member.strip))
-            members.push_back(member);
-        }
-        if (members.size() > best.size()) best = std::move(members);
-      }
-    if (best.size() < enough) break;
-    double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-    std::vector<float> levels;
-    for (const Member& member : best) {
-      const double place = strips[member.strip].middle(), depth = member.end.depth;
-      n += 1, x += place, y += depth, xx += place * place, xy += place * depth;
-      levels.push_back(member.end.level);
-    }
-    SolidBorder border;
-    border.side = view.side;
-    border.slope = (n * xy - x * y) / (n * xx - x * x);
-    border.depth_px = (y - border.slope * x) / n;
-    border.level = static_cast<double>(quantile_of(levels, 0.5));
-    border.from = strips[best.front().strip].from;
-    border.to = strips[best.back().strip].to;
-    // What is even right through, beside these strips, belongs to it; a strip between that ends earlier holds
-    // something.
-    if (std::all_of(strips.begin(), strips.begin() + static_cast<std::ptrdiff_t>(best.front().strip),
-                    [](const Strip& strip) { return strip.through; }))
-      border.from = strips.front().from;
-    if (std::all_of(strips.begin() + static_cast<std::ptrdiff_t>(best.back().strip), strips.end(),
-                    [&](const Strip& strip) { return strip.through || &strip == &strips[best.back().strip]; }))
-      border.to = strips.back().to;
+    const std::vector<Member> line = longest_line(strips, ends, tolerance);
+    if (line.size() < enough) return borders;
+    const SolidBorder border = border_along(strips, line, view.side);
     const bool free = std::none_of(strips.begin(), strips.end(), [&](const Strip& strip) {
       return strip.from >= border.from && strip.to <= border.to && !strip.through &&
              strip.deepest < border.depth_px + border.slope * strip.middle() - 2 * same_line;
     });
     if (free) borders.push_back(border);
     std::erase_if(ends, [&](const Member& end) {
-      return std::any_of(best.begin(), best.end(), [&](const Member& member) {
+      return std::any_of(line.begin(), line.end(), [&](const Member& member) {
         return member.strip == end.strip && member.end.depth == end.end.depth;
       });
     });
   }
-  return borders;
 }
 
 void hide(GrayFrame& frame, const SolidBorder& border, double margin_px) {

@@ -48,6 +48,16 @@ PixelPlace LensMap::to_recorded(PixelPlace seen) const {
   return {(middle_x_ + s * x + 0.5) / lens_.pixel_aspect - 0.5, middle_y_ + s * y};
 }
 
+namespace {
+
+// Catmull-Rom's cubic through the four nearest.
+std::array<float, 4> cubic(float t) {
+  return {t * (-0.5F + t * (1 - 0.5F * t)), 1 + t * t * (-2.5F + 1.5F * t), t * (0.5F + t * (2 - 1.5F * t)),
+          t * t * (-0.5F + 0.5F * t)};
+}
+
+}  // namespace
+
 GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
   if (recorded.width != recorded_width_ || recorded.height != recorded_height_)
     throw std::invalid_argument("lens: the frame differs in size from the map of the lens");
@@ -55,36 +65,37 @@ GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
   frame.width = width_;
   frame.height = height_;
   frame.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  // Catmull-Rom's cubic through the four nearest.
-  const auto weights = [](float t) {
-    return std::array<float, 4>{t * (-0.5F + t * (1 - 0.5F * t)), 1 + t * t * (-2.5F + 1.5F * t),
-                                t * (0.5F + t * (2 - 1.5F * t)), t * t * (-0.5F + 0.5F * t)};
+  lens_.radial == 0 ? correct_rows(recorded, frame) : correct_all(recorded, frame);
+  return frame;
+}
+
+// Without a radial term rows stay rows.
+void LensMap::correct_rows(const GrayFrame& recorded, GrayFrame& frame) const {
+  struct Part {
+    std::array<std::size_t, 4> from;
+    std::array<float, 4> weight;
   };
-  const std::size_t stride = static_cast<std::size_t>(recorded_width_);
-  if (lens_.radial == 0) {  // rows stay rows
-    struct Part {
-      std::array<std::size_t, 4> from;
-      std::array<float, 4> weight;
-    };
-    std::vector<Part> parts(static_cast<std::size_t>(width_));
-    for (int column = 0; column < width_; ++column) {
-      Part& part = parts[static_cast<std::size_t>(column)];
-      const double x = std::clamp(to_recorded({static_cast<double>(column), middle_y_}).x, 0.0, recorded_width_ - 1.0);
-      const int left = static_cast<int>(x);
-      part.weight = weights(static_cast<float>(x - left));
-      for (int i = 0; i < 4; ++i)
-        part.from[static_cast<std::size_t>(i)] =
-            static_cast<std::size_t>(std::clamp(left + i - 1, 0, recorded_width_ - 1));
-    }
-    for (int row = 0; row < height_; ++row) {
-      const float* line = recorded.pixels.data() + static_cast<std::size_t>(row) * stride;
-      float* to = frame.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
-      for (const Part& part : parts)
-        *to++ = part.weight[0] * line[part.from[0]] + part.weight[1] * line[part.from[1]] +
-                part.weight[2] * line[part.from[2]] + part.weight[3] * line[part.from[3]];
-    }
-    return frame;
+  std::vector<Part> parts(static_cast<std::size_t>(width_));
+  for (int column = 0; column < width_; ++column) {
+    Part& part = parts[static_cast<std::size_t>(column)];
+    const double x = std::clamp(to_recorded({static_cast<double>(column), middle_y_}).x, 0.0, recorded_width_ - 1.0);
+    const int left = static_cast<int>(x);
+    part.weight = cubic(static_cast<float>(x - left));
+    for (int i = 0; i < 4; ++i)
+      part.from[static_cast<std::size_t>(i)] =
+          static_cast<std::size_t>(std::clamp(left + i - 1, 0, recorded_width_ - 1));
   }
+  for (int row = 0; row < height_; ++row) {
+    const float* line =
+        recorded.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(recorded_width_);
+    float* to = frame.pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
+    for (const Part& part : parts)
+      *to++ = part.weight[0] * line[part.from[0]] + part.weight[1] * line[part.from[1]] +
+              part.weight[2] * line[part.from[2]] + part.weight[3] * line[part.from[3]];
+  }
+}
+
+void LensMap::correct_all(const GrayFrame& recorded, GrayFrame& frame) const {
   // The map bends so little that straight lines between a thousand values of q are good to 1e-4 px.
   constexpr std::size_t pieces = 1024;
   const double farthest = std::hypot(0.5 * width_ + 1, 0.5 * height_ + 1) / half_diagonal_;
@@ -104,11 +115,12 @@ GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
                                   recorded_width_ - 1.0),
                    y = std::clamp(middle_y_ + s * away_y, 0.0, recorded_height_ - 1.0);
       const int left = static_cast<int>(x), top = static_cast<int>(y);
-      const auto along = weights(static_cast<float>(x - left)), down = weights(static_cast<float>(y - top));
+      const auto along = cubic(static_cast<float>(x - left)), down = cubic(static_cast<float>(y - top));
       float sum = 0;
       for (int j = 0; j < 4; ++j) {
         const int from_row = std::clamp(top + j - 1, 0, recorded_height_ - 1);
-        const float* line = recorded.pixels.data() + static_cast<std::size_t>(from_row) * stride;
+        const float* line =
+            recorded.pixels.data() + static_cast<std::size_t>(from_row) * static_cast<std::size_t>(recorded_width_);
         float across = 0;
         for (int i = 0; i < 4; ++i)
           across += along[static_cast<std::size_t>(i)] * line[std::clamp(left + i - 1, 0, recorded_width_ - 1)];
@@ -117,7 +129,6 @@ GrayFrame LensMap::corrected(const GrayFrame& recorded) const {
       to[column] = sum;
     }
   }
-  return frame;
 }
 
 namespace {

@@ -41,6 +41,8 @@ class LensMap {
 
  private:
   [[nodiscard]] double shrink(double q) const;
+  void correct_rows(const GrayFrame& recorded, GrayFrame& frame) const;
+  void correct_all(const GrayFrame& recorded, GrayFrame& frame) const;
 
   Lens lens_;
   int recorded_width_, recorded_height_, width_, height_;

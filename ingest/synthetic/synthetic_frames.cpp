@@ -145,6 +145,9 @@ struct FrameRenderer::State {
   void add_sharp(double radius, const RadialContrast& profile, double x, double y, float weight,
                  std::vector<float>& contrast) const;
   void add_spot(double x, double y, double sigma, double amplitude, std::vector<float>& contrast) const;
+  [[nodiscard]] DrawnAs fate_of(std::size_t i) const;
+  void add_disk(const RenderedDisk& disk, bool is_transparent, std::vector<float>& contrast) const;
+  void expose(std::uint64_t frame_index, std::vector<float>& contrast) const;
 };
 
 void FrameRenderer::State::add_blurred(const BlurredDisk& disk, double x, double y, float weight,
@@ -248,7 +251,9 @@ void FrameRenderer::State::add_spot(double x, double y, double sigma, double amp
     }
 }
 
-FrameRenderer::FrameRenderer(const Camera& camera) : state_(std::make_unique<State>()) {
+namespace {
+
+void require_possible(const Camera& camera) {
   const auto require = [](bool condition, const char* what) {
     if (!condition) throw std::invalid_argument(std::string("camera: ") + what);
   };
@@ -260,6 +265,58 @@ FrameRenderer::FrameRenderer(const Camera& camera) : state_(std::make_unique<Sta
   require(camera.jpeg_quality >= 0 && camera.jpeg_quality <= 100, "jpeg_quality must lie in 0 .. 100");
   require(camera.dust_fraction >= 0 && camera.dust_fraction < 0.9, "dust_fraction must lie in 0 .. 0.9");
   require(camera.background_level != camera.bead_level, "beads and background have the same level");
+}
+
+// Specks that hold back light.
+void add_dust(const Camera& camera, std::vector<float>& light) {
+  const std::size_t width = static_cast<std::size_t>(camera.width), height = static_cast<std::size_t>(camera.height);
+  RandomStream random(camera.seed, 0xd057, 0);
+  const double total = camera.dust_fraction * static_cast<double>(width) * static_cast<double>(height);
+  double covered = 0;
+  while (covered < total) {
+    const double radius = 0.5 * camera.dust_size_px * (0.4 + 1.2 * random.uniform());
+    const double x = random.uniform() * camera.width, y = random.uniform() * camera.height;
+    const float level = static_cast<float>(0.35 + 0.5 * random.uniform());  // what is left of the light
+    covered += std::max(0.5, std::numbers::pi * radius * radius);
+    const int reach = static_cast<int>(radius + 2);
+    for (int row = static_cast<int>(y) - reach; row <= static_cast<int>(y) + reach; ++row)
+      for (int column = static_cast<int>(x) - reach; column <= static_cast<int>(x) + reach; ++column) {
+        if (row < 0 || column < 0 || row >= camera.height || column >= camera.width) continue;
+        const double distance = std::hypot(column - x, row - y);
+        const double soft = std::clamp(radius + 0.5 - distance, 0.0, 1.0);
+        float& there = light[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)];
+        there *= static_cast<float>(1 - soft) + static_cast<float>(soft) * level;
+      }
+  }
+}
+
+// The illumination, 1 where full; empty when even.
+std::vector<float> light_of(const Camera& camera) {
+  const bool even =
+      camera.gradient_x == 0 && camera.gradient_y == 0 && camera.vignette == 0 && camera.dust_fraction == 0;
+  if (even) return {};
+  const std::size_t width = static_cast<std::size_t>(camera.width), height = static_cast<std::size_t>(camera.height);
+  std::vector<float> light(width * height);
+  const double middle_x = 0.5 * (camera.width - 1), middle_y = 0.5 * (camera.height - 1);
+  const double corner_squared = std::max(1e-9, middle_x * middle_x + middle_y * middle_y);
+  const double brightest = 1 + 0.5 * std::abs(camera.gradient_x) + 0.5 * std::abs(camera.gradient_y);
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column) {
+      const double u = camera.width > 1 ? static_cast<double>(column) / (camera.width - 1) - 0.5 : 0;
+      const double v = camera.height > 1 ? static_cast<double>(row) / (camera.height - 1) - 0.5 : 0;
+      const double dx = static_cast<double>(column) - middle_x, dy = static_cast<double>(row) - middle_y;
+      double level = (1 + camera.gradient_x * u + camera.gradient_y * v) / brightest;
+      level *= 1 - camera.vignette * (dx * dx + dy * dy) / corner_squared;
+      light[row * width + column] = static_cast<float>(level);
+    }
+  if (camera.dust_fraction > 0) add_dust(camera, light);
+  return light;
+}
+
+}  // namespace
+
+FrameRenderer::FrameRenderer(const Camera& camera) : state_(std::make_unique<State>()) {
+  require_possible(camera);
   State& state = *state_;
   state.camera = camera;
   const bool dark = camera.bead_level < camera.background_level;
@@ -277,44 +334,7 @@ FrameRenderer::FrameRenderer(const Camera& camera) : state_(std::make_unique<Sta
   };
   const double blur = camera.blur_px;
   state.pixel_rule = gauss_legendre(blur >= 0.7 ? 2 : blur >= 0.35 ? 4 : 10);
-
-  const bool even =
-      camera.gradient_x == 0 && camera.gradient_y == 0 && camera.vignette == 0 && camera.dust_fraction == 0;
-  if (even) return;
-  const std::size_t width = static_cast<std::size_t>(camera.width), height = static_cast<std::size_t>(camera.height);
-  state.light.resize(width * height);
-  const double middle_x = 0.5 * (camera.width - 1), middle_y = 0.5 * (camera.height - 1);
-  const double corner_squared = std::max(1e-9, middle_x * middle_x + middle_y * middle_y);
-  const double brightest = 1 + 0.5 * std::abs(camera.gradient_x) + 0.5 * std::abs(camera.gradient_y);
-  for (std::size_t row = 0; row < height; ++row)
-    for (std::size_t column = 0; column < width; ++column) {
-      const double u = camera.width > 1 ? static_cast<double>(column) / (camera.width - 1) - 0.5 : 0;
-      const double v = camera.height > 1 ? static_cast<double>(row) / (camera.height - 1) - 0.5 : 0;
-      const double dx = static_cast<double>(column) - middle_x, dy = static_cast<double>(row) - middle_y;
-      double level = (1 + camera.gradient_x * u + camera.gradient_y * v) / brightest;
-      level *= 1 - camera.vignette * (dx * dx + dy * dy) / corner_squared;
-      state.light[row * width + column] = static_cast<float>(level);
-    }
-  if (camera.dust_fraction > 0) {
-    RandomStream random(camera.seed, 0xd057, 0);
-    const double total = camera.dust_fraction * static_cast<double>(width) * static_cast<double>(height);
-    double covered = 0;
-    while (covered < total) {
-      const double radius = 0.5 * camera.dust_size_px * (0.4 + 1.2 * random.uniform());
-      const double x = random.uniform() * camera.width, y = random.uniform() * camera.height;
-      const float level = static_cast<float>(0.35 + 0.5 * random.uniform());  // what is left of the light
-      covered += std::max(0.5, std::numbers::pi * radius * radius);
-      const int reach = static_cast<int>(radius + 2);
-      for (int row = static_cast<int>(y) - reach; row <= static_cast<int>(y) + reach; ++row)
-        for (int column = static_cast<int>(x) - reach; column <= static_cast<int>(x) + reach; ++column) {
-          if (row < 0 || column < 0 || row >= camera.height || column >= camera.width) continue;
-          const double distance = std::hypot(column - x, row - y);
-          const double soft = std::clamp(radius + 0.5 - distance, 0.0, 1.0);
-          float& light = state.light[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)];
-          light *= static_cast<float>(1 - soft) + static_cast<float>(soft) * level;
-        }
-    }
-  }
+  state.light = light_of(camera);
 }
 
 FrameRenderer::~FrameRenderer() = default;
@@ -322,59 +342,44 @@ FrameRenderer::FrameRenderer(FrameRenderer&&) noexcept = default;
 FrameRenderer& FrameRenderer::operator=(FrameRenderer&&) noexcept = default;
 const Camera& FrameRenderer::camera() const { return state_->camera; }
 
-GrayFrame FrameRenderer::render(const std::vector<RenderedDisk>& disks, std::uint64_t frame_index,
-                                std::vector<DrawnAs>* drawn_as) const {
-  const State& state = *state_;
-  const Camera& camera = state.camera;
-  const std::size_t width = static_cast<std::size_t>(camera.width), height = static_cast<std::size_t>(camera.height);
-  GrayFrame frame;
-  frame.width = camera.width;
-  frame.height = camera.height;
-  frame.pixels.assign(width * height, 0.0F);
-  std::vector<float>& contrast = frame.pixels;  // in units of bead minus background until the light is put on
-  if (drawn_as) drawn_as->assign(disks.size(), DrawnAs::opaque);
+// What becomes of disk `i` of a film: the same bead is transparent or missing in every frame.
+DrawnAs FrameRenderer::State::fate_of(std::size_t i) const {
+  RandomStream lot(camera.seed, 0xbead, i);
+  const double lottery = lot.uniform();
+  if (lottery < camera.missing_fraction) return DrawnAs::missing;
+  return lottery < camera.missing_fraction + camera.transparent_fraction ? DrawnAs::transparent : DrawnAs::opaque;
+}
 
-  for (std::size_t i = 0; i < disks.size(); ++i) {
-    const RenderedDisk& disk = disks[i];
-    if (!(disk.radius_px > 0) || !std::isfinite(disk.x_px) || !std::isfinite(disk.y_px))
-      throw std::invalid_argument("disk " + std::to_string(i) + ": radius and centre must be finite, radius positive");
-    RandomStream lot(camera.seed, 0xbead, i);  // the same bead is transparent or missing in every frame
-    const double lottery = lot.uniform();
-    bool is_transparent = false;
-    if (lottery < camera.missing_fraction) {
-      if (drawn_as) (*drawn_as)[i] = DrawnAs::missing;
-      continue;
-    }
-    if (lottery < camera.missing_fraction + camera.transparent_fraction) {
-      is_transparent = true;
-      if (drawn_as) (*drawn_as)[i] = DrawnAs::transparent;
-    }
-    const double streak_x = disk.velocity_x_px_per_s * camera.exposure_s;
-    const double streak_y = disk.velocity_y_px_per_s * camera.exposure_s;
-    const double streak = std::hypot(streak_x, streak_y);
-    const double smooth = std::max(0.25, camera.blur_px);
-    const std::size_t moments = streak < 0.02 ? 1 : static_cast<std::size_t>(std::ceil(streak / (1.5 * smooth))) + 1;
-    const double reach = disk.radius_px + 6 * camera.blur_px + 1 + 0.5 * streak;
-    if (disk.x_px < -reach || disk.y_px < -reach || disk.x_px > camera.width + reach ||
-        disk.y_px > camera.height + reach)
-      continue;
-    std::shared_ptr<const BlurredDisk> table;
-    if (!state.sharp()) table = state.table(disk.radius_px, is_transparent);
-    const GaussLegendre moments_rule = moments > 1 ? gauss_legendre(moments) : GaussLegendre{{0.5}, {1.0}};
-    for (std::size_t k = 0; k < moments; ++k) {
-      const double x = disk.x_px + (moments_rule.node[k] - 0.5) * streak_x;
-      const double y = disk.y_px + (moments_rule.node[k] - 0.5) * streak_y;
-      const float weight = static_cast<float>(moments_rule.weight[k]);
-      if (table)
-        state.add_blurred(*table, x, y, weight, contrast);
-      else
-        state.add_sharp(disk.radius_px, is_transparent ? state.transparent : state.opaque, x, y, weight, contrast);
-      if (camera.shading == BeadShading::highlight && !is_transparent)
-        state.add_spot(x - 0.3 * disk.radius_px, y - 0.3 * disk.radius_px, 0.12 * disk.radius_px,
-                       -static_cast<double>(weight) * camera.highlight_level * (1 - camera.shading_depth), contrast);
-    }
+// Adds a disk that is not missing to `contrast`, at several moments of the exposure if it moves.
+void FrameRenderer::State::add_disk(const RenderedDisk& disk, bool is_transparent, std::vector<float>& contrast) const {
+  const double streak_x = disk.velocity_x_px_per_s * camera.exposure_s;
+  const double streak_y = disk.velocity_y_px_per_s * camera.exposure_s;
+  const double streak = std::hypot(streak_x, streak_y);
+  const double smooth = std::max(0.25, camera.blur_px);
+  const std::size_t moments = streak < 0.02 ? 1 : static_cast<std::size_t>(std::ceil(streak / (1.5 * smooth))) + 1;
+  const double reach = disk.radius_px + 6 * camera.blur_px + 1 + 0.5 * streak;
+  if (disk.x_px < -reach || disk.y_px < -reach || disk.x_px > camera.width + reach || disk.y_px > camera.height + reach)
+    return;
+  std::shared_ptr<const BlurredDisk> blurred;
+  if (!sharp()) blurred = table(disk.radius_px, is_transparent);
+  const GaussLegendre rule = moments > 1 ? gauss_legendre(moments) : GaussLegendre{{0.5}, {1.0}};
+  for (std::size_t k = 0; k < moments; ++k) {
+    const double x = disk.x_px + (rule.node[k] - 0.5) * streak_x;
+    const double y = disk.y_px + (rule.node[k] - 0.5) * streak_y;
+    const float weight = static_cast<float>(rule.weight[k]);
+    if (blurred)
+      add_blurred(*blurred, x, y, weight, contrast);
+    else
+      add_sharp(disk.radius_px, is_transparent ? transparent : opaque, x, y, weight, contrast);
+    if (camera.shading == BeadShading::highlight && !is_transparent)
+      add_spot(x - 0.3 * disk.radius_px, y - 0.3 * disk.radius_px, 0.12 * disk.radius_px,
+               -static_cast<double>(weight) * camera.highlight_level * (1 - camera.shading_depth), contrast);
   }
+}
 
+// Grey levels from the contrast: the light, and the noise of frame `frame_index`.
+void FrameRenderer::State::expose(std::uint64_t frame_index, std::vector<float>& contrast) const {
+  const std::size_t width = static_cast<std::size_t>(camera.width), height = static_cast<std::size_t>(camera.height);
   const float background = static_cast<float>(camera.background_level);
   const float depth = static_cast<float>(camera.bead_level - camera.background_level);
   const bool noisy = camera.read_noise > 0 || camera.shot_noise > 0;
@@ -383,10 +388,10 @@ GrayFrame FrameRenderer::render(const std::vector<RenderedDisk>& disks, std::uin
   const float shot_variance = static_cast<float>(camera.shot_noise * camera.shot_noise / 255.0);
   for (std::size_t row = 0; row < height; ++row) {
     float* line = contrast.data() + row * width;
-    const float* light = state.light.empty() ? nullptr : state.light.data() + row * width;
+    const float* lit = light.empty() ? nullptr : light.data() + row * width;
     for (std::size_t column = 0; column < width; ++column) {
       const float level = background + depth * std::min(1.0F, line[column]);  // overlapping beads hide one another
-      line[column] = light ? level * light[column] : level;
+      line[column] = lit ? level * lit[column] : level;
     }
     if (!noisy) continue;
     RandomStream random(camera.seed, frame_index + 1, row);
@@ -397,19 +402,47 @@ GrayFrame FrameRenderer::render(const std::vector<RenderedDisk>& disks, std::uin
       line[column] += std::sqrt(variance) * quantiles[word & 0xffffU];
     }
   }
-  if (camera.jpeg_quality > 0) {
-    cv::Mat picture(camera.height, camera.width, CV_8U);
-    for (std::size_t row = 0; row < height; ++row)
-      for (std::size_t column = 0; column < width; ++column)
-        picture.at<std::uint8_t>(static_cast<int>(row), static_cast<int>(column)) =
-            static_cast<std::uint8_t>(std::clamp(frame.pixels[row * width + column], 0.0F, 255.0F) + 0.5F);
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, camera.jpeg_quality});
-    const cv::Mat decoded = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-    for (std::size_t row = 0; row < height; ++row)
-      for (std::size_t column = 0; column < width; ++column)
-        frame.pixels[row * width + column] = decoded.at<std::uint8_t>(static_cast<int>(row), static_cast<int>(column));
+}
+
+namespace {
+
+// As a camera's JPEG gives it back.
+void compress(GrayFrame& frame, int quality) {
+  const std::size_t width = static_cast<std::size_t>(frame.width), height = static_cast<std::size_t>(frame.height);
+  cv::Mat picture(frame.height, frame.width, CV_8U);
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column)
+      picture.at<std::uint8_t>(static_cast<int>(row), static_cast<int>(column)) =
+          static_cast<std::uint8_t>(std::clamp(frame.pixels[row * width + column], 0.0F, 255.0F) + 0.5F);
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  const cv::Mat decoded = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column)
+      frame.pixels[row * width + column] = decoded.at<std::uint8_t>(static_cast<int>(row), static_cast<int>(column));
+}
+
+}  // namespace
+
+GrayFrame FrameRenderer::render(const std::vector<RenderedDisk>& disks, std::uint64_t frame_index,
+                                std::vector<DrawnAs>* drawn_as) const {
+  const Camera& camera = state_->camera;
+  GrayFrame frame;
+  frame.width = camera.width;
+  frame.height = camera.height;
+  frame.pixels.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), 0.0F);
+  if (drawn_as) drawn_as->assign(disks.size(), DrawnAs::opaque);
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    const RenderedDisk& disk = disks[i];
+    if (!(disk.radius_px > 0) || !std::isfinite(disk.x_px) || !std::isfinite(disk.y_px))
+      throw std::invalid_argument("disk " + std::to_string(i) + ": radius and centre must be finite, radius positive");
+    const DrawnAs fate = state_->fate_of(i);
+    if (drawn_as) (*drawn_as)[i] = fate;
+    // The contrast is in units of bead minus background until the light is put on.
+    if (fate != DrawnAs::missing) state_->add_disk(disk, fate == DrawnAs::transparent, frame.pixels);
   }
+  state_->expose(frame_index, frame.pixels);
+  if (camera.jpeg_quality > 0) compress(frame, camera.jpeg_quality);
   if (camera.round_to_8_bits)
     for (float& level : frame.pixels)
       level = static_cast<float>(static_cast<int>(std::min(255.0F, std::max(0.0F, level)) + 0.5F));

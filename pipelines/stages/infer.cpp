@@ -494,6 +494,40 @@ std::vector<BestBed> Infer::best_beds(RunContext& context, const Inference& foun
 }
 
 // Beds with known parameters, each inferred from the beds of the first round.
+// The targets that a bed of known parameters gives, with the errors of the real ones; nothing where it lacks a number.
+// The bed's number has its scatter already.
+std::optional<std::vector<ScaledTarget>> targets_of_bed(const RunBed& bed, std::size_t first,
+                                                        std::vector<ScaledTarget> targets,
+                                                        const BedSurrogate& surrogate,
+                                                        const std::function<double()>& uniform) {
+  bool complete = true;
+  for (ScaledTarget& target : targets) {
+    const double missing = std::pow(target.least_scatter, 2) - std::pow(surrogate.scatter(target.number), 2);
+    const double error = std::sqrt(std::max(0.0, missing) + std::pow(target.further_error, 2));
+    target.value =
+        to_scale(target.number, bed.numbers[first + target.number]) + error * fit::normal_quantile(uniform());
+    complete = complete && std::isfinite(target.value);
+  }
+  if (!complete) return std::nullopt;
+  return targets;
+}
+
+// Rank and intervals of parameter k of bed i, whose true value is known.
+CalibrationRow calibration_row(const fit::Posterior& posterior, const UnknownParameter& parameter, std::size_t i,
+                               std::size_t k, double truth) {
+  CalibrationRow row{i, k, truth, 0, 0, 0, 0, 0};
+  std::vector<double> values;
+  for (std::size_t p = 0; p < posterior.size(); ++p) {
+    values.push_back(parameter.value(std::clamp(posterior.point(p)[k], 0.0, 1.0)));
+    if (values.back() < truth) row.rank += posterior.weight[p];
+  }
+  row.low_68 = fit::weighted_quantile(values, posterior.weight, 0.16);
+  row.high_68 = fit::weighted_quantile(values, posterior.weight, 0.84);
+  row.low_95 = fit::weighted_quantile(values, posterior.weight, 0.025);
+  row.high_95 = fit::weighted_quantile(values, posterior.weight, 0.975);
+  return row;
+}
+
 std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inference& found, BedsAhead& ahead) const {
   std::vector<CalibrationRow> rows;
   if (options_.calibration == 0) return rows;
@@ -518,36 +552,14 @@ std::vector<CalibrationRow> Infer::calibrate(RunContext& context, const Inferenc
     std::size_t view = 0;
     for (; view + 1 < options_.bed.views.size() && chance > surrogate.view_prior(view); ++view)
       chance -= surrogate.view_prior(view);
-    std::vector<ScaledTarget> targets = found.targets;
-    bool complete = true;
-    for (ScaledTarget& target : targets) {
-      // The bed's number has its scatter already.
-      const double missing = std::pow(target.least_scatter, 2) - std::pow(surrogate.scatter(target.number), 2);
-      const double error = std::sqrt(std::max(0.0, missing) + std::pow(target.further_error, 2));
-      target.value = to_scale(target.number, beds[i].numbers[view * count + target.number]) +
-                     error * fit::normal_quantile(uniform());
-      complete = complete && std::isfinite(target.value);
-    }
-    if (!complete) {  // no fit: such a bed gives no targets
+    const auto targets = targets_of_bed(beds[i], view * count, found.targets, surrogate, uniform);
+    if (!targets) {  // no fit: such a bed gives no targets
       ++incomplete;
       continue;
     }
-    const fit::Posterior posterior = known_parameters(context, options_, first, targets, of_first.all).posterior;
-    for (std::size_t k = 0; k < d; ++k) {
-      const double truth = values[i][k];
-      CalibrationRow row{i, k, truth, 0, 0, 0, 0, 0};
-      std::vector<double> of_parameter;
-      for (std::size_t p = 0; p < posterior.size(); ++p) {
-        const double place = std::clamp(posterior.point(p)[k], 0.0, 1.0);
-        of_parameter.push_back(options_.parameters[k].second.value(place));
-        if (of_parameter.back() < truth) row.rank += posterior.weight[p];
-      }
-      row.low_68 = fit::weighted_quantile(of_parameter, posterior.weight, 0.16);
-      row.high_68 = fit::weighted_quantile(of_parameter, posterior.weight, 0.84);
-      row.low_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.025);
-      row.high_95 = fit::weighted_quantile(of_parameter, posterior.weight, 0.975);
-      rows.push_back(row);
-    }
+    const fit::Posterior posterior = known_parameters(context, options_, first, *targets, of_first.all).posterior;
+    for (std::size_t k = 0; k < d; ++k)
+      rows.push_back(calibration_row(posterior, options_.parameters[k].second, i, k, values[i][k]));
     context.progress(ahead.time.fraction(), "inference of the beds of the calibration");
   }
   if (rows.empty())

@@ -165,9 +165,98 @@ double tic_step(double range) {
 }  // namespace
 
 // pairs.gp: marginals on the diagonal, draws below it.
+namespace {
+
+// The gnuplot commands of the plot of pairs: the draws of each parameter in the diagonal, of each two below it.
+class PairPlot {
+ public:
+  PairPlot(RunContext& context, const InferOptions& options, std::size_t draws)
+      : context_(context),
+        options_(options),
+        every_(std::max<std::size_t>(1, (draws + most_points - 1) / most_points)) {}
+
+  std::string commands() {
+    const std::size_t d = options_.dimensions();
+    body_ = fmt::format(
+        "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font "
+        "tic_font\n",
+        d);
+    for (std::size_t row = 0; row < d; ++row) {
+      for (std::size_t column = 0; column < d; ++column) {
+        if (column > row) {
+          body_ += "set multiplot next\n";
+          continue;
+        }
+        set_axes(row, column);
+        row == column ? add_bars(column) : add_points(row, column);
+      }
+    }
+    return body_ + "unset multiplot\nunset output\n";
+  }
+
+ private:
+  // The bars are of all draws; as points more hide one another and make the page large.
+  static constexpr std::size_t most_points = 400;
+
+  const UnknownParameter& parameter(std::size_t k) const { return options_.parameters[k].second; }
+  std::string label(std::size_t k) const {
+    const std::string& unit = parameter(k).unit;
+    return words(options_.parameters[k].first) + (unit.empty() ? "" : " (" + unit + ")");
+  }
+  std::pair<double, double> ends(std::size_t k) const {
+    const UnknownParameter& p = parameter(k);
+    return p.is_choice() ? std::pair(-0.5, static_cast<double>(p.values.size()) - 0.5) : std::pair(p.low, p.high);
+  }
+
+  void set_axes(std::size_t row, std::size_t column) {
+    body_ += row + 1 == options_.dimensions()
+                 ? fmt::format("set xlabel '{}' font label_font\nset format x '%g'\n", label(column))
+                 : "unset xlabel\nset format x ''\n";
+    body_ += column == 0 && row > 0 ? fmt::format("set ylabel '{}' font label_font\nset format y '%g'\n", label(row))
+                                    : "unset ylabel\nset format y ''\n";
+    const auto [low, high] = ends(column);
+    body_ += fmt::format("set xrange [{}:{}]\nset xtics {}\n", low, high, tic_step(high - low));
+  }
+
+  void add_bars(std::size_t column) {
+    const auto [low, high] = ends(column);
+    body_ += fmt::format(
+        "set yrange [0:*]\nset ytics autofreq\nplot 'pairs.dat' index 0 using "
+        "({0}+{1}*(floor((${2}-({0}))/{1})+0.5)):(1) smooth "
+        "frequency with boxes fillstyle solid 0.5 noborder lc rgb '#0072B2'\n",
+        low, (high - low) / 24, column + 1);
+  }
+
+  void add_points(std::size_t row, std::size_t column) {
+    const UnknownParameter &x = parameter(column), &y = parameter(row);
+    const auto [low, high] = ends(row);
+    body_ += fmt::format(
+        "set yrange [{}:{}]\nset ytics {}\nplot 'pairs.dat' index 0 every {} using {}:{} with points pt 7 ps 0.2 lc "
+        "rgb '#0072B2', "
+        "'pairs.dat' index 1 using {}:{} with points pt 2 ps 0.8 lw 2 lc rgb '#D55E00'",
+        low, high, tic_step(high - low), every_, column + 1, row + 1, column + 1, row + 1);
+    const auto a = x.in_scene(options_.bed.scene), b = y.in_scene(options_.bed.scene);
+    if (a && b)
+      body_ += fmt::format(", '+' using ({}):({}) every ::0::0 with points pt 6 ps 1 lw 2 lc rgb '#000000'", *a, *b);
+    const bool shaking = x.set.front() == "/floor/frequency" && y.set.front() == "/floor/gamma",
+               turned = x.set.front() == "/floor/gamma" && y.set.front() == "/floor/frequency";
+    if (options_.curve && (shaking || turned)) {
+      write_file(context_.output("map-curve.dat"), map_curve(options_, shaking ? x : y));
+      body_ += fmt::format(", 'map-curve.dat' using {} with lines lw 2 lc rgb '#009E73'", shaking ? "1:2" : "2:1");
+    }
+    body_ += "\n";
+  }
+
+  RunContext& context_;
+  const InferOptions& options_;
+  std::size_t every_;
+  std::string body_;
+};
+
+}  // namespace
+
 void draw_pairs(RunContext& context, const InferOptions& options, const Inference& found) {
-  const std::size_t d = options.dimensions();
-  std::string draws, best, marginals;
+  std::string draws, best;
   for (const std::size_t i : found.draws) {
     for (const double value : values_at(options, found.posterior.point(i))) draws += number_text(value) + " ";
     draws += "\n";
@@ -177,61 +266,7 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
     best += "\n";
   }
   write_file(context.output("pairs.dat"), draws + "\n\n" + (best.empty() ? "NaN\n" : best));
-  // The bars are of all draws; as points more than 400 hide one another and make the page large.
-  const std::size_t every = std::max<std::size_t>(1, (found.draws.size() + 399) / 400);
-  std::string body = fmt::format(
-      "set multiplot layout {0},{0} margins 0.1,0.98,0.1,0.98 spacing 0.03\nunset key\nset tics nomirror font "
-      "tic_font\n",
-      d);
-  for (std::size_t row = 0; row < d; ++row) {
-    for (std::size_t column = 0; column < d; ++column) {
-      const auto& [x_name, x] = options.parameters[column];
-      const auto& [y_name, y] = options.parameters[row];
-      const auto ends = [](const UnknownParameter& p) {
-        return p.is_choice() ? std::pair(-0.5, static_cast<double>(p.values.size()) - 0.5) : std::pair(p.low, p.high);
-      };
-      if (column > row) {
-        body += "set multiplot next\n";
-        continue;
-      }
-      const auto label = [](const std::string& name, const UnknownParameter& p) {
-        return words(name) + (p.unit.empty() ? "" : " (" + p.unit + ")");
-      };
-      body += row + 1 == d ? fmt::format("set xlabel '{}' font label_font\nset format x '%g'\n", label(x_name, x))
-                           : "unset xlabel\nset format x ''\n";
-      body += column == 0 && row > 0
-                  ? fmt::format("set ylabel '{}' font label_font\nset format y '%g'\n", label(y_name, y))
-                  : "unset ylabel\nset format y ''\n";
-      const auto [x_low, x_high] = ends(x);
-      body += fmt::format("set xrange [{}:{}]\nset xtics {}\n", x_low, x_high, tic_step(x_high - x_low));
-      if (row == column) {
-        const double bin = (x_high - x_low) / 24;
-        body += fmt::format(
-            "set yrange [0:*]\nset ytics autofreq\nplot 'pairs.dat' index 0 using "
-            "({0}+{1}*(floor((${2}-({0}))/{1})+0.5)):(1) smooth "
-            "frequency with boxes fillstyle solid 0.5 noborder lc rgb '#0072B2'\n",
-            x_low, bin, column + 1);
-        continue;
-      }
-      const auto [y_low, y_high] = ends(y);
-      body += fmt::format(
-          "set yrange [{}:{}]\nset ytics {}\nplot 'pairs.dat' index 0 every {} using {}:{} with points pt 7 ps 0.2 lc "
-          "rgb '#0072B2', "
-          "'pairs.dat' index 1 using {}:{} with points pt 2 ps 0.8 lw 2 lc rgb '#D55E00'",
-          y_low, y_high, tic_step(y_high - y_low), every, column + 1, row + 1, column + 1, row + 1);
-      const auto a = x.in_scene(options.bed.scene), b = y.in_scene(options.bed.scene);
-      if (a && b)
-        body += fmt::format(", '+' using ({}):({}) every ::0::0 with points pt 6 ps 1 lw 2 lc rgb '#000000'", *a, *b);
-      const bool shaking = x.set.front() == "/floor/frequency" && y.set.front() == "/floor/gamma",
-                 turned = x.set.front() == "/floor/gamma" && y.set.front() == "/floor/frequency";
-      if (options.curve && (shaking || turned)) {
-        write_file(context.output("map-curve.dat"), map_curve(options, shaking ? x : y));
-        body += fmt::format(", 'map-curve.dat' using {} with lines lw 2 lc rgb '#009E73'", shaking ? "1:2" : "2:1");
-      }
-      body += "\n";
-    }
-  }
-  body += "unset multiplot\nunset output\n";
+  const std::string body = PairPlot(context, options, found.draws.size()).commands();
   run_gnuplot(context.output_directory(), "pairs",
               "set encoding utf8\ntic_font = ',14'\nlabel_font = ',15'\nset terminal svg size 700,700 noenhanced font "
               "'Helvetica,14' background '#ffffff'\nset output 'pairs.svg'\n" +

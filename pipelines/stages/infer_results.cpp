@@ -486,11 +486,9 @@ void state_tables(ResultList& list, const InferOptions& options) {
 
 }  // namespace
 
-void state_inference(ResultList& list, const InferOptions& options) {
-  list.number("/beds", "1", "number of beds on which the surrogate is based");
-  list.number("/effective_samples", "1",
-              "effective number of independent draws of the weighted points of the posterior");
-  list.quantity("/log_evidence", "1", "natural logarithm of the mean likelihood over the prior");
+namespace {
+
+void state_parameters(ResultList& list, const InferOptions& options) {
   for (const auto& [name, parameter] : options.parameters) {
     const std::string at = pointer_join("/parameters", name), unit = unit_of(parameter);
     list.quantity(at, unit, "mean and standard deviation of the posterior");
@@ -505,9 +503,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.number(at + "/width_over_prior", "1", "standard deviation of the posterior over that of the prior");
     list.text(at + "/why", "reason for this prior");
   }
-  list.text("/photographs/#/show", "what the photographs show: the average over the shaking, or one phase of it");
-  list.number("/photographs/#/prior", "1", "prior probability that the photographs show this");
-  list.number("/photographs/#/posterior", "1", "posterior probability that the photographs show this");
+}
+
+void state_agreement(ResultList& list) {
   list.number("/agreement/least_chi2", "1",
               "chi-square of the nearest bed; errors include that of the surrogate and the scatter between beds");
   list.number("/agreement/numbers", "1", "number of targets");
@@ -519,6 +517,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
   list.number("/agreement/beds_run_again_that_agree", "1",
               "number of the beds run again that lie within three standard errors of every target");
   list.text("/agreement/statement", "agreement in words");
+}
+
+void state_beds(ResultList& list, const InferOptions& options) {
   const Given inside = given_when("the scene as written lies within the prior");
   for (const auto& [name, parameter] : options.parameters)
     list.number(pointer_join("/assumed/values", name), unit_of(parameter),
@@ -534,6 +535,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
   state_targets(list, options, "/best/#", best);
   list.number("/best/#/largest_difference_in_errors", "1", "largest difference from a target, in standard errors", best,
               true);
+}
+
+void state_narrowing(ResultList& list, const InferOptions& options) {
   list.text("/narrowing/#/measurement", "name of a further measurement");
   list.text("/narrowing/#/meaning", "meaning of the further measurement");
   list.number("/narrowing/#/reduction", "1",
@@ -542,6 +546,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.number(pointer_join("/narrowing/#/parameters", name), "1",
                 "share of the variance of this parameter that the measurement would remove",
                 given_when("the measurement is not the parameter itself"));
+}
+
+void state_surrogate(ResultList& list) {
   for (const Observable& observable : observables()) {
     const std::string at = "/surrogate/" + std::string(observable.name);
     list.number(at + "/beds", "1", "number of beds in which this number could be measured");
@@ -552,6 +559,9 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.number(at + "/within_2", "1",
                 "share of the beds within two standard deviations of the prediction from the others");
   }
+}
+
+void state_calibration(ResultList& list, const InferOptions& options) {
   const Given calibrated = given_if(options.calibration > 0, "\"calibration\" is above 0");
   list.number("/calibration/beds", "1", "number of beds with known parameters", calibrated);
   list.number("/calibration/within_68", "1", "share of the 68 % intervals that contain the true value", calibrated);
@@ -565,6 +575,24 @@ void state_inference(ResultList& list, const InferOptions& options) {
     list.number(at + "/rank_chi2_p", "1", "probability that uniformly distributed ranks are at least as uneven",
                 calibrated);
   }
+}
+
+}  // namespace
+
+void state_inference(ResultList& list, const InferOptions& options) {
+  list.number("/beds", "1", "number of beds on which the surrogate is based");
+  list.number("/effective_samples", "1",
+              "effective number of independent draws of the weighted points of the posterior");
+  list.quantity("/log_evidence", "1", "natural logarithm of the mean likelihood over the prior");
+  state_parameters(list, options);
+  list.text("/photographs/#/show", "what the photographs show: the average over the shaking, or one phase of it");
+  list.number("/photographs/#/prior", "1", "prior probability that the photographs show this");
+  list.number("/photographs/#/posterior", "1", "posterior probability that the photographs show this");
+  state_agreement(list);
+  state_beds(list, options);
+  state_narrowing(list, options);
+  state_surrogate(list);
+  state_calibration(list, options);
   state_tables(list, options);
 }
 

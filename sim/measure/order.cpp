@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 namespace shakebed::sim {
 
@@ -98,6 +100,45 @@ std::vector<double> smoothed(const std::vector<double>& histogram) {
 
 }  // namespace
 
+namespace {
+
+// Where a disk beside an empty site sees it: in the widest gap between its neighbours, given by their angles. Nothing
+// where no gap is wide enough.
+std::optional<double> widest_gap(std::vector<double>& angles) {
+  std::sort(angles.begin(), angles.end());
+  double widest = 0, middle = 0;
+  for (std::size_t k = 0; k < angles.size(); ++k) {
+    const double next = k + 1 < angles.size() ? angles[k + 1] : angles[0] + 2 * std::numbers::pi;
+    if (next - angles[k] > widest) {
+      widest = next - angles[k];
+      middle = (next + angles[k]) / 2;
+    }
+  }
+  if (widest < std::numbers::pi / 2) return std::nullopt;
+  return middle;
+}
+
+// An empty site near (x, z): the middle of those around it, so that all of them find the same site. Nothing where fewer
+// than five are around it, or one is in it.
+std::optional<std::pair<double, double>> empty_site(const Cells& cells, double x, double z, double diameter) {
+  const double reach = neighbour_reach * diameter;
+  int seen = 0;
+  double nearest = reach, mean_x = 0, mean_z = 0;
+  cells.around(x, z, [&](std::uint32_t, double dx, double dz) {
+    const double distance = std::sqrt(dx * dx + dz * dz);
+    nearest = std::min(nearest, distance);
+    if (distance < reach) {
+      ++seen;
+      mean_x += dx;
+      mean_z += dz;
+    }
+  });
+  if (seen < 5 || nearest < 0.8 * diameter) return std::nullopt;
+  return std::pair(x + mean_x / seen, z + mean_z / seen);
+}
+
+}  // namespace
+
 BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double period_x, double period_z) {
   const std::size_t n = at.x.size();
   BondOrder order;
@@ -106,8 +147,14 @@ BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double per
   order.psi6_im.resize(n);
   if (n == 0) return order;
   const double diameter = 2 * *std::max_element(disks.radius.begin(), disks.radius.end());
-  const double reach = neighbour_reach * diameter;
-  const Cells cells(at, reach, period_x, period_z);
+  const Cells cells(at, neighbour_reach * diameter, period_x, period_z);
+  const auto is_known = [&](double x, double z) {
+    for (std::size_t k = 0; k < order.vacancy_x.size(); ++k) {
+      const double dx = wrapped(order.vacancy_x[k] - x, period_x), dz = wrapped(order.vacancy_z[k] - z, period_z);
+      if (dx * dx + dz * dz < 0.36 * diameter * diameter) return true;
+    }
+    return false;
+  };
   std::vector<double> angles;
   for (std::uint32_t i = 0; i < n; ++i) {
     angles.clear();
@@ -129,42 +176,14 @@ BondOrder bond_order(const Snapshot& at, const DiskProperties& disks, double per
     if (count == 0) continue;
     order.psi6_re[i] = re / static_cast<double>(count);
     order.psi6_im[i] = im / static_cast<double>(count);
-    // A disk beside an empty site has five neighbours or fewer and sees it in the widest gap between them.
-    if (count >= 6 || count < 2) continue;
-    std::sort(angles.begin(), angles.end());
-    double widest = 0, middle = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double next = k + 1 < count ? angles[k + 1] : angles[0] + 2 * std::numbers::pi;
-      if (next - angles[k] > widest) {
-        widest = next - angles[k];
-        middle = (next + angles[k]) / 2;
-      }
-    }
-    if (widest < std::numbers::pi / 2) continue;
-    double x = at.x[i] + diameter * std::cos(middle), z = at.z[i] + diameter * std::sin(middle);
-    int seen = 0;
-    double nearest = reach, mean_x = 0, mean_z = 0;
-    cells.around(x, z, [&](std::uint32_t, double dx, double dz) {
-      const double distance = std::sqrt(dx * dx + dz * dz);
-      nearest = std::min(nearest, distance);
-      if (distance < reach) {
-        ++seen;
-        mean_x += dx;
-        mean_z += dz;
-      }
-    });
-    if (seen < 5 || nearest < 0.8 * diameter) continue;
-    // The middle of those around it, so that all of them find the same site.
-    x += mean_x / seen;
-    z += mean_z / seen;
-    bool known = false;
-    for (std::size_t k = 0; k < order.vacancy_x.size() && !known; ++k) {
-      const double dx = wrapped(order.vacancy_x[k] - x, period_x), dz = wrapped(order.vacancy_z[k] - z, period_z);
-      known = dx * dx + dz * dz < 0.36 * diameter * diameter;
-    }
-    if (known) continue;
-    order.vacancy_x.push_back(x);
-    order.vacancy_z.push_back(z);
+    if (count >= 6 || count < 2) continue;  // beside an empty site it has five neighbours or fewer
+    const auto gap = widest_gap(angles);
+    if (!gap) continue;
+    const auto site =
+        empty_site(cells, at.x[i] + diameter * std::cos(*gap), at.z[i] + diameter * std::sin(*gap), diameter);
+    if (!site || is_known(site->first, site->second)) continue;
+    order.vacancy_x.push_back(site->first);
+    order.vacancy_z.push_back(site->second);
   }
   return order;
 }
