@@ -104,6 +104,40 @@ void quiet_opencv() {
   std::call_once(once, [] { cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); });
 }
 
+namespace {
+
+// The large picture that was decoded last: the first look, both passes over the frames and the drawings each want it.
+class LastPicture {
+ public:
+  struct Key {
+    std::string path;
+    std::size_t page = 0;
+    std::uintmax_t bytes = 0;
+    fs::file_time_type written;
+    bool operator==(const Key&) const = default;
+  };
+
+  // Empty where it is another one.
+  cv::Mat find(const Key& key) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return key == key_ ? picture_.clone() : cv::Mat();
+  }
+  void keep(const Key& key, const cv::Mat& picture) {
+    if (picture.total() < least_pixels) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    key_ = key, picture_ = picture.clone();
+  }
+
+ private:
+  static constexpr std::size_t least_pixels = 4'000'000;  // a PNG takes some 30 ms to decode, a copy of it 1 ms
+
+  mutable std::mutex mutex_;
+  Key key_;
+  cv::Mat picture_;
+};
+
+}  // namespace
+
 cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const FrameSourceOptions& options) {
   quiet_opencv();
   std::error_code error;
@@ -113,6 +147,9 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path, "the file cannot be opened", "no permission to read it", "check its permissions");
   refuse_if_enormous(path, file, bytes, options);
+  static LastPicture last;
+  const LastPicture::Key key{path, page, bytes, fs::last_write_time(path, error)};
+  if (cv::Mat again = last.find(key); !again.empty()) return again;
   char head[2] = {};
   file.clear();
   file.seekg(0);
@@ -144,6 +181,7 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   }
   if (picture.empty())
     throw_unreadable(path, "it is truncated, damaged or not a picture of the type that its name states");
+  last.keep(key, picture);
   return picture;
 }
 

@@ -99,6 +99,21 @@ TEST(Frames, PngComesBackAsItWasWritten) {
   EXPECT_EQ(files, 1) << "a temporary file was left behind";
 }
 
+// A large picture is kept for the next who wants it, but never in place of another of the same name, size and length.
+TEST(Frames, ALargePictureThatIsWrittenAnewIsReadAnew) {
+  const ScratchFolder folder;
+  const std::string path = folder / "large.bmp";
+  for (const int level : {50, 60, 60, 70}) {
+    cv::imwrite(path, cv::Mat(2000, 2100, CV_8U, cv::Scalar(level)));
+    for (int time = 0; time < 2; ++time) {
+      GrayFrame frame = read_frame(path);
+      ASSERT_EQ(frame.pixels.front(), level);
+      ASSERT_EQ(frame.pixels.back(), level);
+      frame.pixels.front() = 0;
+    }
+  }
+}
+
 TEST(Frames, ATextStaysInItsPng) {
   const test::ScratchFolder folder;
   GrayFrame frame{7, 5, std::vector<float>(35, 90.0F)};
