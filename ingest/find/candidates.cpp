@@ -78,8 +78,8 @@ double residual_noise(const JointFit& fit) {
 }
 
 std::vector<DiskCandidate> candidates_in(const GrayFrame& flat, double radius, double noise, double score) {
-  return seen_ones(flat, find_candidates(map_frame(flat, radius, noise), map_reduction(radius), radius, score,
-                                         2 * radius * least_separation));
+  return seen_ones(flat, find_candidates({map_frame(flat, radius, noise), map_reduction(radius)}, radius,
+                                         {score, 2 * radius * least_separation}));
 }
 
 std::vector<DiskCandidate> candidates_by(const KnownBead& bead, const GrayFrame& flat, double noise, double score) {
@@ -87,8 +87,8 @@ std::vector<DiskCandidate> candidates_by(const KnownBead& bead, const GrayFrame&
   if (bead.edge_px < strong_blur * radius && !hollow(bead.profile, radius))
     return candidates_in(flat, radius, noise, score);
   const int factor = map_reduction(radius);
-  return seen_ones(flat, find_matched_candidates(reduced(flat, factor), factor, bead.profile, radius, noise, score,
-                                                 2 * radius * least_separation));
+  return seen_ones(flat, find_matched_candidates({reduced(flat, factor), factor}, bead.profile, radius, noise,
+                                                 {score, 2 * radius * least_separation}));
 }
 
 }  // namespace shakebed::ingest

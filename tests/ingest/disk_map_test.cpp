@@ -104,7 +104,7 @@ TEST(DiskMap, OfAnIdealDiskHasTheScoreOfItsRule) {
     const GrayFrame small = busy_frame(31, 26, radius);
     for (const auto& [least, apart] : {std::pair{0.1, 1.44}, {0.35, 0.1}}) {
       const auto score = [&, r = radius](int x, int y) { return score_of_ideal_disk(small, r, x, y); };
-      expect_same(find_candidates(small, factor, radius * factor, least, apart * radius * factor),
+      expect_same(find_candidates({small, factor}, radius * factor, {least, apart * radius * factor}),
                   maxima_by_hand(small, factor, radius, least, apart * radius * factor, score), 2e-3 * factor);
     }
   }
@@ -113,7 +113,7 @@ TEST(DiskMap, OfAnIdealDiskHasTheScoreOfItsRule) {
 TEST(DiskMap, OfAPerfectDiskIsTwo) {
   const GrayFrame frame =
       frame_by(40, 40, [](int column, int row) { return std::hypot(column - 19, row - 21) <= 6 ? 1.0 : 0.0; });
-  const auto found = find_candidates(frame, 1, 6, 0.5, 8);
+  const auto found = find_candidates({frame, 1}, 6, {0.5, 8});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found[0].score, 2, 1e-5);
   EXPECT_NEAR(found[0].x, 19, 1e-4);
@@ -186,7 +186,7 @@ TEST(DiskMap, OfALearnedBeadIsWienersFilter) {
       return map[static_cast<std::size_t>((y + high) % high)][static_cast<std::size_t>((x + wide) % wide)].real() /
              lone;
     };
-    expect_same(find_matched_candidates(small, factor, profile, radius * factor, noise, 0.15, 3.0 * factor),
+    expect_same(find_matched_candidates({small, factor}, profile, radius * factor, noise, {0.15, 3.0 * factor}),
                 maxima_by_hand(small, factor, radius, 0.15, 3.0 * factor, at), 2e-3 * factor);
   }
 }
@@ -280,15 +280,15 @@ TEST(Candidates, AreLookedForByTheIdealDiskUnlessBlurredOrHollow) {
   EXPECT_TRUE(same(candidates_by({filled, radius, 0.13 * radius}, flat, 0.02, 0.3), ideal));
   const double apart = 2 * radius * 0.72;
   EXPECT_TRUE(same(candidates_by({filled, radius, 0.15 * radius}, flat, 0.02, 0.3),
-                   find_matched_candidates(flat, 1, filled, radius, 0.02, 0.3, apart)));
+                   find_matched_candidates({flat, 1}, filled, radius, 0.02, {0.3, apart})));
   EXPECT_TRUE(same(candidates_by({hollow, radius, 0.13 * radius}, flat, 0.02, 0.3),
-                   find_matched_candidates(flat, 1, hollow, radius, 0.02, 0.3, apart)));
+                   find_matched_candidates({flat, 1}, hollow, radius, 0.02, {0.3, apart})));
   // The ideal disk's map is that of the frame, or of the smoothed frame where noise is 0.04 or more.
-  EXPECT_TRUE(same(ideal, find_candidates(flat, 1, radius, 0.3, apart)));
+  EXPECT_TRUE(same(ideal, find_candidates({flat, 1}, radius, {0.3, apart})));
   const auto noisy = candidates_in(flat, radius, 0.041, 0.3);
   EXPECT_FALSE(same(noisy, ideal));
-  EXPECT_TRUE(same(candidates_in(flat, 3.4, 0.041, 0.3), find_candidates(flat, 1, 3.4, 0.3, 2 * 3.4 * 0.72)));
-  EXPECT_FALSE(same(candidates_in(flat, 3.6, 0.041, 0.3), find_candidates(flat, 1, 3.6, 0.3, 2 * 3.6 * 0.72)));
+  EXPECT_TRUE(same(candidates_in(flat, 3.4, 0.041, 0.3), find_candidates({flat, 1}, 3.4, {0.3, 2 * 3.4 * 0.72})));
+  EXPECT_FALSE(same(candidates_in(flat, 3.6, 0.041, 0.3), find_candidates({flat, 1}, 3.6, {0.3, 2 * 3.6 * 0.72})));
 }
 
 }  // namespace

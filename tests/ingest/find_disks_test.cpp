@@ -230,8 +230,8 @@ TEST(DiskMap, ShowsDisksWhoseCentresLieBeyondTheFrame) {
   profile.step_px = 0.1;
   for (int k = 0; k < 80; ++k)
     profile.level.push_back(static_cast<float>(std::clamp(radius + 0.5 - (k + 0.5) * profile.step_px, 0.0, 1.0)));
-  for (const auto& found : {find_candidates(frame, 1, radius, 0.25, radius),
-                            find_matched_candidates(frame, 1, profile, radius, 0.02, 0.25, radius)}) {
+  for (const auto& found : {find_candidates({frame, 1}, radius, {0.25, radius}),
+                            find_matched_candidates({frame, 1}, profile, radius, 0.02, {0.25, radius})}) {
     for (const RenderedDisk& disk : truth)
       EXPECT_TRUE(
           std::any_of(found.begin(), found.end(),
