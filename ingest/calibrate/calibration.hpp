@@ -45,9 +45,11 @@ struct RadiusEstimate {
   std::string why_not;  // when not found: a sentence
 };
 
+inline constexpr double smallest_voted_px = 1.2;  // radius
+
 // Radius and polarity by gradient voting over all radii from `smallest_radius_px` to `largest_radius_px` (0: a third of
 // the frame). Accuracy about 3 %; find_disks refines it. Never throws for a well-formed frame.
 RadiusEstimate estimate_radius(const GrayFrame& frame, Polarity polarity = Polarity::automatic,
-                               double smallest_radius_px = 1.2, double largest_radius_px = 0);
+                               double smallest_radius_px = smallest_voted_px, double largest_radius_px = 0);
 
 }  // namespace shakebed::ingest

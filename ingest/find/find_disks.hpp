@@ -45,8 +45,10 @@ struct BeadsSeen {
 // Everything is found when left alone; each member overrides one finding.
 struct FindOptions {
   Polarity polarity = Polarity::automatic;
-  std::optional<double> radius_px{};    // a first value, refined unless hold_radius
-  bool hold_radius = false;             // keep radius_px exactly
+  std::optional<double> radius_px{};  // a first value, refined unless hold_radius
+  bool hold_radius = false;           // keep radius_px exactly
+  std::optional<double>
+      largest_radius_px{};              // beyond it none is looked for; 0.8 to 1.25 times radius_px if that is given
   std::optional<BeadsSeen> seen{};      // for learn_beads()
   bool one_size = false;                // learn_beads() looks for no beads of other sizes
   bool rims_of_one_size = false;        // learn_beads() searches rims at a higher resolution for one size only

@@ -401,7 +401,9 @@ class StartChooser {
     const auto open_part = [](const GrayFrame& frame) { return without_borders(frame, find_solid_borders(frame), 0); };
     if (!options_.radius_px || *options_.radius_px <= 0) {
       for (const GrayFrame* frame : frames_) {
-        estimate_ = estimate_radius(open_part(*frame), options_.polarity);
+        estimate_ = estimate_radius(open_part(*frame), options_.polarity, smallest_voted_px,
+                                    options_.largest_radius_px.value_or(0));
+        if (estimate_.packed_radius_px > options_.largest_radius_px.value_or(HUGE_VAL)) estimate_.packed_radius_px = 0;
         if (estimate_.found) return;
       }
       return;

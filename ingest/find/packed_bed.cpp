@@ -27,6 +27,9 @@ constexpr double least_filled = 0.2;
 // px: smaller disks are specks; rims of larger ones are seen well.
 constexpr double smallest_px = 3, largest_px = 14;
 constexpr int part_px = 400;
+// Of largest_px: a first radius is good to some 5 %. A model of larger disks would be learned in vain: of a ball of 100
+// px it took nine tenths of the time until the picture was refused.
+constexpr double largest_start = 1.25;
 
 struct Neighbours {
   double touching = 0, overlapping = 0;
@@ -163,6 +166,7 @@ std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::
     FindOptions find;
     find.polarity = start.polarity;
     find.radius_px = start.radius_px;
+    find.largest_radius_px = largest_start * largest_px;
     PackedBed bed = learn_packed_bed({part ? &*part : &frame}, find);
     if (!is_small(bed)) continue;
     if (!part) return bed;

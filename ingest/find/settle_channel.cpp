@@ -7,6 +7,7 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/other_shade.hpp"
 #include "ingest/frames/smooth_field.hpp"
 #include "statistics/ranks.hpp"
 
@@ -23,26 +24,34 @@ constexpr double least_contrast = 4;                            // grey levels b
 // photograph of 65 photoelastic disks, all of which are found by their faces, is searched in a channel that shows 63.
 constexpr double hardly = 0.05;
 
+// A rim that another channel shows, and that lies on no disk found in this one: its probability, and the distance from
+// the centres of disks in radii. A bead may have no contrast in one channel, as a dark one in the saturation.
+constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
+
+enum class Shades { common, all };
+
 struct Trial {
+  std::vector<FoundDisk> disks;
   double expected = 0;  // beads found, each by its probability
   bool by_rims = true;
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
   [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly; }
 };
-Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi) {
+Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi, Shades shades) {
   FindOptions find;
   find.seen = seen;
   find.roi = roi;
   find.rims_of_one_size = true;
-  const CalibrationResult learned = learn_beads({&frame}, find);
+  CalibrationResult learned = learn_beads({&frame}, find);
   Trial trial;
   if (!learned.found) return trial;
   trial.by_rims = learned.calibration.by_rims;
-  const FindResult found =
-      learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
+  FindResult found = learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
+  if (shades == Shades::all) learn_other_shade(frame, find, learned.calibration, found);
   for (const FoundDisk& disk : found.disks) trial.expected += disk.probability;
   trial.missed = learned.calibration.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
+  trial.disks = std::move(found.disks);
   return trial;
 }
 
@@ -81,9 +90,21 @@ class ChannelTrials {
                           options.roi->height / all};
   }
 
-  [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity) const {
-    const GrayFrame small = factor_ > 1 ? reduced(picture, factor_) : picture;
-    return tried(small, {polarity, best_.rims.radius_px / (frames_.reduction * factor_)}, roi_);
+  [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades) const {
+    return tried(small(picture), {polarity, radius_px()}, roi_, shades);
+  }
+
+  // Rims in this channel, none of which lies on a disk found.
+  [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture,
+                                   Polarity polarity) const {
+    const LearnedRims rims = learn_rims(small(picture), polarity, radius_px(), Known::beads);
+    double sure = 0;
+    for (const RimDisk& rim : rims.disks)
+      sure +=
+          rim.probability >= sure_rim && std::none_of(disks.begin(), disks.end(), [&](const FoundDisk& disk) {
+            return std::hypot(disk.x_px - rim.circle.x, disk.y_px - rim.circle.y) < nearest_of_another * radius_px();
+          });
+    return sure;
   }
 
   // Of the beads in this channel; none where they hardly stand out.
@@ -95,6 +116,11 @@ class ChannelTrials {
   }
 
  private:
+  [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
+    return factor_ > 1 ? reduced(picture, factor_) : picture;
+  }
+  [[nodiscard]] double radius_px() const { return best_.rims.radius_px / (frames_.reduction * factor_); }
+
   const ChannelFrames& frames_;
   const SurveyCandidate& best_;
   int factor_ = 1;
@@ -109,19 +135,20 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
   const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
   if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
-  const Trial here = trials.trial_in(first->frame, best.rims.polarity);
+  const Trial here = trials.trial_in(first->frame, best.rims.polarity, Shades::common);
   SurveyCandidate settled = best;
   settled.by_rims = here.by_rims;
-  if (!here.by_rims && !here.doubtful()) return settled;
+  const bool plain = !here.by_rims && !here.doubtful();
   double most = clearly_more * here.expected;
   for (const ChannelFrames::One& one : frames.channels) {
     if (one.channel == best.channel) continue;
     const std::optional<Polarity> polarity = trials.polarity_in(one);
     if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
-    const Trial there = trials.trial_in(one.frame, *polarity);
+    if (plain && here.expected + trials.rims_beside(here.disks, one.frame, *polarity) <= most) continue;
+    const Trial there = trials.trial_in(one.frame, *polarity, plain ? Shades::all : Shades::common);
     if (there.expected <= most) continue;
     // More faces are found where other things pass as beads, too: these then are less sure.
-    if (!here.by_rims && (there.by_rims || there.wrong >= here.wrong)) continue;
+    if (!here.by_rims && (there.by_rims || there.wrong >= std::max(here.wrong, plain ? hardly : 0.0))) continue;
     most = clearly_more * there.expected;
     settled.channel = one.channel;
     settled.rims.polarity = *polarity;

@@ -26,7 +26,7 @@ constexpr double cost_radius_px = 8;
 constexpr double hopeless_share = 0.5;  // of the census's circles, made up by chance: not looked at in full
 constexpr double worth_a_look = 0.15;   // of the best hypothesis's gain
 constexpr double most_by_chance = 0.2;  // share of the circles that chance may make up
-constexpr double few_wrong = 0.1;       // beyond it, beads must make up a good part of the picture's edges
+constexpr double few_wrong = 0.1;  // beyond it, beads whose radius is not given must make up a good part of the edges
 constexpr double good_part = 0.15;
 constexpr double least_explained =
     0.05;  // share of all edges on beads' rims; with beads 0.1 to 0.7, without up to 0.13
@@ -47,7 +47,43 @@ constexpr double largest_proposed = 0.25;
 // not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
 constexpr double coarse_px = 10, wide_enough_px = 24;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
+// Half as much is added where the radius is given: then something of this size is known to be there.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
+constexpr double most_of_few = 100;      // circles: of more, support_for_few asks for 4 % more at most
+constexpr double least_open_rim = 0.35;  // share of the rim that others leave free, at least
+
+// Radii: the rim of a circle is not asked for where another circle is so near.
+constexpr double rim_of_another = 1.15;
+
+// Share of a circle's rim that is seen, of that which no other circle touches or covers.
+double support_beside_others(const std::vector<RimDisk>& disks, std::size_t which) {
+  const Circle& circle = disks[which].circle;
+  int open = 0, met = 0;
+  for (int k = 0; k < circle.directions; ++k) {
+    const double angle = 2 * std::numbers::pi * k / circle.directions;
+    const double x = circle.x + circle.radius * std::cos(angle), y = circle.y + circle.radius * std::sin(angle);
+    if (std::any_of(disks.begin(), disks.end(), [&](const RimDisk& other) {
+          return &other != &disks[which] &&
+                 std::hypot(other.circle.x - x, other.circle.y - y) < rim_of_another * other.circle.radius;
+        }))
+      continue;
+    ++open;
+    met += static_cast<int>(circle.met >> static_cast<unsigned>(k) & 1U);
+  }
+  const double share = open > 0 ? static_cast<double>(met) / open : 0;
+  return open >= least_open_rim * circle.directions ? std::max(circle.support, share) : circle.support;
+}
+
+// Whether circles are so few, and so little of them is seen, that squares and ovals could look like them.
+bool few_and_faint(const std::vector<RimDisk>& disks, double support, bool given) {
+  const auto count = static_cast<double>(disks.size());
+  const auto asked = std::min(most_asked, least_mean_support + (given ? 0.5 : 1) * support_for_few / count);
+  if (support / count >= asked) return false;
+  if (count > most_of_few) return true;
+  double open = 0;
+  for (std::size_t k = 0; k < disks.size(); ++k) open += support_beside_others(disks, k);
+  return open / count < asked;
+}
 
 // Share of the rims seen in the eighth of all directions where least is seen.
 double least_seen_side(const std::vector<RimDisk>& disks) {
@@ -135,7 +171,7 @@ void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool an
     candidate.why_not = candidate.why_not_round;
 }
 
-void judge(SurveyCandidate& candidate, double edge_length_px) {
+void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   double support = 0;
   for (const RimDisk& disk : candidate.disks) {
     const double rim = 2 * std::numbers::pi * disk.circle.radius;
@@ -153,9 +189,9 @@ void judge(SurveyCandidate& candidate, double edge_length_px) {
                                  candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
   if (candidate.disks.empty())
     candidate.why_not = "no circles are seen beyond what chance gives";
-  else if (at_worst > most_by_chance || (at_worst > few_wrong && candidate.explained_share < good_part))
+  else if (at_worst > most_by_chance || (!given && at_worst > few_wrong && candidate.explained_share < good_part))
     candidate.why_not = formatted("up to %.0f %% of the %.0f circles may be due to chance", 100 * at_worst, count);
-  else if (support / count < std::min(most_asked, least_mean_support + support_for_few / count))
+  else if (few_and_faint(candidate.disks, support, given))
     candidate.why_not = formatted("only %.0f circles are seen, and only %.0f %% of their rims is visible", count,
                                   100 * support / count);
   else if (candidate.one_sided && !lit_from_one_side)
@@ -326,7 +362,7 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
                                      options.radius_px ? Known::radius : Known::nothing);
     candidate.rims = std::move(learned.model);
     candidate.disks = std::move(learned.disks);
-    judge(candidate, learned.edge_length_px);
+    judge(candidate, learned.edge_length_px, options.radius_px.has_value());
     candidate.plausible =
         candidate.why_not.empty() &&
         candidate.rims.radius_px <= largest_proposed * std::min(frames.width, frames.height) / frames.reduction;

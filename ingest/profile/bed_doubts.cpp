@@ -21,6 +21,8 @@ constexpr double fewest_expected = 10, most_seen = 0.1;
 constexpr double farthest_of_beads = 1.4;
 // Diameters: beads that lie a little behind one another in a narrow cell 0.995, disks outlined with their shadows 0.94.
 constexpr double nearest_of_beads = 0.96;
+// Diameters: beads of one size in one layer are not nearer. A tenth is left to errors of centres and of the radius.
+constexpr double nearest_in_layer = 0.9;
 // The lowest disks lie on an arc when so many columns show them, it sags by so much, and it leaves less than this share
 // of the squares that a straight line leaves. A bed at rest on a level floor sags by 0; a single photograph of a dilute
 // bed, whose lowest disks lie at random heights, leaves 0.6 or more.
@@ -67,6 +69,23 @@ Contacts contacts_of(const std::vector<FrameFindings>& frames, double radius_px)
   contacts.nearest_px = contacts.touching_px = quantile(std::move(nearest_of_all), 0.5);
   if (const auto distance = touching_distance(frames, radius_px)) contacts.touching_px = distance->px;
   return contacts;
+}
+
+double overlapping_too_many(const std::vector<FoundDisk>& disks, double touching_px) {
+  std::vector<const FoundDisk*> of_one_size;
+  for (const FoundDisk& disk : disks)
+    if (!disk.other_size) of_one_size.push_back(&disk);
+  const double nearest = nearest_in_layer * touching_px;
+  std::vector<bool> overlaps(of_one_size.size(), false);
+  Nearby(of_one_size.size(), nearest, [&](std::size_t i) {
+    return std::pair(of_one_size[i]->x_px, of_one_size[i]->y_px);
+  }).pairs([&](std::size_t i, std::size_t j) {
+    const double away =
+        std::hypot(of_one_size[i]->x_px - of_one_size[j]->x_px, of_one_size[i]->y_px - of_one_size[j]->y_px);
+    if (away < nearest) overlaps[i] = overlaps[j] = true;
+    return false;
+  });
+  return 0.5 * static_cast<double>(std::count(overlaps.begin(), overlaps.end(), true));
 }
 
 BedEnds ends_of_bed(const std::vector<FrameFindings>& frames, double radius_px) {

@@ -12,6 +12,10 @@ namespace shakebed::ingest {
 
 Contacts contacts_of(const std::vector<FrameFindings>& frames, double radius_px);
 
+// Of the disks of the most frequent size, those that are too many: half of those that overlap another one.
+// `touching_px` is the distance between the centres of beads that touch.
+double overlapping_too_many(const std::vector<FoundDisk>& disks, double touching_px);
+
 // Columns between which the bed lies, from the disks of all frames: what is beyond are few disks, with nothing between
 // them and the bed.
 struct BedEnds {

@@ -314,7 +314,10 @@ class BedMeasurer {
     if (status == FrameStatus::good || status == FrameStatus::nothing_found)
       counts_in_width_.push_back(static_cast<double>(heights.size()));
     result_.disk_total += disks.size();
-    for (const MeasuredDisk& disk : disks) wrong_ += 1 - disk.probability;
+    double wrong = 0;
+    for (const MeasuredDisk& disk : disks) wrong += 1 - disk.probability;
+    const double touching = result_.contacts.touching_px > 0 ? result_.contacts.touching_px : diameter_px_;
+    wrong_ += std::max(wrong, overlapping_too_many(frame.disks, std::min(touching, diameter_px_)));
     result_.expected_wrong = result_.disk_total > 0 ? wrong_ / static_cast<double>(result_.disk_total) : 0;
     if (status != FrameStatus::unreadable && status != FrameStatus::size_changed) {
       densities_.add(density_of_frame(heights, bed_.width, bins_, options_.kernel), expected_frames_);

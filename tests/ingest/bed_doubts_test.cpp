@@ -86,6 +86,17 @@ TEST(BedDoubts, CirclesTooLargeForTheirDistancesOverlap) {
   EXPECT_FALSE(contacts_of(frames, 0.94 * radius).overlapping(0.94 * diameter));
 }
 
+TEST(BedDoubts, OfTwoDisksThatOverlapOneIsTooMany) {
+  std::vector<FoundDisk> disks = findings(triangular(1.01 * diameter, 6, 5)).disks;
+  EXPECT_EQ(overlapping_too_many(disks, diameter), 0);
+  FoundDisk& other = disks.emplace_back(disks.front());
+  other.x_px -= 0.85 * diameter;
+  EXPECT_EQ(overlapping_too_many(disks, diameter), 1);
+  EXPECT_EQ(overlapping_too_many(disks, 0.9 * diameter), 0) << "the outline is larger than the bead";
+  disks.back().other_size = true;
+  EXPECT_EQ(overlapping_too_many(disks, diameter), 0);
+}
+
 TEST(BedDoubts, AFewDisksFarBesideTheBedAreNoPartOfIt) {
   std::vector<std::pair<double, double>> places = strewn(80, diameter, 400, 7);
   const auto all_beads = [](const BedEnds& ends) { return std::isinf(ends.left_px) && std::isinf(ends.right_px); };

@@ -11,6 +11,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "ingest/find/settle_channel.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
@@ -234,10 +235,12 @@ TEST(Sizes, ABeadInsideALargerOneGivesItsPlace) {
   const RimsFound found = find_rims(frame, *learned.calibration.rims);
   EXPECT_EQ(found.disks.size(), 36U);
   for (const Bead& bead : beads)
-    EXPECT_TRUE(std::any_of(found.disks.begin(), found.disks.end(), [&](const RimDisk& disk) {
-      return std::hypot(disk.circle.x - bead.x, disk.circle.y - bead.y) < 0.1 * bead.radius &&
-             std::abs(disk.circle.radius - bead.radius) < 0.1 * bead.radius;
-    })) << bead.x << " " << bead.y << " " << bead.radius;
+    EXPECT_TRUE(std::any_of(found.disks.begin(), found.disks.end(),
+                            [&](const RimDisk& disk) {
+                              return std::hypot(disk.circle.x - bead.x, disk.circle.y - bead.y) < 0.1 * bead.radius &&
+                                     std::abs(disk.circle.radius - bead.radius) < 0.1 * bead.radius;
+                            }))
+        << bead.x << " " << bead.y << " " << bead.radius;
 }
 
 TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
@@ -285,6 +288,25 @@ TEST(Sizes, TheChannelIsSettledInWhichTheFacesAreSeen) {
   const Survey survey = take_survey(frames);
   ASSERT_TRUE(survey.found) << survey.why_not;
   EXPECT_EQ(survey.candidates.front().channel, Channel::blue);
+}
+
+// One bead of twelve has no contrast in the channel that shows the others best: nothing there gives a doubt.
+TEST(Sizes, AChannelIsLeftThatDoesNotShowABeadAtAll) {
+  const std::vector<Bead> beads = scattered(12, {18}, 300, 260, 21);
+  const std::vector<Bead> all_but_one(beads.begin(), beads.end() - 1);
+  ChannelFrames frames;
+  frames.width = 300, frames.height = 260;
+  frames.channels = {{Channel::saturation, drawn(all_but_one, 300, 260, 190, plain_face, 7)},
+                     {Channel::grey, drawn(beads, 300, 260, 160, plain_face, 8)}};
+  SurveyCandidate best;
+  best.channel = Channel::saturation;
+  LearnedRims rims = learn_rims(frames.channels.front().frame, Polarity::dark_beads, 18, Known::beads);
+  best.rims = rims.model;
+  best.disks = rims.disks;
+  ASSERT_EQ(best.disks.size(), 11U);
+  EXPECT_EQ(settle_channel(frames, best, {}).channel, Channel::grey);
+  frames.channels.back().frame = drawn(all_but_one, 300, 260, 160, plain_face, 8);
+  EXPECT_EQ(settle_channel(frames, best, {}).channel, Channel::saturation) << "the other shows no more";
 }
 
 TEST(Sizes, DoubtsOfAFilmAreTheMeanOverItsDisks) {

@@ -137,6 +137,47 @@ TEST(Survey, FindsBeadsOfTwoColoursInOneChannel) {
   EXPECT_EQ(survey.candidates.front().channel, Channel::saturation);
 }
 
+double mean_support(const std::vector<RimDisk>& disks) {
+  double sum = 0;
+  for (const RimDisk& disk : disks) sum += disk.circle.support / static_cast<double>(disks.size());
+  return sum;
+}
+
+// Where coins touch no rim is seen. Of their free rims all is.
+TEST(Survey, FewCoinsThatTouchAreFound) {
+  const double radius = 30;
+  std::vector<Place> truth;
+  for (int k = 0; k < 9; ++k) truth.push_back({60 + 60.0 * (k % 3), 60 + 60.0 * std::floor(k / 3)});
+  const GrayFrame frame = painted(
+      240, 240, [&](double x, double y) { return bead_at(truth, 1.04 * radius, x, y) != nullptr ? 80.0 : 240.0; });
+  const Survey survey = survey_of({{Channel::automatic, frame}});
+  ASSERT_FALSE(survey.candidates.empty());
+  const std::vector<RimDisk>& disks = survey.candidates.front().disks;
+  EXPECT_EQ(disks.size(), 9U);
+  EXPECT_LT(mean_support(disks), 0.42 + 3.5 / 9) << "as much was asked for of nine circles";
+  EXPECT_TRUE(survey.found) << survey.why_not;
+}
+
+// A part of each rim is not seen. So few could be parts of other shapes, unless their radius is given.
+TEST(Survey, FewPartsOfRimsAreBeadsOfAGivenRadius) {
+  const double radius = 20;
+  const std::vector<Place> truth = scattered(7, 2.6 * radius, 320, 300, 12);
+  const GrayFrame frame = painted(320, 300, [&](double x, double y) {
+    const Place* bead = bead_at(truth, radius, x, y);
+    if (bead == nullptr) return 200.0;
+    const double side = 2.4 * static_cast<double>(bead - truth.data());
+    const double along = (x - bead->x) * std::cos(side) + (y - bead->y) * std::sin(side);
+    return along > 0.6 * std::hypot(x - bead->x, y - bead->y) ? 200.0 : 90.0;
+  });
+  const Survey unasked = survey_of({{Channel::automatic, frame}});
+  EXPECT_FALSE(unasked.found);
+  SurveyOptions given;
+  given.any_shape = true;
+  EXPECT_FALSE(survey_of({{Channel::automatic, frame}}, given).found);
+  given.radius_px = radius;
+  expect_all(survey_of({{Channel::automatic, frame}}, given), truth, radius, 0.8);
+}
+
 TEST(Survey, ALargerOutlineWinsOverTheHighlightInIt) {
   const double radius = 16;
   const std::vector<Place> truth = scattered(30, 2.2 * radius, 420, 400, 9);
