@@ -75,12 +75,12 @@ endfunction()
 #               [OPTIMIZED] [BY_SUITE] [BY_HAND] [LONG patterns...] [LONG_COST seconds] [STUDY patterns...])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
 # compute long. BY_SUITE: the tests of a suite are one ctest case, for programs that take long to start (OpenCV's
-# libraries take a quarter of a second). LONG, STUDY: names of tests (* and ? as in --gtest_filter) that also get the
-# label long or study. UNITY: how many files are compiled at once, if not as many as elsewhere.
+# libraries take a quarter of a second); the suites in SMALL together are one more. LONG, STUDY: names of tests (* and ?
+# as in --gtest_filter) that also get the label long or study. UNITY: how many files are compiled at once, if not as many as elsewhere.
 # LONG_COST: what a long one takes; ctest starts the dearest first. BY_HAND: the program has no quick tests, and is built
 # with the target by_hand, not with all.
 function(shakebed_test name)
-  cmake_parse_arguments(ARG "OPTIMIZED;BY_SUITE;BY_HAND" "TIMEOUT;UNITY;LONG_COST" "SOURCES;LABELS;LIBRARIES;LONG;STUDY" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED;BY_SUITE;BY_HAND" "TIMEOUT;UNITY;LONG_COST" "SOURCES;LABELS;LIBRARIES;LONG;STUDY;SMALL" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -107,6 +107,7 @@ function(shakebed_test name)
   list(JOIN ARG_STUDY ":" study)
   set(slow ${ARG_LONG} ${ARG_STUDY})
   list(JOIN slow ":" slow)
+  set(SMALL_SUITES ${ARG_SMALL})
   set(discover shakebed_discover_tests)
   if(ARG_BY_SUITE)
     set(discover shakebed_discover_suites)
@@ -151,7 +152,7 @@ function(shakebed_discover_suites name part filter timeout)
   endif()
   file(GENERATE OUTPUT "${file}" CONTENT
        "set(program \"$<TARGET_FILE:${name}>\")\nset(filter \"${filter}\")\nset(timeout ${timeout})\nset(labels \"${ARGN}\")
-set(suffix \"${suffix}\")
+set(suffix \"${suffix}\")\nset(small \"${SMALL_SUITES}\")
 include(\"${PROJECT_SOURCE_DIR}/cmake/suites.cmake\")\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${file}")
 endfunction()

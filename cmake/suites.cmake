@@ -1,7 +1,8 @@
 # Read by ctest: one case for each suite of the GoogleTest program `program` that has tests that pass `filter`, with the
 # `labels` and the `timeout` given. Its name is the suite's with `suffix`, of a single test that test's own. Suites with
-# many tests are started first. A suite is skipped when all of its tests are. Where only some are, its output names
-# them: an expression for them would hide failures of the others.
+# many tests are started first. The suites in `small`, none of which takes as long as the program does to start, are one
+# case: the program's name with ".small" and `suffix`. A suite is skipped when all of its tests are. Where only some
+# are, its output names them: an expression for them would hide failures of the others.
 if(NOT EXISTS "${program}")
   get_filename_component(name "${program}" NAME)
   add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)
@@ -29,9 +30,26 @@ foreach(line IN LISTS lines)
     set("count_of_${suite}" ${count})
   endif()
 endforeach()
+set(tests_of_all_small "")
+set(count_of_all_small 0)
+foreach(suite IN LISTS small)
+  list(FIND suites "${suite}" at)
+  if(at GREATER -1)
+    list(REMOVE_ITEM suites "${suite}")
+    list(APPEND tests_of_all_small "${tests_of_${suite}}")
+    math(EXPR count_of_all_small "${count_of_all_small} + ${count_of_${suite}}")
+  endif()
+endforeach()
+if(count_of_all_small)
+  list(JOIN tests_of_all_small ":" tests_of_all_small)
+  list(APPEND suites "all_small")
+endif()
 foreach(suite IN LISTS suites)
   set(test "${suite}${suffix}")
-  if("${count_of_${suite}}" EQUAL 1)
+  if(suite STREQUAL "all_small")
+    get_filename_component(test "${program}" NAME)
+    string(APPEND test ".small${suffix}")
+  elseif("${count_of_${suite}}" EQUAL 1)
     set(test "${tests_of_${suite}}")
   endif()
   add_test("${test}" "${program}" "--gtest_filter=${tests_of_${suite}}")

@@ -92,14 +92,10 @@ TEST(HardCases, DisksOfThreePixels) {
 }
 
 TEST(HardCases, DisksOfThreeHundredPixels) {
-  const std::vector<RenderedDisk> disks = {{200, 200, 150, 0, 0},
-                                           {520, 240, 150, 0, 0},
-                                           {820, 180, 150, 0, 0},
-                                           {350, 600, 150, 0, 0},
-                                           {760, 580, 150, 0, 0}};
-  const test::Score score = found_in(disks, camera_of(1000, 800));
-  EXPECT_EQ(score.hits, 5U);
-  EXPECT_EQ(score.found, 5U);
+  const std::vector<RenderedDisk> disks = {{180, 180, 150, 0, 0}, {500, 220, 150, 0, 0}, {330, 500, 150, 0, 0}};
+  const test::Score score = found_in(disks, camera_of(680, 680));
+  EXPECT_EQ(score.hits, 3U);
+  EXPECT_EQ(score.found, 3U);
   EXPECT_LT(score.rms_px, 0.05);
 }
 
@@ -218,10 +214,13 @@ TEST(HardCases, BeadsLitFromOneSideAreWhereTheirOutlineIs) {
   for (int row = 0; row < 400; ++row)
     for (int column = 0; column < 400; ++column) {
       double sum = 0;
+      std::vector<RenderedDisk> near;
+      for (const RenderedDisk& disk : truth)
+        if (std::abs(disk.x_px - column) < 12 && std::abs(disk.y_px - row) < 12) near.push_back(disk);
       for (int k = 0; k < finer * finer; ++k) {
         const double x = column - 0.5 + (k % finer + 0.5) / finer, y = row - 0.5 + (k / finer + 0.5) / finer;
         double level = 25;
-        for (const RenderedDisk& disk : truth) {
+        for (const RenderedDisk& disk : near) {
           const double dx = (x - disk.x_px) / 10, dy = (y - disk.y_px) / 10, squared = dx * dx + dy * dy;
           if (squared < 1) level = 60 + 140 * std::max(0.0, 0.8 * std::sqrt(1 - squared) - 0.36 * dx - 0.48 * dy);
         }

@@ -24,15 +24,24 @@ void add(FrameFindings& frame, double x, double z, double contrast, RandomStream
   frame.disks.push_back(disk);
 }
 
-// Frames of a simulated shaken bed on a floor that seems to rest, its images seen down to `depth` D.
-std::vector<FrameFindings> film(double depth, double reflected, std::uint64_t seed) {
+// Twelve moments of a shaken bed.
+std::vector<sim::Snapshot> moments(std::uint64_t seed) {
   const auto bed = sim::simulate(shaken_bed({.gamma = 2.5, .restitution = 0.8, .seed = seed}));
-  RandomStream random(seed);
-  std::vector<FrameFindings> frames(12);
-  sim::Snapshot now;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
+  std::vector<sim::Snapshot> moments(12);
+  for (std::size_t k = 0; k < moments.size(); ++k) {
     bed->advance_to(50 + 3.7 * static_cast<double>(k));
-    bed->snapshot(now);
+    bed->snapshot(moments[k]);
+  }
+  return moments;
+}
+
+// Its frames on a floor that seems to rest, its images seen down to `depth` D.
+std::vector<FrameFindings> film(const std::vector<sim::Snapshot>& bed, double depth, double reflected,
+                                std::uint64_t seed) {
+  RandomStream random(seed);
+  std::vector<FrameFindings> frames(bed.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const sim::Snapshot& now = bed[k];
     for (std::size_t i = 0; i < now.x.size(); ++i) {
       const double above = now.z[i] - now.floor_position;
       add(frames[k], now.x[i], above, 1, random);
@@ -43,16 +52,18 @@ std::vector<FrameFindings> film(double depth, double reflected, std::uint64_t se
 }
 
 TEST(MirrorImage, OfABedInItsFloorIsSeen) {
+  const std::vector<sim::Snapshot> bed = moments(3);
   for (const double depth : {2.0, 5.0})
     for (const double reflected : {0.3, 0.8}) {
-      const auto row = find_mirror_row(film(depth, reflected, 3), diameter_px);
+      const auto row = find_mirror_row(film(bed, depth, reflected, 3), diameter_px);
       ASSERT_TRUE(row) << depth << ", " << reflected;
       EXPECT_NEAR(*row, floor_row, 0.5);
     }
 }
 
 TEST(MirrorImage, IsNoneWhereNothingIsReflected) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) EXPECT_FALSE(find_mirror_row(film(0, 1, seed), diameter_px)) << seed;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+    EXPECT_FALSE(find_mirror_row(film(moments(seed), 0, 1, seed), diameter_px)) << seed;
 }
 
 // Rows of a crystal mirror one another about the row between them, also where the light fades downwards.

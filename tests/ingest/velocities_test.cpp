@@ -26,7 +26,7 @@ Measurement walkers(std::size_t frames, double dt, double speed, double memory_s
   measurement.calibration.scale_m_per_px = 1e-4;
   measurement.calibration.radius_px = 10;  // D = 2 mm
   RandomStream random(seed);
-  constexpr int across = 20, up = 15, substeps = 50;
+  constexpr int across = 20, up = 15, substeps = 10;
   struct Walker {
     double x, z, vx, vz;
   };
