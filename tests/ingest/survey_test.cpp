@@ -175,8 +175,9 @@ TEST(Survey, FewCoinsThatTouchAreFound) {
   const double radius = 30;
   std::vector<Place> truth;
   for (int k = 0; k < 9; ++k) truth.push_back({60 + 60.0 * (k % 3), 60 + 60.0 * std::floor(k / 3)});
-  const GrayFrame frame = painted(
-      240, 240, [&](double x, double y) { return bead_at(truth, 1.04 * radius, x, y) != nullptr ? 80.0 : 240.0; });
+  const BeadAt bead_at(truth, 1.04 * radius);
+  const GrayFrame frame =
+      painted(240, 240, [&](double x, double y) { return bead_at(x, y) != nullptr ? 80.0 : 240.0; });
   const Survey survey = survey_of({{Channel::automatic, frame}});
   ASSERT_FALSE(survey.candidates.empty());
   const std::vector<RimDisk>& disks = survey.candidates.front().disks;
@@ -189,8 +190,9 @@ TEST(Survey, FewCoinsThatTouchAreFound) {
 TEST(Survey, FewPartsOfRimsAreBeadsOfAGivenRadius) {
   const double radius = 20;
   const std::vector<Place> truth = scattered(7, 2.6 * radius, 320, 300, 12);
+  const BeadAt bead_at(truth, radius);
   const GrayFrame frame = painted(320, 300, [&](double x, double y) {
-    const Place* bead = bead_at(truth, radius, x, y);
+    const Place* bead = bead_at(x, y);
     if (bead == nullptr) return 200.0;
     const double side = 2.4 * static_cast<double>(bead - truth.data());
     const double along = (x - bead->x) * std::cos(side) + (y - bead->y) * std::sin(side);
