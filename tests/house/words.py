@@ -10,6 +10,7 @@ comments of the C++ code, and docstrings and messages of the Python module: dial
 """
 import ast
 import collections
+import functools
 import pathlib
 import re
 import shutil
@@ -197,10 +198,11 @@ def misspelled(root, files, parsed):
         known = {w.lower() for w in (HERE / "known_words.txt").read_text().split()}
         text = {}
         for file in files:
+            name = file.relative_to(root)
             for line, _, block in parsed[file].blocks:
                 block = re.sub(r"\S*[\d_/.=<>@]\S*[\w]", " ", plain(block).replace("CODE", " "))
                 for word in re.findall(r"[A-Za-zÀ-ÿ]+(?:'[a-z]+)?", block):
-                    text.setdefault(word.removesuffix("'s").removesuffix("'"), (file.relative_to(root), line))
+                    text.setdefault(word.removesuffix("'s").removesuffix("'"), (name, line))
         listed = subprocess.run(["aspell", "--lang=en", "--encoding=utf-8", "list"], input="\n".join(text),
                                 capture_output=True, text=True, check=True)
         for word in listed.stdout.split():
@@ -209,6 +211,12 @@ def misspelled(root, files, parsed):
                 yield f"{where[0]}:{where[1]}: \"{word}\": misspelled, or a word for tests/house/known_words.txt"
     else:
         print("SKIPPED: aspell is not installed (Debian: aspell, aspell-en): the spelling is not checked")
+
+
+@functools.cache
+def pieces(file):
+    """(line, text) of what a file of code says."""
+    return list(python_pieces(file) if file.suffix == ".py" else code_pieces(file))
 
 
 def code_pieces(file):
@@ -270,8 +278,11 @@ def code_faults(root, rows):
         files = [*(root / room).rglob("*.[ch]pp"), *(() if room != "python" else (root / room / "shakebed").rglob("*.py"))]
         for file in sorted(files):
             name = file.relative_to(root).as_posix()
-            for line, piece in python_pieces(file) if file.suffix == ".py" else code_pieces(file):
-                for pattern, instead in rows:
+            # Nearly every pattern is nowhere in a file: one search tells so for all of its pieces.
+            whole = "\n".join(piece for _, piece in pieces(file))
+            there = [row for row in rows if row[0].search(whole)]
+            for line, piece in pieces(file):
+                for pattern, instead in there:
                     for hit in pattern.finditer(piece):
                         yield name, line, "dialect", f"\"{hit.group(0)}\": write {instead}"
                 for sentence in sentences(piece):
@@ -290,7 +301,7 @@ def quoted_messages(prose):
 def unknown_messages(root):
     """Quoted messages that the code does not say: their words, in this order, with anything where ... stands."""
     said = " ".join(piece for room in CODE_ROOMS if (root / room).is_dir()
-                    for file in sorted((root / room).rglob("*.cpp")) for _, piece in code_pieces(file))
+                    for file in sorted((root / room).rglob("*.cpp")) for _, piece in pieces(file))
     said = re.sub(r"%\.?\d*[a-z]+|\{[^}]*\}", "#", said).lower()
     for file in sorted((root / "docs/how-to").glob("*.md")):
         for line, phrase in quoted_messages(enumerate(file.read_text().splitlines(), 1)):

@@ -36,9 +36,9 @@ class InferBed : public testing::Test {
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
   }
   static void TearDownTestSuite() { delete folder_; }
-  static ProgramResult infer(const std::string& out, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"infer-bed", "hidden/film/frames", "--diameter", "3 mm", "--out", out,
-                                       "--quiet"};
+  static ProgramResult infer(const std::string& out, const std::vector<std::string>& more,
+                             const std::string& frames = "hidden/film/frames") {
+    std::vector<std::string> arguments{"infer-bed", frames, "--diameter", "3 mm", "--out", out, "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_shakebed(arguments, folder_->path());
   }
@@ -49,9 +49,10 @@ ScratchFolder* InferBed::folder_ = nullptr;
 // What is asked of the stage infer follows from the frames: count, width, heights, temperatures, and Gamma from the
 // amplitude of the floor.
 TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
-  const ProgramResult ran = infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--beds", "20", "--set",
-                                        "/stages/infer/rounds=0", "--set", "/stages/infer/best=1", "--set",
-                                        "/stages/infer/best_replicas=2", "--set", "/stages/infer/measure=1 s"});
+  const ProgramResult ran =
+      infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--beds", "20", "--set", "/stages/infer/rounds=0",
+                  "--set", "/stages/infer/best=1", "--set", "/stages/infer/best_replicas=2", "--set",
+                  "/stages/infer/measure=0.5 s", "--set", "/stages/infer/settle=1 s"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   EXPECT_NE(ran.out.find("agree with all"), std::string::npos) << ran.out;
   // The frames are measured in a run of their own before: its warnings are said once.
@@ -87,7 +88,7 @@ TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
 
 TEST_F(InferBed, SaysWhatIsMissing) {
   const auto refused = [](const std::vector<std::string>& more, int code, const std::string& words) {
-    const ProgramResult ran = infer("wrong", more);
+    const ProgramResult ran = infer("wrong", more, "hidden/film/frames/000000.png");
     EXPECT_EQ(ran.exit_code, code) << ran.err;
     EXPECT_NE(ran.err.find(words), std::string::npos) << ran.err;
   };

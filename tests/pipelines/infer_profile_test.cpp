@@ -29,7 +29,7 @@ Json recipe() {
   infer["from"] = "bed";
   infer["targets"] = Json{{"profile", {{"from", "bed"}, {"low", 0.5}, {"high", 7.5}}}};
   for (const char* key : {"moments", "average", "calibration"}) infer.erase(key);
-  infer["rounds"] = 0;
+  infer["rounds"] = 0, infer["measure"] = 30;
   return Json{{"name", "t"}, {"stages", {bed, infer}}};
 }
 
@@ -117,7 +117,7 @@ TEST_F(InferProfile, UsesTheBedsOfAnEarlierRun) {
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   for (const char* file : {"beds.csv", "posterior.csv", "profile.csv"})
     EXPECT_EQ(read_text(*folder_ / "same/search" / file), read_text(*folder_ / "o/search" / file)) << file;
-  same["stages"][1]["measure"] = 61;
+  same["stages"][1]["measure"] = 31;
   const ProgramResult other = run(same, "other");
   EXPECT_EQ(other.exit_code, 3);
   EXPECT_NE(other.err.find("a different scene, different parameters or a different measurement"), std::string::npos)

@@ -17,11 +17,16 @@ inline constexpr const char* infer_recipe =
   "targets": { "temperature_over_mg": { "value": 0.35, "std_error": 0.01 }, "center_of_mass_rise": { "value": 1.5, "std_error": 0.05 } },
   "moments": 2, "average": 0.8, "first": 24, "rounds": 1, "each": 6, "best": 1, "best_replicas": 3, "draws": 400, "calibration": 3 } ] })";
 
-// The same with beds measured for a third of the time, where their numbers do not matter.
+// The same with fewer beds, measured for a quarter of the time, where their numbers do not matter.
 inline std::string brief_infer_recipe() {
-  const std::string usual = R"("settle": 20, "measure": 60)", brief = R"("settle": 5, "measure": 20)";
   std::string recipe = infer_recipe;
-  return recipe.replace(recipe.find(usual), usual.size(), brief);
+  const auto replace = [&](const std::string& usual, const std::string& brief) {
+    recipe.replace(recipe.find(usual), usual.size(), brief);
+  };
+  replace(R"("settle": 20, "measure": 60)", R"("settle": 5, "measure": 15)");
+  replace(R"("first": 24, "rounds": 1, "each": 6)", R"("first": 20, "rounds": 1, "each": 3)");
+  replace(R"("draws": 400, "calibration": 3)", R"("draws": 200, "calibration": 1)");
+  return recipe;
 }
 
 }  // namespace shakebed::tests

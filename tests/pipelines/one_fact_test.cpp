@@ -18,12 +18,14 @@ using shakebed::pipelines::Json;
 using testing::HasSubstr;
 
 // A shaken bed of 40 disks of 3 mm in 48.9 mm, photographed; about 0.2 s.
-std::string photographed_bed(const std::string& extract, const std::string& fit = "", const std::string& more = "") {
+std::string photographed_bed(const std::string& extract, const std::string& fit = "", const std::string& more = "",
+                             const std::string& scale = "0.3 mm/px") {
   return R"({ "name": "t", "stages": [
     { "stage": "simulate", "id": "bed", "seed": 3, "replicas": 1, "disks": { "count": 40, "diameter": "3 mm", "restitution": 0.7 },
       "box": { "width": "48.9 mm" }, "floor": { "motion": "sinusoidal", "amplitude": "2.5 mm", "frequency": "20 Hz" },
       "settle": "0.5 s", "measure": "1 s", "frames": { "count": 4, "phases": 4 } },
-    { "stage": "render", "from": "bed" },
+    { "stage": "render", "from": "bed", "scale": ")" +
+         scale + R"(" },
     { "stage": "extract", "from": "render")" +
          extract + R"( },
     { "stage": "fit", "from": "extract")" +
@@ -71,7 +73,7 @@ TEST_F(OneFact, WhatTheBedKnowsNeedNotBeStatedAgain) {
 }
 
 TEST_F(OneFact, PhotographsOfTheUsersOwnNeedTheirDiameterAndCarryIt) {
-  ASSERT_EQ(run(photographed_bed("")).exit_code, 0);
+  ASSERT_EQ(run(photographed_bed("", "", "", "0.15 mm/px")).exit_code, 0);
   const std::string own = R"({ "name": "t", "stages": [
     { "stage": "extract", "images": "o/render/frames/*.png"%, "scale": "0.15 mm/px", "left_wall": 11.5, "right_wall": 337.5 },
     { "stage": "fit", "from": "extract" } ] })";

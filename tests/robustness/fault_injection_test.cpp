@@ -385,7 +385,8 @@ TEST(ExternalFiles, AFrameThatChangesWhileItIsReadIsNoticed) {
     write_text(frame, changed);
     fs::last_write_time(frame, written);
   });
-  const std::vector<std::string> measure{"fit-images", "frames", "--diameter", "3 mm", "--out", "mine"};
+  const std::vector<std::string> measure{"fit-images", "frames",  "--diameter", "3 mm",
+                                         "--until",    "extract", "--out",      "mine"};
   ProgramResult disturbed;
   {
     const Shim shim;
