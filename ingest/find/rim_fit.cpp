@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "ingest/find/bead_profile.hpp"
@@ -23,8 +24,8 @@ using RimTerms = std::array<bool, rim_terms>;
 
 // The shapes of a bead, blurred, at each of the distances given. Where the optical blur is smaller than the
 // pixel, the pixel's own square window is laid over it (averaged over directions) instead of being counted as a
-// Gaussian.
-std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<double>& distance) {
+// Gaussian, for those in use alone: it takes most of the time.
+std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<double>& distance, const RimTerms& use) {
   std::vector<Shapes> shapes(distance.size());
   constexpr double pixel_variance = 1.0 / 12, gaussian_enough = 0.7;
   if (edge > gaussian_enough) {
@@ -45,6 +46,10 @@ std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<doub
   }
   static const GaussLegendre rule = gauss_legendre(6);
   constexpr int directions = 4;
+  std::array<std::size_t, std::tuple_size_v<Shapes>> which{};
+  std::size_t used = 0;
+  for (std::size_t k = 0; k < which.size(); ++k)
+    if (use[k]) which[used++] = k;
   for (std::size_t i = 0; i < distance.size(); ++i) {
     Shapes sum{};
     for (int d = 0; d < directions; ++d) {
@@ -57,8 +62,10 @@ std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<doub
           const auto cell = static_cast<std::size_t>(place);
           const double part = place - static_cast<double>(cell);
           const double weight = rule.weight[a] * rule.weight[b] / directions;
-          for (std::size_t k = 0; k < sum.size(); ++k)
+          for (std::size_t n = 0; n < used; ++n) {
+            const std::size_t k = which[n];
             sum[k] += weight * ((1 - part) * table[cell][k] + part * table[cell + 1][k]);
+          }
         }
     }
     shapes[i] = sum;
@@ -153,7 +160,7 @@ class RimLeastSquares {
   // Weighted sum of squares with the best sum of shapes.
   double misfit_of(double radius, double edge, std::vector<double>& residual) {
     const std::vector<double>&distance = data_.distance, &level = data_.level;
-    const auto rows = shapes_at(radius, edge, distance);
+    const auto rows = shapes_at(radius, edge, distance, use_);
     // A shape that takes no part is 0 everywhere.
     const auto shape = [&](std::size_t i, std::size_t a) { return use_[a] ? (a < 5 ? rows[i][a] : 1.0) : 0.0; };
     std::vector<double> matrix(rim_terms * rim_terms, 0.0), right(rim_terms, 0.0);
