@@ -60,9 +60,7 @@ Table run_quick(const std::string& recipe, const std::string& study, const std::
 
 // Replicas were two at each of `points` parameters: a pooled error has one degree of freedom a point. How many errors
 // may the largest of `comparisons` differences have, if one test in a thousand may fail?
-double allowed_errors(int points, int comparisons) {
-  return fit::student_quantile(1 - 1e-3 / 2 / comparisons, points);
-}
+double allowed_errors(int points, int comparisons) { return fit::student_quantile(1 - 1e-3 / 2 / comparisons, points); }
 
 // Equipartition: elastic disks in a reservoir have its temperature. Disks that lose energy in collisions are colder.
 TEST(QuinnHongFigure2, BathsSetTheTemperatureOfElasticBeds) {
