@@ -11,6 +11,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "fit/profile_fit/chances.hpp"
 #include "statistics/parallel.hpp"
 
 namespace shakebed::fit {

@@ -94,7 +94,7 @@ class ImageFaults : public testing::Test {
 TEST_F(ImageFaults, FilesMayNotGrowBeyondALimit) {
   const auto before = ::signal(SIGXFSZ, SIG_IGN);  // as a full disk: the write fails, no signal
   int render_failed = 0, extract_failed = 0;
-  for (const rlim_t bytes : {6'000, 8'000, 10'000, 14'000, 50'000, 150'000}) {
+  for (const rlim_t bytes : {6'000U, 8'000U, 10'000U, 14'000U, 50'000U, 150'000U}) {
     start_from({"bed"});
     ProgramResult result;
     {
@@ -217,7 +217,7 @@ TEST_F(ImageFaults, MemoryIsShort) {
   // want more than is there.
   write_text(folder_ / "r.json", image_recipe("0.012 mm/px"));
   int started = 0;
-  for (const rlim_t megabytes : {60, 420, 500}) {
+  for (const rlim_t megabytes : {60U, 420U, 500U}) {
     start_from({"bed"});
     ProgramResult result;
     {
