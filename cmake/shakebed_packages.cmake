@@ -40,9 +40,9 @@ set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The program, its images module, recipes
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libshakebed-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS "libgsl-dev, libopencv-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS "libgsl-dev, libopencv-videoio-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
-    "Libraries and headers of shakebed::sim (standard library only), shakebed::fit (needs libgsl-dev) and\n shakebed::ingest (needs libopencv-dev), with files for CMake and pkg-config.")
+    "Libraries and headers of shakebed::sim (standard library only), shakebed::fit (needs libgsl-dev) and\n shakebed::ingest (needs libopencv-videoio-dev), with files for CMake and pkg-config.")
 
 if(TARGET shakebed_python)
   list(APPEND CPACK_COMPONENTS_ALL python)

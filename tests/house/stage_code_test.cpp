@@ -183,10 +183,10 @@ TEST(StageCodeOfTheProject, HoldsEveryFileThatComputes) {
   // For those who use the library: no stage measures by it.
   for (const char* file : {"sim/measure/measured_bed.cpp", "ingest/profile/photographs.cpp"}) std::erase(outside, file);
   EXPECT_THAT(outside, IsEmpty()) << "name the header that it implements: // implements: <header>";
-  // A change in fit/ is none of the bed's, nor of its photographs'.
+  // A change in fit/ is none of the bed's, nor of its photographs'. Several beds together have errors by Student's t.
   for (const char* stage : {"simulate", "render", "extract"}) {
     for (const std::string& file : code.files.at(stage))
-      EXPECT_FALSE(file.starts_with("fit/")) << stage << ": " << file;
+      EXPECT_FALSE(file.starts_with("fit/") && !file.starts_with("fit/profile_fit/chances.")) << stage << ": " << file;
   }
   EXPECT_TRUE(code.files.at("fit").contains("fit/profile_fit/fit_profile.cpp"));
   EXPECT_TRUE(code.files.at("simulate").contains("sim/engine/engine_contacts.hpp"));

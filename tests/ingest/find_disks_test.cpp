@@ -328,12 +328,12 @@ TEST(Finder, BeadsOfASmallFrameAreFound) {
 
 TEST(Finder, LooksForNoneBeyondTheLargestRadius) {
   const auto disks = make_synthetic_bed(
-      {.left_wall_px = 20, .right_wall_px = 580, .floor_px = 460, .radius_px = 40, .rows = 3, .seed = 31});
-  const GrayFrame frame = render_frame(disks, {.width = 600, .height = 480});
+      {.left_wall_px = 15, .right_wall_px = 435, .floor_px = 345, .radius_px = 30, .rows = 3, .seed = 31});
+  const GrayFrame frame = render_frame(disks, {.width = 450, .height = 360});
   FindOptions options;
   const CalibrationResult any = learn_finder({&frame}, options);
   ASSERT_TRUE(any.found) << any.why_not;
-  EXPECT_NEAR(any.calibration.radius_px, 40, 1);
+  EXPECT_NEAR(any.calibration.radius_px, 30, 1);
   options.largest_radius_px = 17.5;
   const CalibrationResult small = learn_finder({&frame}, options);
   EXPECT_TRUE(!small.found || small.calibration.radius_px < 1.5 * 17.5) << small.calibration.radius_px;
