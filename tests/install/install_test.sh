@@ -95,7 +95,7 @@ case $case in
       -DCMAKE_DISABLE_FIND_PACKAGE_GSL=ON
     if grep -q 'OpenCV_DIR\|GSL_' "$folder/build/CMakeCache.txt"; then fail "sim looks for OpenCV or GSL"; fi
     # What is not there is named.
-    if "$cmake" -S "$folder" -B "$folder/bad" "-DCMAKE_PREFIX_PATH=$work/moved" -DCOMPONENTS=magnets \
+    if "$cmake" -S "$folder" -B "$folder/bad" -G Ninja "-DCMAKE_PREFIX_PATH=$work/moved" -DCOMPONENTS=magnets \
       >"$folder/bad.log" 2>&1; then fail "an unknown component was found"; fi
     grep -q 'no component "magnets"' "$folder/bad.log" || fail "the message does not name the component"
     ;;
