@@ -47,8 +47,8 @@ struct FindOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px{};  // a first value, refined unless hold_radius
   bool hold_radius = false;           // keep radius_px exactly
-  std::optional<double>
-      largest_radius_px{};              // beyond it none is looked for; 0.8 to 1.25 times radius_px if that is given
+  // Beyond it none is looked for. Where radius_px is given, 0.8 to 1.25 times that is looked for instead.
+  std::optional<double> largest_radius_px{};
   std::optional<BeadsSeen> seen{};      // for learn_beads()
   bool one_size = false;                // learn_beads() looks for no beads of other sizes
   bool rims_of_one_size = false;        // learn_beads() searches rims at a higher resolution for one size only
