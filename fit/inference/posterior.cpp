@@ -2,7 +2,7 @@
 
 #include <gsl/gsl_qrng.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -26,8 +26,6 @@ constexpr std::size_t points_at_once = 512;  // of a call of the likelihood
 constexpr std::size_t mixture_centres = 64;
 constexpr double prior_share = 0.1;
 constexpr double mixture_width = 0.5;  // of a normal distribution, in standard deviations of the weighted points
-
-double normal(std::mt19937_64& generator) { return normal_quantile(even_number(generator)); }
 
 std::vector<double> likelihoods(std::size_t dimensions, const std::vector<double>& points,
                                 const LogLikelihood& log_likelihood, int threads) {
@@ -95,7 +93,7 @@ class Mixture {
     }
     const auto centre = static_cast<std::size_t>(even_number(generator) * static_cast<double>(centres_.size()));
     Vector step(d);
-    for (double& one : step) one = normal(generator);
+    for (double& one : step) one = normal_number(generator);
     const Vector point = centres_[centre] + lower_ * step;
     out.insert(out.end(), point.begin(), point.end());
   }
@@ -147,8 +145,6 @@ Posterior further_round(const Posterior& before, const LogLikelihood& log_likeli
 }
 
 }  // namespace
-
-double even_number(std::mt19937_64& generator) { return (static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53; }
 
 std::vector<double> even_points(std::size_t dimensions, std::size_t count, std::uint64_t seed) {
   const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sequence(

@@ -11,9 +11,6 @@
 // from 0 to 1: a point is in the unit cube.
 namespace shakebed::fit {
 
-// Between 0 and 1, without either.
-double even_number(std::mt19937_64& generator);
-
 // Points that fill the unit cube evenly: Sobol's sequence, shifted by a random vector [Sobol1967,
 // CranleyPatterson1976]. The first points of a longer set are the shorter set.
 std::vector<double> even_points(std::size_t dimensions, std::size_t count, std::uint64_t seed);

@@ -2,7 +2,7 @@
 
 #include <gsl/gsl_multimin.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <memory>

@@ -1,6 +1,6 @@
 #include "fit/map/empirical_map.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>

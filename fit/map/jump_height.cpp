@@ -9,8 +9,7 @@ namespace shakebed::fit {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double two_pi = 2.0 * pi;
+constexpr double two_pi = 2.0 * std::numbers::pi;
 
 // Below this velocity relative to the floor [g/w] the remaining bounces take no time worth keeping: the ball is put to
 // rest where the geometric series of its bounces ends, but no later than after the next time [radians of phase].

@@ -1,11 +1,10 @@
 // implements: fit/profile_fit/fit_profile.hpp
-#include <gsl/gsl_cdf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
 
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
 #include "fit/profile_fit/measured_profile.hpp"
 #include "statistics/correlated_series.hpp"
@@ -62,11 +61,6 @@ Samples samples_of(const ProfileFrames& frames) {
   height = statistics::from_mean(std::move(height));
   samples.windows = statistics::windows_for(statistics::memory_of(height), height);
   return samples;
-}
-
-// Normal variates, the same on every platform.
-double normal(std::mt19937_64& generator) {
-  return gsl_cdf_ugaussian_Pinv((static_cast<double>(generator() >> 11) + 0.5) * 0x1p-53);
 }
 
 }  // namespace
@@ -129,7 +123,7 @@ class Resampler {
     const std::size_t count = samples_.frames.size(), window = samples_.windows.length;
     std::vector<double> before{0.0};  // the sum of the variates of the windows that begin before each frame
     for (std::size_t w = 0; w < count; ++w)
-      before.push_back(before.back() + (w + window <= count ? share_ * normal(generator_) : 0.0));
+      before.push_back(before.back() + (w + window <= count ? share_ * normal_number(generator_) : 0.0));
     std::vector<double> density = samples_.mean;
     for (std::size_t f = 0; f < count; ++f) {
       // Of all windows that the frame is in.
@@ -166,7 +160,7 @@ double spread_of(const std::vector<double>& values) {
 // Percentiles about the centre, moved apart as Student's are from the normal ones: the windows are few.
 Interval interval_of(const std::vector<double>& sorted, double centre, double confidence, double degrees) {
   const double upper = 0.5 * (1.0 + confidence);
-  const double apart = gsl_cdf_tdist_Pinv(upper, degrees) / gsl_cdf_ugaussian_Pinv(upper);
+  const double apart = student_quantile(upper, degrees) / normal_quantile(upper);
   Interval interval;
   interval.status = FitStatus::ok;
   interval.confidence = confidence;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <array>
 #include <vector>
 

@@ -21,8 +21,8 @@ constexpr double fallen = 0.5, fall_errors = 3.0;
 // Below the densest height, this part of the bed may be missing of a bed as dense as there: floors in motion thin the
 // bed above them.
 constexpr double most_missing = 0.5;
-// Above the first gap, less dense than this part of the greatest density, there may lie so much of the bed.
-constexpr double gap = 0.02, most_above = 0.1;
+// above the first gap, less dense than this part of the greatest density, there may lie so much of the bed.
+constexpr double least_gap = 0.02, most_above = 0.1;
 // Where a crystal's rows show, a diameter may hold two of them. Below this part of their modulation it does not matter.
 constexpr double few_rows = 0.05;
 
@@ -155,7 +155,7 @@ class ProfileReader {
   // A bed under gravity has no gap with disks above it.
   void look_at_gaps() {
     std::size_t first = densest();
-    while (first < measured_.size() && measured_.one_diameter_mean[first] >= gap * greatest_) ++first;
+    while (first < measured_.size() && measured_.one_diameter_mean[first] >= least_gap * greatest_) ++first;
     double above = 0.0;
     for (std::size_t i = first; i < measured_.size(); ++i) above += area_at(i) * std::max(0.0, measured_.density[i]);
     if (!(above > most_above * measured_.area)) return;

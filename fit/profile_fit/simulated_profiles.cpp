@@ -2,7 +2,7 @@
 
 #include <gsl/gsl_cdf.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

@@ -71,9 +71,9 @@ class WindowRule {
     std::size_t last = peak_;
     while (last + 1 < measured_.size()) {
       const double mean = mean_[last + 1];
-      const bool significant =
+      const bool above_noise =
           !measured_.errors_known || mean >= options_.lowest_significance * measured_.error[last + 1];
-      if (mean < options_.lowest_fraction * measured_.greatest_mean || !significant) break;
+      if (mean < options_.lowest_fraction * measured_.greatest_mean || !above_noise) break;
       ++last;
     }
     window_.high = measured_.height[last];

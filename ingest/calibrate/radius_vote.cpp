@@ -17,7 +17,7 @@ constexpr double vote_ratio = 1.04;          // of one radius voted for to the n
 constexpr std::size_t most_edges = 14000;    // that vote
 constexpr std::size_t most_maxima = 3;       // radii of a level looked at in full
 constexpr std::size_t most_peaks = 4000;     // centres looked at
-constexpr double least_support = 0.45;       // share of the rim
+constexpr double least_vote_support = 0.45;  // share of the rim
 constexpr double keep_off_radii = 1.2;       // from one centre to the next, along rows and columns
 constexpr std::size_t most_sizes = 200'000;  // gradients, for their quantiles
 
@@ -275,7 +275,7 @@ class RadiusVote {
       if (taken[gradient_.at(peak.column, peak.row)]) continue;
       const double support =
           rim_support(gradient_, {peak.column, peak.row, radius}, circle, static_cast<float>(sign_), edges_.threshold);
-      if (support < least_support) continue;
+      if (support < least_vote_support) continue;
       take(taken, peak, std::max(1, static_cast<int>(keep_off_radii * radius)));
       explained += static_cast<double>(peak.score);
       support_sum += support * static_cast<double>(peak.score);

@@ -93,7 +93,7 @@ void look_inwards(const View& view, float tolerance, Strip& strip) {
   strip.through = true;
 }
 
-constexpr double steepest = 0.14, same_line = 1.5;  // 8 degrees; px
+constexpr double steepest_border = 0.14, same_line = 1.5;  // 8 degrees; px
 constexpr int thinnest = 2;
 constexpr std::size_t fewest_strips = 4;
 
@@ -110,7 +110,7 @@ std::vector<Member> longest_line(const std::vector<Strip>& strips, const std::ve
       if (other.strip <= one.strip || std::abs(other.end.level - one.end.level) > 2 * tolerance) continue;
       const double from = strips[one.strip].middle();
       const double slope = (other.end.depth - one.end.depth) / (strips[other.strip].middle() - from);
-      if (std::abs(slope) > steepest) continue;
+      if (std::abs(slope) > steepest_border) continue;
       std::vector<Member> members;
       for (const Member& member : ends) {
         const double line = one.end.depth + slope * (strips[member.strip].middle() - from);

@@ -18,9 +18,9 @@ namespace {
 constexpr std::size_t orders = BeadAsymmetry::orders;
 constexpr double ring_px = 0.4;  // distance of the rings on which harmonics are learned
 // Contrast units: a residual beyond that is dirt or something in front.
-constexpr float no_bead = 1;
+constexpr float least_foreign_residual = 1;
 // Pixels that two beads share count for both, so a little less than all of a residual is taken over.
-constexpr double share = 0.7;
+constexpr double share_taken_over = 0.7;
 // Contrast units: rims that are no circles (pixels wider than high) differ along and across, but not from side to side.
 constexpr double least_one_sided = 0.015;
 
@@ -47,7 +47,8 @@ class HarmonicSums {
       const int right = std::min(fit.width() - 1, static_cast<int>(std::floor(bead.x + half)));
       const float* line = fit.residual_row(row);
       for (int column = left; column <= right; ++column)
-        if (std::abs(line[column]) <= no_bead) add_pixel(column - bead.x, dy, static_cast<double>(line[column]));
+        if (std::abs(line[column]) <= least_foreign_residual)
+          add_pixel(column - bead.x, dy, static_cast<double>(line[column]));
     }
   }
 
@@ -58,7 +59,8 @@ class HarmonicSums {
   [[nodiscard]] std::optional<Mean> mean(std::size_t ring, std::size_t order) const {
     const double weight = weight_[ring][order];
     if (!(weight > 0)) return std::nullopt;
-    return Mean{share * cosine_[ring][order] / weight, share * sine_[ring][order] / weight, weight};
+    return Mean{share_taken_over * cosine_[ring][order] / weight, share_taken_over * sine_[ring][order] / weight,
+                weight};
   }
 
  private:
@@ -114,7 +116,8 @@ std::shared_ptr<const BeadAsymmetry> learn_asymmetry(const std::vector<const Joi
       if (const auto mean = sums.mean(k, m)) {
         c += mean->cosine;
         s += mean->sine;
-        if (r <= how.radius_px) chance += r * share * share * how.noise * how.noise / mean->variance;
+        if (r <= how.radius_px)
+          chance += r * share_taken_over * share_taken_over * how.noise * how.noise / mean->variance;
       }
       cosine[k] = allowed * c;
       sine[k] = allowed * s;

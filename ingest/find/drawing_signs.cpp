@@ -8,12 +8,12 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr float faint_step = 4;                // grey levels: up to it noise, beyond it an edge
-constexpr std::size_t shortest_run = 12;       // px of one level on both sides of an edge
-constexpr float darkest = 3, brightest = 252;  // grey levels: beyond, a camera may be at its limits ...
-constexpr double least_shaded = 0.005;         // ... and so much of the picture must be between
-constexpr double ruled_share = 0.25;           // of the frame's width or height
-constexpr std::size_t one_line = 12;           // px: edges so near to one another are one line's
+constexpr float faint_step = 4;                            // grey levels: up to it noise, beyond it an edge
+constexpr std::size_t shortest_run = 12;                   // px of one level on both sides of an edge
+constexpr float darkest_level = 3, brightest_level = 252;  // grey levels: beyond, a camera may be at its limits ...
+constexpr double least_shaded = 0.005;                     // ... and so much of the picture must be between
+constexpr double ruled_share = 0.25;                       // of the frame's width or height
+constexpr std::size_t one_line = 12;                       // px: edges so near to one another are one line's
 
 // Limits. 24 photographs of beads by 6 authors: flat up to 0.57, not one ruled line; screen copies of plots, figures
 // and drawings: flat 0.43 to 0.96, with plots' axes and grids 3 to 40 lines.
@@ -82,7 +82,7 @@ DrawingSigns signs_of_drawing(const GrayFrame& frame) {
       const auto [low, high] = std::minmax({above[k - 1], above[k], above[k + 1], here[k - 1], here[k], here[k + 1],
                                             below[k - 1], below[k], below[k + 1]});
       flat += high == low;
-      if (here[k] < darkest || here[k] > brightest) continue;
+      if (here[k] < darkest_level || here[k] > brightest_level) continue;
       shaded_flat += high == low;
       faint += high > low && high - low <= faint_step;
     }

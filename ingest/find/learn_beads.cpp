@@ -19,11 +19,11 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double same_bead = 0.3;      // radii, between a face and a rim that are one bead
-constexpr double surely_a_bead = 0.9;  // probability of a rim from which the faces must have it too
-constexpr double most_missed = 0.06;   // share of these that faces may miss
-constexpr double no_rim = 0.2;         // support below which a face has no rim at all
-constexpr double most_rimless = 0.35;  // share of the faces without a rim beyond which they are something else
+constexpr double same_bead = 0.3;            // radii, between a face and a rim that are one bead
+constexpr double surely_a_bead = 0.9;        // probability of a rim from which the faces must have it too
+constexpr double most_missed_faces = 0.06;   // share of these that faces may miss
+constexpr double support_without_rim = 0.2;  // support below which a face has no rim at all
+constexpr double most_rimless = 0.35;        // share of the faces without a rim beyond which they are something else
 // Radii: pixels so near to a face without a rim, and to none with one, are left out. A jammed tiling leaves voids of up
 // to half a radius between its disks.
 constexpr double left_out_reach = 1.5;
@@ -67,11 +67,11 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
   for (std::size_t k = 0; k < circles.size(); ++k) {
     FoundDisk disk = found.disks[k];
     // A cut bead may show too little of its rim: it is doubtful, and stays where beads are.
-    if (circles[k].support < no_rim && !disk.cut) {
+    if (circles[k].support < support_without_rim && !disk.cut) {
       ++found.rejected;
       continue;
     }
-    const bool whole = disk.quality >= whole_quality && circles[k].support >= no_rim;
+    const bool whole = disk.quality >= whole_quality && circles[k].support >= support_without_rim;
     disk.probability = std::max(rims.probability_of(circles[k].support), whole ? 0.95 : 0.5);
     kept.push_back(disk);
   }
@@ -94,7 +94,7 @@ struct Agreement {
   double rimless = 0;                 // share of the faces
   std::vector<Circle> faces, no_rim;  // whole faces with a rim, and without
   std::vector<Circle> all;            // these and those that are cut
-  [[nodiscard]] bool good() const { return missed <= most_missed && rimless <= most_rimless; }
+  [[nodiscard]] bool good() const { return missed <= most_missed_faces && rimless <= most_rimless; }
 };
 Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
   Agreement agreement;
@@ -121,7 +121,7 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   }
   const std::vector<Circle> circles = rims_at(frame, rims.model, places);
   for (std::size_t k = 0; k < places.size(); ++k)
-    (circles[k].support < no_rim ? agreement.no_rim : agreement.faces).push_back(places[k]);
+    (circles[k].support < support_without_rim ? agreement.no_rim : agreement.faces).push_back(places[k]);
   if (!places.empty())
     agreement.rimless = static_cast<double>(agreement.no_rim.size()) / static_cast<double>(places.size());
   return agreement;

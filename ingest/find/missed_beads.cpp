@@ -16,12 +16,12 @@ namespace shakebed::ingest {
 namespace {
 
 // Radii of the beads: the sizes of places that are looked for, the largest first. Each counts by its area.
-constexpr std::array<double, 3> sizes = {1.0, 0.8, 0.6};
-constexpr double covered = 0.2;   // radii of the beads: so near to a disk found, an edge is its own
-constexpr double overlap = 0.12;  // of a place's radius, with a disk found
+constexpr std::array<double, 3> tried_sizes = {1.0, 0.8, 0.6};
+constexpr double radii_covered = 0.2;  // radii of the beads: so near to a disk found, an edge is its own
+constexpr double most_overlap = 0.12;  // of a place's radius, with a disk found
 // Of a place's radius: between these its edges are looked for, in as many directions.
 constexpr double nearest_edge = 0.35, farthest_edge = 1.15;
-constexpr int directions = 24;
+constexpr int tried_directions = 24;
 // Of the directions that no disk covers: a straight line is met in 0.3, two that are parallel in 0.6.
 constexpr double least_met = 0.65;
 constexpr int fewest_open = 6;
@@ -85,7 +85,7 @@ class FreePlaces {
       const int column = static_cast<int>(pixel.x), row = static_cast<int>(pixel.y);
       const std::size_t at = edges.at(column, row);
       const double step = step_per_slope * static_cast<double>(edges.slope(at));
-      if (static_cast<double>(clearance_[at]) < covered * radius || step < faintest_edge * contrast) continue;
+      if (static_cast<double>(clearance_[at]) < radii_covered * radius || step < faintest_edge * contrast) continue;
       if (outer.has(pixel.x, pixel.y, radius) || is_straight(pixel)) continue;
       for (int y = std::max(0, row - 1); y <= std::min(edges.height - 1, row + 1); ++y)
         for (int x = std::max(0, column - 1); x <= std::min(edges.width - 1, column + 1); ++x)
@@ -155,7 +155,7 @@ class FreePlaces {
                    y = static_cast<double>(pixel.y) + side * away * static_cast<double>(pixel.unit_x);
       if (x < 0 || y < 0 || x >= edges_.width || y >= edges_.height) break;
       const std::size_t at = edges_.at(static_cast<int>(x), static_cast<int>(y));
-      if (static_cast<double>(clearance_[at]) < covered * radius_) continue;  // a disk hides it
+      if (static_cast<double>(clearance_[at]) < radii_covered * radius_) continue;  // a disk hides it
       ++seen;
       const float size = edges_.slope(at);
       const float along = edges_.x[at] * pixel.unit_x + edges_.y[at] * pixel.unit_y;
@@ -166,7 +166,7 @@ class FreePlaces {
 
   [[nodiscard]] bool is_free(double x, double y, double radius) const {
     return static_cast<double>(clearance_[edges_.at(static_cast<int>(x), static_cast<int>(y))]) >=
-           (1 - overlap) * radius;
+           (1 - most_overlap) * radius;
   }
 
   [[nodiscard]] bool is_beside_a_disk(double x, double y, double radius) const {
@@ -189,10 +189,10 @@ class FreePlaces {
 
   // Of the directions from a place that are not covered, the share in which an edge is met.
   [[nodiscard]] double share_met(double x, double y, double radius) const {
-    static const std::array<std::array<double, 2>, directions> units = [] {
-      std::array<std::array<double, 2>, directions> all{};
-      for (std::size_t k = 0; k < directions; ++k) {
-        const double angle = 2 * std::numbers::pi * static_cast<double>(k) / directions;
+    static const std::array<std::array<double, 2>, tried_directions> units = [] {
+      std::array<std::array<double, 2>, tried_directions> all{};
+      for (std::size_t k = 0; k < tried_directions; ++k) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(k) / tried_directions;
         all[k] = {std::cos(angle), std::sin(angle)};
       }
       return all;
@@ -205,7 +205,7 @@ class FreePlaces {
         const int column = static_cast<int>(x + away * cosine + 0.5), row = static_cast<int>(y + away * sine + 0.5);
         if (column < 0 || row < 0 || column >= edges_.width || row >= edges_.height) continue;
         const std::size_t at = edges_.at(column, row);
-        uncovered = uncovered || (away > 0.8 * radius && static_cast<double>(clearance_[at]) > covered * radius_);
+        uncovered = uncovered || (away > 0.8 * radius && static_cast<double>(clearance_[at]) > radii_covered * radius_);
         edge = edge || edge_[at] != 0;
       }
       open += uncovered;
@@ -248,7 +248,7 @@ double expected_missed_beads(const GrayFrame& frame, const RimModel& model, cons
   const double radius = model.radius_px / at.scale;
   FreePlaces places(edges, disks, radius, model.contrast);
   double missed = 0;
-  for (const double size : sizes) missed += size * size * places.take(size * radius, searched);
+  for (const double size : tried_sizes) missed += size * size * places.take(size * radius, searched);
   return missed;
 }
 

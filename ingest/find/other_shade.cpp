@@ -25,18 +25,18 @@ namespace shakebed::ingest {
 namespace {
 
 // Beyond the rim of a bead found its blurred edge is painted over, too [edge widths of faces; radii, px of rims].
-constexpr double margin_edges = 2, margin_radii = 0.06, margin_px = 1;
+constexpr double shade_margin_edges = 2, margin_radii = 0.06, shade_margin_px = 1;
 // What is behind the beads: the level of this rank among the pixels that no bead found covers, the darkest being 0, in
 // cells so wide [radii]. Beads of the other shade, which are brighter or darker, may be most of these pixels.
 constexpr double rank_behind_bright = 0.15, rank_behind_dark = 0.85, cell_radii = 4;
 constexpr std::size_t fewest_in_cell = 40, most_in_cell = 600;
 // Sums of radii: a bead nearer than that to another overlaps it.
-constexpr double nearest_centres = 0.8;
+constexpr double nearest_shade_centres = 0.8;
 // Radii of the bead found: a rim that is so near to it is no evidence. Share of the rest in which edges must be met,
 // and share of the whole rim that the rest must be.
 constexpr double near_rim = 0.12, least_own_support = 0.6, least_open = 0.15;
 // Beads of another shade are accepted when at least this number is expected, and this share of the beads found.
-constexpr double fewest_others = 3, least_share_of_others = 0.03;
+constexpr double fewest_of_a_shade = 3, least_share_of_a_shade = 0.03;
 // Radii of the beads found: sizes of the others, and how many are looked for.
 constexpr double smallest_other = 0.4, largest_other = 2.5;
 constexpr double same_size = 0.06;  // of the radius: drawn beds of one size differ by up to 0.03 between their shades
@@ -47,7 +47,7 @@ constexpr double least_rim = 0.5, faintest_rim = 0.35;
 constexpr float plain_edge = 1.5F;
 
 double margin_of(const FinderCalibration& finder) {
-  return finder.by_rims ? margin_px + margin_radii * finder.radius_px : margin_edges * finder.edge_width_px;
+  return finder.by_rims ? shade_margin_px + margin_radii * finder.radius_px : shade_margin_edges * finder.edge_width_px;
 }
 
 // Levels behind the beads in cells of the frame, and between the middles of the cells.
@@ -174,7 +174,8 @@ class FreeOf {
 
   [[nodiscard]] bool overlapped(double x, double y, double radius) const {
     return near_.any_near(x, y, [&](std::size_t i) {
-      return std::hypot(disks_[i].x_px - x, disks_[i].y_px - y) < nearest_centres * (disks_[i].radius_px + radius);
+      return std::hypot(disks_[i].x_px - x, disks_[i].y_px - y) <
+             nearest_shade_centres * (disks_[i].radius_px + radius);
     });
   }
 
@@ -232,18 +233,18 @@ double expected_of(const std::vector<FoundDisk>& disks) {
 }
 
 // Beads brighter, or darker, than what is behind the beads found.
-struct Seen {
+struct SeenShade {
   GrayFrame painted;
   BeadsSeen beads;
   double expected = 0;
 };
 
 bool enough(double expected, const std::vector<FoundDisk>& found) {
-  return expected >= std::max(fewest_others, least_share_of_others * static_cast<double>(found.size()));
+  return expected >= std::max(fewest_of_a_shade, least_share_of_a_shade * static_cast<double>(found.size()));
 }
 
 // With this radius, to begin with.
-void look_with(double radius_px, const std::vector<FoundDisk>& found, Seen& seen) {
+void look_with(double radius_px, const std::vector<FoundDisk>& found, SeenShade& seen) {
   const LearnedRims rims = learn_rims(seen.painted, seen.beads.polarity, radius_px, Known::radius);
   const FreeOf free(found);
   double expected = 0;
@@ -265,7 +266,7 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
     return edges.slope(edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y))) < plain ||
            !free.beside_rims(at.to_frame_x(static_cast<double>(pixel.x)), at.to_frame_y(static_cast<double>(pixel.y)));
   });
-  const double beads = std::max(fewest_others, least_share_of_others * static_cast<double>(found.size()));
+  const double beads = std::max(fewest_of_a_shade, least_share_of_a_shade * static_cast<double>(found.size()));
   const double length = at.scale * static_cast<double>(edges.ridge.size());
   if (length <= least_rim * 2 * std::numbers::pi * smallest_other * radius_px * beads) return false;
   CirclesAsked asked{smallest_other * radius_px / at.scale, largest_other * radius_px / at.scale, polarity,
@@ -276,15 +277,15 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
   std::erase_if(circles, [&](const Circle& circle) {
     return free.overlapped(circle.x, circle.y, circle.radius) || !free.has_own_rim(circle);
   });
-  return static_cast<double>(without_doubles(std::move(circles), nearest_centres).size()) >= beads;
+  return static_cast<double>(without_doubles(std::move(circles), nearest_shade_centres).size()) >= beads;
 }
 
 // Of the same size as the beads found, else of the size of which most circles are seen.
-std::optional<Seen> seen_of(const GrayFrame& frame, const FinderCalibration& calibration,
-                            const std::vector<FoundDisk>& found, Polarity polarity) {
+std::optional<SeenShade> seen_of(const GrayFrame& frame, const FinderCalibration& calibration,
+                                 const std::vector<FoundDisk>& found, Polarity polarity) {
   std::optional<GrayFrame> painted = painted_over(frame, found, margin_of(calibration), polarity);
   if (!painted || !leaves_rims(*painted, calibration.radius_px, polarity, found)) return std::nullopt;
-  Seen seen{std::move(*painted), {polarity, calibration.radius_px}};
+  SeenShade seen{std::move(*painted), {polarity, calibration.radius_px}};
   look_with(calibration.radius_px, found, seen);
   if (enough(seen.expected, found)) return seen;
   CensusOptions asked;
@@ -375,10 +376,10 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   if (found.disks.empty() || !calibration.rims || calibration.other_shade) return;
   // The noise of an enlarged picture is smooth, and what is painted is not: beads would be seen in it.
   if (frame.enlargement > 1) return;
-  std::optional<Seen> best;
+  std::optional<SeenShade> best;
   for (const Polarity polarity : {Polarity::bright_beads, Polarity::dark_beads}) {
     if (options.polarity != Polarity::automatic && options.polarity != polarity) continue;
-    std::optional<Seen> seen = seen_of(frame, calibration, found.disks, polarity);
+    std::optional<SeenShade> seen = seen_of(frame, calibration, found.disks, polarity);
     if (seen && (!best || seen->expected > best->expected)) best = std::move(seen);
   }
   if (!best || !enough(best->expected, found.disks)) return;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double nearest_touch = 0.96, farthest_touch = 1.05;  // diameters between centres
 constexpr double overlap_below = 0.9;                          // diameters
-constexpr double beside = 1.2;                                 // radii: the voids between disks lie within
+constexpr double beside_disk = 1.2;                            // radii: the voids between disks lie within
 // A pixel is plainly not explained beyond so many times the noise and this share of the contrast.
 constexpr double plainly_sigmas = 4, plainly_contrast = 0.1;
 constexpr double model_contrast = 0.015;  // contrast units: what the model leaves without noise
@@ -82,7 +82,7 @@ Packing packing_of(const GrayFrame& frame, const FindResult& found, const Finder
   const double noise = std::hypot(faces.noise_level, model_contrast * contrast);
   const double plainly = std::max(plainly_sigmas * noise, plainly_contrast * contrast);
   const GrayFrame left = residual_frame(frame, found, faces), in_view = seen_part(frame, faces);
-  const Nearby near(found.disks.size(), beside * radius,
+  const Nearby near(found.disks.size(), beside_disk * radius,
                     [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });
   double looked = 0, off = 0, seen = 0, squares = 0;
   for (int row = 0; row < left.height; ++row)

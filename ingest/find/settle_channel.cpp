@@ -15,10 +15,11 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double trial_radius_px = 9;                           // frames are averaged down to it for the trials
-constexpr double clearly_more = 1.03;                           // times as many beads, for a change of channel
-constexpr double inside = 0.8, outside = 1.15, farthest = 1.3;  // radii: where a face and what is behind it are seen
-constexpr double least_contrast = 4;                            // grey levels between the two
+constexpr double trial_radius_px = 9;  // frames are averaged down to it for the trials
+constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
+constexpr double inside = 0.8, outside = 1.15,
+                 farthest_behind = 1.3;  // radii: where a face and what is behind it are seen
+constexpr double least_contrast = 4;     // grey levels between the two
 
 // Shares of disks that are wrong or beads that are missed, below which another channel is not tried. At 0.02 a
 // photograph of 65 photoelastic disks, all of which are found by their faces, is searched in a channel that shows 63.
@@ -61,7 +62,7 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
   for (const RimDisk& disk : disks) {
     const double x = (disk.circle.x + 0.5) / scale - 0.5, y = (disk.circle.y + 0.5) / scale - 0.5;
     const double radius = disk.circle.radius / scale;
-    const int reach = static_cast<int>(std::ceil(farthest * radius));
+    const int reach = static_cast<int>(std::ceil(farthest_behind * radius));
     double in = 0, in_count = 0, out = 0, out_count = 0;
     for (int row = std::max(0, static_cast<int>(y) - reach);
          row <= std::min(frame.height - 1, static_cast<int>(y) + reach); ++row)
@@ -71,7 +72,7 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
         const float level = frame.at(column, row);
         if (unseen(level)) continue;
         if (away < inside) in += static_cast<double>(level), ++in_count;
-        if (away > outside && away < farthest) out += static_cast<double>(level), ++out_count;
+        if (away > outside && away < farthest_behind) out += static_cast<double>(level), ++out_count;
       }
     if (in_count > 0 && out_count > 0) contrasts.push_back(in / in_count - out / out_count);
   }

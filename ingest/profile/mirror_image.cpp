@@ -24,7 +24,7 @@ constexpr double most_are_images = 0.8;
 // Images are dimmer than beads, by what the floor does not reflect: of the contrast of the beads at most.
 constexpr double brightest_image = 0.93;
 constexpr double frames_that_show_it = 0.6;
-constexpr std::size_t enough_frames = 20, most_rows_tried = 40;
+constexpr std::size_t enough_mirrored_frames = 20, most_rows_tried = 40;
 
 // One frame's disks of the most frequent size, in units of the diameter.
 class MirrorSearch {
@@ -98,7 +98,7 @@ class MirrorSearch {
 }  // namespace
 
 std::optional<double> find_mirror_row(const std::vector<FrameFindings>& frames, double diameter_px) {
-  const std::size_t looked_at = std::min(frames.size(), enough_frames);
+  const std::size_t looked_at = std::min(frames.size(), enough_mirrored_frames);
   std::vector<double> rows;
   for (std::size_t k = 0; k < looked_at; ++k)
     if (const auto row = MirrorSearch(frames[k], diameter_px).row()) rows.push_back(*row * diameter_px);

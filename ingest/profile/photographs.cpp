@@ -20,7 +20,7 @@ namespace {
 // at 16 px and 210 at 24 px (sums of probabilities; disks cut by the border included).
 constexpr double enough_radius_px = 12, enough_for_rims_px = 24;
 constexpr std::size_t most_surveyed_pixels = 6'000'000;
-constexpr double most_wrong = 0.2, most_missed = 0.4, worth_a_word = 0.02;  // shares that may be wrong, or missed
+constexpr double most_wrong = 0.2, most_missed = 0.4, share_worth_a_word = 0.02;  // shares that may be wrong, or missed
 constexpr double levels_16_bit = 65535.0 / 255.0;
 
 std::size_t pixel_bytes(PixelType type) {
@@ -231,12 +231,12 @@ std::string why_reduced(int width, int height, int reduction) {
 
 Doubt doubt_of(double expected_wrong) {
   if (expected_wrong > most_wrong) return Doubt::too_many;
-  return expected_wrong > worth_a_word ? Doubt::some : Doubt::little;
+  return expected_wrong > share_worth_a_word ? Doubt::some : Doubt::little;
 }
 
 Doubt doubt_of_missed(double expected_missed) {
   if (expected_missed > most_missed) return Doubt::too_many;
-  return expected_missed > worth_a_word ? Doubt::some : Doubt::little;
+  return expected_missed > share_worth_a_word ? Doubt::some : Doubt::little;
 }
 
 DisksFound find_disks(const ImageView& image, const FindOptions& options) {

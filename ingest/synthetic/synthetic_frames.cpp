@@ -45,11 +45,6 @@ const float* normal_quantiles() {
 
 double RandomStream::normal() { return static_cast<double>(normal_quantiles()[next() >> 48U]); }
 
-namespace {
-
-// Below this optical blur a disk is drawn sharp: its edge is then the pixel's own.
-constexpr double sharp_below_px = 0.12;
-
 // Blurred contrast against the distance to the centre, linear between samples `step` apart.
 struct BlurredDisk {
   double step = 0.01;
@@ -64,6 +59,11 @@ struct BlurredDisk {
     return static_cast<double>(contrast[cell]) * (1 - part) + static_cast<double>(contrast[cell + 1]) * part;
   }
 };
+
+namespace {
+
+// Below this optical blur a disk is drawn sharp: its edge is then the pixel's own.
+constexpr double sharp_below_px = 0.12;
 
 BlurredDisk blur_disk(double radius, double blur, const RadialContrast& contrast) {
   BlurredDisk disk;

@@ -62,13 +62,13 @@ Series::Style style_of(Look look) {
          : look == Look::dashed ? Series::Style::dashed
                                 : Series::Style::dotted;
 }
-const std::vector<Choice<Look>> looks{{Look::points, "points"},
-                                      {Look::line, "line"},
-                                      {Look::dashed, "dashed"},
-                                      {Look::dotted, "dotted"},
-                                      {Look::none, "none"}};
+const std::vector<Choice<Look>> all_looks{{Look::points, "points"},
+                                          {Look::line, "line"},
+                                          {Look::dashed, "dashed"},
+                                          {Look::dotted, "dotted"},
+                                          {Look::none, "none"}};
 
-double value_at(const CurveOptions& curve, double x) {
+double curve_at(const CurveOptions& curve, double x) {
   double y = 0;
   for (std::size_t k = curve.polynomial.size(); k-- > 0;) y = y * x + curve.polynomial[k];
   return curve.exponent == 0 ? y : y * std::pow(x, curve.exponent);
@@ -156,7 +156,7 @@ std::optional<double> rms_log_ratio(const CurveOptions& curve, const std::vector
                                     const std::vector<double>& y) {
   double squares = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const double ratio = y[i] / value_at(curve, x[i]);
+    const double ratio = y[i] / curve_at(curve, x[i]);
     if (!(ratio > 0) || !std::isfinite(ratio)) return std::nullopt;
     squares += std::pow(std::log(ratio), 2);
   }
@@ -229,7 +229,7 @@ Json against_json(const CurveOptions& curve, const Used& used, bool has_errors) 
   }
   double chi2 = 0, sum = 0, squares = 0, propagated = 0, largest = 0;
   for (std::size_t i = 0; i < used.x.size(); ++i) {
-    const double difference = used.y[i] - value_at(curve, used.x[i]);
+    const double difference = used.y[i] - curve_at(curve, used.x[i]);
     if (used.weighted) chi2 += std::pow(difference / used.error[i], 2);
     propagated += std::pow(difference * used.error[i], 2);
     sum += difference, squares += difference * difference, largest = std::max(largest, std::abs(difference));
@@ -310,7 +310,7 @@ void add_residuals(const CurveOptions& curve, const Series& series, Picture& pic
   Series below{series.label, series.style, series.color, {}, {}, {}};
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     if (series.x[i] < curve.from || series.x[i] > curve.to) continue;
-    below.x.push_back(series.x[i]), below.y.push_back(series.y[i] - value_at(curve, series.x[i]));
+    below.x.push_back(series.x[i]), below.y.push_back(series.y[i] - curve_at(curve, series.x[i]));
     if (!series.error.empty()) below.error.push_back(series.error[i]);
   }
   if (below.x.empty()) return;
@@ -325,7 +325,7 @@ void add_curve(const CurveOptions& curve, Picture& picture) {
   series.markup = true;
   for (int i = 0; i <= 200; ++i) {
     const double x = curve.from + (curve.to - curve.from) * i / 200;
-    series.x.push_back(x), series.y.push_back(value_at(curve, x));
+    series.x.push_back(x), series.y.push_back(curve_at(curve, x));
   }
   picture.series.push_back(std::move(series));
 }
@@ -401,7 +401,8 @@ void describe_points(Fields& fields, PointsOptions& p) {
   fields.text("y", p.y, {.help = "column of the y values", .required = true});
   fields.text("error", p.error,
               {.help = "column of the standard errors of y; left out, y_error or std_error; \"none\": no errors"});
-  fields.choice("look", p.look, looks, {.help = "how the points are drawn; none: not drawn, only fitted and compared"});
+  fields.choice("look", p.look, all_looks,
+                {.help = "how the points are drawn; none: not drawn, only fitted and compared"});
   fields.integer("color", p.color, {.help = "number of the colour in the palette, 0 to 6; -1: the next colour"});
   fields.number("times", p.times, {.help = "factor of y"});
   fields.number("plus", p.plus, {.help = "constant that is added to y after the factor"});
@@ -567,7 +568,7 @@ void Chart::describe(Fields& fields) {
               g.number("exponent", c.exponent, {.help = "the polynomial is multiplied by x to this power"});
               g.number("from", c.from, {.help = "smallest x of the curve"});
               g.number("to", c.to, {.help = "largest x of the curve"});
-              g.choice("look", c.look, looks, {.help = "how the curve is drawn; none: not drawn, only compared"});
+              g.choice("look", c.look, all_looks, {.help = "how the curve is drawn; none: not drawn, only compared"});
               g.integer("color", c.color, {.help = "number of the colour in the palette, 0 to 6"});
             },
             {.help = "curves with which the points are compared: polynomials times a power of x"});
@@ -607,7 +608,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
   if (chart.lead) out["lead"] = true;
   int color = 1;
   for (const PointsOptions& options : chart.points) {
-    Data data = read_data(input_named(context, options.from).file(options.file), options);
+    Data data = read_data(context.input_from(options.from).file(options.file), options);
     if (data.has_errors) data.error = pooled(data.error, options.pool);
     if (options.look != Look::none) {
       const bool bars = data.has_errors && options.look == Look::points;
@@ -631,7 +632,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
 }
 
 Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) const {
-  TrajectoryReader reader(input_named(context, options.from).file("final.extxyz"));
+  TrajectoryReader reader(context.input_from(options.from).file("final.extxyz"));
   TrajectoryFrame frame;
   if (!reader.read(frame))
     throw InputError(options.from + "/final.extxyz contains no frame; run the simulate stage again");
@@ -671,13 +672,6 @@ void Chart::run(RunContext& context) const {
 }
 
 }  // namespace
-
-const Input& input_named(const RunContext& context, const std::string& id) {
-  for (const Input& input : context.inputs()) {
-    if (input.id == id || (id.empty() && context.inputs().size() == 1)) return input;
-  }
-  throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
-}
 
 StageRow chart_stage() {
   return {.name = "chart",

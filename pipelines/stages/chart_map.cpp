@@ -168,7 +168,7 @@ void state_map(ResultList& list, const MapOptions& map) {
 }
 
 Json draw_map(const RunContext& context, const MapOptions& map) {
-  const StudyTable table = read_study_table(input_named(context, map.from).file(map.file));
+  const StudyTable table = read_study_table(context.input_from(map.from).file(map.file));
   const std::vector<MapPoint> points = points_of(map, table);
   if (points.empty())
     throw InputError(

@@ -32,7 +32,4 @@ void state_map(ResultList& list, const MapOptions& map);
 // Draws NAME.svg and NAME.pdf with NAME.dat and NAME.gp beside them; what chart.json says of the map.
 Json draw_map(const RunContext& context, const MapOptions& map);
 
-// The input with this id; with an empty one, the only input. Throws InputError.
-const Input& input_named(const RunContext& context, const std::string& id);
-
 }  // namespace shakebed::pipelines

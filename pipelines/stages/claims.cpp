@@ -25,7 +25,7 @@ struct Claim {
 // The interval of the measured number, by default of 95 %, against what is claimed. A claim of a number to some
 // tolerance is an interval too.
 enum class ClaimVerdict { holds, open, fails, missing, unread };
-std::string_view name_of(ClaimVerdict verdict) {
+std::string_view verdict_name(ClaimVerdict verdict) {
   switch (verdict) {
     case ClaimVerdict::holds:
       return "holds";
@@ -122,7 +122,7 @@ Json claim_json(const Claim& c, const Measured& number, const Judged& judged) {
   Json row{{"claim", c.claim},
            {"claimed", judged.claimed},
            {"measured", judged.measured},
-           {"verdict", name_of(judged.verdict)}};
+           {"verdict", verdict_name(judged.verdict)}};
   row["value"] = std::isfinite(number.value) ? Json(number.value) : Json();
   if (number.error > 0) row["std_error"] = number.error;
   if (!c.place.empty()) row["place"] = c.place;
@@ -143,7 +143,7 @@ std::string markdown_row(const Claim& c, const Judged& judged) {
   };
   return fmt::format("| {}{} | {} | {} | {}{} | {} |\n", cell(c.claim),
                      c.measured_as.empty() ? "" : " (" + cell(c.measured_as) + ")", judged.claimed,
-                     cell(judged.measured), name_of(judged.verdict), c.note.empty() ? "" : ": " + cell(c.note),
+                     cell(judged.measured), verdict_name(judged.verdict), c.note.empty() ? "" : ": " + cell(c.note),
                      cell(c.place));
 }
 
@@ -242,7 +242,7 @@ class Claims : public Stage {
                           verdict_of(claim, number, standard_errors_)};
       rows.push_back(claim_json(claim, number, judged));
       verdicts.add({claim.claim, claim.measured_as, judged.claimed, number.value,
-                    number.error > 0 ? number.error : no_number, name_of(judged.verdict), claim.place});
+                    number.error > 0 ? number.error : no_number, verdict_name(judged.verdict), claim.place});
       markdown += markdown_row(claim, judged);
     }
     write_file(context.output("claims.json"), dump(Json{{"verdict_is", rule()}, {"claims", std::move(rows)}}));

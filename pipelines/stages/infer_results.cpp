@@ -53,9 +53,10 @@ sim::Measured moments_of(const std::vector<double>& values, const std::vector<do
   return {mean, std::sqrt(square)};
 }
 
-class Report {
+class ResultsOfInference {
  public:
-  Report(RunContext& context, const InferOptions& options, const KnownParameters& known, const Inference& found)
+  ResultsOfInference(RunContext& context, const InferOptions& options, const KnownParameters& known,
+                     const Inference& found)
       : context_(context), options_(options), known_(known), surrogate_(*known.near), found_(found) {
     const fit::Posterior& posterior = found.posterior;
     values_.resize(options.dimensions());
@@ -415,7 +416,7 @@ class Report {
 
 void write_inference(RunContext& context, const InferOptions& options, const KnownParameters& known,
                      const Inference& found) {
-  Report(context, options, known, found).write();
+  ResultsOfInference(context, options, known, found).write();
 }
 
 namespace {

@@ -43,7 +43,7 @@ void describe_number(Fields& f, InferTarget& target, const Observable& observabl
   if (!target.at.empty()) f.check_result("/at", target.at);
 }
 
-void describe_profile(Fields& f, ProfileTarget& profile) {
+void describe_profile_target(Fields& f, ProfileTarget& profile) {
   if (f.describes(!profile.from.empty()))
     f.text("from", profile.from, {.help = "stage in \"from\" whose profile this is", .example = "\"extract\""});
   f.text("table", profile.table,
@@ -73,11 +73,6 @@ void describe_profile(Fields& f, ProfileTarget& profile) {
   f.require(profile.from.empty() ||
                 std::any_of(from.begin(), from.end(), [&](const StatedStage& one) { return one.id == profile.from; }),
             "from", "there is no stage \"" + profile.from + "\" in the stage's \"from\"");
-}
-
-const Input& input_named(const RunContext& context, const std::string& id) {
-  return *std::find_if(context.inputs().begin(), context.inputs().end(),
-                       [&](const Input& one) { return one.id == id; });
 }
 
 // Slope of the profile at a height, from the rows about it.
@@ -131,7 +126,7 @@ void describe_targets(Fields& fields, InferOptions& options) {
                                                    },
                                                    {.help = observable.meaning});
                            }
-                           f.object<ProfileTarget>("profile", options.profile, describe_profile,
+                           f.object<ProfileTarget>("profile", options.profile, describe_profile_target,
                                                    {.help = "measured density profile, compared at several heights"});
                          },
                          {.help = "measured numbers with their errors", .required = true});
@@ -152,7 +147,7 @@ ScaledTarget number_target(const RunContext& context, const InferOptions& option
   InferTarget target = *options.targets[k];
   if (!target.at.empty()) {
     const std::string id = split_pointer(target.at).front();
-    const Json result = input_named(context, id).result();
+    const Json result = context.input_from(id).result();
     const Json* found = find_pointer(result, target.at.substr(1 + escape_pointer_token(id).size()));
     if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
       throw InputError(
@@ -175,12 +170,12 @@ std::vector<ScaledTarget> profile_targets(const RunContext& context, const Infer
   const ProfileTarget& target = *options.profile;
   const bool from_stage = !target.from.empty();
   const std::filesystem::path path =
-      from_stage ? input_named(context, target.from).file(target.table) : std::filesystem::path(target.file.paths[0]);
+      from_stage ? context.input_from(target.from).file(target.table) : std::filesystem::path(target.file.paths[0]);
   const ProfileTable profile = read_profile_csv(path);
   // Beds are measured as long as a film, so that their scatter is that of its profile. What a film of few periods
   // states may be more, since the density near the floor goes up and down with it: 0.044 where beds scatter by 0.016.
   const bool filmed = from_stage && target.includes_scatter && options.bed.frame_rate;
-  const PlaceErrors more = from_stage ? place_errors(input_named(context, target.from)) : PlaceErrors{};
+  const PlaceErrors more = from_stage ? place_errors(context.input_from(target.from)) : PlaceErrors{};
   const Kernel wanted{KernelKind::gaussian, options.bed.kernel_width};
   if (profile.std_error.empty())
     throw InputError(path.string() + ": the profile has no standard errors, so it cannot be a target");

@@ -10,7 +10,7 @@ namespace shakebed::pipelines {
 namespace {
 
 // To four digits: what is advised is accepted.
-double rounded_up(double value) {
+double rounded_up_to_four_digits(double value) {
   const double step = std::pow(10, std::floor(std::log10(value)) - 3);
   return std::ceil(value / step) * step;
 }
@@ -63,8 +63,9 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
   const sim::MeasureOptions options = reduced(time_unit);
   for (const MeasureProblem problem : options.problems(floor_period)) {
     if (problem == MeasureProblem::shorter_than_a_period)
-      fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
-                     "Give " + handy_text(rounded_up(floor_period * time_unit), dimension::time) + " or more");
+      fields.require(
+          false, "measure", "the bed must be measured over at least one period of the floor",
+          "Give " + handy_text(rounded_up_to_four_digits(floor_period * time_unit), dimension::time) + " or more");
     if (problem == MeasureProblem::too_many_periods)
       fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run can reach",
                      "Give a shorter \"measure\" or \"settle\", or a lower frequency");

@@ -41,6 +41,13 @@ std::vector<const Input*> RunContext::inputs_of(std::string_view kind) const {
   return found;
 }
 
+const Input& RunContext::input_from(const std::string& id) const {
+  for (const Input& input : inputs()) {
+    if (input.id == id || (id.empty() && inputs().size() == 1)) return input;
+  }
+  throw InputError(fmt::format("\"{}\" is not in the \"from\" of this stage", id));
+}
+
 const Input& RunContext::input(std::string_view kind) const {
   const auto found = inputs_of(kind);
   if (found.empty())

@@ -105,6 +105,8 @@ class RunContext {
   const Input& input(std::string_view kind) const;
   const Input* find_input(std::string_view kind) const;  // nullptr if none
   std::vector<const Input*> inputs_of(std::string_view kind) const;
+  // The input of this stage; with an empty id, the only input. Throws InputError.
+  const Input& input_from(const std::string& id) const;
 
   // --- what comes out
   virtual const std::filesystem::path& output_directory() const = 0;
