@@ -100,4 +100,22 @@ PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling&
   return part;
 }
 
+PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height) {
+  constexpr int steps_a_side = 8;
+  const int step = std::max(1, side / steps_a_side);
+  PicturePart best;
+  best.width = std::min(side, width), best.height = std::min(side, height);
+  std::ptrdiff_t most = -1;
+  for (int top = 0; top < height - best.height + step; top += step)
+    for (int left = 0; left < width - best.width + step; left += step) {
+      const int x = std::min(left, width - best.width), y = std::min(top, height - best.height);
+      const auto count = std::count_if(places.begin(), places.end(), [&](const auto& place) {
+        const double column = place.first - x, row = place.second - y;
+        return column >= 0 && row >= 0 && column < best.width && row < best.height;
+      });
+      if (count > most) most = count, best.left = x, best.top = y;
+    }
+  return best;
+}
+
 }  // namespace shakebed::ingest

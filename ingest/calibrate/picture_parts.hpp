@@ -1,6 +1,9 @@
 #pragma once
 // Parts and copies of a picture, for searches that need not look at all of it.
 
+#include <utility>
+#include <vector>
+
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
@@ -21,5 +24,8 @@ struct ChangeSampling {
 };
 // The part of at most `side` x `side` px with the most change of level.
 PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling& sampling);
+
+// The part of a picture of width x height px, of at most `side` x `side` px, that holds most of the places (x, y).
+PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height);
 
 }  // namespace shakebed::ingest

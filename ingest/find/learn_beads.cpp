@@ -382,10 +382,11 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
+  if (options.quick_rims_only) return calibration_by_rims(frame, rims, options);
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
-  if (!options.quick_rims_only) rims = most_telling(frame, std::move(rims), options);
+  rims = most_telling(frame, std::move(rims), options);
   return calibration_by_rims(frame, rims, options);
 }
 

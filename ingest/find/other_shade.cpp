@@ -17,6 +17,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
+#include "ingest/find/rim_probability.hpp"
 #include "statistics/ranks.hpp"
 #include "statistics/text.hpp"
 
@@ -239,6 +240,13 @@ struct SeenShade {
   double expected = 0;
 };
 
+// Whether chance may have made them up: of mottled ground each circle alone is likely to be a bead, and all of them are
+// none.
+bool by_chance(const std::vector<FoundDisk>& others) {
+  const auto count = static_cast<double>(others.size());
+  return share_by_chance_at_worst(count - expected_of(others), count) > most_by_chance;
+}
+
 bool enough(double expected, const std::vector<FoundDisk>& found) {
   return expected >= std::max(fewest_of_a_shade, least_share_of_a_shade * static_cast<double>(found.size()));
 }
@@ -388,13 +396,14 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   find.seen = best->beads;
   find.radius_px.reset();
   find.hold_radius = false;
-  // Once a picture is enough for the thorough search, which took most of the time where it found nothing.
+  // Where faces did not show the one shade, they took most of the time and did not show the other. So did the thorough
+  // search by rims.
   find.quick_rims_only = calibration.by_rims;
   CalibrationResult learned = learn_beads({&best->painted}, find);
   if (!learned.found || !learned.calibration.rims) return;
   tell_radius(learned);
   FindResult more = others_in(best->painted, learned.calibration, find, found.disks);
-  if (!enough(expected_of(more.disks), found.disks)) return;
+  if (!enough(expected_of(more.disks), found.disks) || by_chance(more.disks)) return;
   const double ratio = contrast_ratio(frame, margin_of(calibration), find.polarity, found.disks, more.disks);
   calibration.warnings.push_back(formatted(
       "Beads of two shades were found. In the first frame %zu of %zu beads differ from the background by %.2f of what "

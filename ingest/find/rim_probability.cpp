@@ -76,6 +76,10 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
   return probability;
 }
 
+double share_by_chance_at_worst(double wrong, double count) {
+  return (wrong + std::sqrt(std::max(0.0, wrong))) / std::max(1.0, count);
+}
+
 double probability_at(const std::vector<double>& by_support, double support) {
   if (by_support.empty()) return 0;
   const double place = std::clamp(support, 0.0, 1.0) * static_cast<double>(by_support.size() - 1);

@@ -20,6 +20,11 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
                                              const std::vector<std::vector<Circle>>& copies,
                                              Known known = Known::nothing);
 
+// Of `count` circles of which `wrong` are expected to be due to chance: their share, a standard deviation more. And the
+// largest with which circles are believed to be beads.
+double share_by_chance_at_worst(double wrong, double count);
+inline constexpr double most_by_chance = 0.2;
+
 // Linear between the table's values; 0 for an empty table.
 double probability_at(const std::vector<double>& by_support, double support);
 

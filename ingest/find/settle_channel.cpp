@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
@@ -16,6 +18,7 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr double trial_radius_px = 9;  // frames are averaged down to it for the trials
+constexpr int trial_side_px = 640;     // of the part of a frame that trials look at
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
 constexpr double inside = 0.8, outside = 1.15,
                  farthest_behind = 1.3;  // radii: where a face and what is behind it are seen
@@ -85,10 +88,14 @@ class ChannelTrials {
       : frames_(frames), best_(best) {
     const double radius = best.rims.radius_px / frames.reduction;
     factor_ = std::max(1, static_cast<int>(radius / trial_radius_px));
-    if (!options.roi) return;
     const int all = factor_ * frames.reduction;
-    roi_ = PixelRectangle{options.roi->left / all, options.roi->top / all, options.roi->width / all,
-                          options.roi->height / all};
+    std::vector<std::pair<double, double>> places;
+    for (const RimDisk& disk : best.disks) places.emplace_back(disk.circle.x / all, disk.circle.y / all);
+    const GrayFrame& frame = frames.channels.front().frame;
+    part_ = part_with_most(places, trial_side_px, frame.width / factor_, frame.height / factor_);
+    if (!options.roi) return;
+    roi_ = PixelRectangle{options.roi->left / all - part_.left, options.roi->top / all - part_.top,
+                          options.roi->width / all, options.roi->height / all};
   }
 
   [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades) const {
@@ -117,14 +124,18 @@ class ChannelTrials {
   }
 
  private:
+  // The same part of every channel, so that numbers of beads compare.
   [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
-    return factor_ > 1 ? reduced(picture, factor_) : picture;
+    GrayFrame part = cut_out(factor_ > 1 ? reduced(picture, factor_) : picture, part_);
+    part.enlargement = picture.enlargement;
+    return part;
   }
   [[nodiscard]] double radius_px() const { return best_.rims.radius_px / (frames_.reduction * factor_); }
 
   const ChannelFrames& frames_;
   const SurveyCandidate& best_;
   int factor_ = 1;
+  PicturePart part_;
   std::optional<PixelRectangle> roi_;
 };
 

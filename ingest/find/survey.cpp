@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
@@ -12,6 +13,7 @@
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/edge_map.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/find/rim_probability.hpp"
 #include "ingest/find/settle_channel.hpp"
 #include "statistics/text.hpp"
 
@@ -25,7 +27,6 @@ constexpr std::size_t most_examined = 8;  // hypotheses of the census looked at 
 constexpr double cost_radius_px = 8;
 constexpr double hopeless_share = 0.5;  // of the census's circles, made up by chance: not looked at in full
 constexpr double worth_a_look = 0.15;   // of the best hypothesis's gain
-constexpr double most_by_chance = 0.2;  // share of the circles that chance may make up
 constexpr double few_wrong = 0.1;  // beyond it, beads whose radius is not given must make up a good part of the edges
 constexpr double good_part = 0.15;
 constexpr double least_explained =
@@ -54,6 +55,11 @@ constexpr double least_open_rim = 0.35;  // share of the rim that others leave f
 
 // Radii: the rim of a circle is not asked for where another circle is so near.
 constexpr double rim_of_another = 1.15;
+
+// Radii: the side of the part that is looked at first, where the picture is larger; and the circles there that are
+// enough to refuse a hypothesis.
+constexpr double part_radii = 80;
+constexpr std::ptrdiff_t fewest_in_part = 50;
 
 // Share of a circle's rim that is seen, of that which no other circle touches or covers.
 double support_beside_others(const std::vector<RimDisk>& disks, std::size_t which) {
@@ -183,7 +189,7 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   candidate.expected_wrong = expected_wrong_share(candidate.disks);
   const auto count = static_cast<double>(candidate.disks.size());
   const double wrong = candidate.expected_wrong * count;
-  const double at_worst = (wrong + std::sqrt(wrong)) / std::max(1.0, count);  // a standard deviation more
+  const double at_worst = share_by_chance_at_worst(wrong, count);
   candidate.one_sided = least_seen_side(candidate.disks) < least_side;
   const bool lit_from_one_side = count >= fewest_one_sided && support >= one_sided_support * count &&
                                  candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
@@ -337,6 +343,58 @@ std::string why_none(const Survey& survey) {
                             best.rims.radius_px, wide_enough_px);
 }
 
+// What is known before the hypotheses of a survey are looked at.
+struct SurveyAsked {
+  const SurveyOptions& options;
+  const DrawingSigns& signs;
+  double largest_px = 0;  // largest radius that is proposed, px of the picture
+};
+
+// What a picture shows of a hypothesis.
+SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
+  const bool given = asked.options.radius_px.has_value();
+  LearnedRims learned =
+      learn_rims(picture, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : Known::nothing);
+  SurveyCandidate candidate;
+  candidate.rims = std::move(learned.model);
+  candidate.disks = std::move(learned.disks);
+  judge(candidate, learned.edge_length_px, given);
+  candidate.plausible = candidate.why_not.empty() && candidate.rims.radius_px <= asked.largest_px;
+  if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
+  if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
+  if (candidate.why_not.empty())
+    judge_shape(candidate, roundness_of(picture, candidate.rims, candidate.disks), asked.options.any_shape);
+  candidate.plausible = candidate.plausible && candidate.why_not != spots;
+  return candidate;
+}
+
+// Of a picture in which the circles are small, the part in which most of them were seen. None where the part would be
+// the picture.
+std::optional<PicturePart> part_of(const GrayFrame& picture, const CircleHypothesis& hypothesis) {
+  const int side = static_cast<int>(part_radii * hypothesis.radius_px);
+  if (std::min(picture.width, picture.height) <= side) return std::nullopt;
+  std::vector<std::pair<double, double>> places;
+  for (const Circle& circle : hypothesis.seen) places.emplace_back(circle.x, circle.y);
+  return part_with_most(places, side, picture.width, picture.height);
+}
+
+// What a part shows where it is enough to refuse a hypothesis: chance, other edges and outlines are no better in the
+// rest of the picture, and the circles that the census saw there are so many that their number does not matter.
+std::optional<SurveyCandidate> refused_by_part(const GrayFrame& picture, const CircleHypothesis& hypothesis,
+                                               const SurveyAsked& asked) {
+  const std::optional<PicturePart> part = part_of(picture, hypothesis);
+  if (!part) return std::nullopt;
+  const auto seen = std::count_if(hypothesis.seen.begin(), hypothesis.seen.end(), [&](const Circle& circle) {
+    return circle.x >= part->left && circle.y >= part->top && circle.x < part->left + part->width &&
+           circle.y < part->top + part->height;
+  });
+  if (seen < fewest_in_part) return std::nullopt;
+  SurveyCandidate candidate = examined(cut_out(picture, *part), hypothesis, asked);
+  if (candidate.why_not.empty()) return std::nullopt;
+  for (RimDisk& disk : candidate.disks) disk.circle.x += part->left, disk.circle.y += part->top;
+  return candidate;
+}
+
 }  // namespace
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
@@ -352,26 +410,16 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   const DrawingSigns signs = signs_inside(frames, options.roi);
   if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
   const CircleCensus census = take_census(pictures, asked);
+  const SurveyAsked asked_of_each{options, signs,
+                                  largest_proposed * std::min(frames.width, frames.height) / frames.reduction};
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
     if (survey.candidates.size() >= most_examined) break;
     if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
     if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
-    SurveyCandidate candidate;
+    const GrayFrame& picture = *pictures[hypothesis.channel];
+    std::optional<SurveyCandidate> refused = refused_by_part(picture, hypothesis, asked_of_each);
+    SurveyCandidate candidate = refused ? std::move(*refused) : examined(picture, hypothesis, asked_of_each);
     candidate.channel = channels[hypothesis.channel]->channel;
-    LearnedRims learned = learn_rims(*pictures[hypothesis.channel], hypothesis.polarity, hypothesis.radius_px,
-                                     options.radius_px ? Known::radius : Known::nothing);
-    candidate.rims = std::move(learned.model);
-    candidate.disks = std::move(learned.disks);
-    judge(candidate, learned.edge_length_px, options.radius_px.has_value());
-    candidate.plausible =
-        candidate.why_not.empty() &&
-        candidate.rims.radius_px <= largest_proposed * std::min(frames.width, frames.height) / frames.reduction;
-    if (const char* why = why_drawn(signs, candidate.explained_share)) candidate.why_drawn = why;
-    if (candidate.why_not.empty() && !options.any_shape) candidate.why_not = candidate.why_drawn;
-    if (candidate.why_not.empty())
-      judge_shape(candidate, roundness_of(*pictures[hypothesis.channel], candidate.rims, candidate.disks),
-                  options.any_shape);
-    candidate.plausible = candidate.plausible && candidate.why_not != spots;
     enlarge(candidate, frames.reduction);
     if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
       candidate.why_not =

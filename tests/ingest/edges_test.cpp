@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "ingest/calibrate/picture_parts.hpp"
@@ -279,6 +280,20 @@ TEST(PictureParts, TheBusiestHoldsWhatChanges) {
   EXPECT_EQ(whole.top, 0);
   EXPECT_EQ(whole.width, 100);
   EXPECT_EQ(whole.height, 40);
+}
+
+TEST(PictureParts, HoldMostOfThePlacesGiven) {
+  const std::vector<std::pair<double, double>> places = {{10, 10}, {300, 250}, {330, 240}, {310, 280}, {390, 290}};
+  const PicturePart part = part_with_most(places, 120, 400, 300);
+  EXPECT_EQ(part.width, 120);
+  EXPECT_EQ(part.height, 120);
+  for (std::size_t k = 1; k < places.size(); ++k) {
+    EXPECT_TRUE(places[k].first >= part.left && places[k].first < part.left + part.width) << k;
+    EXPECT_TRUE(places[k].second >= part.top && places[k].second < part.top + part.height) << k;
+  }
+  const PicturePart wide = part_with_most({}, 120, 400, 90);
+  EXPECT_EQ(wide.width, 120);
+  EXPECT_EQ(wide.height, 90);
 }
 
 TEST(SmoothField, HasChebyshevsPolynomials) {

@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
@@ -70,6 +73,44 @@ TEST(Shades, BeadsDarkerThanTheBackgroundAreFoundBetweenBrighterOnes) {
   EXPECT_TRUE(warned_of(found, "in the opposite direction"));
   for (const FoundDisk& disk : found.disks)
     EXPECT_TRUE(std::abs(disk.contrast - 1) < 0.3 || std::abs(disk.contrast + 0.5) < 0.2) << disk.contrast;
+}
+
+// Dark beads on ground whose level varies by 6 over 7 px, as of paper or agar: rounded patches of it pass as beads of
+// another shade, 7 to 20 beside 25.
+GrayFrame on_mottled_ground(unsigned seed, std::size_t* count) {
+  constexpr int side = 480;
+  std::mt19937 random(seed);
+  const auto level = [&] { return std::normal_distribution<float>(0, 1)(random); };
+  cv::Mat ground(side, side, CV_32F);
+  for (int row = 0; row < side; ++row)
+    for (int column = 0; column < side; ++column) ground.at<float>(row, column) = level();
+  cv::GaussianBlur(ground, ground, cv::Size(0, 0), 7);
+  cv::Scalar mean, spread;
+  cv::meanStdDev(ground, mean, spread);
+  ground = ground * (6 / spread[0]) + 225;
+  std::vector<std::pair<double, double>> beads;
+  for (int k = 0; k < 25; ++k) beads.emplace_back(50 + 90 * (k % 5) + random() % 20, 50 + 90 * (k / 5) + random() % 20);
+  *count = beads.size();
+  GrayFrame frame{side, side, {}};
+  for (int row = 0; row < side; ++row)
+    for (int column = 0; column < side; ++column) {
+      double cover = 0;
+      for (const auto& [x, y] : beads)
+        cover = std::max(cover, std::clamp(8.5 - std::hypot(column - x, row - y), 0.0, 1.0));
+      const auto dark = static_cast<float>(cover);
+      frame.pixels.push_back(std::round((1 - dark) * ground.at<float>(row, column) + dark * 140 + 0.7F * level()));
+    }
+  return frame;
+}
+
+TEST(Shades, MottledGroundHoldsNoBeads) {
+  for (const unsigned seed : {308U, 312U, 316U}) {
+    std::size_t beads = 0;
+    const DisksFound found = found_in(on_mottled_ground(seed, &beads));
+    ASSERT_TRUE(found.ok()) << found.message;
+    EXPECT_EQ(found.calibration.other_shade, nullptr) << seed;
+    EXPECT_EQ(found.disks.size(), beads) << seed;
+  }
 }
 
 // Places in a crystal are round by the rims of their neighbours alone.

@@ -13,6 +13,7 @@
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/settle_channel.hpp"
 #include "ingest/find/survey.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "statistics/text.hpp"
@@ -307,6 +308,27 @@ TEST(Sizes, AChannelIsLeftThatDoesNotShowABeadAtAll) {
   EXPECT_EQ(settle_channel(frames, best, {}).channel, Channel::grey);
   frames.channels.back().frame = drawn(all_but_one, 300, 260, 160, plain_face, 8);
   EXPECT_EQ(settle_channel(frames, best, {}).channel, Channel::saturation) << "the other shows no more";
+}
+
+// By how often it asks whether to stop: channels are compared in one part of a large picture.
+TEST(Sizes, AChannelIsSettledInAPartOfALargePicture) {
+  const auto asked_for = [](int side, std::size_t count) {
+    const std::vector<Bead> beads = scattered(count, {8}, side, side, 23);
+    ChannelFrames frames;
+    frames.width = frames.height = side;
+    frames.channels = {{Channel::saturation, drawn(beads, side, side, 190, plain_face, 7)},
+                       {Channel::grey, drawn(beads, side, side, 160, plain_face, 8)}};
+    SurveyCandidate best;
+    best.channel = Channel::saturation;
+    LearnedRims rims = learn_rims(frames.channels.front().frame, Polarity::dark_beads, 8, Known::beads);
+    best.rims = rims.model, best.disks = rims.disks;
+    EXPECT_GT(best.disks.size(), count * 9 / 10);
+    std::size_t asked = 0;
+    const StopQuestion counted([&] { ++asked; });
+    settle_channel(frames, best, {});
+    return asked;
+  };
+  EXPECT_LT(2 * asked_for(1000, 260), 3 * asked_for(640, 106));
 }
 
 TEST(Sizes, DoubtsOfAFilmAreTheMeanOverItsDisks) {

@@ -18,6 +18,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/survey.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "tests/ingest/drawn_pictures.hpp"
 #include "tests/ingest/test_files.hpp"
@@ -288,6 +289,24 @@ void expect_nothing_found(std::size_t step, unsigned noises) {
     EXPECT_FALSE(survey_of({{Channel::automatic, noise}}).found) << seed;
   }
 }
+// Tiles, seen as circles of 7 px: a part of a large picture is enough to refuse them. By how often it asks whether to
+// stop.
+TEST(Survey, ALargePictureOfSmallThingsIsRefusedByAPart) {
+  const auto asked_for = [](int side) {
+    ChannelFrames frames;
+    frames.width = frames.height = side;
+    frames.channels = {{Channel::automatic, painted(side, side, [](double x, double y) {
+                          const double u = std::fmod(x, 22.0) - 11, v = std::fmod(y, 22.0) - 11;
+                          return std::max(std::abs(u), std::abs(v)) < 6.5 ? 90.0 : 190.0;
+                        })}};
+    std::size_t asked = 0;
+    const StopQuestion counted([&] { ++asked; });
+    EXPECT_FALSE(take_survey(frames).found);
+    return asked;
+  };
+  EXPECT_LT(asked_for(1300), 2 * asked_for(640));
+}
+
 TEST(Survey, RefusesPicturesWithoutBeads) { expect_nothing_found(5, 1); }
 TEST(Survey, RefusesEveryPictureWithoutBeads) { expect_nothing_found(1, 3); }
 
