@@ -475,6 +475,16 @@ TEST(FitHardCases, AnOutlierIsNamedAndTheRobustOptionBoundsIt) {
             2.0 * std::abs(robust.temperature.value - reference.temperature.value));
 }
 
+// A profile of which every height is off is one that the model does not fit, not one with an outlier.
+TEST(FitHardCases, ManyDensitiesThatAreOffAreNoOutlier) {
+  Profile data = good_profile();
+  for (std::size_t i = 0; i < data.number_density.size(); ++i)
+    data.number_density[i] += (i % 2 == 0 ? 15.0 : -15.0) * data.std_error[i];
+  const FitResult fit = fit_profile(data, full_options());
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("The model does not fit")));
+  EXPECT_THAT(fit.warnings, testing::Not(testing::Contains(testing::HasSubstr("an outlier"))));
+}
+
 TEST(FitHardCases, RobustCostsFivePerCentOnCleanData) {
   const FitResult plain = fit_profile(good_profile(), core_options(1.10));
   FitOptions options = core_options(1.10);
