@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -319,6 +320,35 @@ TEST(KineticTemperatures, AreTakenFromABedOrFromAFilm) {
       "temperature_x_over_mg": {"value": 0.0012, "std_error": 0.00008},
       "temperature_z_over_mg": {"value": 0.002, "std_error": 0.00012}}})");
   EXPECT_FALSE(kinetic_temperatures(stage.inputs()[1], 0.004).x);
+}
+
+// --- simulate
+
+// A contact duration that is far too long is named as it was given, in the unit of the recipe, and a shorter one with
+// it: of 16 mm and 10 m/s^2 the unit of time is 40 ms.
+TEST(ContactDurationWarning, StatesItInTheUnitsOfTheRecipe) {
+  for (const bool reduced : {true, false}) {
+    LoneStage bed(*find_stage("simulate"));
+    bed.reduced = reduced;
+    const std::string units = reduced ? R"("disks": {"count": 30, "restitution": 0.7, "contact_duration": 0.1},
+            "box": {"width": 8}, "floor": {"motion": "sinusoidal", "gamma": 4, "frequency": 0.4, "restitution": 0.7},
+            "settle": 5, "measure": 15)"
+                                      : R"("disks": {"count": 30, "restitution": 0.7, "contact_duration": "4 ms",
+            "diameter": "16 mm"}, "gravity": "10 m/s^2", "box": {"width": "128 mm"},
+            "floor": {"motion": "sinusoidal", "gamma": 4, "frequency": "10 Hz", "restitution": 0.7},
+            "settle": "0.2 s", "measure": "0.6 s")";
+    bed.run("{" + units + R"(, "replicas": 1})");
+    const std::string given = reduced ? "0.1" : "\"4 ms\"", key = "\"contact_duration\": ";
+    const auto warning = std::find_if(bed.warnings.begin(), bed.warnings.end(), [&](const std::string& one) {
+      return one.find("contact duration t_c = " + given + " makes") != std::string::npos;
+    });
+    ASSERT_NE(warning, bed.warnings.end()) << given;
+    const std::string advice = warning->substr(warning->find(key) + key.size());
+    const double shorter =
+        reduced ? std::stod(advice) : 25 * parse_quantity(advice.substr(1, advice.find('"', 1) - 1)).value;
+    EXPECT_GT(shorter, 0);
+    EXPECT_LT(shorter, 0.1);
+  }
 }
 
 }  // namespace
