@@ -295,8 +295,8 @@ class Bench:
 
     def prepare(self):
         log, first = self.base / ".ninja_log", self.work / "prepared"
-        if first.exists() and log.exists() and first.stat().st_mtime < log.stat().st_mtime:
-            shutil.rmtree(self.work)  # linked from the objects of an earlier build
+        if log.exists() and (not first.exists() or first.stat().st_mtime < log.stat().st_mtime):
+            shutil.rmtree(self.work, ignore_errors=True)  # linked from the objects of an earlier build, or in part
         for name in ("bin", "lib/shakebed", "objects"):
             (self.work / name).mkdir(parents=True, exist_ok=True)
         shutil.rmtree(self.overlay, ignore_errors=True)
