@@ -160,6 +160,30 @@ TEST(MapNumbers, ComeFromTheBedAndTheFit) {
   EXPECT_NEAR(value(back["readings"][0]["gamma_of_measured_temperature"]), 5, 1e-6);
 }
 
+// Beds of a table whose series name what has no column: with blanks, commas or both between the numbers. A number with
+// something behind it is none.
+TEST(MapNumbers, ReadAxesFromTheNamesOfSeries) {
+  LoneStage map(*find_stage("map"));
+  const auto simulated = [&](const std::string& between, const std::string& behind = "") {
+    std::string text = "series,gamma,T,T_error\n";
+    for (const double e : {0.7, 0.8, 0.9})
+      for (const double gamma : {2.0, 3.0, 4.0, 5.0})
+        text += "\"wide=1" + between + "restitution=" + number_text(e) + behind + between + "n=3\"," +
+                number_text(gamma) + "," + number_text(0.1 * gamma * gamma / std::sqrt(1 - e)) + ",0.01\n";
+    write_text(map.file("table.csv"), text);
+    return map.run(
+        R"({"gamma": 3, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10, "bead_restitution": 0.8,
+        "columns": {"axes": ["gamma", "restitution"]}, "table": ")" +
+        map.file("table.csv").string() + R"("})")["simulated"];
+  };
+  const Json found = simulated(" ");
+  EXPECT_NEAR(value(found["temperature"]), 0.9 / std::sqrt(0.2), 3 * error(found["temperature"]));
+  EXPECT_LT(error(found["temperature"]), 0.2);
+  EXPECT_EQ(simulated(","), found);
+  EXPECT_EQ(simulated(", "), found);
+  EXPECT_THROW(simulated(" ", "x"), InputError);
+}
+
 // --- fit
 
 // The tail of the hydrostatic profile with T = 0.4 above a solid that ends at 8, as fits are to find it.
