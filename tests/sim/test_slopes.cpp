@@ -148,34 +148,39 @@ void advance_to_relief(Simulation& locked, double time) {
 }
 
 // A row of disks that touch one another and both sides.
-Scene locked_row(double slope, std::size_t count, bool shaken, const std::vector<double>& vx) {
+Scene locked_row(double slope, double height, const std::vector<double>& vx, bool shaken = false) {
   Scene scene;
   scene.gravity = UniformGravity{};
-  scene.disks.species = {{static_cast<std::uint32_t>(count), 1, 1}};
-  const double first = std::nextafter((0.5 - 3 * std::sin(slope)) / std::cos(slope), 10);
-  scene.box.width = 2 * first + static_cast<double>(count - 1);
+  scene.disks.species = {{static_cast<std::uint32_t>(vx.size()), 1, 1}};
+  const double first = std::nextafter((0.5 - height * std::sin(slope)) / std::cos(slope), 10);
+  scene.box.width = 2 * first + static_cast<double>(vx.size() - 1);
   scene.box.sides = HardSides{{}, slope};
   if (shaken) scene.box.floor = SinusoidalFloor{amplitude, frequency};
   PlacedStart start;
-  for (std::size_t k = 0; k < count; ++k) start.disks.push_back({first + static_cast<double>(k), 3, vx[k], 0, 0, 0});
+  for (std::size_t k = 0; k < vx.size(); ++k)
+    start.disks.push_back({first + static_cast<double>(k), height, vx[k], 0, 0, 0});
   scene.start = start;
   return scene;
 }
+const std::vector<double> six_velocities{0.7, -0.2, 0.1, 0.3, -0.6, 0.2};
 
-// Under a lid nothing can go anywhere: all come to rest, and all their energy is lost.
+// Under a lid nothing can go anywhere: all come to rest but for what gravity gives meanwhile, and all their energy is
+// lost.
 TEST(LockedRow, BetweenSlopesUnderALidComesToRest) {
-  for (const double slope : {0.3, 0.6}) {
-    Scene scene = locked_row(slope, 6, false, {0.7, -0.2, 0.1, 0.3, -0.6, 0.2});
-    scene.box.top = Lid{3.5, {}};
+  double energy = 0;
+  for (const double v : six_velocities) energy += v * v / 2;
+  for (const double slope : {0.3, 0.7, 1.1}) {
+    Scene scene = locked_row(slope, 0.6, six_velocities);
+    scene.box.top = Lid{1.1, {}};
     const auto row = simulate(scene);
     advance_to_relief(*row, 1e-9);
     ASSERT_EQ(row->counters().locks_relieved, 1U) << slope;
     const Snapshot after = snapshot_of(*row);
-    for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t k = 0; k < six_velocities.size(); ++k) {
       EXPECT_NEAR(after.vx[k], 0, 1e-12) << slope;
-      EXPECT_NEAR(after.vz[k], 0, 1e-12) << slope;
+      EXPECT_NEAR(after.vz[k], 0, 1e-12 + row->time()) << slope;
     }
-    EXPECT_NEAR(row->energy().dissipated, 0.5 * (0.49 + 0.04 + 0.01 + 0.09 + 0.36 + 0.04), 1e-9);
+    EXPECT_NEAR(row->energy().dissipated, energy, 1e-9);
   }
 }
 
@@ -183,7 +188,7 @@ TEST(LockedRow, BetweenSlopesUnderALidComesToRest) {
 // the momentum that disks and lid get upwards.
 TEST(LockedRow, BetweenSlopesUnderAFreeLidPushesIt) {
   constexpr double mass = 1e6;
-  Scene scene = locked_row(0.3, 6, true, {0.7, -0.2, 0.1, 0.3, -0.6, 0.2});
+  Scene scene = locked_row(0.3, 3, six_velocities, true);
   scene.box.top = Lid{3.5, {}, mass};
   const auto row = simulate(scene);
   advance_to_relief(*row, 1e-9);
@@ -201,7 +206,7 @@ TEST(LockedRow, BetweenSlopesUnderAFreeLidPushesIt) {
 // Half a radius and more beyond where vertical sides would be, or a little: disks begin where they are placed.
 TEST(SlopedSides, LetDisksBeginWhereTheyArePlaced) {
   for (const double slope : {1e-3, 0.3}) {
-    const Scene scene = locked_row(slope, 4, false, {0, 0, 0, 0});
+    const Scene scene = locked_row(slope, 3, {0, 0, 0, 0});
     const Snapshot at = snapshot_of(*simulate(scene));
     const auto& placed = std::get<PlacedStart>(scene.start).disks;
     EXPECT_LT(placed[0].x, 0.5);
