@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace shakebed::pipelines {
 
-Console::Console(Level level) : level_(level), terminal_(::isatty(STDERR_FILENO) == 1) {}
+Console::Console(Level level, std::function<Clock::time_point()> now)
+    : level_(level), now_(std::move(now)), terminal_(::isatty(STDERR_FILENO) == 1) {}
 Console::~Console() { end_progress(); }
 
 void Console::write(std::string_view prefix, std::string_view line) {
@@ -46,7 +48,7 @@ void Console::progress(std::string_view what, double fraction, std::string_view 
                        std::optional<double> seconds_left) {
   if (level_ == Level::quiet) return;
   const std::lock_guard lock(mutex_);
-  const auto now = Clock::now();
+  const auto now = now_();
   if (what != progress_of_) {
     progress_of_ = what;
     progress_since_ = progress_shown_ = now;
@@ -74,8 +76,10 @@ void Console::progress(std::string_view what, double fraction, std::string_view 
     left = fmt::format(", for {}", duration_text(elapsed));
   else if (done > 0.02 && elapsed > 0.5)
     left = fmt::format(", {} left", duration_text(elapsed * (1 - fraction) / done));
-  const std::string line = fraction <= 0 ? fmt::format("  {}: {}{}", what, note, left)
-                                         : fmt::format("  {}: {:3.0f} % {}{}", what, 100 * fraction, note, left);
+  std::string line = fmt::format("  {}:", what);
+  if (fraction > 0) line += fmt::format(" {:3.0f} %", 100 * fraction);
+  if (!note.empty()) line += fmt::format(" {}", note);
+  line += fraction > 0 || !note.empty() ? left : left.substr(1);
   if (terminal_) {
     std::fputs(("\r\033[K" + line.substr(0, 118)).c_str(), stderr);
     std::fflush(stderr);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -16,7 +17,9 @@ namespace shakebed::pipelines {
 class Console {
  public:
   enum class Level { quiet, normal, verbose };
-  explicit Console(Level level = Level::normal);
+  using Clock = std::chrono::steady_clock;
+  // `now`: the time, for tests.
+  explicit Console(Level level = Level::normal, std::function<Clock::time_point()> now = Clock::now);
   ~Console();
 
   void message(std::string_view line);  // not when quiet
@@ -33,8 +36,8 @@ class Console {
 
  private:
   void write(std::string_view prefix, std::string_view line);
-  using Clock = std::chrono::steady_clock;
   Level level_;
+  std::function<Clock::time_point()> now_;
   bool terminal_;
   std::mutex mutex_;
   bool line_open_ = false;

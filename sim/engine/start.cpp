@@ -198,12 +198,13 @@ void check_placed(const Scene& scene, const std::vector<Placed>& disks) {
 }
 
 // A start may be the frame of a bed that was pressed on the floor, whose disks overlap by less than soft_overlap. They
-// are moved apart. Where more overlaps nothing is changed, and check_placed() says so.
+// are moved apart. Where more overlaps nothing is changed, and check_placed() says so. Beds between sloped sides are
+// never pressed: their disks may lie where vertical sides would not let them.
 void move_apart(const Scene& scene, std::vector<Placed>& disks) {
   constexpr double most = 1e-13;
   constexpr int sweeps = 100'000;
   const Room room = room_of(scene);
-  if (!scene.presses || room.periodic_z || scene.disks.species.size() != 1) return;
+  if (!scene.presses || room.periodic_z || room.slope > 0 || scene.disks.species.size() != 1) return;
   Snapshot at;
   std::vector<PressedBed::State> states;
   double deepest = 0;

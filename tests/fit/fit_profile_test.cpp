@@ -249,6 +249,38 @@ TEST(FitProfile, UsesTheFullCovariance) {
   EXPECT_GT(pull_without / trials, 2.0);
 }
 
+// Weights by a covariance of few samples are uncertain themselves: T scatters more, by the formula of Percival and
+// others (2014), here as they print it. The covariance is that of independent heights, so that nothing else changes. Of
+// so many heights and samples the number of independent heights is n = p + (n' - p)^2/t, n' those of the window and
+// t the trace of the squared covariance, estimated without bias from v = samples - 1 (Srivastava 2005).
+TEST(FitProfile, StatesWhatUncertainWeightsAddToErrors) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.15, {11.22, 1.10});
+  Profile data = profile_of(truth, {}, 40, top_of(truth), 0.005, 11);
+  FitOptions options = core_options(1.10);
+  options.window.low = 3.0;
+  const FitResult plain = fit_profile(data, options);
+  ASSERT_EQ(plain.status, FitStatus::ok);
+  ASSERT_FALSE(plain.misfit);
+  double bins = 0;
+  for (const Residual& residual : plain.residuals) bins += residual.used;
+  const double dof = plain.dof, parameters = bins - dof;
+  const std::size_t n = data.height.size();
+  data.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
+  for (const int samples : {60, 100, 1000}) {
+    data.covariance_samples = samples;
+    const FitResult weighed = fit_profile(data, options);
+    ASSERT_EQ(weighed.status, FitStatus::ok);
+    const double ns = samples, v = ns - 1;
+    const double trace = std::max(v * v / ((v + 2) * (v - 1)) * (dof - dof * dof / v), dof * dof / bins);
+    const double heights = parameters + dof * dof / trace, divisor = (ns - heights - 1) * (ns - heights - 4);
+    const double a = 2 / divisor, b = (ns - heights - 2) / divisor;
+    const double factor = std::sqrt((1 + b * (heights - parameters)) / (1 + a + b * (parameters + 1)));
+    EXPECT_NEAR(weighed.temperature.std_error / plain.temperature.std_error, factor, 1e-6) << samples;
+    EXPECT_NEAR(weighed.temperature.value, plain.temperature.value, 1e-8);
+  }
+}
+
 // What a model misses is the same in every measurement: T scatters by the statistical error, 4 standard errors of a
 // scatter of 200, the whole error is larger, and the interval of the next bed holds the mean of many in 95 %, 4
 // standard errors of a share. With errors alone and with a covariance.
@@ -473,6 +505,16 @@ TEST(FitHardCases, AnOutlierIsNamedAndTheRobustOptionBoundsIt) {
   EXPECT_NEAR(robust.temperature.value, reference.temperature.value, reference.temperature.std_error);
   EXPECT_GT(std::abs(plain.temperature.value - reference.temperature.value),
             2.0 * std::abs(robust.temperature.value - reference.temperature.value));
+}
+
+// A profile of which every height is off is one that the model does not fit, not one with an outlier.
+TEST(FitHardCases, ManyDensitiesThatAreOffAreNoOutlier) {
+  Profile data = good_profile();
+  for (std::size_t i = 0; i < data.number_density.size(); ++i)
+    data.number_density[i] += (i % 2 == 0 ? 15.0 : -15.0) * data.std_error[i];
+  const FitResult fit = fit_profile(data, full_options());
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::HasSubstr("The model does not fit")));
+  EXPECT_THAT(fit.warnings, testing::Not(testing::Contains(testing::HasSubstr("an outlier"))));
 }
 
 TEST(FitHardCases, RobustCostsFivePerCentOnCleanData) {

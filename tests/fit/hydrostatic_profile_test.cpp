@@ -8,6 +8,7 @@
 
 #include "fit/theory/fermi_profile.hpp"
 #include "fit/theory/quadrature.hpp"
+#include "fit/theory/tail.hpp"
 
 namespace shakebed::fit {
 namespace {
@@ -217,6 +218,37 @@ TEST(FermiProfile, IsSmoothedAsDirectIntegrationDoes) {
       profile.sample({&height, 1}, kernel, {&smooth, 1});
       EXPECT_NEAR(smooth, brute_force(profile, kernel, height, {0.0}), 1e-9);
     }
+  }
+}
+
+// A bed higher up has the same profile higher up, also through a kernel, and with all its derivatives.
+TEST(Tails, MoveWithTheirBed) {
+  const auto tail_at = [](double base) {
+    Tail tail;
+    tail.table = &enskog().inverse_table();
+    tail.temperature = 0.06, tail.base = base, tail.reference = base + 4, tail.rectangle_density = 1.1;
+    tail.f_reference = std::log(1.1) + enskog().excess(1.1);
+    tail.d_temperature = {1, 0, 0}, tail.d_reference = {0, 1, 0}, tail.d_rectangle = {0, 0, 1};
+    tail.prepare(enskog());
+    return tail;
+  };
+  const Tail low = tail_at(0), high = tail_at(2.5);
+  for (const Kernel& kernel : {Kernel{}, Kernel{KernelKind::gaussian, 0.4}, Kernel{KernelKind::top_hat, 1},
+                               Kernel{KernelKind::disk_chord, 1}}) {
+    const KernelRule rule(kernel);
+    double area = 0;
+    for (double height = -2.995; height < 12; height += 0.01) {
+      const double value = low.smoothed(height, rule);
+      EXPECT_NEAR(high.smoothed(height + 2.5, rule), value, 1e-9) << to_string(kernel) << ' ' << height;
+      area += 0.01 * value;
+      if (rule.is_point()) continue;
+      const auto here = low.smoothed_with_gradient(height, rule),
+                 there = high.smoothed_with_gradient(height + 2.5, rule);
+      EXPECT_NEAR(here[0], value, 1e-9);
+      for (std::size_t k = 0; k < here.size(); ++k) EXPECT_NEAR(there[k], here[k], 1e-8) << k << ' ' << height;
+    }
+    // The rectangle, and the tail, whose weight is the pressure at its start.
+    EXPECT_NEAR(area, 1.1 * 4 + enskog().pressure(1.1, 0.06).value, 2e-3) << to_string(kernel);
   }
 }
 

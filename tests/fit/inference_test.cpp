@@ -48,6 +48,31 @@ TEST(Surrogate, PredictsFurtherRunsWithItsStatedError) {
   EXPECT_NEAR(left_out / 100, 1, 0.3);
 }
 
+// Which parameter is called the first does not matter, nor which end of a range is called 0, nor the unit of a value.
+// The search for the constants stops within some per cent, which depends on their order.
+TEST(Surrogate, DoesNotDependOnNamesAndUnits) {
+  const TrainingSet runs = stand_in_runs(60, 0, 1);
+  const Surrogate usual = Surrogate::train(runs);
+  for (std::size_t first = 0; first < 3; ++first) {
+    TrainingSet other = runs;
+    for (std::size_t r = 0; r < runs.runs(); ++r) {
+      for (std::size_t k = 0; k < 3; ++k) other.points[3 * r + k] = 1 - runs.points[3 * r + (k + first) % 3];
+      other.values[r] = 1e6 - 1e3 * runs.values[r];
+    }
+    const Surrogate turned = Surrogate::train(other);
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(std::log(turned.lengths()[k] / usual.lengths()[(k + first) % 3]), 0, 0.2) << first << ' ' << k;
+    EXPECT_NEAR(turned.scatter(0) / usual.scatter(0) / 1e3, 1, 0.02);
+    std::mt19937_64 generator(6);
+    for (int i = 0; i < 20; ++i) {
+      const std::vector<double> point{even_number(generator), even_number(generator), even_number(generator)};
+      std::vector<double> there;
+      for (std::size_t k = 0; k < 3; ++k) there.push_back(1 - point[(k + first) % 3]);
+      EXPECT_NEAR((1e6 - turned.predict(there).mean[0]) / 1e3, usual.predict(point).mean[0], 0.15 * usual.scatter(0));
+    }
+  }
+}
+
 TEST(Surrogate, NeedsRunsEnough) {
   TrainingSet few = stand_in_runs(10, 0, 1);
   EXPECT_THROW(Surrogate::train(few), std::invalid_argument);

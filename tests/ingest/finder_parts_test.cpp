@@ -109,6 +109,22 @@ TEST(FinderParts, MissedBeadsAreCounted) {
   }
 }
 
+// As many of a picture twice as large, which is looked at on a reduced one.
+TEST(FinderParts, MissedBeadsAreCountedInLargePicturesToo) {
+  std::vector<RenderedDisk> truth = twenty_disks();
+  for (RenderedDisk& disk : truth) disk.x_px *= 2, disk.y_px *= 2, disk.radius_px *= 2;
+  const GrayFrame frame = drawn(truth, 70, 280, 232);
+  const LearnedRims learned = learn_rims(frame, Polarity::dark_beads, 18);
+  for (const std::size_t missing : {0U, 1U, 3U}) {
+    std::vector<Circle> found;
+    for (std::size_t k = 0; k < 20; ++k)
+      if (k % 7 != 2 || k / 7 >= missing) found.push_back({truth[k].x_px, truth[k].y_px, 18});
+    EXPECT_NEAR(expected_missed_beads(frame, learned.model, found, std::nullopt), static_cast<double>(missing), 0.01);
+    const double upper = expected_missed_beads(frame, learned.model, found, PixelRectangle{0, 0, 280, 116});
+    EXPECT_NEAR(upper, std::min(static_cast<double>(missing), 2.0), 0.01);  // of 2, 9 and 16
+  }
+}
+
 TEST(FinderParts, CensusFindsTheRadiusThatExplainsMost) {
   const GrayFrame frame = drawn(twenty_disks()), bright = drawn(twenty_disks(), 230);
   const CircleCensus census = take_census({&frame});
@@ -310,6 +326,11 @@ TEST(FinderParts, DisksAreReportedFromTheirRegion) {
   EXPECT_NEAR(bead.at(0, 0), 150, 2);
   EXPECT_NEAR(bead.at(bead.width / 2 + 27, bead.width / 2), 110, 8) << "half of it at the rim";
   EXPECT_NEAR(bead.at(bead.width / 2, bead.width / 2 + 27), bead.at(bead.width / 2 + 27, bead.width / 2), 1e-3);
+  // Outside it is the background in the middle of the frame.
+  FinderCalibration lit = faces;
+  lit.light.columns = 5, lit.light.rows = 3, lit.light.background.assign(15, 90.0F);
+  lit.light.background[7] = 140;
+  EXPECT_EQ(bead_picture(lit, 3).at(0, 0), 140);
 }
 
 // Walls and a floor of the beads' own level are not seen; background is.

@@ -328,6 +328,24 @@ TEST(JointFit, KnowsTheCovarianceOfCentresThatShareTheirPixels) {
   }
 }
 
+// Two cut beads whose shared part outweighs what each has along one axis: each has the error of its own Hessian.
+TEST(JointFit, HasTheErrorOfOneBeadWhereTwoShareTooMuch) {
+  const ProfileTable table(test::blurred_profile(fit_radius, fit_edge, fit_reach), fit_radius, fit_edge, 0);
+  JointFit fit(even_frame(fit_width, fit_height, 0));
+  fit.set_table(&table);
+  std::vector<ModelDisk> disks = {model_at(16, 14), model_at(16.02, 14)};
+  disks[0].hessian_xx = 0.02, disks[0].hessian_yy = 9;
+  disks[1].hessian_xx = 8, disks[1].hessian_yy = 0.025;
+  const auto both = fit.covariances(disks);
+  ASSERT_EQ(both.size(), 2U);
+  const double factor = both[0].xx * 0.02;  // of all, from the table
+  EXPECT_GT(factor, 0);
+  EXPECT_NEAR(both[0].yy, factor / 9, 1e-9);
+  EXPECT_NEAR(both[1].xx, factor / 8, 1e-9);
+  EXPECT_NEAR(both[1].yy, factor / 0.025, 1e-9);
+  EXPECT_NEAR(both[0].xy, 0, 1e-12);
+}
+
 // A bead that explains all but a quarter of itself: the shares of the worst and of the best quarter, and the whole.
 TEST(JointFit, JudgesTheQuartersOfABead) {
   const ProfileTable table(test::blurred_profile(fit_radius, fit_edge, fit_reach), fit_radius, fit_edge, 0);

@@ -368,6 +368,23 @@ TEST(SolidBorders, EndWhereTheirEvenAreaEnds) {
       << "too small a frame";
 }
 
+// The mirror image of a picture has the mirror image of its border, place by place.
+TEST(SolidBorders, OfAMirrorImageAreTheirMirrorImages) {
+  for (const double slope : {-0.08, 0.03, 0.1}) {
+    const GrayFrame frame = test::frame_by(160, 120, [&](int column, int row) {
+      return 119 - row <= 14.3 + slope * (column - 80) ? 30.0 : 150 + 80 * std::sin(0.4 * column + 0.37 * row);
+    });
+    const GrayFrame image = test::frame_by(160, 120, [&](int column, int row) { return frame.at(159 - column, row); });
+    const auto borders = find_solid_borders(frame), mirrored = find_solid_borders(image);
+    ASSERT_EQ(borders.size(), 1U);
+    ASSERT_EQ(mirrored.size(), 1U);
+    EXPECT_NEAR(mirrored[0].slope, -borders[0].slope, 1e-9);
+    for (const int place : {0, 80, 159})
+      EXPECT_NEAR(mirrored[0].depth_px + mirrored[0].slope * place,
+                  borders[0].depth_px + borders[0].slope * (159 - place), 1e-9);
+  }
+}
+
 TEST(SolidBorders, ReachToTheirCommonCorner) {
   const GrayFrame frame = even_frame(120, 100, 1);
   std::vector<SolidBorder> borders(3);

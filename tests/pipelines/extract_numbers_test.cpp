@@ -269,6 +269,28 @@ TEST_F(ExtractTables, HoldFramesAndTheBead) {
   EXPECT_EQ(bead("fourth_harmonic", 1), 0.125);
 }
 
+// What is drawn beside the disks of a frame: where one was missed, and which are none. Frames in which all agrees have
+// no marks.
+TEST_F(ExtractTables, MarkWhatWasMissedAndWhatIsNone) {
+  ExtractOptions options = some_options();
+  options.stride = 1, options.overlays = 0;
+  std::istringstream truth("frame,disk,x_px,y_px,radius_px\n0,0,10,20,5\n0,1,40,20,5\n0,2,70,20,5\n1,0,10,20,5\n");
+  DisksOnTheWay on_the_way(extract_, options, &truth);
+  const auto at = [](double x) {
+    ingest::MeasuredDisk one;
+    one.x_px = x, one.y_px = 20, one.radius_px = 5;
+    return one;
+  };
+  ingest::FrameReport frame;
+  on_the_way.take(frame, {at(25), at(41), at(39.5), at(100)});  // two at the second: the one that comes first counts
+  frame.index = 1;
+  on_the_way.take(frame, {at(10)});
+  ASSERT_NE(on_the_way.marks(0), nullptr);
+  EXPECT_EQ(on_the_way.marks(0)->missed, (std::vector<std::pair<double, double>>{{10, 20}, {70, 20}}));
+  EXPECT_EQ(on_the_way.marks(0)->wrong, (std::vector<std::size_t>{0, 2, 3}));
+  EXPECT_EQ(on_the_way.marks(1), nullptr);
+}
+
 // Three disks in each of two frames, of which every second one of the film was read: frames 0 and 2. Of the six true
 // ones one is missed, and one disk is none. Centres are off by (0.3, 0.4) px.
 TEST_F(ExtractTables, HoldTheDisksAndCompareThemWithTheTruth) {

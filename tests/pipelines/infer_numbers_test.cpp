@@ -1,8 +1,10 @@
 // The numbers of the infer stage, done again from its tables.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
@@ -202,6 +204,46 @@ TEST(InferNumbers, SurrogateNarrowingAndCalibrationAreShares) {
   EXPECT_EQ(inferred["calibration"]["beds"].get<double>() * 2, n);
   EXPECT_NEAR(inferred["calibration"]["within_68"].get<double>(), in_68 / n, 1e-12);
   EXPECT_NEAR(inferred["calibration"]["within_95"].get<double>(), in_95 / n, 1e-12);
+}
+
+// Whether ranks are evenly spread: chi2 of their counts in tenths, and its chance with 9 degrees of freedom in closed
+// form, erfc(sqrt(chi2/2)) and four more terms.
+TEST(InferNumbers, CalibrationSaysHowEvenlyItsRanksAreSpread) {
+  const NumberTable rows = found().table("calibration.csv");
+  for (const auto& [name, of_parameter] : found().result["calibration"]["parameters"].items()) {
+    double tenths[10] = {}, n = 0;
+    for (std::size_t r = 0; r < rows.rows(); ++r) {
+      if (rows.text("parameter", r) != name) continue;
+      n += 1;
+      tenths[std::min(9, static_cast<int>(10 * rows("rank", r)))] += 1;
+    }
+    ASSERT_GT(n, 0);
+    double chi2 = 0, term = std::sqrt(2 / M_PI), chance = 0;
+    for (const double count : tenths) chi2 += (count - n / 10) * (count - n / 10) / (n / 10);
+    term *= std::exp(-chi2 / 2) * std::sqrt(chi2);
+    for (int k = 1; k <= 7; k += 2) {
+      chance += term;
+      term *= chi2 / (k + 2);
+    }
+    EXPECT_NEAR(of_parameter["rank_chi2_p"].get<double>(), chance + std::erfc(std::sqrt(chi2 / 2)), 1e-9) << name;
+  }
+}
+
+// Bars of a 24th of each range: 3 to 6 and 0.5 to 0.9.
+TEST(InferNumbers, PairsHaveTheirBarsAndDraws) {
+  const std::string script = read_text(found().folder / "o/search/pairs.gp");
+  const auto numbers_behind = [&](const std::string& words, std::size_t from) {
+    const std::size_t at = script.find(words, from);
+    EXPECT_NE(at, std::string::npos) << words;
+    return at + words.size();
+  };
+  std::size_t at = 0;
+  for (const auto& [low, high] : {std::pair{3.0, 6.0}, {0.5, 0.9}}) {
+    at = numbers_behind("index 0 using (", at);
+    EXPECT_DOUBLE_EQ(std::stod(script.substr(at)), low);
+    at = numbers_behind("+", at);
+    EXPECT_DOUBLE_EQ(std::stod(script.substr(at)), (high - low) / 24);
+  }
 }
 
 }  // namespace

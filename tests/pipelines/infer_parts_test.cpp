@@ -312,6 +312,8 @@ TEST_F(BedsOfAFormula, HaveThePosteriorOfALine) {
   // The region holds the posterior and a quarter of its width beyond.
   EXPECT_LT(known.region.low[0], 0.5 - 3 * deviation);
   EXPECT_GT(known.region.high[0], 0.5 + 3 * deviation);
+  EXPECT_NEAR((known.region.low[0] + known.region.high[0]) / 2, 0.5, 0.5 * deviation) << "about the posterior";
+  EXPECT_LT(known.region.high[0], 0.95);
   EXPECT_GE(known.beds_near, 40U) << "20 for the parameter and 20 more";
   const auto [predicted, error] = known.near->predicted(std::vector<double>{0.5}, 0, rise_);
   EXPECT_NEAR(predicted, 5, 0.05);

@@ -42,6 +42,7 @@ class LoneStage : public pipelines::RunContext {
     std::unique_ptr<pipelines::Stage> stage = row_.make();
     if (node) {
       pipelines::Fields fields = pipelines::Fields::decode(*node, "", source);
+      fields.set_reduced(reduced);
       stage->describe(fields);
       fields.finish();
     }
@@ -70,6 +71,7 @@ class LoneStage : public pipelines::RunContext {
   }
 
   std::vector<std::string> warnings;
+  bool reduced = false;  // "units": "reduced", which the plan reads
 
  private:
   const pipelines::StageRow& row_;

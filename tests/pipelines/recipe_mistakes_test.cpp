@@ -396,19 +396,19 @@ TEST(PresetChanges, AreMadeAndNamed) {
       "stages": [ { "stage": "simulate", "id": "m" }, { "stage": "map" } ] })",
       "r.json", problems);
   EXPECT_THAT(message("lost"), HasSubstr("/presets/lost/~1stages~1no~1x: "));
-  const std::vector<Relocation> changes = apply_preset(document, "r.json", "quick");
+  const std::vector<Relocation> relocations = apply_preset(document, "r.json", "quick");
   EXPECT_EQ(document.to_json()["stages"][0]["gamma"], 2);
   EXPECT_EQ(document.to_json()["stages"][1]["seed"], 3);
   EXPECT_EQ(document.to_json()["$preset"], "quick");
-  ASSERT_EQ(changes.size(), 2U);
-  EXPECT_EQ(changes[0], Relocation("/stages/0/gamma", "/presets/quick/~1stages~1m~1gamma"));
-  EXPECT_EQ(changes[1], Relocation("/stages/1/seed", "/presets/quick/~1stages~11~1seed"));
+  ASSERT_EQ(relocations.size(), 2U);
+  EXPECT_EQ(relocations[0], Relocation("/stages/0/gamma", "/presets/quick/~1stages~1m~1gamma"));
+  EXPECT_EQ(relocations[1], Relocation("/stages/1/seed", "/presets/quick/~1stages~11~1seed"));
   std::vector<Problem> moved(4);
   moved[0].pointer = "/stages/0/gamma", moved[1].pointer = "/stages/0/gamma/x", moved[2].pointer = "/stages/0/gamma_2",
   moved[3].pointer = "";
-  relocate(moved, changes, " (elsewhere)");
-  EXPECT_EQ(moved[0].pointer, changes[0].second);
-  EXPECT_EQ(moved[1].pointer, changes[0].second);
+  relocate(moved, relocations, " (elsewhere)");
+  EXPECT_EQ(moved[0].pointer, relocations[0].second);
+  EXPECT_EQ(moved[1].pointer, relocations[0].second);
   EXPECT_EQ(moved[1].what, " (the preset or sweep sets /stages/0/gamma/x)");
   EXPECT_EQ(moved[2].pointer, "/stages/0/gamma_2");
   EXPECT_EQ(moved[2].what, " (elsewhere)");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -157,6 +158,31 @@ TEST(MapNumbers, ComeFromTheBedAndTheFit) {
                                        R"(}, "plateau_density": {"value": 1.1}})");
   const Json back = map.run(R"({ "gamma": 3, "frequency": "25 Hz", "diameter": "3 mm", "initial_height": 10 })");
   EXPECT_NEAR(value(back["readings"][0]["gamma_of_measured_temperature"]), 5, 1e-6);
+}
+
+// Beds of a table whose series name what has no column: with blanks, commas or both between the numbers. A number with
+// something behind it is none.
+TEST(MapNumbers, ReadAxesFromTheNamesOfSeries) {
+  LoneStage map(*find_stage("map"));
+  const auto simulated = [&](const std::string& between, const std::string& behind = "") {
+    std::string text = "series,gamma,T,T_error\n";
+    for (const double e : {0.7, 0.8, 0.9})
+      for (const double gamma : {2.0, 3.0, 4.0, 5.0})
+        text += "\"wide=1" + between + "restitution=" + number_text(e) + behind + between + "n=3\"," +
+                number_text(gamma) + "," + number_text(0.1 * gamma * gamma / std::sqrt(1 - e)) + ",0.01\n";
+    write_text(map.file("table.csv"), text);
+    return map.run(
+        R"({"gamma": 3, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10, "bead_restitution": 0.8,
+        "columns": {"axes": ["gamma", "restitution"]}, "table": ")" +
+        map.file("table.csv").string() + R"("})")["simulated"];
+  };
+  const Json found = simulated(" ");
+  const double truth = 0.1 * 9 / std::sqrt(0.2);
+  EXPECT_NEAR(value(found["temperature"]), truth, 2 * error(found["temperature"]));
+  EXPECT_LT(error(found["temperature"]), 0.2 * truth);
+  EXPECT_EQ(simulated(","), found);
+  EXPECT_EQ(simulated(", "), found);
+  EXPECT_THROW(simulated(" ", "x"), InputError);
 }
 
 // --- fit
@@ -319,6 +345,35 @@ TEST(KineticTemperatures, AreTakenFromABedOrFromAFilm) {
       "temperature_x_over_mg": {"value": 0.0012, "std_error": 0.00008},
       "temperature_z_over_mg": {"value": 0.002, "std_error": 0.00012}}})");
   EXPECT_FALSE(kinetic_temperatures(stage.inputs()[1], 0.004).x);
+}
+
+// --- simulate
+
+// A contact duration that is far too long is named as it was given, in the unit of the recipe, and a shorter one with
+// it: of 16 mm and 10 m/s^2 the unit of time is 40 ms.
+TEST(ContactDurationWarning, StatesItInTheUnitsOfTheRecipe) {
+  for (const bool reduced : {true, false}) {
+    LoneStage bed(*find_stage("simulate"));
+    bed.reduced = reduced;
+    const std::string units = reduced ? R"("disks": {"count": 30, "restitution": 0.7, "contact_duration": 0.1},
+            "box": {"width": 8}, "floor": {"motion": "sinusoidal", "gamma": 4, "frequency": 0.4, "restitution": 0.7},
+            "settle": 5, "measure": 15)"
+                                      : R"("disks": {"count": 30, "restitution": 0.7, "contact_duration": "4 ms",
+            "diameter": "16 mm"}, "gravity": "10 m/s^2", "box": {"width": "128 mm"},
+            "floor": {"motion": "sinusoidal", "gamma": 4, "frequency": "10 Hz", "restitution": 0.7},
+            "settle": "0.2 s", "measure": "0.6 s")";
+    bed.run("{" + units + R"(, "replicas": 1})");
+    const std::string given = reduced ? "0.1" : "\"4 ms\"", key = "\"contact_duration\": ";
+    const auto warning = std::find_if(bed.warnings.begin(), bed.warnings.end(), [&](const std::string& one) {
+      return one.find("contact duration t_c = " + given + " makes") != std::string::npos;
+    });
+    ASSERT_NE(warning, bed.warnings.end()) << given;
+    const std::string advice = warning->substr(warning->find(key) + key.size());
+    const double shorter =
+        reduced ? std::stod(advice) : 25 * parse_quantity(advice.substr(1, advice.find('"', 1) - 1)).value;
+    EXPECT_GT(shorter, 0);
+    EXPECT_LT(shorter, 0.1);
+  }
 }
 
 }  // namespace

@@ -71,6 +71,17 @@ class SweepPages : public testing::Test {
   std::string page_, summary_;
 };
 
+// A number whose meaning is longer than an axis is called by its place; temperatures alone by their symbols.
+TEST_F(SweepPages, NameNumbersByMeaningOrPlace) {
+  read(R"({ "over": { "/stages/fit/diameter": ["3 mm", "4 mm"] },
+            "collect": ["/fit/shift", "/fit/statistical_error", "/fit/reduced_temperature"] })");
+  for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t k = 0; k < 3; ++k) cell(i, k) = std::to_string(i + k + 1);
+  write();
+  for (const char* name : {"fit shift  [D]", "fit statistical error  [m g D]", "reduced temperature T/T<sub>c</sub>"})
+    EXPECT_THAT(page_, HasSubstr("data-label=\"" + std::string(name) + "\"")) << name;
+}
+
 // Two diameters, two column numbers, two replicas: of (3 mm, 10) the mean of 1 and 3, of (4 mm, 10) one alone, of
 // (4 mm, 12) none.
 TEST_F(SweepPages, HoldMapsFiguresAndRows) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/json.hpp"
 #include "pipelines/formats/markup.hpp"
@@ -300,6 +301,25 @@ TEST(TrajectoryText, IsReadWithItsColumnsAndMistakes) {
 }
 
 // --- quantities, beds, programs
+
+// Quotes hold separators and doubled quotes, and a line ends where it ends, whatever follows in memory.
+TEST(CsvText, UnderstandsQuotes) {
+  using Cells = std::vector<std::string>;
+  EXPECT_EQ(split_csv_line("a, b ,,c"), (Cells{"a", "b", "", "c"}));
+  EXPECT_EQ(split_csv_line("\"a,b\",c"), (Cells{"a,b", "c"}));
+  EXPECT_EQ(split_csv_line("\"say \"\"no\"\"\";x", ';'), (Cells{"say \"no\"", "x"}));
+  EXPECT_EQ(split_csv_line(""), Cells{""});
+  const std::string text = "x,\"a\"\"b\"";
+  EXPECT_EQ(split_csv_line(std::string_view(text).substr(0, 5)), (Cells{"x", "a"}));
+  std::vector<std::size_t> numbers;
+  each_csv_line("h\r\n\n# c\n1,2\r\n3", [&](const Cells& cells, std::size_t line) {
+    numbers.push_back(line);
+    EXPECT_EQ(cells, line == 1 ? Cells{"h"} : line == 4 ? (Cells{"1", "2"}) : Cells{"3"});
+  });
+  EXPECT_EQ(numbers, (std::vector<std::size_t>{1, 4, 5}));
+  EXPECT_EQ(number_in("-1.5e2"), -150);
+  for (const char* wrong : {"", "1 ", "x", "1x", "nan", "inf", "+1"}) EXPECT_FALSE(number_in(wrong)) << wrong;
+}
 
 TEST(QuantityText, NamesItsDimension) {
   EXPECT_EQ(si_unit(dimension::none), "");

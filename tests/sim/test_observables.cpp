@@ -253,6 +253,22 @@ TEST(Velocities, KnowTheErrorOfTheFourthCumulant) {
   EXPECT_NEAR(cumulant.std_error / expected, 1, 0.3);
 }
 
+// Two light disks and two of mass 4, which rise together at 3. About that each component of sqrt(m) v is 1 or -1, so
+// T = 1, and half of the disks are in each of two bins 0.1 wide.
+TEST(Velocities, HaveAHistogramInUnitsOfTheirTemperature) {
+  const DiskProperties disks{{0.5, 0.5, 0.5, 0.5}, {1, 1, 4, 4}};
+  VelocityObserver velocities(box_of(4), disks, 1, {0, 10, 10}, false);
+  Snapshot at;
+  at.x = {1, 2, 3, 4}, at.z = {5, 5, 5, 5}, at.vx = {1, -1, 0.5, -0.5}, at.vz = {4, 2, 3.5, 2.5};
+  velocities.observe(at, 0);
+  EXPECT_DOUBLE_EQ(velocities.histogram_unit(), 1);
+  for (int bin = 0; bin < VelocityObserver::histogram_bins; ++bin) {
+    const double expected = std::abs(std::abs(velocities.histogram_place(bin)) - 1) < 0.01 ? 0.5 / 0.1 : 0;
+    EXPECT_DOUBLE_EQ(velocities.histogram_x(bin), expected) << bin;
+    EXPECT_DOUBLE_EQ(velocities.histogram_z(bin), expected) << bin;
+  }
+}
+
 // In the frame of a floor that rises at 2, disks at rest in the lab fall at -2.
 TEST(Velocities, AreRelativeToTheFloorInItsFrame) {
   const Scene scene = box_of(1);

@@ -139,6 +139,84 @@ TEST(SlopedSides, KeepTheEnergyOfAnElasticDiskForAThousandContacts) {
   EXPECT_EQ(disk->energy().floor_work, 0);
 }
 
+// What fills a gap exactly hands its momentum on without end at one instant. Then plastic impulses end every approach.
+constexpr double upwards = 2 * std::numbers::pi * amplitude * frequency;  // the velocity of the floor at time 0
+
+// Goes on, event by event, until a lock has been relieved, or to that time at most.
+void advance_to_relief(Simulation& locked, double time) {
+  while (locked.counters().locks_relieved == 0 && !locked.advance_towards(time, 1)) continue;
+}
+
+// A row of disks that touch one another and both sides.
+Scene locked_row(double slope, double height, const std::vector<double>& vx, bool shaken = false) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{static_cast<std::uint32_t>(vx.size()), 1, 1}};
+  const double first = std::nextafter((0.5 - height * std::sin(slope)) / std::cos(slope), 10);
+  scene.box.width = 2 * first + static_cast<double>(vx.size() - 1);
+  scene.box.sides = HardSides{{}, slope};
+  if (shaken) scene.box.floor = SinusoidalFloor{amplitude, frequency};
+  PlacedStart start;
+  for (std::size_t k = 0; k < vx.size(); ++k)
+    start.disks.push_back({first + static_cast<double>(k), height, vx[k], 0, 0, 0});
+  scene.start = start;
+  return scene;
+}
+const std::vector<double> six_velocities{0.7, -0.2, 0.1, 0.3, -0.6, 0.2};
+
+// Under a lid nothing can go anywhere: all come to rest but for what gravity gives meanwhile, and all their energy is
+// lost.
+TEST(LockedRow, BetweenSlopesUnderALidComesToRest) {
+  double energy = 0;
+  for (const double v : six_velocities) energy += v * v / 2;
+  for (const double slope : {0.3, 0.7, 1.1}) {
+    Scene scene = locked_row(slope, 0.6, six_velocities);
+    scene.box.top = Lid{1.1, {}};
+    const auto row = simulate(scene);
+    advance_to_relief(*row, 1e-9);
+    ASSERT_EQ(row->counters().locks_relieved, 1U) << slope;
+    const Snapshot after = snapshot_of(*row);
+    for (std::size_t k = 0; k < six_velocities.size(); ++k) {
+      EXPECT_NEAR(after.vx[k], 0, 1e-12) << slope;
+      EXPECT_NEAR(after.vz[k], 0, 1e-12 + row->time()) << slope;
+    }
+    EXPECT_NEAR(row->energy().dissipated, energy, 1e-9);
+  }
+}
+
+// Sides that rise and a heavy lid at rest. Nothing else acts along z. So the work of the sides is their velocity times
+// the momentum that disks and lid get upwards.
+TEST(LockedRow, BetweenSlopesUnderAFreeLidPushesIt) {
+  constexpr double mass = 1e6;
+  Scene scene = locked_row(0.3, 3, six_velocities, true);
+  scene.box.top = Lid{3.5, {}, mass};
+  const auto row = simulate(scene);
+  advance_to_relief(*row, 1e-9);
+  ASSERT_EQ(row->counters().locks_relieved, 1U);
+  const Snapshot after = snapshot_of(*row);
+  double upward = mass * after.lid_velocity;
+  for (std::size_t k = 0; k < 6; ++k) {
+    upward += after.vz[k];
+    EXPECT_GE(after.lid_velocity - after.vz[k], -1e-12) << k;
+  }
+  EXPECT_NEAR(row->energy().floor_work, upwards * upward, 1e-12 * mass);
+  EXPECT_GT(upward, 0.01 * mass * upwards);
+}
+
+// Half a radius and more beyond where vertical sides would be, or a little: disks begin where they are placed.
+TEST(SlopedSides, LetDisksBeginWhereTheyArePlaced) {
+  for (const double slope : {1e-3, 0.3}) {
+    const Scene scene = locked_row(slope, 3, {0, 0, 0, 0});
+    const Snapshot at = snapshot_of(*simulate(scene));
+    const auto& placed = std::get<PlacedStart>(scene.start).disks;
+    EXPECT_LT(placed[0].x, 0.5);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(at.x[k], placed[k].x) << slope;
+      EXPECT_EQ(at.z[k], placed[k].z) << slope;
+    }
+  }
+}
+
 Scene bed(double slope, bool rough = false) {
   Scene scene;
   scene.gravity = UniformGravity{};

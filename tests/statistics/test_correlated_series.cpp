@@ -141,6 +141,76 @@ TEST(CorrelatedSeries, KnowsTheErrorOfAMean) {
   EXPECT_EQ(mean_of({}).value, 0);
 }
 
+// Three quarters of the windows that lie side by side, to the nearest whole number.
+TEST(CorrelatedSeries, CountsThreeQuartersOfTheWindowsSideBySide) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  std::vector<double> series;
+  for (std::size_t count = 1; count <= 90; ++count) {
+    series.push_back(normal(random));
+    if (count < 16) continue;
+    for (const double memory : {1.0, 2.0, 4.5}) {
+      const Windows windows = windows_for(memory, series);
+      EXPECT_EQ(windows.length, memory == 1 ? 2 : 2 * half_window(memory, count));
+      EXPECT_EQ(windows.independent,
+                std::floor(0.75 * static_cast<double>(count) / static_cast<double>(windows.length) + 0.5))
+          << count << ' ' << windows.length;
+    }
+  }
+}
+
+// The error of a mean is in the unit of the values, and memory has none: in another unit, by a power of two, not a bit
+// of either changes.
+TEST(CorrelatedSeries, IsTheSameInAnyUnit) {
+  std::mt19937_64 random(7);
+  double mean = 0;
+  std::vector<double> series = series_that_remembers(random, 0.8, 200, mean);
+  const double memory = memory_of(series), error = mean_of(series).std_error;
+  EXPECT_GT(memory, 1.5);
+  for (const double unit : {0x1p-60, 0x1p-6, 0x1p60}) {
+    std::vector<double> other = series;
+    for (double& x : other) x *= unit;
+    EXPECT_EQ(memory_of(other), memory) << unit;
+    EXPECT_EQ(mean_of(other).std_error, unit * error) << unit;
+  }
+}
+
+// Of few values the error is that of textbooks: s/sqrt(n), s^2 by n - 1.
+TEST(CorrelatedSeries, OfFewValuesHasTheErrorOfIndependentOnes) {
+  EXPECT_DOUBLE_EQ(mean_of(std::vector<double>{1, 3}).std_error, 1);
+  EXPECT_DOUBLE_EQ(mean_of(std::vector<double>{1, 3, 8}).std_error, std::sqrt((9 + 1 + 16) / 2.0 / 3));
+}
+
+// Sums over all windows, one by one.
+TEST(CorrelatedSeries, HasTheSumsOfAllItsWindows) {
+  std::mt19937_64 random(8);
+  std::vector<std::vector<double>> samples;
+  for (int k = 0; k < 23; ++k)
+    samples.push_back({static_cast<double>(random() % 17), static_cast<double>(random() % 5)});
+  std::vector<double> mean(2);
+  for (const auto& sample : samples)
+    for (std::size_t i = 0; i < 2; ++i) mean[i] += sample[i] / 23;
+  std::vector<double> first;
+  for (const auto& sample : samples) first.push_back(sample[0] - mean[0]);
+  for (const std::size_t window : {1u, 2u, 5u, 11u}) {
+    double products[2][2] = {};
+    for (std::size_t from = 0; from + window <= 23; ++from) {
+      double sum[2] = {};
+      for (std::size_t k = from; k < from + window; ++k)
+        for (std::size_t i = 0; i < 2; ++i) sum[i] += samples[k][i] - mean[i];
+      for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) products[i][j] += sum[i] * sum[j];
+    }
+    const auto w = static_cast<double>(window);
+    const double divisor = w * (23 - w) * (23 - w + 1);  // 23 - w + 1 windows; each sum scatters by w (1 - w/23)
+    EXPECT_NEAR(variance_by_windows(first, window), products[0][0] / divisor, 1e-12);
+    const auto covariance = covariance_by_windows(samples, 0, 2, {window, 1.5, 1});
+    for (std::size_t i = 0; i < 2; ++i)
+      for (std::size_t j = 0; j < 2; ++j)
+        EXPECT_NEAR(covariance[2 * i + j], 1.5 * products[i][j] / divisor, 1e-12) << window;
+  }
+}
+
 TEST(CorrelatedSeries, WhatRoundingLeftIsNoScatter) {
   std::vector<double> equal(64, 11.7);
   for (std::size_t k = 0; k < equal.size(); ++k) equal[k] *= 1 + 1e-15 * static_cast<double>(k % 5);

@@ -80,6 +80,24 @@ TEST(Kernel, CumulativeIsTheIntegralOfTheDensity) {
   }
 }
 
+// What has no kernel weighs nothing in a density, and a width of 0 is one that stands for none.
+TEST(Kernel, MayHaveNoWidth) {
+  EXPECT_TRUE(kernel_is_valid({}));
+  EXPECT_EQ(kernel_density({}, 0), 0);
+  EXPECT_EQ(kernel_density({}, 0.3), 0);
+  for (Kernel kernel : windows) {
+    EXPECT_TRUE(kernel_is_valid(kernel));
+    for (const double wrong : {-1e-300, -1.0, std::nan(""), double(INFINITY)}) {
+      kernel.width = wrong;
+      EXPECT_FALSE(kernel_is_valid(kernel)) << wrong;
+    }
+    kernel.width = 0;
+    EXPECT_TRUE(kernel_is_valid(kernel));
+    EXPECT_EQ(kernel_reach(kernel), 0);
+    EXPECT_EQ(kernel_from(to_string(kernel)), kernel);
+  }
+}
+
 TEST(Kernel, EverySpellingComesBack) {
   const std::pair<KernelKind, const char*> names[] = {{KernelKind::none, "none"},
                                                       {KernelKind::gaussian, "gaussian"},
