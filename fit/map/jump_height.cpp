@@ -563,7 +563,7 @@ BounceStatistics bounce(double gamma, const BounceOptions& options, const WaveFo
 
 ModeRange period_one_mode(int mode, double restitution) {
   const double e = restitution;
-  const double onset = mode * pi * (1.0 - e) / (1.0 + e);
+  const double onset = mode * std::numbers::pi * (1.0 - e) / (1.0 + e);
   const double width = 2.0 * (1.0 + e * e) / ((1.0 + e) * (1.0 + e));
   return {onset, std::hypot(onset, width)};
 }

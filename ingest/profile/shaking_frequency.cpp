@@ -117,66 +117,76 @@ struct LineFit {
   double amplitude = 0, phase = 0;     // at the middle of the film
   Series left;                         // what the fit leaves
 };
+// Terms of a model of a line: a constant, a drift, up to three tones, and the derivative of the first tone by
+// frequency.
+struct LineTerms {
+  static constexpr std::size_t most = 9;
+  double frequency, length;     // [cycles per frame, frames]
+  double sine = 0, cosine = 0;  // amplitudes of the first tone
+  std::size_t tones = 1 + (2 * frequency < 0.5 - 1 / length) + (3 * frequency < 0.5 - 1 / length);
+  std::size_t count = 3 + 2 * tones;
+
+  void at(double t, double* row) const {
+    row[0] = 1;
+    row[1] = t / length;
+    for (std::size_t k = 0; k < tones; ++k) {
+      const double angle = whole_turn * static_cast<double>(k + 1) * frequency * t;
+      row[2 + 2 * k] = std::sin(angle);
+      row[3 + 2 * k] = std::cos(angle);
+    }
+    row[count - 1] = whole_turn * t * (sine * row[3] - cosine * row[2]);
+  }
+};
+
+// The fit's normal equations with the first `used` terms.
+void sum_up(const Series& series, const LineTerms& terms, std::size_t used, std::vector<double>& square,
+            std::vector<double>& right) {
+  double row[LineTerms::most];
+  square.assign(used * used, 0.0), right.assign(used, 0.0);
+  for (std::size_t k = 0; k < series.time.size(); ++k) {
+    terms.at(series.time[k], row);
+    for (std::size_t a = 0; a < used; ++a) {
+      right[a] += row[a] * series.place[k];
+      for (std::size_t b = 0; b < used; ++b) square[a * used + b] += row[a] * row[b];
+    }
+  }
+  for (std::size_t a = 0; a < used; ++a) square[a * used + a] *= 1 + 1e-12;
+}
+
 LineFit fit_line(const Series& series, double frequency) {
   LineFit fit;
-  constexpr std::size_t most = 9;
-  const std::size_t tones = 1 + (2 * frequency < 0.5 - 1 / series.length) + (3 * frequency < 0.5 - 1 / series.length);
-  const std::size_t terms = 3 + 2 * tones;
-  double sine = 0, cosine = 0;
-  std::vector<double> matrix, answer;
+  LineTerms terms{frequency, series.length};
+  std::vector<double> square, right, factor;
   fit.left = series;
   for (int round = 0; round < 12; ++round) {
-    matrix.assign(terms * terms, 0.0);
-    answer.assign(terms, 0.0);
-    const auto row_at = [&](double t, double* row) {
-      row[0] = 1;
-      row[1] = t / series.length;
-      for (std::size_t k = 0; k < tones; ++k) {
-        const double angle = whole_turn * static_cast<double>(k + 1) * frequency * t;
-        row[2 + 2 * k] = std::sin(angle);
-        row[3 + 2 * k] = std::cos(angle);
-      }
-      // d/df of the first tone
-      row[terms - 1] = whole_turn * t * (sine * row[3] - cosine * row[2]);
-    };
-    double row[most];
     const bool with_frequency = round > 0;  // the first round tells sine and cosine
-    const std::size_t used = with_frequency ? terms : terms - 1;
-    std::vector<double> square(used * used, 0.0), right(used, 0.0);
-    for (std::size_t k = 0; k < series.time.size(); ++k) {
-      row_at(series.time[k], row);
-      for (std::size_t a = 0; a < used; ++a) {
-        right[a] += row[a] * series.place[k];
-        for (std::size_t b = 0; b < used; ++b) square[a * used + b] += row[a] * row[b];
-      }
-    }
-    std::vector<double> factor = square;
-    for (std::size_t a = 0; a < used; ++a) factor[a * used + a] *= 1 + 1e-12;
+    const std::size_t used = with_frequency ? terms.count : terms.count - 1;
+    sum_up(series, terms, used, square, right);
+    factor = square;
     if (!solve_symmetric(factor, right, used)) return fit;
-    sine = right[2], cosine = right[3];
+    terms.sine = right[2], terms.cosine = right[3];
     double change = 0;
     if (with_frequency) {
-      change = std::clamp(right[terms - 1], -0.3 / series.length, 0.3 / series.length);
-      frequency += change;
-      std::vector<double> again = square, unit(used, 0.0);
-      for (std::size_t a = 0; a < used; ++a) again[a * used + a] *= 1 + 1e-12;
-      unit[terms - 1] = 1;
-      if (!solve_symmetric(again, unit, used)) return fit;
-      fit.variance = unit[terms - 1];
+      change = std::clamp(right[used - 1], -0.3 / series.length, 0.3 / series.length);
+      terms.frequency += change;
+      std::vector<double> unit(used, 0.0);
+      unit[used - 1] = 1;
+      if (!solve_symmetric(square, unit, used)) return fit;
+      fit.variance = unit[used - 1];
       for (std::size_t k = 0; k < series.time.size(); ++k) {
-        row_at(series.time[k], row);
-        double model = 0;
-        for (std::size_t a = 0; a + 1 < terms; ++a) model += right[a] * row[a];
+        double row[LineTerms::most], model = 0;
+        terms.at(series.time[k], row);
+        for (std::size_t a = 0; a + 1 < used; ++a) model += right[a] * row[a];
         fit.left.place[k] = series.place[k] - model;
       }
     }
     if (round > 1 && std::abs(change) < 1e-7 / series.length) break;
   }
-  if (!(frequency > 0 && frequency < 0.5)) return fit;
+  if (!(terms.frequency > 0 && terms.frequency < 0.5)) return fit;
   fit.good = true;
-  fit.frequency = frequency;
-  fit.amplitude = std::hypot(sine, cosine);
-  fit.phase = std::atan2(cosine, sine) / whole_turn;
+  fit.frequency = terms.frequency;
+  fit.amplitude = std::hypot(terms.sine, terms.cosine);
+  fit.phase = std::atan2(terms.cosine, terms.sine) / whole_turn;
   return fit;
 }
 

@@ -122,6 +122,10 @@ class Engine final : public Simulation {
     double vz() const { return velocity[1]; }
   };
 
+  // --- beginning
+  [[gnu::cold]] void set_bounds(const Box& box);
+  [[gnu::cold]] void set_disks(const Scene& scene, const std::vector<Placed>& placed);
+
   // --- flight
   Motion motion_at(const Disk& disk, double time) const;
   void write_down(std::uint32_t i, const Motion& motion);

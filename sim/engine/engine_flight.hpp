@@ -15,7 +15,32 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
       bath_(scene.bath),
       random_(scene.seed ^ 0x6261746800000000) {
   if constexpr (Space::falls) gravity_ = 1;
-  if (const auto* sides = std::get_if<HardSides>(&scene.box.sides)) {
+  set_bounds(scene.box);
+  set_disks(scene, placed);
+  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) bath_at_ = bath->interval;
+  if (const auto* bath = std::get_if<WhiteNoiseBath>(&bath_)) bath_at_ = bath->interval;
+  if (const auto* bath = std::get_if<AndersenBath>(&bath_))
+    bath_at_ = -std::log(random_.uniform_positive()) / (bath->rate * count_);
+  interval_ = floor_.period();
+  if (!floor_.moves()) intervals_ = 16;
+  event_rate_ = 8.0 * count_;
+  initial_energy_ = kinetic_energy() + potential_energy();
+  unusual_ = disk_surface_.varies();
+  const auto* plates = std::get_if<RubbingPlates>(&scene.box.plates);
+  plan_rest(scene.rests && plates == nullptr);
+  plan_press(scene.presses && plates == nullptr);
+  if (plates != nullptr) {
+    plates_ = *plates;
+    rubs_.resize(count_);
+    if (Rule::spins && plates_.contact_radius > 0) spin_rubs_.resize(count_);
+    begin_rub();
+  }
+  begin_interval();
+}
+
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::set_bounds(const Box& box) {
+  if (const auto* sides = std::get_if<HardSides>(&box.sides)) {
     hard_sides_ = Space::has_walls;
     side_surface_ = Contact(sides->surface);
     slope_sine_ = std::sin(sides->slope);
@@ -23,7 +48,7 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
   } else {
     period_x_ = Period(width_);
   }
-  if (const auto* lid = std::get_if<Lid>(&scene.box.top)) {
+  if (const auto* lid = std::get_if<Lid>(&box.top)) {
     lid_height_ = lid->height;
     if (lid->is_free()) {
       lid_.mass = lid->mass;
@@ -31,8 +56,12 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
     }
     lid_surface_ = Contact(lid->surface);
   }
-  if (const auto* top = std::get_if<PeriodicTop>(&scene.box.top)) period_z_ = Period(top->height);
+  if (const auto* top = std::get_if<PeriodicTop>(&box.top)) period_z_ = Period(top->height);
+}
 
+// With their event "never": what happens first is predicted later.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::set_disks(const Scene& scene, const std::vector<Placed>& placed) {
   beyond_cache_ = count_ > fits_cache;
   disks_.resize(count_ + 1);
   labels_.resize(count_);
@@ -58,25 +87,6 @@ Engine<Space, Rule, Sizes>::Engine(const Scene& scene, FloorMotion floor, const 
     sizes_.radii.push_back(0.5);
     sizes_.masses.push_back(1);
   }
-  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) bath_at_ = bath->interval;
-  if (const auto* bath = std::get_if<WhiteNoiseBath>(&bath_)) bath_at_ = bath->interval;
-  if (const auto* bath = std::get_if<AndersenBath>(&bath_))
-    bath_at_ = -std::log(random_.uniform_positive()) / (bath->rate * count_);
-  interval_ = floor_.period();
-  if (!floor_.moves()) intervals_ = 16;
-  event_rate_ = 8.0 * count_;
-  initial_energy_ = kinetic_energy() + potential_energy();
-  unusual_ = disk_surface_.varies();
-  const auto* plates = std::get_if<RubbingPlates>(&scene.box.plates);
-  plan_rest(scene.rests && plates == nullptr);
-  plan_press(scene.presses && plates == nullptr);
-  if (plates != nullptr) {
-    plates_ = *plates;
-    rubs_.resize(count_);
-    if (Rule::spins && plates_.contact_radius > 0) spin_rubs_.resize(count_);
-    begin_rub();
-  }
-  begin_interval();
 }
 
 template <class Space, class Rule, class Sizes>
