@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 import os
 import warnings
@@ -112,10 +113,10 @@ def reporter(progress: Progress, what: str) -> tuple[Optional[Callable[[float], 
     if callable(progress):
         return progress, lambda: None
     try:
-        from tqdm.auto import tqdm  # type: ignore[import]
+        tqdm = importlib.import_module("tqdm.auto")  # by its name: it may have types, or none
     except ImportError:
         return None, lambda: None
-    bar = tqdm(total=100, desc=what, unit="%")
+    bar = tqdm.tqdm(total=100, desc=what, unit="%")
 
     def show(fraction: float) -> None:
         bar.update(int(100 * fraction) - bar.n)

@@ -116,7 +116,7 @@ def test_control_c_ends_the_search_in_one_picture():
     )
     process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
     assert process.stdout.readline() == b"ready\n"
-    time.sleep(1)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()
@@ -150,14 +150,13 @@ def test_errors_of_photographs(tmp_path):
 def test_control_c_ends_a_measurement_on_several_threads():
     code = (
         "import sys, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
-        "frames = [drawn_image()[0]] * 1000\n"
-        "print('ready', flush=True)\n"
-        "try:\n    shakebed.measure_bed(frames, '3 mm', threads=2)\n"
+        "frames = [drawn_image()[0]] * 3000\n"
+        "def begun(part):\n    print('begun', flush=True)\n"
+        "try:\n    shakebed.measure_bed(frames, '3 mm', threads=2, progress=begun)\n"
         "except KeyboardInterrupt:\n    sys.exit(42)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", code, os.path.dirname(__file__)], stdout=subprocess.PIPE)
-    assert process.stdout.readline() == b"ready\n"
-    time.sleep(1)
+    assert process.stdout.readline() == b"begun\n"
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()
