@@ -110,13 +110,14 @@ double chance_of(const Series& series, double frequency, double power) {
   return near.known ? std::pow(1 + power / near.level / near.count, -near.count) : 1.0;
 }
 
-// Least squares of middle, trend, a line at `frequency` with its overtones and, by the line's slope, its frequency.
+// A line that was fitted, and what is left of the series without it.
 struct LineFit {
   bool good = false;
   double frequency = 0, variance = 0;  // the latter per unit of the noise's variance
   double amplitude = 0, phase = 0;     // at the middle of the film
   Series left;                         // what the fit leaves
 };
+
 // Terms of a model of a line: a constant, a drift, up to three tones, and the derivative of the first tone by
 // frequency.
 struct LineTerms {
@@ -153,6 +154,7 @@ void sum_up(const Series& series, const LineTerms& terms, std::size_t used, std:
   for (std::size_t a = 0; a < used; ++a) square[a * used + a] *= 1 + 1e-12;
 }
 
+// Least squares of middle, trend, a line at `frequency` with its overtones and, by the line's slope, its frequency.
 LineFit fit_line(const Series& series, double frequency) {
   LineFit fit;
   LineTerms terms{frequency, series.length};
