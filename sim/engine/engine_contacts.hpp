@@ -77,7 +77,8 @@ void Engine<Space, Rule, Sizes>::collide(std::uint32_t i, std::uint32_t j) {
 
 // The contact itself: changes the velocities, the spins and the ledger.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second) {
+[[gnu::always_inline]] inline void Engine<Space, Rule, Sizes>::exchange(std::uint32_t i, std::uint32_t j, Motion& first,
+                                                                        Motion& second) {
   TwoLanes d = second.place - first.place;
   // Which images meet follows from the records, which are at hand before the flights are: both disks are in their
   // shells there as now.
