@@ -177,7 +177,9 @@ class Engine final : public Simulation {
   bool foresees_contacts_of(std::uint32_t i) const;
 
   // --- shells
-  void centre_shell(std::uint32_t i);
+  void bound_shells(double density, double height, double top);
+  void choose_ahead(double density);
+  void centre_shell(std::uint32_t i, double ahead = 0);
   template <class Grid>
   void file_shells(Grid& grid, double height);
   void file_shells(double height);
@@ -438,7 +440,8 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  bool beyond_cache_ = false;                                      // so many disks that it pays to fetch ahead
+  double ahead_ = 0;           // how far ahead of its disk a shell of the largest size is centred
+  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
   std::variant<ShellGrid<NarrowCell>, ShellGrid<WideCell>> grid_;  // where the shells are
   NeighbourLists lists_;
   EventQueue queue_;

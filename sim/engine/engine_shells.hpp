@@ -28,11 +28,17 @@ void Engine<Space, Rule, Sizes>::file_shells(double height) {
   file_shells(grid_.template emplace<ShellGrid<WideCell>>(), height);
 }
 
-// Centres the disk's shell on where it is now, and takes the image of it that is in the box.
+// Centres the disk's shell on where it is now, or where it will be when it has gone so far ahead without gravity. Takes
+// the image of the disk that has the centre in the box.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i) {
+void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i, [[maybe_unused]] double ahead) {
   Disk& disk = disks_[i];
-  TwoLanes here = motion_at(disk, now_).place;
+  const Motion motion = motion_at(disk, now_);
+  TwoLanes here = motion.place;
+  if constexpr (!Space::falls) {
+    const double squared = motion.vx() * motion.vx() + motion.vz() * motion.vz();
+    if (squared > 0) here = fused(motion.velocity, both(ahead / std::sqrt(squared)), here);
+  }
   if constexpr (Space::wraps_x) {
     const double off = period_x_.beyond(here[0]);
     disk.x -= off;
@@ -170,17 +176,18 @@ template <class Space, class Rule, class Sizes>
 template <class Grid>
 void Engine<Space, Rule, Sizes>::draw_shell(Grid& grid, std::uint32_t i) {
   grid.unfile(i);
-  centre_shell(i);
   // Where no more than eight are near the largest shell will do, and nobody need be ranked. So it most often is where
   // it was so before.
   const auto largest = static_cast<std::uint8_t>(largest_skin_ / skin_unit);
   bool largest_will_do = disks_[i].skin == largest;
+  centre_shell(i, largest_will_do ? ahead_ : 0);
   if (largest_will_do) [[likely]] {
     look_round<false>(grid, i);
     largest_will_do = nearby_count_ <= inline_neighbours;
   }
   std::span<const std::uint32_t> found(nearby_.data(), nearby_count_);
   if (!largest_will_do) [[unlikely]] {
+    if (!Space::falls && ahead_ > 0) centre_shell(i);
     look_round<true>(grid, i);
     choose_skin(i);
     found = find_neighbours(i);

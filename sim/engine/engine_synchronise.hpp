@@ -102,6 +102,38 @@ double Engine<Space, Rule, Sizes>::density_round_disks() const {
   return squares / (count_ * width_ * thickness);
 }
 
+// The largest shell: where it is as dense as round the disks, it has so many neighbours on the average that few have
+// more than eight. In a gas the number of neighbours varies most. Many a bed is denser than that for a part of its
+// period.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::bound_shells(double density, double height, double top) {
+  const double neighbours = Space::falls ? 7.5 : std::min(8.3, 5.1 + 4.6 * std::numbers::pi / 4 * density);
+  largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
+  // Two disks that stay in their shells must not come near a second image of each other.
+  if constexpr (Space::wraps_x) {
+    if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact_) / 4);
+  }
+  if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact_) / 4);
+  largest_skin_ = std::floor(largest_skin_ / skin_unit) * skin_unit;  // as records hold it
+  // Distances of shells' centres are taken in single precision.
+  const double extent = std::max(width_, std::max(height, top));
+  shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
+}
+
+// How far ahead of its disk a shell is centred: a mean free path of hard disks, where that is a good part of the shell.
+// So a disk that is not hit crosses almost the whole shell. A disk that is hit many times on its way stays longest in a
+// shell round the place where it is. Tiles need such shells, too, since a disk may have to go back.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::choose_ahead(double density) {
+  constexpr double least = 0.25, most = 0.75;  // of the shell's radius
+  ahead_ = 0;
+  if (Space::falls || !tiles_.empty()) return;
+  const double packing = std::min(std::numbers::pi / 4 * density, 0.9);
+  const double at_contact = (1 - 7 * packing / 16) / ((1 - packing) * (1 - packing));  // pair correlation (Henderson)
+  const double free_path = 1 / (2 * std::numbers::sqrt2 * density * at_contact);
+  if (free_path > least * largest_skin_) ahead_ = std::min(free_path, most * largest_skin_);
+}
+
 // From positions, velocities, spins and clocks at now_ = 0 alone.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::begin_interval() {
@@ -120,23 +152,12 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  // Bounds of the shells: the radius that gives eight neighbours on the average where it is as dense as round the
-  // disks. Many a bed is denser than that for a part of its period.
-  const double neighbours = Space::falls ? 7.5 : 8.3;
   const double density = Space::wraps_z ? count_ / (width_ * height) : density_round_disks();
-  largest_skin_ = std::clamp(0.5 * (std::sqrt(neighbours / (std::numbers::pi * density)) - 1), 0.25, 1.5);
-  // Two disks that stay in their shells must not come near a second image of each other.
-  if constexpr (Space::wraps_x) {
-    if (period_x_.length > 0) largest_skin_ = std::min(largest_skin_, (period_x_.length / 2 - largest_contact_) / 4);
-  }
-  if constexpr (Space::wraps_z) largest_skin_ = std::min(largest_skin_, (period_z_.length / 2 - largest_contact_) / 4);
-  largest_skin_ = std::floor(largest_skin_ / skin_unit) * skin_unit;  // as records hold it
-  // Distances of shells' centres are taken in single precision.
-  const double extent = std::max(width_, std::max(height, top));
-  shell_slack_ = static_cast<float>(shell_slack + 1e-6 * (extent + 8));
+  bound_shells(density, height, top);
   lists_.reset(disks_.data(), count_);
   if constexpr (Space::is_cell) draw_lid_bound();
   choose_tiles();
+  choose_ahead(density);
   file_shells(height);
   std::visit(
       [this](auto& grid) {
