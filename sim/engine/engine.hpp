@@ -179,6 +179,7 @@ class Engine final : public Simulation {
   // --- shells
   void bound_shells(double density, double height, double top);
   void choose_ahead(double density);
+  TwoLanes shell_centre(const Motion& motion, double ahead) const;
   void centre_shell(std::uint32_t i, double ahead = 0);
   template <class Grid>
   void file_shells(Grid& grid, double height);

@@ -28,7 +28,12 @@ template <class Space, class Rule, class Sizes>
   }
   for (std::uint32_t neighbour : lists_.first_block(a).disk) fetch(&disks_[neighbour]);
   if (a == b) [[unlikely]] {
-    std::visit([a](const auto& grid) { grid.fetch_round(a); }, grid_);
+    float x = disks_[a].shell_x, z = disks_[a].shell_z;
+    if (ahead_ > 0) {
+      const TwoLanes centre = shell_centre(motion_at(disks_[a], disks_[a].event_time), ahead_);
+      x = static_cast<float>(centre[0]), z = static_cast<float>(centre[1]);
+    }
+    std::visit([x, z](const auto& grid) { grid.fetch_round(x, z); }, grid_);
     return;
   }
   for (std::uint32_t neighbour : lists_.first_block(b).disk) fetch(&disks_[neighbour]);

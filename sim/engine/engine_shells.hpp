@@ -28,17 +28,21 @@ void Engine<Space, Rule, Sizes>::file_shells(double height) {
   file_shells(grid_.template emplace<ShellGrid<WideCell>>(), height);
 }
 
-// Centres the disk's shell on where it is now, or where it will be when it has gone so far ahead without gravity. Takes
-// the image of the disk that has the centre in the box.
+// Where the disk is, or will be when it has gone so far ahead without gravity.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i, [[maybe_unused]] double ahead) {
-  Disk& disk = disks_[i];
-  const Motion motion = motion_at(disk, now_);
-  TwoLanes here = motion.place;
+TwoLanes Engine<Space, Rule, Sizes>::shell_centre(const Motion& motion, [[maybe_unused]] double ahead) const {
   if constexpr (!Space::falls) {
     const double squared = motion.vx() * motion.vx() + motion.vz() * motion.vz();
-    if (squared > 0) here = fused(motion.velocity, both(ahead / std::sqrt(squared)), here);
+    if (squared > 0) return fused(motion.velocity, both(ahead / std::sqrt(squared)), motion.place);
   }
+  return motion.place;
+}
+
+// Centres the disk's shell there, and takes the image of the disk that has the centre in the box.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::centre_shell(std::uint32_t i, double ahead) {
+  Disk& disk = disks_[i];
+  TwoLanes here = shell_centre(motion_at(disk, now_), ahead);
   if constexpr (Space::wraps_x) {
     const double off = period_x_.beyond(here[0]);
     disk.x -= off;

@@ -113,7 +113,7 @@ class ShellGrid {
   template <class Visit>
   [[gnu::always_inline]] void each_eight_round(std::uint32_t i, Visit visit) const {
     if constexpr (Cell::places > 4) {
-      each_place_round(i, [&](const Cell& place) {
+      each_place_round(disks_[i].shell_x, disks_[i].shell_z, [&](const Cell& place) {
         for (const Cell* cell = &place;; cell = &crowded_[cell->next()]) {
           visit(eight_floats(cell->x.data()), eight_floats(cell->z.data()), eight_floats(cell->reach.data()),
                 eight_words(cell->disk.data()));
@@ -130,7 +130,7 @@ class ShellGrid {
       std::array<const Cell*, 10> cells;
       std::size_t count = 0;
       std::uint32_t further = 0;
-      each_place_round(i, [&](const Cell& cell) {
+      each_place_round(disks_[i].shell_x, disks_[i].shell_z, [&](const Cell& cell) {
         further |= cell.next();
         cells[count++] = &cell;
       });
@@ -147,9 +147,9 @@ class ShellGrid {
   // No more than that many eights are visited.
   std::size_t most_eights_round() const { return 9 + crowded_.size(); }
 
-  // Prefetches the cells round i.
-  [[gnu::always_inline]] void fetch_round(std::uint32_t i) const {
-    each_place_round(i, [](const Cell& cell) {
+  // Prefetches the cells round a shell with that centre.
+  [[gnu::always_inline]] void fetch_round(float x, float z) const {
+    each_place_round(x, z, [](const Cell& cell) {
       fetch(&cell);
       if constexpr (sizeof(Cell) > 64) fetch(&cell.reach);
     });
@@ -162,11 +162,11 @@ class ShellGrid {
  private:
   static constexpr unsigned all_places = (1u << Cell::places) - 1;
 
-  int column_of(const Disk& disk) const { return wrap(static_cast<int>(std::floor(disk.shell_x * per_x_)), columns_); }
-  int row_of(const Disk& disk) const { return wrap(static_cast<int>(std::floor(disk.shell_z * per_z_)), rows_); }
+  int column_of(float x) const { return wrap(static_cast<int>(std::floor(x * per_x_)), columns_); }
+  int row_of(float z) const { return wrap(static_cast<int>(std::floor(z * per_z_)), rows_); }
   std::size_t cell_of(const Disk& disk) const {
-    return static_cast<std::size_t>(row_of(disk)) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(column_of(disk));
+    return static_cast<std::size_t>(row_of(disk.shell_z)) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column_of(disk.shell_x));
   }
   static int wrap(int index, int size) {
     if (static_cast<unsigned>(index) < static_cast<unsigned>(size)) return index;
@@ -174,10 +174,10 @@ class ShellGrid {
     return index < 0 ? index + size : index;
   }
 
-  // Calls visit(cell) for the nine places of the grid round i's, fewer in a small grid.
+  // Calls visit(cell) for the nine places of the grid round a shell's centre, fewer in a small grid.
   template <class Visit>
-  [[gnu::always_inline]] void each_place_round(std::uint32_t i, Visit visit) const {
-    const int column = column_of(disks_[i]), row = row_of(disks_[i]);
+  [[gnu::always_inline]] void each_place_round(float x, float z, Visit visit) const {
+    const int column = column_of(x), row = row_of(z);
     std::array<int, 3> rows = {row == 0 ? rows_ - 1 : row - 1, row, row + 1 == rows_ ? 0 : row + 1};
     std::array<int, 3> columns = {column == 0 ? columns_ - 1 : column - 1, column,
                                   column + 1 == columns_ ? 0 : column + 1};
