@@ -304,7 +304,8 @@ class Engine final : public Simulation {
   void write_down_pressed();
   void end_press();
   void soften_pressed();
-  void harden_pressed();
+  void harden_pressed(double contact_time, double most);
+  void adapt_contact_time(bool stays);
   void check_press(const FloorMotion::Motion& floor);
   bool press_until(double until);
   FloorMotion::Motion press_on(const FloorMotion::Motion& before, double next);

@@ -39,8 +39,13 @@ inline constexpr double chattering = 0.6, chattering_on = 0.04;
 // hard disks and go on pressed are too cold by two.
 inline constexpr double cold = 0.02, chattering_of_cold = 0.02;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
-// What springs that are still compressed may gain thereby [m g D], a disk and check.
-inline constexpr double gained_by_hardening = 1e-6;
+// How far rough beds move against the floor in a contact time [D], at most: they harden as soon as their springs hold
+// little. Beds of 24 to 45 rows that had softened while they lay there, and were shaken up again, were compressed by up
+// to 0.02 D.
+inline constexpr double landing_travel = 2e-3;
+// What springs that are still compressed may gain thereby, a check: of disks in flight [m g D], each; of the kinetic
+// energy against the floor.
+inline constexpr double gained_by_hardening = 1e-6, gained_of_motion = 1e-3;
 // Of the contact time at most, between two checks. A part of what the springs hold is lost thereby: with 1.05 rough
 // beds at Gamma = 1.2 have a fifth of the T_z of soft spheres.
 inline constexpr double softening = 1.05, softening_of_rough = 1.005;
@@ -252,25 +257,35 @@ void Engine<Space, Rule, Sizes>::soften_pressed() {
   pressed_.soften(press_contact_time_);
 }
 
-// A bed in flight gets the contacts with which it is to land, as soon as its springs hold little.
+// Contacts as short as that or, if the springs of the bed would then hold more than `most`, not as short.
 template <class Space, class Rule, class Sizes>
-void Engine<Space, Rule, Sizes>::harden_pressed() {
-  if (press_contact_time_ <= landing_contact_time) return;
-  const double ratio = std::sqrt(pressed_.compressed() / (gained_by_hardening * count_));
+void Engine<Space, Rule, Sizes>::harden_pressed(double contact_time, double most) {
+  if (press_contact_time_ <= contact_time) return;
+  const double ratio = std::sqrt(pressed_.compressed() / most);
   if (ratio >= 1) return;
-  press_contact_time_ = std::max(landing_contact_time, ratio * press_contact_time_);
+  press_contact_time_ = std::max(contact_time, ratio * press_contact_time_);
   pressed_.soften(press_contact_time_);
+}
+
+// Contacts follow the bed: short in flight, since it is to land, and where it moves fast; as long as may be where it
+// lies.
+template <class Space, class Rule, class Sizes>
+void Engine<Space, Rule, Sizes>::adapt_contact_time(bool stays) {
+  const double square = pressed_.mean_square_speed(), longest = landing_travel / std::sqrt(square);
+  if (stays && pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_) {
+    harden_pressed(landing_contact_time, gained_by_hardening * count_);
+  } else if (floor_falls_ && press_contact_time_ > longest) {
+    harden_pressed(std::max(landing_contact_time, longest), gained_of_motion * 0.5 * square * count_);
+  } else {
+    soften_pressed();
+  }
 }
 
 // Sleeps, wakes, softens or ends, by what the bed does. After a step.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
   const bool stays = floor_falls_ && pressed_.side_temperature() < cold;
-  const bool apart = pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_;
-  if (stays && apart)
-    harden_pressed();
-  else
-    soften_pressed();
+  adapt_contact_time(stays);
   const double weight = floor.acceleration + gravity_;
   if (weight >= 0 || pressed_.floor_force() != 0) {
     released_at_ = never;
