@@ -24,6 +24,8 @@ constexpr double keeps_a_run = 16;
 // ... and as often as costs at most a fiftieth of the time, but not oftener than every two seconds.
 constexpr int keeping_share = 50;
 constexpr std::chrono::seconds shortest_keeping{2};
+// So often a run is asked whether it is still precise, unless synchronisations of the engine are rarer.
+constexpr double precision_checks = 256;
 constexpr std::size_t hash_size = 32;  // characters before the state in a checkpoint file
 
 double thread_cpu_seconds() {
@@ -180,10 +182,14 @@ sim::RunControl BedRun::control() {
   control.stop = [this] { return context_.interrupted(); };
   control.progress = progress_;
   control.gone_on = [this](const sim::Simulation& simulation) {
+    checked_slot_ = slot_of(simulation);
     context_.log(
         fmt::format("continues after {:.0f} % of the simulated time", 100 * simulation.time() / plan_.schedule.end()));
   };
-  control.keep_due = [this](const sim::Simulation& simulation) { return keep_is_due(simulation); };
+  control.keep_due = [this](const sim::Simulation& simulation) {
+    check_precision(simulation);
+    return keep_is_due(simulation);
+  };
   control.keep = [this](const sim::Simulation& simulation, const sim::RunControl::State& state) {
     keep(simulation, state);
   };
@@ -215,8 +221,20 @@ bool BedRun::keep_is_due(const sim::Simulation& simulation) const {
   return save_is_due() || simulation.time() >= keep_at_ || Clock::now() >= keep_after_;
 }
 
-void BedRun::keep(const sim::Simulation& simulation, const sim::RunControl::State& state) {
+double BedRun::slot_of(const sim::Simulation& simulation) const {
+  return std::floor(simulation.time() / plan_.schedule.end() * precision_checks);
+}
+
+// At moments that depend on simulated time alone: whether a run stops must not depend on the speed of the machine.
+void BedRun::check_precision(const sim::Simulation& simulation) {
+  const double slot = slot_of(simulation);
+  if (slot == checked_slot_) return;
+  checked_slot_ = slot;
   require_precision(simulation, sound_, checkpoint_);
+}
+
+void BedRun::keep(const sim::Simulation& simulation, const sim::RunControl::State& state) {
+  if (!sim::precision_lost(simulation).empty()) return;  // no state to go on from
   const auto start = Clock::now();
   sound_ = state();
   kept_at_ = Clock::now();

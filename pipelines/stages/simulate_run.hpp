@@ -107,6 +107,8 @@ class BedRun {
   sim::RunResult measured(const std::vector<std::uint8_t>& kept);
   sim::RunControl control();
   std::vector<std::uint8_t> read_checkpoint() const;
+  double slot_of(const sim::Simulation& simulation) const;
+  void check_precision(const sim::Simulation& simulation);
   bool keep_is_due(const sim::Simulation& simulation) const;
   bool save_is_due() const;
   void keep(const sim::Simulation& simulation, const sim::RunControl::State& state);
@@ -125,7 +127,8 @@ class BedRun {
 
   // The latest sound state, in memory, and when it was made and is to be made anew.
   std::vector<std::uint8_t> sound_;
-  double keep_at_ = 0;  // of the run's time
+  double keep_at_ = 0;       // of the run's time
+  double checked_slot_ = 0;  // of the run's time, in which precision was asked for last
   Clock::time_point last_saved_, kept_at_, keep_after_;
 };
 

@@ -438,6 +438,7 @@ class Engine final : public Simulation {
   std::uint64_t contacts_when_counted_ = 0;
   bool chatters_ = false, pressed_in_interval_ = false;
   bool floor_falls_ = false;  // faster than rough disks do, once a period
+  double floor_speed_ = 0;    // at most, under rough disks
   std::vector<PressedBed::Stretch> stretches_;
 
   // --- bookkeeping

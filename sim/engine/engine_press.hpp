@@ -82,8 +82,11 @@ void Engine<Space, Rule, Sizes>::plan_press(bool wanted) {
                     Rule::spins ? inverse_inertia_ratio_ : 0);
     if constexpr (Rule::spins) {
       constexpr int moments = 256;
-      for (int k = 0; k < moments; ++k)
-        floor_falls_ = floor_falls_ || gravity_ + floor_.motion(floor_.period() * k / moments).acceleration < 0;
+      for (int k = 0; k < moments; ++k) {
+        const FloorMotion::Motion floor = floor_.motion(floor_.period() * k / moments);
+        floor_falls_ = floor_falls_ || gravity_ + floor.acceleration < 0;
+        floor_speed_ = std::max(floor_speed_, std::abs(floor.velocity));
+      }
     }
   }
 }
@@ -271,8 +274,11 @@ void Engine<Space, Rule, Sizes>::harden_pressed(double contact_time, double most
 // lies.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::adapt_contact_time(bool stays) {
-  const double square = pressed_.mean_square_speed(), longest = landing_travel / std::sqrt(square);
-  if (stays && pressed_.floor_force() == 0 && pressed_.touching() < released_touching * count_) {
+  const bool flies = pressed_.floor_force() == 0;
+  // In flight it is not yet as fast as it will land.
+  const double least = flies ? floor_speed_ * floor_speed_ : 0;
+  const double square = std::max(pressed_.mean_square_speed(), least), longest = landing_travel / std::sqrt(square);
+  if (stays && flies && pressed_.touching() < released_touching * count_) {
     harden_pressed(landing_contact_time, gained_by_hardening * count_);
   } else if (floor_falls_ && press_contact_time_ > longest) {
     harden_pressed(std::max(landing_contact_time, longest), gained_of_motion * 0.5 * square * count_);
