@@ -8,13 +8,15 @@
 
 namespace shakebed::ingest {
 
-// What is known before circles are judged: nothing, the radius of the beads, or that beads were found.
-enum class Known { nothing, radius, beads };
+// What is known before circles are judged: nothing, that they are so wide that their outlines will tell whether they
+// are round, the radius of the beads, or that beads were found.
+enum class Known { nothing, wide, radius, beads };
 
 // The probability for support 0, 1/20, 2/20 .. 1 (the visible share of the rim). `copies`: the circles of each copy. A
 // class of support without a circle is joined to the next better one, which lowers that one's probability. Where the
-// radius is known, only classes at most 0.2 below are joined: half of a large oval passes as a poor small circle. Where
-// beads are known most classes are empty, and they stay separate. The probability never falls with the support:
+// radius is known, or wide circles are seen nearly whole, only classes at most 0.2 below are joined: half of a large
+// oval passes as a poor small circle, and clutter closes no rim. Where beads are known most classes are empty, and they
+// stay separate. The probability never falls with the support:
 // neighbouring classes that violate this are pooled (isotonic regression [Barlow]).
 std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
                                              const std::vector<std::vector<Circle>>& copies,
