@@ -15,9 +15,13 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr double smallest_at_level = 5, largest_at_level = 10.4;  // px, radii searched at each level of the pyramid
-constexpr int census_window = 640;                                // px, of the busiest part searched at each level
-constexpr double mode_width = 0.1;                                // radii of one hypothesis, either way
-constexpr double faintest_census_support = 0.35;
+constexpr int smallest_picture = 12;  // px, side: the smallest circle fits in, with a margin
+// px, side: in a smaller picture two circles fit beside one another at most. So few are asked for this share of rim.
+constexpr int room_for_two = 20;
+constexpr double few_asked = 0.8;
+constexpr int census_window = 640;  // px, of the busiest part searched at each level
+constexpr double mode_width = 0.1;  // radii of one hypothesis, either way
+constexpr double faintest_census_support = 0.35, least_asked = 0.4;
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
@@ -53,7 +57,7 @@ std::vector<ScaledPicture> pyramid_of(const GrayFrame& frame, const CensusOption
     levels.push_back(std::move(half));
   }
   GrayFrame picture = frame;
-  for (double scale = 1; std::min(picture.width, picture.height) >= 4 * smallest_at_level; scale *= 2) {
+  for (double scale = 1; std::min(picture.width, picture.height) >= smallest_picture; scale *= 2) {
     if (wanted(scale)) levels.push_back(windowed(picture, scale, census_window));
     picture = halved(picture);
   }
@@ -102,12 +106,12 @@ Sum sum_of(const std::vector<Circle>& circles, double least_support, double rang
 }
 
 // The hypothesis of this radius at the threshold of support that serves it best.
-CircleHypothesis weigh(const Found& found, double radius, double range, double* by_chance) {
+CircleHypothesis weigh(const Found& found, double radius, double range, double from_support, double* by_chance) {
   CircleHypothesis best;
   const std::vector<Circle> seen = near_radius(found.picture, radius);
   const std::array<std::vector<Circle>, 2> copies = {near_radius(found.copies[0], radius),
                                                      near_radius(found.copies[1], radius)};
-  for (double least = 0.4; least < 0.99; least += 0.05) {
+  for (double least = from_support; least < 0.99; least += 0.05) {
     const Sum here = sum_of(seen, least, range);
     const Sum one = sum_of(copies[0], least, range), other = sum_of(copies[1], least, range);
     const double gain = here.gain - 0.5 * (one.gain + other.gain);
@@ -141,16 +145,17 @@ class Census {
       const EdgeMap edges = find_edges(level.picture);
       const EdgeMap one = find_edges(stretched(level.picture, decoy_stretch, 0), edges.threshold);
       const EdgeMap other = find_edges(stretched(level.picture, decoy_stretch, std::numbers::pi / 4), edges.threshold);
+      const RadiusRange range_of_radii = radii_at(level.scale, options_);
+      const bool tiny = std::min(level.picture.width, level.picture.height) < room_for_two;
       for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
         if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
         const auto circles = [&](const EdgeMap& map) {
           return find_circles(map, {smallest_at_level, largest_at_level, polarity, faintest_census_support});
         };
         const Found found{circles(edges), {circles(one), circles(other)}};
-        const RadiusRange range_of_radii = radii_at(level.scale, options_);
         for (double radius = range_of_radii.from; radius < range_of_radii.to; radius *= 1.05) {
           double by_chance = 0;
-          CircleHypothesis hypothesis = weigh(found, radius, range, &by_chance);
+          CircleHypothesis hypothesis = weigh(found, radius, range, tiny ? few_asked : least_asked, &by_chance);
           census_.best_by_chance_px = std::max(census_.best_by_chance_px, by_chance * level.scale);
           if (!(hypothesis.gain_px > 0)) continue;
           hypothesis.channel = channel;

@@ -13,12 +13,15 @@ constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
 // Classes of support in which the picture has no circle: so many below one that has count for it. What chance makes up
 // of much poorer rims says nothing of it: ovals of large beads pass as half of a small circle.
 constexpr std::size_t near_classes = 4;
+// Share of their rims from which circles are seen whole. Clutter that leaves gaps does not close them.
+constexpr double seen_whole = 0.9;
 
 // Circles of one class of support, in the frame and (the mean) in its copies.
 struct SupportClass {
   double here = 0, chance = 0, support_sum = 0;
   std::size_t classes = 1;   // that were put together
   bool joined_near = false;  // the classes just below it that have no circle
+  [[nodiscard]] bool whole() const { return here > 0 && support_sum >= seen_whole * here; }
   [[nodiscard]] double doubt() const { return here > 0 ? chance / here : chance > 0 ? HUGE_VAL : 0; }
 };
 
@@ -55,8 +58,8 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
       SupportClass& above = pooled.back();
       const bool below_says_something = below.here > 0 || (known == Known::beads && below.chance > 0);
       if (below_says_something && above.here > 0 && below.doubt() >= above.doubt()) break;
-      if (known == Known::radius && below.here == 0 && below.chance > 0 && above.here > 0 &&
-          below.classes > near_classes) {
+      if ((known == Known::radius || (known == Known::wide && above.whole())) && below.here == 0 && below.chance > 0 &&
+          above.here > 0 && below.classes > near_classes) {
         if (!above.joined_near) join_near(classes, k + 1 - above.classes, below, above);
         break;
       }

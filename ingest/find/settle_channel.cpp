@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -31,6 +32,10 @@ constexpr double hardly = 0.05;
 // A rim that another channel shows, and that lies on no disk found in this one: its probability, and the distance from
 // the centres of disks in radii. A bead may have no contrast in one channel, as a dark one in the saturation.
 constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
+
+// Of the other channels, those in which a quick search by rims expects most beads are searched as thoroughly as this
+// one.
+constexpr std::size_t most_channels = 2;
 
 enum class Shades { common, all };
 
@@ -102,6 +107,19 @@ class ChannelTrials {
     return tried(small(picture), {polarity, radius_px()}, roi_, shades);
   }
 
+  [[nodiscard]] double expected_by_rims(const GrayFrame& picture, Polarity polarity) const {
+    FindOptions find;
+    find.seen = BeadsSeen{polarity, radius_px()};
+    find.roi = roi_;
+    find.quick_rims_only = true;
+    const GrayFrame part = small(picture);
+    const CalibrationResult learned = learn_beads({&part}, find);
+    double expected = 0;
+    if (learned.found && learned.in_last_frame)
+      for (const FoundDisk& disk : learned.in_last_frame->disks) expected += disk.probability;
+    return expected;
+  }
+
   // Rims in this channel, none of which lies on a disk found.
   [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture,
                                    Polarity polarity) const {
@@ -139,6 +157,39 @@ class ChannelTrials {
   std::optional<PixelRectangle> roi_;
 };
 
+// Another channel in which the beads stand out.
+struct OtherChannel {
+  Channel channel = Channel::automatic;
+  const GrayFrame* frame = nullptr;
+  Polarity polarity = Polarity::automatic;
+  double by_rims = 0;  // beads that a quick search expects
+};
+
+// In their order in the picture. Where this channel shows the beads plainly, a look at the rims excludes the others.
+std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, const SurveyCandidate& best,
+                                               const SurveyOptions& options, const ChannelTrials& trials,
+                                               bool here_is_plain) {
+  std::vector<OtherChannel> others;
+  for (const ChannelFrames::One& one : frames.channels) {
+    if (one.channel == best.channel) continue;
+    const std::optional<Polarity> polarity = trials.polarity_in(one);
+    if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
+    others.push_back({one.channel, &one.frame, *polarity, 0});
+  }
+  if (here_is_plain || others.size() <= most_channels) return others;
+  std::vector<double> ranked;
+  for (OtherChannel& other : others) {
+    other.by_rims = trials.expected_by_rims(*other.frame, other.polarity);
+    ranked.push_back(other.by_rims);
+  }
+  std::sort(ranked.begin(), ranked.end(), std::greater<>());
+  std::size_t kept = 0;
+  std::erase_if(others, [&](const OtherChannel& other) {
+    return other.by_rims < ranked[most_channels - 1] || ++kept > most_channels;
+  });
+  return others;
+}
+
 }  // namespace
 
 SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
@@ -152,18 +203,15 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   settled.by_rims = here.by_rims;
   const bool plain = !here.by_rims && !here.doubtful();
   double most = clearly_more * here.expected;
-  for (const ChannelFrames::One& one : frames.channels) {
-    if (one.channel == best.channel) continue;
-    const std::optional<Polarity> polarity = trials.polarity_in(one);
-    if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
-    if (plain && here.expected + trials.rims_beside(here.disks, one.frame, *polarity) <= most) continue;
-    const Trial there = trials.trial_in(one.frame, *polarity, plain ? Shades::all : Shades::common);
+  for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
+    if (plain && here.expected + trials.rims_beside(here.disks, *other.frame, other.polarity) <= most) continue;
+    const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
     if (there.expected <= most) continue;
     // More faces are found where other things pass as beads, too: these then are less sure.
     if (!here.by_rims && (there.by_rims || there.wrong >= std::max(here.wrong, plain ? hardly : 0.0))) continue;
     most = clearly_more * there.expected;
-    settled.channel = one.channel;
-    settled.rims.polarity = *polarity;
+    settled.channel = other.channel;
+    settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;
   }
   return settled;

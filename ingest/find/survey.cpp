@@ -47,6 +47,8 @@ constexpr double largest_proposed = 0.25;
 // px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
 // not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
 constexpr double coarse_px = 10, wide_enough_px = 24;
+// px, width: twice as wide, so that the shape of an outline shows in the reduced picture that circles are searched in.
+constexpr double outline_tells_px = 2 * wide_enough_px;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 // Half as much is added where the radius is given: then something of this size is known to be there.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
@@ -353,8 +355,8 @@ struct SurveyAsked {
 // What a picture shows of a hypothesis.
 SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
   const bool given = asked.options.radius_px.has_value();
-  LearnedRims learned =
-      learn_rims(picture, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : Known::nothing);
+  const Known unasked = 2 * hypothesis.radius_px >= outline_tells_px ? Known::wide : Known::nothing;
+  LearnedRims learned = learn_rims(picture, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : unasked);
   SurveyCandidate candidate;
   candidate.rims = std::move(learned.model);
   candidate.disks = std::move(learned.disks);

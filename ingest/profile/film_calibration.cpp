@@ -227,7 +227,7 @@ class FilmLearner {
   // Beads of another shade cover area as these do, but not by their contrast.
   void learn_shades() {
     FinderCalibration& calibration = calibrated_.calibration;
-    if (film_.options.second_diameter_m || !calibration.rims) return;
+    if (film_.options.second_diameter_m || !calibration.rims || find_.quick_rims_only) return;
     FindResult found = calibrated_.in_last_frame ? std::move(*calibrated_.in_last_frame)
                                                  : find_beads(straight_.back(), calibration, find_);
     learn_other_shade(straight_.back(), find_, calibration, found);

@@ -186,31 +186,41 @@ std::optional<Trial> judged(const ExtractOptions& options, const ingest::Measure
     return std::nullopt;
   }
   if (found.disk_total == 0) return std::nullopt;
-  return Trial{found.disk_total, found.calibration.radius_px,
-               found.calibration.polarity == ingest::Polarity::bright_beads, found.contacts, circles_of(disks)};
+  return Trial{
+      found.disk_total,     found.calibration.radius_px,  found.calibration.polarity == ingest::Polarity::bright_beads,
+      found.expected_wrong, found.finder.expected_missed, found.contacts,
+      circles_of(disks)};
 }
 
-std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+namespace {
+
+// `reduced`: read instead of the picture.
+std::optional<Trial> tried_after(const FirstLook& look, const ExtractOptions& options, TrialSearch search,
                                  const ingest::ChannelFrames* reduced) {
+  if (!look.survey.found) return std::nullopt;
+  require_inside(options, look);
+  const ingest::SurveyCandidate& chosen = chosen_of(look.survey, options);
+  if (options.scale && !ingest::why_not_scale(options.diameter, *options.scale, chosen.rims.radius_px).empty())
+    return std::nullopt;
+  ingest::MeasureOptions measure = asked_for(options);
+  measure.shaking_frequency_hz.reset();  // of one frame there is none
+  measure.find.quick_rims_only = search == TrialSearch::by_rims_alone;
+  ingest::FrameSourceOptions source;
+  source.channel = channel_of(options.channel);
+  go_on_with(chosen, look, source, measure);
+  if (reduced != nullptr) measure.reduction = reduced->reduction;
+  ingest::FrameSource one = ingest::FrameSource::from_generator(1, [&](std::size_t) {
+    return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look.path, 0, source);
+  });
+  const ingest::Measurement found = ingest::measure_bed(one, measure);
+  return judged(options, found, found.disks);
+}
+
+// Nothing where the trial is refused.
+template <class Try>
+std::optional<Trial> unless_refused(const Try& attempt) {
   try {
-    const std::optional<FirstLook> look =
-        reduced != nullptr ? look_at_reduced(picture, options, *reduced) : look_at_first({picture}, options);
-    if (!look || !look->survey.found) return std::nullopt;
-    require_inside(options, *look);
-    const ingest::SurveyCandidate& chosen = chosen_of(look->survey, options);
-    if (options.scale && !ingest::why_not_scale(options.diameter, *options.scale, chosen.rims.radius_px).empty())
-      return std::nullopt;
-    ingest::MeasureOptions measure = asked_for(options);
-    measure.shaking_frequency_hz.reset();  // of one frame there is none
-    ingest::FrameSourceOptions source;
-    source.channel = channel_of(options.channel);
-    go_on_with(chosen, *look, source, measure);
-    if (reduced != nullptr) measure.reduction = reduced->reduction;
-    ingest::FrameSource one = ingest::FrameSource::from_generator(1, [&](std::size_t) {
-      return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look->path, 0, source);
-    });
-    const ingest::Measurement found = ingest::measure_bed(one, measure);
-    return judged(options, found, found.disks);
+    return attempt();
   } catch (const StageError&) {
     return std::nullopt;
   } catch (const ingest::InputError&) {
@@ -218,6 +228,21 @@ std::optional<Trial> try_options(const std::string& picture, const ExtractOption
   } catch (const std::invalid_argument&) {
     return std::nullopt;
   }
+}
+
+}  // namespace
+
+std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+                                 const ingest::ChannelFrames* reduced) {
+  return unless_refused([&]() -> std::optional<Trial> {
+    const std::optional<FirstLook> look =
+        reduced != nullptr ? look_at_reduced(picture, options, *reduced) : look_at_first({picture}, options);
+    return look ? tried_after(*look, options, TrialSearch::as_the_run, reduced) : std::nullopt;
+  });
+}
+
+std::optional<Trial> try_after_look(const FirstLook& look, const ExtractOptions& options, TrialSearch search) {
+  return unless_refused([&] { return tried_after(look, options, search, nullptr); });
 }
 
 }  // namespace shakebed::pipelines

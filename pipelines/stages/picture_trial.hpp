@@ -42,12 +42,16 @@ struct Trial {
   std::size_t beads = 0;
   double radius_px = 0;
   bool bright = false;
+  double wrong = 0, missed = 0;  // shares that are expected, of the disks and of the beads
   ingest::Contacts contacts;
   ingest::SurveyCandidate found;  // the disks, to be drawn
 };
 // Nothing where the run refuses it. `reduced`: the picture for a quick trial, which may be wrong.
 std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
                                  const ingest::ChannelFrames* reduced = nullptr);
+// The same after a first look at the picture with these options. Beads are searched as quickly as by_rims_alone says.
+enum class TrialSearch { as_the_run, by_rims_alone };
+std::optional<Trial> try_after_look(const FirstLook& look, const ExtractOptions& options, TrialSearch search);
 // The same of what is measured already. `disks`: of its first frame.
 std::optional<Trial> judged(const ExtractOptions& options, const ingest::Measurement& found,
                             const std::vector<ingest::MeasuredDisk>& disks);

@@ -19,6 +19,10 @@ constexpr std::size_t most_proposed = 2, most_tries = 6;
 // Searches of the picture as it is; those of reduced copies take a few per cent of one. 1,400 shells that do not touch
 // are refused after twice the time in which they are found.
 constexpr std::size_t most_searches = 3;
+// Shares of wrong disks and missed beads, three quarters and half of what a run accepts: a quick search by rims that
+// finds no more of them stands for that of the run, which takes several times as long. Beads of any shape may be
+// missed.
+constexpr double few_wrong = 0.15, few_missed = 0.2;
 constexpr std::size_t most_other_pictures = 3;  // a survey takes seconds where pictures are large
 constexpr std::size_t fewest_of_region = 3;     // circles that a region of their own is proposed for
 constexpr double sure = 0.5;                    // probability of a circle that the region must hold
@@ -94,7 +98,7 @@ class Proposer {
   std::vector<Proposal> find() {
     leave_out_what_excludes_beads();
     if (proposals_.empty()) give_what_candidates_need();
-    if (refused_ == RefusedBy::measurement) accept_what_was_found();
+    if (refused_ == RefusedBy::measurement && (proposals_.empty() || apart())) accept_what_was_found();
     return std::move(proposals_);
   }
 
@@ -145,6 +149,9 @@ class Proposer {
     propose(instead, options_for(candidate), [&](ExtractOptions& o) { take_candidate(candidate, o); });
   }
 
+  // Whether the beads measured do not touch: a scale, or any shape, then helps as well as other options.
+  [[nodiscard]] bool apart() const { return measured_ == nullptr || measured_->contacts.missing(); }
+
   // What was measured may be right all the same.
   void accept_what_was_found() {
     ExtractOptions open = options_;
@@ -169,13 +176,22 @@ class Proposer {
 
   // What was measured, if these options choose the same beads in the picture.
   std::optional<Trial> found_with(const ExtractOptions& open) {
-    if (measured_ == nullptr || measured_->frames.size() != 1 || !look_.survey.found)
-      return searched_again() ? try_options(look_.path, open) : std::nullopt;
     const std::optional<FirstLook> look = look_at_first({look_.path}, open);
     if (!look || !look->survey.found) return std::nullopt;
-    if (same_start(chosen_of(look->survey, open), chosen_of(look_.survey, options_)))
+    if (measured_ != nullptr && measured_->frames.size() == 1 && look_.survey.found &&
+        same_start(chosen_of(look->survey, open), chosen_of(look_.survey, options_)))
       return judged(open, *measured_, measured_->disks);
-    return searched_again() ? try_options(look_.path, open) : std::nullopt;
+    return searched(*look, open);
+  }
+
+  // What a search of the picture finds that the run accepts. The quick one is enough where it finds nothing, or leaves
+  // little doubt.
+  std::optional<Trial> searched(const FirstLook& look, const ExtractOptions& options) {
+    if (searches_++ >= most_searches || !look.survey.found) return std::nullopt;
+    std::optional<Trial> quick = try_after_look(look, options, TrialSearch::by_rims_alone);
+    const bool complete = options.shape == BeadShape::any || (quick && quick->missed <= few_missed);
+    if (!quick || (quick->wrong <= few_wrong && complete)) return quick;
+    return try_after_look(look, options, TrialSearch::as_the_run);
   }
 
   static bool same_start(const ingest::SurveyCandidate& one, const ingest::SurveyCandidate& other) {
@@ -183,9 +199,6 @@ class Proposer {
            one.rims.radius_px == other.rims.radius_px && one.one_sided == other.one_sided &&
            one.by_rims == other.by_rims;
   }
-
-  // Whether the picture may be searched once more.
-  bool searched_again() { return searches_++ < most_searches; }
 
   // Whether the run accepts the picture once the options are changed so.
   template <class Change>
@@ -195,7 +208,9 @@ class Proposer {
     ExtractOptions options = options_;
     change(options);
     if (excluded_at_a_glance(options)) return false;
-    const std::optional<Trial> trial = searched_again() ? try_options(look_.path, options) : std::nullopt;
+    if (searches_ >= most_searches) return false;
+    const std::optional<FirstLook> look = look_at_first({look_.path}, options);
+    const std::optional<Trial> trial = look ? searched(*look, options) : std::nullopt;
     if (!trial) return false;
     add(std::move(options), *trial, std::move(without), std::move(give));
     return true;

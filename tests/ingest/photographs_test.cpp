@@ -155,6 +155,7 @@ TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
 
 TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
   EXPECT_EQ(reduction_for(1000, 1000, 90), 1) << "the frame is small";
+  EXPECT_EQ(reduction_for(1500, 800, 340), 3) << "the beads are so wide that a third of the pixels is enough";
   for (const double radius : {11.0, 13.0, 23.9, 24.0, 37.0, 100.0}) {
     const int by = reduction_for(4000, 3000, radius);
     EXPECT_EQ(by, std::max(1, static_cast<int>(radius / 12)));

@@ -356,5 +356,18 @@ TEST(Sizes, FewWellSeenCirclesAreNotDoubtedForPoorOnesOfChance) {
   EXPECT_EQ(probability_at({}, 1), 0);
 }
 
+// Five wide circles seen whole. In each copy are three whose rims are seen in part: a third of the rim says nothing
+// against the five, nine tenths do.
+TEST(Sizes, OfWholeCirclesOnlyNearlyWholeOnesOfChanceRaiseDoubt) {
+  std::vector<Circle> seen(5), poor(3), good(3);
+  for (Circle& circle : seen) circle.support = 1;
+  for (Circle& circle : poor) circle.support = 0.35;
+  for (Circle& circle : good) circle.support = 0.9;
+  EXPECT_GT(probability_at(probabilities_by_support(seen, {poor, poor}, Known::wide), 1), 0.95);
+  EXPECT_LT(probability_at(probabilities_by_support(seen, {good, good}, Known::wide), 1), 0.5);
+  for (Circle& circle : seen) circle.support = 0.7;
+  EXPECT_LT(probability_at(probabilities_by_support(seen, {poor, poor}, Known::wide), 0.7), 0.5);
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

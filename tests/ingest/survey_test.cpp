@@ -187,6 +187,41 @@ TEST(Survey, FewCoinsThatTouchAreFound) {
   EXPECT_TRUE(survey.found) << survey.why_not;
 }
 
+// Three in a row, nearly as large as the picture is high.
+TEST(Survey, CoinsNearlyAsHighAsThePictureAreFound) {
+  const double radius = 115;
+  const std::vector<Place> truth = {{130, 128}, {420, 130}, {705, 127}};
+  const BeadAt bead_at(truth, radius);
+  const GrayFrame frame = painted(840, 290, [&](double x, double y) {
+    const Place* bead = bead_at(x, y);
+    if (bead == nullptr) return 250.0;
+    const double away = std::hypot(x - bead->x, y - bead->y), turn = std::atan2(y - bead->y, x - bead->x);
+    if (away > 0.9 * radius) return 120.0;
+    return 150 + 40 * std::sin(0.11 * x + 5 * turn) * std::sin(0.13 * y);
+  });
+  expect_all(survey_of({{Channel::automatic, frame}}), truth, radius);
+}
+
+// Five plain outlines around marks of all kinds. In the stretched copies some marks look like poor circles of this
+// size, which says nothing against whole ones.
+TEST(Survey, OrnateCoinsOnAPlainGroundAreFound) {
+  const double radius = 90;
+  const std::vector<Place> truth = {{110, 110}, {460, 112}, {284, 280}, {110, 452}, {462, 450}};
+  const BeadAt bead_at(truth, radius);
+  const GrayFrame frame = painted(570, 560, [&](double x, double y) {
+    const Place* bead = bead_at(x, y);
+    if (bead == nullptr) return 254.0;
+    const double u = x - bead->x, v = y - bead->y, away = std::hypot(u, v) / radius, turn = std::atan2(v, u);
+    if (away > 0.96) return 70.0;
+    if (away > 0.84) return std::sin(40 * turn) > 0 ? 60.0 : 190.0;
+    if (away > 0.8) return 70.0;
+    if (away > 0.55) return std::sin(13 * turn + 0.3 * std::sin(0.4 * u)) * std::sin(0.45 * v) > 0.1 ? 50.0 : 160.0;
+    if (away > 0.5) return 60.0;
+    return std::sin(0.21 * u + 0.1 * v) * std::sin(0.17 * v) > 0.2 ? 200.0 : 120.0;
+  });
+  expect_all(survey_of({{Channel::automatic, frame}}), truth, radius);
+}
+
 // A part of each rim is not seen. So few could be parts of other shapes, unless their radius is given.
 TEST(Survey, FewPartsOfRimsAreBeadsOfAGivenRadius) {
   const double radius = 20;

@@ -440,6 +440,31 @@ TEST(PictureTrial, OfWhatWasMeasuredIsNoSearch) {
   EXPECT_EQ(trial->beads, places.size());
 }
 
+// Every second of 81 disks has another face. What stands for the search of the run finds the same beads.
+TEST(PictureTrial, ByRimsAloneFindsTheBeadsOfTheRun) {
+  std::vector<Place> places;
+  for (int column = 0; column < 9; ++column)
+    for (int row = 0; row < 9; ++row) places.push_back({32.0 + 28 * column, 30.0 + 28 * row});
+  PaintedPicture picture(290, 290);
+  picture.disks(places, 12, 60);
+  for (std::size_t k = 0; k < places.size(); k += 2) picture.disks({places[k]}, 8, 160);
+  const std::string path = (std::filesystem::path(testing::TempDir()) / "rings.pgm").string();
+  write_text(path, picture.noise(3).pgm());
+  ExtractOptions options = some_options();
+  options.bead_number.reset();
+  options.shape = BeadShape::any;
+  const std::optional<FirstLook> look = look_at_first({path}, options);
+  ASSERT_TRUE(look && look->survey.found);
+  const std::optional<Trial> quick = try_after_look(*look, options, TrialSearch::by_rims_alone);
+  const std::optional<Trial> whole = try_after_look(*look, options, TrialSearch::as_the_run);
+  ASSERT_TRUE(quick && whole);
+  EXPECT_EQ(quick->beads, places.size());
+  EXPECT_EQ(whole->beads, places.size());
+  EXPECT_LT(quick->missed, 0.1);
+  EXPECT_LT(quick->wrong, 0.1);
+  EXPECT_NEAR(quick->radius_px, whole->radius_px, 0.05 * whole->radius_px);
+}
+
 // Twenty disks that go straight on, each at its own speed. Half of the frame rate makes a quarter of the temperature,
 // every second frame of the film as well; half of g makes twice the length T/(m g).
 // Of a film of unknown length the first four good frames, then every second, then every fourth; two of them, the first
