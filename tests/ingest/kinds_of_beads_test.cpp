@@ -30,11 +30,12 @@ std::vector<RenderedDisk> strewn_disks(int columns, int rows, double apart, doub
   }
   return disks;
 }
-GrayFrame strewn_frame(const std::vector<RenderedDisk>& disks, int width, int height, double bead = 70) {
+GrayFrame strewn_frame(const std::vector<RenderedDisk>& disks, int width, int height, double bead = 70,
+                       double noise = 2) {
   Camera camera;
   camera.width = width, camera.height = height;
   camera.background_level = 150, camera.bead_level = bead;
-  camera.blur_px = 0.8, camera.read_noise = 2;
+  camera.blur_px = 0.8, camera.read_noise = noise;
   return render_frame(disks, camera);
 }
 std::vector<Circle> circles_of(const std::vector<RenderedDisk>& disks) {
@@ -260,12 +261,12 @@ struct TwoChannels {
   ChannelFrames frames;
   SurveyCandidate best;
   // Red shows every second bead, dark; green all of them, of this level.
-  explicit TwoChannels(double green_level) {
+  explicit TwoChannels(double green_level, double noise = 2) {
     std::vector<RenderedDisk> half;
     for (std::size_t k = 0; k < all.size(); k += 2) half.push_back(all[k]);
     frames.width = 132, frames.height = 108;
     frames.channels = {{Channel::red, strewn_frame(half, 132, 108)},
-                       {Channel::green, strewn_frame(all, 132, 108, green_level)}};
+                       {Channel::green, strewn_frame(all, 132, 108, green_level, noise)}};
     best.channel = Channel::red, best.rims.radius_px = 9, best.rims.polarity = Polarity::dark_beads;
     for (const Circle& circle : circles_of(half)) best.disks.push_back({circle, 1, 0.01, false});
   }
@@ -287,8 +288,10 @@ TEST(SettledChannel, IsThatOfMostBeads) {
 }
 
 TEST(SettledChannel, IsLeftForNothingElse) {
-  const TwoChannels faint(153);  // 3 grey levels, hardly more than the noise
+  // Less than four grey levels are hardly seen, be the noise ever so small.
+  const TwoChannels faint(153.5, 0.2), plain(155, 0.2);
   EXPECT_EQ(settle_channel(faint.frames, faint.best, {}).channel, Channel::red);
+  EXPECT_EQ(settle_channel(plain.frames, plain.best, {}).channel, Channel::green);
   TwoChannels one(230);
   one.frames.channels.resize(1);
   EXPECT_EQ(settle_channel(one.frames, one.best, {}).channel, Channel::red);
@@ -417,6 +420,89 @@ TEST(FilmCalibrated, SaysWhyNoFrameShowsABead) {
   const std::string blank = why({test::even_frame(60, 50, 100), test::even_frame(60, 50, 100)});
   EXPECT_TRUE(test::holds(blank, "no disks in any of the first 2 frames")) << blank;
   EXPECT_TRUE(test::holds(why({}), "no frame could be read")) << why({});
+}
+
+// --- learn_beads.hpp -------------------------------------------------------------------------------------------------
+
+// Eight of 24 beads are of another size: by rims alone each has its radius, and a sentence says so.
+TEST(BeadsByRims, OfTwoSizesSayHowMany) {
+  std::vector<RenderedDisk> truth = strewn_disks(6, 4, 30, 9);
+  for (std::size_t k = 0; k < truth.size(); k += 3) truth[k].radius_px = 13;
+  const GrayFrame frame = strewn_frame(truth, 200, 140);
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 9, false};
+  options.quick_rims_only = true, options.recorded_px = 2;
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found && learned.calibration.by_rims) << learned.why_not;
+  const FinderCalibration& finder = learned.calibration;
+  ASSERT_EQ(finder.warnings.size(), 1U);
+  EXPECT_TRUE(test::holds(finder.warnings[0], "In the first frame 8 of 24 beads do not have the most frequent size"));
+  EXPECT_TRUE(test::holds(finder.warnings[0], "with radii from 17.") || test::holds(finder.warnings[0], "from 18."))
+      << finder.warnings[0] << ": px as recorded, two of which are one here";
+  EXPECT_TRUE(test::holds(finder.warnings[0], "to 25.") || test::holds(finder.warnings[0], "to 26."));
+  ASSERT_TRUE(learned.in_last_frame);
+  for (const FoundDisk& disk : learned.in_last_frame->disks) {
+    std::vector<RenderedDisk> same;
+    for (const RenderedDisk& one : truth)
+      if (std::hypot(one.x_px - disk.x_px, one.y_px - disk.y_px) < 3) same.push_back(one);
+    ASSERT_EQ(same.size(), 1U);
+    EXPECT_EQ(disk.other_size, same[0].radius_px == 13);
+    EXPECT_NEAR(disk.radius_px, same[0].radius_px, 0.4);
+    EXPECT_NEAR(disk.contrast, 1, 0.2);
+    EXPECT_GT(disk.variance_x, 0);
+    EXPECT_EQ(disk.variance_x, disk.variance_y);
+    EXPECT_EQ(disk.quality, disk.probability);
+    EXPECT_FALSE(disk.half_hidden || disk.cut);
+  }
+  options.roi = PixelRectangle{60, 30, 70, 70};  // centres from 59.5 and 29.5 to 129.5 and 99.5
+  const FindResult inside = find_beads(frame, finder, options);
+  std::size_t expected = 0;
+  for (const RenderedDisk& one : truth)
+    expected += one.x_px > 59.5 && one.x_px < 129.5 && one.y_px > 29.5 && one.y_px < 99.5 ? 1 : 0;
+  EXPECT_EQ(inside.disks.size(), expected);
+  for (const FoundDisk& disk : inside.disks)
+    EXPECT_EQ(disk.cut, disk.x_px - disk.radius_px < 59.5 || disk.x_px + disk.radius_px > 129.5 ||
+                            disk.y_px - disk.radius_px < 29.5 || disk.y_px + disk.radius_px > 99.5);
+}
+
+// Half of each rim is as dark as the bead: of what is left of it 70 % at most are met.
+TEST(BeadsByRims, OfWhichHalfIsSeenAreDoubted) {
+  const std::vector<RenderedDisk> truth = strewn_disks(5, 4, 26, 9);
+  GrayFrame frame = strewn_frame(truth, 140, 116);
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column)
+      for (const RenderedDisk& disk : truth) {
+        const double dx = column - disk.x_px, dy = row - disk.y_px;
+        if (dy > 3.5 && std::hypot(dx, dy) < 15)  // the lower part fades out
+          test::set(frame, column, row, 150 + 2 * (test::scattered(column, row) - 0.5));
+      }
+  FindOptions options;
+  options.seen = BeadsSeen{Polarity::dark_beads, 9, false};
+  options.quick_rims_only = true, options.one_size = true;
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found) << learned.why_not;
+  EXPECT_TRUE(test::any_holds(learned.calibration.warnings, "Beads were found by their rims alone. On average only"));
+}
+
+// Faces are beads where a rim of theirs is seen: of rims of the other sign none is.
+TEST(FacesWithoutARim, AreNoBeads) {
+  const GrayFrame frame = strewn_frame(strewn_disks(5, 4, 24, 9), 132, 108);
+  FinderCalibration finder;
+  const FindResult faces = find_disks(frame, {.radius_px = 9}, &finder);
+  ASSERT_EQ(faces.disks.size(), 20U);
+  finder.rims = learn_rims(frame, Polarity::dark_beads, 9).model;
+  finder.rims_to_be_checked = true;
+  const FindResult checked = find_beads(frame, finder, {});
+  EXPECT_EQ(checked.disks.size(), 20U);
+  EXPECT_EQ(checked.rejected, faces.rejected);
+  for (const FoundDisk& disk : checked.disks) EXPECT_GE(disk.probability, 0.95);
+  finder.rims->polarity = Polarity::bright_beads;
+  const FindResult none = find_beads(frame, finder, {});
+  EXPECT_TRUE(none.disks.empty());
+  EXPECT_EQ(none.rejected, faces.rejected + 20);
+  EXPECT_EQ(none.why_nothing, "none of the disks has a visible rim");
+  finder.rims_to_be_checked = false;
+  EXPECT_EQ(find_beads(frame, finder, {}).disks.size(), 20U);
 }
 
 }  // namespace

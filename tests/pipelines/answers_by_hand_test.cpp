@@ -5,11 +5,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/bed_judgement.hpp"
+#include "pipelines/stages/hard_disk_trust.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 
 namespace {
@@ -294,6 +299,38 @@ TEST(JudgementOfABed, IsALineWithItsNumbers) {
             "T_x = 0.2 ± 0.003, T_z = 0.4 ± 0.01 m g D, rise = 1.5 ± 0.02 D. One bed: Why. Do.");
   numbers["temperature_x"]["std_error"] = 0, numbers.erase("temperature_z");
   EXPECT_EQ(judgement_text(numbers), "T_x = 0.2, rise = 1.5 ± 0.02 D. One bed: Why. Do.");
+}
+
+// --- the study of record
+
+// The numbers by which hard disks are trusted are those of the table that users read, in whole per cent.
+TEST(StudyOfHardDisks, IsThatOfTheManual) {
+  std::istringstream manual(read_text(SHAKEBED_SOFT_SPHERES_PAGE));
+  std::string line;
+  HardDiskScene of;
+  int layers = 0;
+  std::size_t compared = 0;
+  while (std::getline(manual, line)) {
+    double e = 0, friction = 0, gamma = 0, x = 0, x_error = 0, z = 0, z_error = 0;
+    if (std::sscanf(line.c_str(), "| %lf | %lf | %d | %lf | soft, 10 us", &e, &friction, &layers, &gamma) == 4)
+      of.restitution = e, of.friction = friction, of.gamma = gamma;
+    if (std::sscanf(line.c_str(), "| | | | | t_c 1.4 us | %lf \u00b1 %lf | %lf \u00b1 %lf |", &x, &x_error, &z,
+                    &z_error) != 4)
+      continue;
+    const auto study = hard_disk_study();
+    const auto bed = std::find_if(study.begin(), study.end(), [&](const HardDiskBed& one) {
+      return one.restitution == of.restitution && one.friction == of.friction && one.gamma == of.gamma &&
+             std::abs(one.column_number - 0.97 * layers) < 0.1;  // a row of 20 disks in 20.6 D
+    });
+    ASSERT_NE(bed, study.end()) << line;
+    constexpr double rounding = 0.51;
+    EXPECT_NEAR(100 * (bed->ratio_x - 1), x, rounding) << line;
+    EXPECT_NEAR(100 * bed->error_x, x_error, rounding) << line;
+    EXPECT_NEAR(100 * (bed->ratio_z - 1), z, rounding) << line;
+    EXPECT_NEAR(100 * bed->error_z, z_error, rounding) << line;
+    ++compared;
+  }
+  EXPECT_EQ(compared, hard_disk_study().size());
 }
 
 }  // namespace

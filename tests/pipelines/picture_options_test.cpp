@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -313,6 +315,83 @@ TEST(AdviceOfProposals, NamesWhatIsChanged) {
   options.roi = {1, 2, 3, 4};
   EXPECT_THAT(advice_of({}, options), testing::EndsWith("The region and the radius given do not help: take such a "
                                                         "photograph"));
+}
+
+// --- proposals
+
+// 25 dark beads of 10 px in rows on a floor, at the left of an empty field.
+struct BedInAPicture {
+  ScratchFolder folder;
+  std::vector<Place> places = lattice(10, 5, 20, 122, 118, 0.02);
+  std::string path = (folder / "bed.pgm").string();
+  FirstLook look{path, 260, 140, {}, nullptr};
+  ExtractOptions options;
+  BedInAPicture() {
+    write_text(path, PaintedPicture(260, 140).disks(places, 10, 60).blur(0.7).noise(2).pgm());
+    look.survey.candidates = {candidate(10, dark, ingest::Channel::automatic, 0)};
+    for (const Place& place : places) add(place.x, place.y, 1);
+    options.diameter = 0.004;
+  }
+  void add(double x, double y, double probability) {
+    ingest::RimDisk disk;
+    disk.circle.x = x, disk.circle.y = y, disk.circle.radius = 10, disk.circle.support = 1;
+    disk.probability = probability;
+    look.survey.candidates[0].disks.push_back(disk);
+  }
+};
+
+TEST(ProposalsForAPicture, LeaveOutTheOptionThatExcludesBeads) {
+  BedInAPicture bed;
+  bed.options.polarity = BeadPolarity::bright, bed.options.radius = 10;
+  const std::vector<Proposal> proposals = proposals_for(bed.look, bed.options, RefusedBy::first_look);
+  ASSERT_EQ(proposals.size(), 1U);
+  EXPECT_THAT(proposals[0].leave_out, ElementsAre("--polarity"));
+  EXPECT_EQ(proposals[0].give, "");
+  EXPECT_EQ(proposals[0].options.polarity, BeadPolarity::automatic);
+  EXPECT_EQ(proposals[0].options.radius, 10) << "it excludes none";
+  EXPECT_EQ(proposals[0].seen, std::to_string(bed.places.size()) + " dark beads of 10.0 px radius");
+  EXPECT_EQ(proposals[0].found.disks.size(), bed.places.size());
+}
+
+// The circles that lie near one another, 2.5 radii beyond their centres, in whole pixels and inside the picture. One
+// that is hardly a bead counts for nothing, nor does one farther than 20 radii.
+TEST(ProposalsForAPicture, GiveTheRegionOfTheBeads) {
+  BedInAPicture bed;
+  bed.look.survey.candidates[0].few_edges = true, bed.look.survey.candidates[0].plausible = false;
+  bed.look.survey.candidates[0].credible = false;
+  bed.add(200, 30, 0.4);
+  bed.look.width = 900;  // so it is said
+  bed.add(800, 30, 1);
+  double left = 1e9, top = 1e9, right = 0, bottom = 0;
+  for (const Place& place : bed.places) {
+    left = std::min(left, place.x - 25), right = std::max(right, place.x + 25);
+    top = std::min(top, place.y - 25), bottom = std::max(bottom, place.y + 25);
+  }
+  const int from_x = std::max(0, static_cast<int>(std::floor(left))),
+            from_y = std::max(0, static_cast<int>(std::floor(top)));
+  const int width = static_cast<int>(std::ceil(right)) - from_x,
+            height = std::min(140, static_cast<int>(std::ceil(bottom))) - from_y;
+  const std::vector<Proposal> proposals = proposals_for(bed.look, bed.options, RefusedBy::first_look);
+  ASSERT_EQ(proposals.size(), 1U);
+  EXPECT_EQ(proposals[0].give, "--roi " + std::to_string(from_x) + "," + std::to_string(from_y) + "," +
+                                   std::to_string(width) + "," + std::to_string(height));
+  EXPECT_THAT(proposals[0].options.roi, ElementsAre(from_x, from_y, width, height));
+  EXPECT_THAT(proposals[0].leave_out, IsEmpty());
+  bed.look.survey.candidates[0].disks.resize(2);
+  EXPECT_THAT(proposals_for(bed.look, bed.options, RefusedBy::first_look), IsEmpty()) << "two are no region";
+}
+
+TEST(ProposalsForAPicture, MayBeInALaterOne) {
+  const BedInAPicture bed;
+  const std::string blank = (bed.folder / "blank.pgm").string();
+  write_text(blank, PaintedPicture(260, 140).noise(2).pgm());
+  const std::string count = std::to_string(bed.places.size());
+  EXPECT_EQ(advice_of_other_pictures({blank, bed.path}, bed.options),
+            "bed.pgm shows " + count + " beads: leave out the picture before it");
+  EXPECT_EQ(advice_of_other_pictures({blank, blank, bed.path}, bed.options),
+            "bed.pgm shows " + count + " beads: leave out the pictures before it");
+  EXPECT_EQ(advice_of_other_pictures({bed.path, blank}, bed.options), "") << "the first was refused";
+  EXPECT_EQ(advice_of_other_pictures({blank, blank, blank, blank, bed.path}, bed.options), "") << "three are tried";
 }
 
 // --- what is accepted

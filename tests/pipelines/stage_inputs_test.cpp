@@ -286,7 +286,7 @@ TEST(TableOfAStudy, HasItsCellsByName) {
     write_text(folder / "t.csv", text);
     return read_study_table(folder / "t.csv");
   };
-  const StudyTable read = table("# of a study\nseries,gamma,T,T_error\na,4,0.5,0.01\nb,5,,-1\nc,6,x,\n");
+  const StudyTable read = table("# of a study\nseries,gamma,T,T_error\na,4,0.5,0.01\nb,5,,-1\nc,6,x,\nd,7,1,0\n");
   EXPECT_TRUE(read.has("T_error"));
   EXPECT_FALSE(read.has("gamma_error"));
   EXPECT_EQ(read.column("T"), 2U);
@@ -296,6 +296,7 @@ TEST(TableOfAStudy, HasItsCellsByName) {
   EXPECT_FALSE(read.number(1, 2));
   EXPECT_THAT(mistake_of([&] { return read.number(2, 2); }), EndsWith("t.csv: \"x\" in column \"T\" is not a number"));
   EXPECT_EQ(read.error(0, "T"), 0.01);
+  EXPECT_EQ(read.error(3, "T"), 0);
   EXPECT_FALSE(read.error(0, "gamma"));
   EXPECT_FALSE(read.error(2, "T"));
   EXPECT_THAT(mistake_of([&] { return read.error(1, "T"); }), EndsWith("a standard error of \"T\" is negative"));
