@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/missed_beads.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/rim_gaps.hpp"
 #include "ingest/find/rim_probability.hpp"
@@ -503,6 +504,26 @@ TEST(FacesWithoutARim, AreNoBeads) {
   EXPECT_EQ(none.why_nothing, "none of the disks has a visible rim");
   finder.rims_to_be_checked = false;
   EXPECT_EQ(find_beads(frame, finder, {}).disks.size(), 20U);
+}
+
+// --- missed_beads.hpp ------------------------------------------------------------------------------------------------
+
+// A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii. What is farther than one
+// and a half radii from the disks found is not looked at.
+TEST(MissedBeads, CountByTheirArea) {
+  const auto missed = [](double radius) {
+    std::vector<RenderedDisk> truth = strewn_disks(5, 4, 26, 9);
+    truth[12].radius_px = radius;
+    truth.push_back({190, 60, 9, 0, 0});  // far from the others
+    const GrayFrame frame = strewn_frame(truth, 220, 120);
+    const RimModel model = learn_rims(frame, Polarity::dark_beads, 9).model;
+    std::vector<Circle> found = circles_of(truth);
+    found.pop_back(), found.erase(found.begin() + 12);
+    return expected_missed_beads(frame, model, found, std::nullopt);
+  };
+  EXPECT_NEAR(missed(9), 1, 1e-9);
+  EXPECT_NEAR(missed(7.2), 0.64, 1e-9);
+  EXPECT_NEAR(missed(5.4), 0.36, 1e-9);
 }
 
 }  // namespace

@@ -162,6 +162,8 @@ def choose(arguments):
     for number, room in enumerate(rooms):
         places = []
         for path in source_files(room):
+            if not path.name.endswith(arguments.suffix or ""):
+                continue
             text = path.read_text()
             places += [(path, text, fault) for fault in faults_of(text)]
         generator.shuffle(places)
@@ -717,6 +719,7 @@ def main():
     chosen.add_argument("--seed", type=int, required=True)
     chosen.add_argument("--count", type=int, required=True)
     chosen.add_argument("--room", choices=ROOMS)
+    chosen.add_argument("--suffix", help="only faults in files that end so, .cpp or .hpp")
     by_hand = commands.add_parser("named")
     by_hand.add_argument("file", type=Path)
     by_hand.add_argument("--again", action="store_true", help="judge those again that no test noticed")
