@@ -508,17 +508,18 @@ TEST(FacesWithoutARim, AreNoBeads) {
 
 // --- missed_beads.hpp ------------------------------------------------------------------------------------------------
 
-// A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii. What is farther than one
-// and a half radii from the disks found is not looked at.
+// A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii of the beads. Here four
+// beads leave room for no more than the one between them.
 TEST(MissedBeads, CountByTheirArea) {
   const auto missed = [](double radius) {
-    std::vector<RenderedDisk> truth = strewn_disks(5, 4, 26, 9);
-    truth[12].radius_px = radius;
-    truth.push_back({190, 60, 9, 0, 0});  // far from the others
+    std::vector<RenderedDisk> truth = strewn_disks(4, 4, 26, 9);
+    const double away = radius + 9.4;
+    for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}})
+      truth.push_back({165 + away * dx, 60 + away * dy, 9, 0, 0});
+    std::vector<Circle> found = circles_of(truth);
+    truth.push_back({165, 60, radius, 0, 0});
     const GrayFrame frame = strewn_frame(truth, 220, 120);
     const RimModel model = learn_rims(frame, Polarity::dark_beads, 9).model;
-    std::vector<Circle> found = circles_of(truth);
-    found.pop_back(), found.erase(found.begin() + 12);
     return expected_missed_beads(frame, model, found, std::nullopt);
   };
   EXPECT_NEAR(missed(9), 1, 1e-9);
