@@ -497,6 +497,13 @@ TEST(FacesWithoutARim, AreNoBeads) {
   EXPECT_EQ(checked.disks.size(), 20U);
   EXPECT_EQ(checked.rejected, faces.rejected);
   for (const FoundDisk& disk : checked.disks) EXPECT_GE(disk.probability, 0.95);
+  // A face like all others is a bead where a rim is seen at all, however likely chance makes up such rims.
+  const std::vector<double> learned = finder.rims->probability;
+  finder.rims->probability.assign(21, 0.6);
+  const FindResult doubtful = find_beads(frame, finder, {});
+  ASSERT_EQ(doubtful.disks.size(), 20U);
+  for (const FoundDisk& disk : doubtful.disks) EXPECT_EQ(disk.probability, 0.95);
+  finder.rims->probability = learned;
   finder.rims->polarity = Polarity::bright_beads;
   const FindResult none = find_beads(frame, finder, {});
   EXPECT_TRUE(none.disks.empty());

@@ -125,6 +125,22 @@ TEST(RenderedBed, EndsWhereItsViewIsTold) {
   EXPECT_EQ(geometry.floor, 65 - 0.5 - 10);
 }
 
+// A disk that goes right and up at sqrt(g D) = 0.2 m/s moves by 12 px each way in 12 ms: a streak from lower left to
+// upper right, seen 7 px from its middle on that diagonal and not on the other.
+TEST(RenderedBed, HasStreaksOfMovingDisks) {
+  TrajectoryFrame frame;
+  frame.width = 6.3;
+  frame.x = {3.15}, frame.z = {3}, frame.vx = {1}, frame.vz = {1}, frame.spin = {0}, frame.radius = {0.3};
+  BedOfCamera bed(bed_of_camera(), {frame});
+  RenderOptions options = plain_camera();
+  options.exposure = 0.012;
+  render_frames(options, bed.stage);
+  const ingest::GrayFrame streak = ingest::read_frame(bed.stage.output("frames") / "000000.png");
+  const int x = static_cast<int>(std::lround(11.5 + 20 * 3.15)), y = static_cast<int>(streak.height - 17.5 - 20 * 3);
+  EXPECT_LT(streak.at(x + 5, y - 5) + streak.at(x - 5, y + 5), 2 * 185);
+  EXPECT_GT(streak.at(x + 5, y + 5) + streak.at(x - 5, y - 5), 2 * 190);
+}
+
 // Beads that stand out beyond the sides by half a diameter make the bed seem wider by 1 D of 7.3.
 TEST(RenderedBed, SaysInItsPicturesWherePeriodicSidesAre) {
   BedDescription periodic = bed_of_camera();

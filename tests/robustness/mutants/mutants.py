@@ -477,7 +477,9 @@ class Bench:
             if code != 0:
                 return text or "time"
             objects.append(output)
-        libraries = {self.work / f"lib/{library}.so" for library, _ in self.shared.values()}
+        # Of the images module the program knows no function until it loads it: the fault's own must find the others.
+        own = {group for group, names in self.groups.items() if any(name in names for name, _ in parts)}
+        libraries = {self.work / f"lib/{library}.so" for library in own | {one for one, _ in self.shared.values()}}
         self.must(["c++", "-shared", "-o", str(self.fault), "-Wl,-soname,libfault.so", "-Wl,--as-needed", *objects,
                    *map(str, libraries), *self.others(), f"-Wl,-rpath,{self.work}/lib"])
         for output, names in programs.items():
