@@ -262,7 +262,7 @@ TEST(JudgementOfABed, AllowsTwoPercentForTheContactDuration) {
             "elastic.");
   EXPECT_EQ(verdict_on({}, R"({"contact_duration_effect": {"value": 0.025}})"), "holds");
   EXPECT_EQ(verdict_on({.contact_duration = 1.0005e-4}, R"({"contact_duration_effect": {"value": 0.025}})"), "holds");
-  EXPECT_EQ(verdict_on({.contact_duration = 1.002e-4}, R"({"contact_duration_effect": {"value": 0.025}})"),
+  EXPECT_EQ(verdict_on({.contact_duration = 1.0011e-4}, R"({"contact_duration_effect": {"value": 0.025}})"),
             "contact duration too long");
 }
 
