@@ -105,10 +105,6 @@ struct Start {
 // Light and profile are learned in turns. In a crystal one can imitate the other: too much light between the beads
 // looks like a wider rim. So the rounds go on until the light settles within the noise, or does not settle. In the
 // latter case the frame holds more than beads and light.
-//
-// Light and profile are learned in turns, and in a crystal the one can stand in for the other: what is too much light
-// between the beads passes for a wider rim. So it goes on until the light settles within what noise allows, or does not
-// settle: then there is more in the frame than beads and light.
 class BeadLearner {
  public:
   BeadLearner(const std::vector<const GrayFrame*>& frames, const FindOptions& options, const Start& start,

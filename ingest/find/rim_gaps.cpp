@@ -248,7 +248,7 @@ class OtherSizes {
     return gain;
   }
 
-  // The radius that most speaks for.
+  // The radius that most speaks for. Several in a row may hold the same circles: theirs is in the middle of the band.
   [[nodiscard]] std::optional<double> next_radius() const {
     struct Seen {
       std::vector<Circle> picture;
@@ -263,10 +263,18 @@ class OtherSizes {
         const SizeBand band = around(radius);
         double gain = gain_near(seen.picture, band);
         for (const auto& copy : seen.copies) gain -= gain_near(copy, band) / static_cast<double>(seen.copies.size());
-        if (gain > best_gain) best_gain = gain, best_radius = radius;
+        if (gain > best_gain) best_gain = gain, best_radius = middle_radius(seen.picture, band);
       }
     }
     return best_gain > 0 ? std::optional<double>(best_radius) : std::nullopt;
+  }
+
+  // Of the circles that say something for the band.
+  [[nodiscard]] double middle_radius(const std::vector<Circle>& circles, const SizeBand& band) const {
+    std::vector<double> radii;
+    for (const Circle& circle : circles)
+      if (gain_near({circle}, band) > 0) radii.push_back(circle.radius);
+    return median_of(std::move(radii));
   }
 
   std::optional<SizeBand> taken_near(double radius) {

@@ -460,6 +460,12 @@ TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
   for (double& height : coarse.height) height *= 4.0;
   EXPECT_EQ(blur_rows(coarse, {}, 0.0).kernel.kind, KernelKind::none);
   EXPECT_EQ(blur_rows(coarse, {}, 0.0).rows_seen, 1.0);
+  Profile two = profile;  // no rows to speak of
+  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error}) values->resize(2);
+  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::none);
+  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error})
+    values->push_back(values == &two.height ? 0.5 : values->back());
+  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::gaussian) << "three";
   Profile bare = profile;
   bare.std_error.clear();
   EXPECT_EQ(blur_rows(bare, {}, 0.0).profile.number_density, bare.number_density);

@@ -95,6 +95,18 @@ class RunsByHand : public testing::Test {
   Console console_{Console::Level::quiet};
 };
 
+// What a stage has warned of is in the outcome, and is said of a result that is kept, too.
+TEST_F(RunsByHand, KeepTheWarningsOfTheirStages) {
+  const Plan fit = plan(fit_of);
+  for (const char* state : {"f ran", "f up to date"}) {
+    const RunOutcome outcome = run(fit, options());
+    EXPECT_EQ(states(outcome.stages), state);
+    EXPECT_THAT(outcome.warnings,
+                testing::Contains(HasSubstr("p.csv: the profile does not state through which kernel")))
+        << state;
+  }
+}
+
 TEST_F(RunsByHand, KeepWhatIsUpToDateAndSayWhyNot) {
   const std::string map_after =
       R"({ "stage": "map", "from": "f", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 })";

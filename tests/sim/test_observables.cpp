@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "sim/engine/random.hpp"
 #include "sim/engine/simulation.hpp"
@@ -13,6 +14,7 @@
 #include "sim/measure/observables.hpp"
 #include "sim/measure/order.hpp"
 #include "sim/measure/velocities.hpp"
+#include "statistics/correlated_series.hpp"
 #include "tests/sim/spoilt_simulation.hpp"
 
 namespace shakebed::sim {
@@ -54,6 +56,30 @@ TEST(Flights, OfABouncingDiskHaveItsExactAverages) {
     EXPECT_NEAR(layer.pressure_zz.value, layer.weight_above.value, 1e-12) << layer.height;
   }
   EXPECT_NEAR(flights.floor_pressure().value, 1.0 / 4, 1e-12);
+}
+
+// In a layer that holds the disk all the time the mean velocity of a block is its way over its time: the error is that
+// of the mean of these.
+TEST(Flights, HaveTheErrorOfTheMeanVelocity) {
+  const double h = 2.8, fall = std::sqrt(2 * h), block = 0.37 * fall;
+  const Scene scene = dropped(h);
+  const auto simulation = simulate(scene);
+  FlightObserver flights(scene, simulation->properties(), {0, 6, 1});
+  simulation->watch(&flights);
+  flights.begin(0);
+  const auto height = [&](double time) { return h - 0.5 * std::pow(std::remainder(time, 2 * fall), 2); };
+  std::vector<double> velocities;
+  for (int k = 1; k <= 300; ++k) {
+    simulation->advance_to(block * k);
+    flights.end_block(block * k);
+    velocities.push_back((height(block * k) - height(block * (k - 1))) / block);
+  }
+  const auto layers = flights.layers();
+  ASSERT_EQ(layers.size(), 1U);
+  const statistics::Mean mean = statistics::mean_of(velocities);
+  EXPECT_NEAR(layers[0].mean_velocity_z.value, mean.value, 1e-6);
+  EXPECT_GT(mean.std_error, 1e-4);
+  EXPECT_NEAR(layers[0].mean_velocity_z.std_error / mean.std_error, 1, 0.5) << "windows of another length";
 }
 
 // Whoever watches changes nothing.

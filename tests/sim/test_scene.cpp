@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 #include <string>
 #include <typeinfo>
+#include <vector>
 
 #include "sim/engine/simulation.hpp"
 #include "sim/engine/start.hpp"
@@ -64,6 +66,20 @@ TEST(SceneCheck, RefusesWhatCannotBe) {
   EXPECT_EQ(first_problem(s), "/floor/heights");
 }
 
+// A floor from a table rises to the highest of its positions: a disk of 1 D needs as much below the lid, and no more.
+TEST(SceneCheck, LeavesRoomAboveTheHighestFloor) {
+  Scene s = bed(3, 30);
+  s.box.floor = TabulatedFloor{2, {0, 0.3, 0, -0.4}};
+  s.box.top = Lid{1.41, {}};
+  EXPECT_EQ(first_problem(s), "");
+  s.box.top = Lid{1.39, {}};
+  EXPECT_EQ(first_problem(s), "/box/lid");
+  s.box.floor = SinusoidalFloor{0.4, 0.35};
+  EXPECT_EQ(first_problem(s), "/box/lid");
+  s.box.top = Lid{1.41, {}};
+  EXPECT_EQ(first_problem(s), "");
+}
+
 TEST(SceneCheck, RefusesMoreDisksThanTheBoxHolds) {
   Scene s = bed(300, 10);
   s.box.floor = StillFloor{};
@@ -96,6 +112,20 @@ TEST(Start, NeverOverlapsAndStaysInTheBox) {
       }
     }
   }
+}
+
+// Rows as far apart as the larger disks of 2 D need: at 1.1 of these, floor(21.1/2.2) = 9 a row in a box of 23.1 D.
+TEST(Start, SpacingIsThatOfTheLargerDisks) {
+  Scene s = bed(20, 23.1);
+  s.disks.species = {{14, 1, 1}, {6, 2, 4}};
+  s.box.floor = StillFloor{};
+  s.start = HexagonalStart{0, 1.1};
+  std::vector<double> lowest;
+  for (const Placed& disk : place_disks(s))
+    if (disk.z < 1.5) lowest.push_back(disk.x);
+  std::sort(lowest.begin(), lowest.end());
+  ASSERT_EQ(lowest.size(), 9U);
+  for (std::size_t k = 0; k < 9; ++k) EXPECT_NEAR(lowest[k], 1 + 2.2 * static_cast<double>(k), 1e-9);
 }
 
 TEST(Start, IsTheSameForTheSameSeedAndAnotherForAnother) {

@@ -238,6 +238,8 @@ TEST(CorrelatedSeries, KnowsTheCovarianceOfMeans) {
     EXPECT_NEAR(one[i] * 8'000, expected[i], 4.5 * scale[i] * std::sqrt(2.0 / 8'000)) << i;
     EXPECT_NEAR(ten[i] * 8'000, expected[i], 4.5 * scale[i] * std::sqrt(2.0 / 600)) << i;
   }
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < i; ++j) EXPECT_EQ(ten[3 * i + j], ten[3 * j + i]) << i << ' ' << j;
   EXPECT_DOUBLE_EQ(part[0], 2 * ten[4]);
   EXPECT_DOUBLE_EQ(part[1], 2 * ten[5]);
   EXPECT_DOUBLE_EQ(part[2], part[1]);

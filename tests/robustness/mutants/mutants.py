@@ -162,6 +162,8 @@ def choose(arguments):
     for number, room in enumerate(rooms):
         places = []
         for path in source_files(room):
+            if not path.name.endswith(arguments.suffix or ""):
+                continue
             text = path.read_text()
             places += [(path, text, fault) for fault in faults_of(text)]
         generator.shuffle(places)
@@ -475,7 +477,9 @@ class Bench:
             if code != 0:
                 return text or "time"
             objects.append(output)
-        libraries = {self.work / f"lib/{library}.so" for library, _ in self.shared.values()}
+        # Of the images module the program knows no function until it loads it: the fault's own must find the others.
+        own = {group for group, names in self.groups.items() if any(name in names for name, _ in parts)}
+        libraries = {self.work / f"lib/{library}.so" for library in own | {one for one, _ in self.shared.values()}}
         self.must(["c++", "-shared", "-o", str(self.fault), "-Wl,-soname,libfault.so", "-Wl,--as-needed", *objects,
                    *map(str, libraries), *self.others(), f"-Wl,-rpath,{self.work}/lib"])
         for output, names in programs.items():
@@ -717,6 +721,7 @@ def main():
     chosen.add_argument("--seed", type=int, required=True)
     chosen.add_argument("--count", type=int, required=True)
     chosen.add_argument("--room", choices=ROOMS)
+    chosen.add_argument("--suffix", help="only faults in files that end so, .cpp or .hpp")
     by_hand = commands.add_parser("named")
     by_hand.add_argument("file", type=Path)
     by_hand.add_argument("--again", action="store_true", help="judge those again that no test noticed")
