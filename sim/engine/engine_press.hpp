@@ -260,7 +260,7 @@ void Engine<Space, Rule, Sizes>::soften_pressed() {
   pressed_.soften(press_contact_time_);
 }
 
-// Contacts as short as that or, if the springs of the bed would then hold more than `most`, not as short.
+// Shortens the contact time to `contact_time`. Shortens it less if the springs would then hold more energy than `most`.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::harden_pressed(double contact_time, double most) {
   if (press_contact_time_ <= contact_time) return;
@@ -275,7 +275,7 @@ void Engine<Space, Rule, Sizes>::harden_pressed(double contact_time, double most
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::adapt_contact_time(bool stays) {
   const bool flies = pressed_.floor_force() == 0;
-  // In flight it is not yet as fast as it will land.
+  // A bed in flight will land faster than it moves now, about as fast as the floor.
   const double least = flies ? floor_speed_ * floor_speed_ : 0;
   const double square = std::max(pressed_.mean_square_speed(), least), longest = landing_travel / std::sqrt(square);
   if (stays && flies && pressed_.touching() < released_touching * count_) {

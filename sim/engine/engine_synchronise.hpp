@@ -122,7 +122,7 @@ void Engine<Space, Rule, Sizes>::bound_shells(double density, double height, dou
 
 // How far ahead of its disk a shell is centred: a mean free path of hard disks, where that is a good part of the shell.
 // So a disk that is not hit crosses almost the whole shell. A disk that is hit many times on its way stays longest in a
-// shell round the place where it is. Tiles need such shells, too, since a disk may have to go back.
+// shell round the place where it is. So it is in tiles, where a disk may have to go back.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::choose_ahead(double density) {
   constexpr double least = 0.25, most = 0.75;  // of the shell's radius

@@ -15,6 +15,7 @@
 #include "pipelines/stages/answer.hpp"
 #include "pipelines/stages/bed_judgement.hpp"
 #include "pipelines/stages/hard_disk_trust.hpp"
+#include "tests/pipelines/decoded_scene.hpp"
 #include "tests/pipelines/lone_stage.hpp"
 
 namespace {
@@ -179,18 +180,12 @@ struct JudgedBed {
 };
 SceneOptions judged_scene(const JudgedBed& bed) {
   std::vector<Problem> problems;
-  const auto node = parse_json(
+  SceneOptions options = tests::decoded_scene(
       fmt::format(R"({{ "disks": {{ "count": 61, "restitution": {}, "friction": {}, "tangential_restitution": {},
       "contact_duration": {} }}, "box": {{ "width": {} }},
       "floor": {{ "motion": "sinusoidal", "gamma": {}, "frequency": 0.5 }} }})",
                   bed.restitution, bed.friction, bed.tangential, bed.contact_duration, bed.width, bed.gamma),
-      "bed.json", problems);
-  Fields::Source source{.file = "bed.json"};
-  source.problems = &problems;
-  SceneOptions options;
-  Fields fields = Fields::decode(*node, "", source);
-  fields.set_reduced(true);
-  options.describe(fields);
+      problems, true);
   EXPECT_TRUE(problems.empty());
   return options;
 }

@@ -12,25 +12,20 @@
 #include "pipelines/formats/json.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "sim/engine/simulation.hpp"
+#include "tests/pipelines/decoded_scene.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
 
 using namespace shakebed;
 using namespace shakebed::pipelines;
+using tests::decoded_scene;
 using tests::ScratchFolder;
 using tests::write_text;
 
 std::vector<std::string> problems_of(const std::string& text, bool reduced = false) {
   std::vector<Problem> problems;
-  const auto node = parse_json(text, "bed.json", problems);
-  Fields::Source source{.file = "bed.json"};
-  source.problems = &problems;
-  SceneOptions options;
-  Fields fields = Fields::decode(*node, "", source);
-  fields.set_reduced(reduced);
-  options.describe(fields);
-  fields.finish();
+  decoded_scene(text, problems, reduced);
   std::vector<std::string> words;
   for (const Problem& problem : problems) words.push_back(problem.pointer + ": " + problem.what);
   return words;

@@ -20,6 +20,7 @@
 #include "pipelines/stages/scene_options.hpp"
 #include "pipelines/stages/study_numbers.hpp"
 #include "pipelines/stages/study_table.hpp"
+#include "tests/pipelines/decoded_scene.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -127,15 +128,10 @@ TEST(StartFromAFile, MustHoldTheDisksOfTheBed) {
 
 SceneOptions scene_with(const std::string& disks, const std::string& rest, bool reduced = false) {
   std::vector<Problem> problems;
-  const auto node = parse_json(fmt::format(R"({{ "disks": {{ "count": 40{} }}, "box": {{ "width": {} {} }})", disks,
-                                           reduced ? "12.3" : "\"49.2 mm\"", rest),
-                               "bed.json", problems);
-  Fields::Source source{.file = "bed.json"};
-  source.problems = &problems;
-  SceneOptions options;
-  Fields fields = Fields::decode(*node, "", source);
-  fields.set_reduced(reduced);
-  options.describe(fields);
+  SceneOptions options =
+      tests::decoded_scene(fmt::format(R"({{ "disks": {{ "count": 40{} }}, "box": {{ "width": {} {} }})", disks,
+                                       reduced ? "12.3" : "\"49.2 mm\"", rest),
+                           problems, reduced);
   for (const Problem& problem : problems) ADD_FAILURE() << problem.pointer << ": " << problem.what;
   return options;
 }
