@@ -15,6 +15,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/learned_beads.hpp"
 #include "ingest/profile/film_calibration.hpp"
+#include "ingest/profile/frame_findings.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
@@ -314,6 +315,83 @@ TEST(SmallFilm, APhotographInMemoryIsFound) {
   EXPECT_EQ(find_disks({0, 130, even.data(), PixelType::u8, 0}).status, FindStatus::bad_input);
   seen.radius_px = -1;
   EXPECT_EQ(find_disks(view, seen).status, FindStatus::bad_input);
+}
+
+// A frame that is said to be reduced by 2 gives what it gives by itself, in pixels half as large. Column 0 of the one
+// is at 1/2 of the other.
+TEST(SmallFilm, ReducedIsItselfInSmallerPixels) {
+  for (const bool floor_given : {true, false}) {
+    const std::vector<GrayFrame> frames = {small_frame(four_rows()), small_frame(four_rows(2))};
+    MeasureOptions options = small_options();
+    options.left_wall_px = 9.75, options.right_wall_px = 134.75;
+    if (floor_given) options.floor_px = 111, options.floor_slope = 0.01;
+    const Measurement own = measured(frames, options);
+    options.left_wall_px = 20, options.right_wall_px = 270;
+    if (floor_given) options.floor_px = 222.5 - 0.01 * 0.5;
+    options.find.seen->radius_px = 16, options.reduction = 2;
+    const Measurement twice = measured(frames, options);
+    ASSERT_EQ(own.disks.size(), 48U);
+    ASSERT_EQ(twice.disks.size(), 48U);
+    for (std::size_t k = 0; k < 48; ++k) {
+      EXPECT_NEAR(twice.disks[k].x_px, 2 * own.disks[k].x_px + 0.5, 1e-9);
+      EXPECT_NEAR(twice.disks[k].y_px, 2 * own.disks[k].y_px + 0.5, 1e-9);
+      EXPECT_NEAR(twice.disks[k].radius_px, 2 * own.disks[k].radius_px, 1e-9);
+      EXPECT_NEAR(twice.disks[k].std_error_px, 2 * own.disks[k].std_error_px, 1e-12);
+      EXPECT_NEAR(twice.disks[k].variance_x, 4 * own.disks[k].variance_x, 1e-12);
+      EXPECT_NEAR(twice.disks[k].variance_y, 4 * own.disks[k].variance_y, 1e-12);
+      EXPECT_NEAR(twice.disks[k].covariance_xy, 4 * own.disks[k].covariance_xy, 1e-12);
+      EXPECT_NEAR(twice.disks[k].x, own.disks[k].x, 1e-9);
+      EXPECT_NEAR(twice.disks[k].z, own.disks[k].z, 1e-9);
+    }
+    const BedCalibration &a = own.calibration, &b = twice.calibration;
+    EXPECT_NEAR(b.scale_m_per_px, 0.5 * a.scale_m_per_px, 1e-15);
+    EXPECT_NEAR(b.radius_px, 2 * a.radius_px, 1e-9);
+    EXPECT_NEAR(b.radius_std_error_px, 2 * a.radius_std_error_px, 1e-9);
+    EXPECT_NEAR(b.edge_width_px, 2 * a.edge_width_px, 1e-9);
+    EXPECT_NEAR(b.floor_px, 2 * a.floor_px + 0.5 - 0.5 * a.floor_slope, 1e-9);
+    EXPECT_EQ(b.floor_slope, a.floor_slope);
+    EXPECT_EQ(a.floor_std_error_px > 0, !floor_given);
+    EXPECT_NEAR(b.floor_std_error_px, 2 * a.floor_std_error_px, 1e-9);
+    EXPECT_NEAR(b.left_wall_px, 20, 1e-9);
+    EXPECT_NEAR(b.right_wall_px, 270, 1e-9);
+    EXPECT_NEAR(b.width, a.width, 1e-9);
+    EXPECT_NEAR(twice.contacts.nearest_px, 2 * own.contacts.nearest_px, 1e-9);
+    EXPECT_NEAR(twice.contacts.touching_px, 2 * own.contacts.touching_px, 1e-9);
+    EXPECT_EQ(twice.bed_region.width, 2 * own.bed_region.width);
+    EXPECT_EQ(twice.bed_region.height, 2 * own.bed_region.height);
+    ASSERT_EQ(twice.profile.bins.count, own.profile.bins.count);
+    for (std::size_t k = 0; k < own.profile.bins.count; ++k)
+      EXPECT_NEAR(twice.profile.number_density[k], own.profile.number_density[k], 1e-9);
+  }
+}
+
+// The rows' covered area is that of the beads between the walls given, and of all where the sides are periodic. A wall
+// through the middle of a column of four, at 20.4 px, leaves what lies right of the edge of pixel 20: half of each,
+// less a strip of 0.1 px.
+TEST(SmallFilm, CoversTheAreaBetweenItsWalls) {
+  const GrayFrame frame = small_frame(four_rows());
+  MeasureOptions options = small_options();
+  const auto beads_covered = [&] {
+    FrameSource source = FrameSource::from_frames({frame});
+    const FilmCalibration film = calibrate_film(source, options);
+    source.rewind();
+    auto item = source.next_item();
+    const FrameFindings findings = FrameExaminer(film).examine(*item);
+    double sum = 0;
+    for (const float row : findings.coverage_of_row) sum += static_cast<double>(row);
+    EXPECT_EQ(findings.coverage_of_row.size(), 130U);
+    return sum / (std::numbers::pi * film.finder.radius_px * film.finder.radius_px);
+  };
+  const double strip = 1.6 / (std::numbers::pi * 64), all = beads_covered();
+  EXPECT_NEAR(all, 24, 0.5);
+  options.left_wall_px = 30.5;
+  EXPECT_NEAR(beads_covered() / all, 20.0 / 24, 3e-3);
+  options.left_wall_px = 20.4;
+  EXPECT_NEAR(beads_covered() / all, (22 - 4 * strip) / 24, 3e-3);
+  options.right_wall_px = 111;
+  EXPECT_NEAR(beads_covered() / all, (18 - 4 * strip) / 24, 3e-3);
+  options.periodic_sides = true;
+  EXPECT_NEAR(beads_covered() / all, 1, 1e-12);
 }
 
 }  // namespace
