@@ -493,6 +493,12 @@ TEST(PictureParts, TheBusiestIsTheFirstOfMostChange) {
     }
 }
 
+TEST(PictureParts, OfAnEvenPictureAreItsFirst) {
+  const PicturePart part = busiest_part(even_frame(53, 47, 9), 22, {5, 1, 1});
+  EXPECT_EQ(part.left, 0);
+  EXPECT_EQ(part.top, 0);
+}
+
 // Eighths of a side apart, and at the far ends: the first that holds most.
 TEST(PictureParts, WithMostPlacesIsTheFirstOfAll) {
   for (int pattern = 0; pattern < 12; ++pattern) {
