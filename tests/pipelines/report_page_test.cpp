@@ -356,6 +356,8 @@ TEST_F(ReportPage, CrateNamesFilesOfTheUserOnce) {
   EXPECT_EQ(names_of(found.at("#run-g")["object"]), "resolved.json #input-2-r.csv");
   EXPECT_EQ(names_of(found.at("#run-h")["object"]), "resolved.json #input-1-p%20q.csv");
   EXPECT_EQ(found.at("#input-1-p%20q.csv")["name"], "p q.csv");
+  EXPECT_EQ(found.at("#input-2-r.csv")["name"], "r.csv");
+  EXPECT_EQ(found.size(), crate_json(plan_, outcome_)["@graph"].size()) << "each once";
 }
 
 }  // namespace

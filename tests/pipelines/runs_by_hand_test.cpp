@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -27,6 +28,7 @@ namespace {
 
 using namespace shakebed::pipelines;
 using namespace shakebed::tests;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -448,6 +450,9 @@ TEST_F(MovedPoints, AreFoundByTheirKeys) {
   EXPECT_EQ(places({{"000000", "d"}, {"000003", "d"}}), "") << "000003 is at home, and nobody else has d";
   hold("000005", "d");
   EXPECT_EQ(places({{"000000", "d"}, {"000003", "d"}}), "000000 from 000005; ");
+  EXPECT_THAT(places({{"000001", "d"}, {"000002", "d"}}),
+              AnyOf("000001 from 000003; 000002 from 000005; ", "000001 from 000005; 000002 from 000003; "))
+      << "each is taken once";
 }
 
 TEST_F(MovedPoints, AreExchangedUntilEachIsAtHome) {
@@ -469,6 +474,23 @@ TEST_F(MovedPoints, AreExchangedUntilEachIsAtHome) {
   }
   EXPECT_EQ(held(), "000001 d, 000002 a, 000003 c, 000004 b");
   EXPECT_EQ(moved(back), "000001 a, 000002 d, 000003 c, 000004 b");
+}
+
+TEST_F(MovedPoints, AreAtHomeAfterEveryPermutation) {
+  std::string before = "abcd", after = before;
+  do {
+    std::filesystem::remove_all(points_);
+    NamedKeys points;
+    std::string all;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string name = "00000" + std::to_string(k);
+      hold(name, before.substr(k, 1));
+      points.emplace_back(name, after.substr(k, 1));
+      all += (k > 0 ? ", " : "") + name + " " + after.substr(k, 1);
+    }
+    move_to_own_places(earlier_places(points, points_), points_);
+    ASSERT_EQ(held(), all);
+  } while (std::next_permutation(after.begin(), after.end()));
 }
 
 // --- what is gathered of a point
