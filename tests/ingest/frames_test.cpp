@@ -415,5 +415,19 @@ TEST(Frames, WritingWhereNothingCanBeWrittenSaysSo) {
   EXPECT_THROW(write_png("a.png", GrayFrame{}), InputError);
 }
 
+TEST_P(Films, StateTheirRate) {
+  const ScratchFolder folder;
+  const auto& [ending, code] = GetParam();
+  const std::string path = folder / (std::string("film.") + ending);
+  if (!write_film(path, cv::VideoWriter::fourcc(code[0], code[1], code[2], code[3]), 12))
+    GTEST_SKIP() << "this OpenCV cannot write " << ending;
+  EXPECT_EQ(FrameSource::open({path}).film_rate_hz(), 25);
+  EXPECT_EQ(FrameSource::open({path}, {.stride = 5}).film_rate_hz(), 5);
+  EXPECT_FALSE(FrameSource::open({path, path}).film_rate_hz()) << "two films have no time in common";
+  EXPECT_FALSE(FrameSource::open({path}).count_if_known());
+  write_png(folder / "a.png", ramp(8, 8, 1));
+  EXPECT_FALSE(FrameSource::open({folder / "a.png"}).film_rate_hz());
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

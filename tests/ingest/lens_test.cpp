@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/synthetic/random_stream.hpp"
@@ -118,6 +119,43 @@ TEST(Lens, ThatHardlyBendsLeavesEveryPixel) {
                     1e-3)
             << column << ' ' << row;
   }
+}
+
+// A level that is quadratic in the recorded place is met by the cubic through four pixels: each pixel of a corrected
+// frame has the level of the place where it was seen. The corners move by the radial term, the middle stays.
+TEST(Lens, CorrectedFramesShowWhatWasSeenThere) {
+  GrayFrame frame;
+  frame.width = 60, frame.height = 44;
+  const auto level = [](double x, double y) { return 20 + 0.05 * x * x + 0.07 * y * y - 0.03 * x * y + x; };
+  for (int row = 0; row < 44; ++row)
+    for (int column = 0; column < 60; ++column) frame.pixels.push_back(static_cast<float>(level(column, row)));
+  for (const Lens& lens : {Lens{1.07, 0}, Lens{0.8, 0}, Lens{1.07, 0.1}, Lens{0.8, -0.12}, Lens{1, 0.2}}) {
+    const LensMap map(lens, 60, 44);
+    const int more_x = lens.radial > 0 ? static_cast<int>(std::ceil(30 * lens.pixel_aspect * lens.radial)) : 0;
+    const int more_y = lens.radial > 0 ? static_cast<int>(std::ceil(22 * lens.radial)) : 0;
+    EXPECT_EQ(map.width(), std::lround(60 * lens.pixel_aspect) + 2 * more_x);
+    EXPECT_EQ(map.height(), 44 + 2 * more_y);
+    const double half_width = 30 * lens.pixel_aspect;
+    const PixelPlace corner = map.to_true({-0.5, 43.5}), middle = map.to_true({29.5, 21.5});
+    EXPECT_NEAR(middle.x, half_width - 0.5 + more_x, 1e-9);
+    EXPECT_NEAR(middle.y, 21.5 + more_y, 1e-9);
+    EXPECT_NEAR(corner.x - middle.x, -half_width * (1 + lens.radial), 1e-9);
+    EXPECT_NEAR(corner.y - middle.y, 22 * (1 + lens.radial), 1e-9);
+    const GrayFrame seen = map.corrected(frame);
+    int inside = 0;
+    for (int row = 0; row < seen.height; ++row)
+      for (int column = 0; column < seen.width; ++column) {
+        const PixelPlace at = map.to_recorded({1.0 * column, 1.0 * row});
+        if (at.x >= 1 && at.x <= 58 && at.y >= 1 && at.y <= 42) {
+          ASSERT_NEAR(seen.at(column, row), level(at.x, at.y), 2e-3) << lens.radial << ' ' << column << ' ' << row;
+          ++inside;
+        } else if (at.x < 0 && at.y < 0) {
+          ASSERT_NEAR(seen.at(column, row), level(0, 0), 1e-3) << "beyond the border its outermost pixels";
+        }
+      }
+    EXPECT_GT(inside, 1200);
+  }
+  EXPECT_THROW((LensMap{{1, 0.1}, 60, 45}.corrected(frame)), std::invalid_argument);
 }
 
 struct Case {

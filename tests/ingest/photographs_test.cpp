@@ -219,5 +219,40 @@ TEST(Photographs, PicturesThatCannotBeReadAreSkippedInTheFirstLook) {
   EXPECT_FALSE(look_at_first({{folder / "broken.png", 0}}, {}).has_value());
 }
 
+// What is said of disks and beds, word by word.
+TEST(Photographs, SayWhatWasFound) {
+  DisksFound disks;
+  disks.message = "the image is empty";
+  EXPECT_EQ(disks.brief(), "bad input: the image is empty");
+  EXPECT_EQ(disks.full(), "bad input: the image is empty\n");
+  disks.status = FindStatus::ok, disks.disks.resize(3), disks.expected_wrong = 0.0123;
+  FinderCalibration& finder = disks.calibration;
+  finder.polarity = Polarity::bright_beads, finder.radius_px = 9.87654, finder.radius_std_error_px = 0.0123;
+  finder.edge_width_px = 0.87654, finder.noise_level = 2.3456, finder.contrast_level = -80.567;
+  finder.expected_missed = 0.0456, finder.warnings = {"first", "second"};
+  EXPECT_EQ(disks.brief(), "3 bright disks of radius 9.877 +- 0.012 px");
+  EXPECT_EQ(disks.full(),
+            "3 bright disks of radius 9.877 +- 0.012 px\nedge width       0.877 px\nnoise            2.35 grey levels\n"
+            "contrast         -80.57 grey levels\nexpected wrong   1.2 % of the disks\n"
+            "expected missed  4.6 % of the beads\nwarning          first\nwarning          second\n");
+  finder.polarity = Polarity::dark_beads;
+  EXPECT_EQ(disks.brief(), "3 dark disks of radius 9.877 +- 0.012 px");
+  BedFound bed;
+  bed.status = FindStatus::doubtful, bed.message = "why";
+  EXPECT_EQ(bed.full(), "doubtful: why\n");
+  bed.status = FindStatus::ok;
+  Measurement& found = bed.measurement;
+  found.disk_total = 47, found.frames.resize(4), found.disk_count_mean = 15.6667;
+  found.calibration.radius_px = 8.0123, found.calibration.width = 6.875, found.calibration.scale_m_per_px = 1.234567e-4;
+  found.calibration.floor_px = 110.256, found.calibration.floor_tilt_degrees = 1.2345;
+  found.calibration.left_wall_px = 9.5, found.calibration.right_wall_px = 119.251;
+  found.profile.number_density.resize(12), found.profile.independent_samples = 3;
+  found.warnings = {"only"};
+  EXPECT_EQ(bed.full(),
+            "47 disks in 4 frames (15.67 a frame), radius 8.012 px, width 6.88 D\nscale            0.123457 mm/px\n"
+            "floor            row 110.26 px, tilted by 1.23 degrees\nwalls            columns 9.50 and 119.25 px\n"
+            "profile          12 heights, 3 independent frames\nwarning          only\n");
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

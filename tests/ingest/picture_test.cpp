@@ -11,8 +11,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/frames/frames.hpp"
@@ -458,6 +460,66 @@ TEST(DrawingSigns, SpeakForADrawingFromTheirLimitsOn) {
   EXPECT_NE(why_drawn(signs_by(0.5, 1, 5), 0.9), nullptr);
   EXPECT_NE(why_drawn(signs_by(0.7, 0.1, 0), 0.49), nullptr);
   EXPECT_EQ(why_drawn(signs_by(0.7, 0.1, 0), 0.5), nullptr);
+}
+
+// --- picture_parts.hpp, by trying every place ------------------------------------------------------------------------
+
+TEST(PictureParts, TheBusiestIsTheFirstOfMostChange) {
+  for (int pattern = 0; pattern < 6; ++pattern)
+    for (const ChangeSampling sampling : {ChangeSampling{5, 1, 1}, ChangeSampling{6, 2, 2}, ChangeSampling{7, 2, 3}}) {
+      const GrayFrame frame = test::frame_by(53, 47, [&](int column, int row) {
+        return 100 * test::scattered(column + 31 * pattern, row) * test::scattered(column / 9 + pattern, row / 8);
+      });
+      constexpr int side = 22;
+      const int block = sampling.block, across = side / block;
+      double most = -1;
+      int first_column = 0, first_row = 0;
+      for (int down = 0; down + across <= 47 / block; ++down)
+        for (int over = 0; over + across <= 53 / block; ++over) {
+          double change = 0;
+          for (int y = down * block; y < (down + across) * block; ++y)
+            for (int x = over * block; x < (over + across) * block; ++x) {
+              const int in_x = x % block, in_y = y % block;  // of its block
+              if (in_x % sampling.stride != 0 || in_y % 2 != 0 || std::max(in_x, in_y) + sampling.reach >= block)
+                continue;
+              change += std::abs(frame.at(x + sampling.reach, y) - frame.at(x, y)) +
+                        std::abs(frame.at(x, y + sampling.reach) - frame.at(x, y));
+            }
+          if (change > most * (1 + 1e-9)) most = change, first_column = over * block, first_row = down * block;
+        }
+      const PicturePart part = busiest_part(frame, side, sampling);
+      EXPECT_EQ(part.left, std::min(first_column, 53 - side)) << pattern << ' ' << block;
+      EXPECT_EQ(part.top, std::min(first_row, 47 - side)) << pattern << ' ' << block;
+    }
+}
+
+TEST(PictureParts, OfAnEvenPictureAreItsFirst) {
+  const PicturePart part = busiest_part(even_frame(53, 47, 9), 22, {5, 1, 1});
+  EXPECT_EQ(part.left, 0);
+  EXPECT_EQ(part.top, 0);
+}
+
+// Eighths of a side apart, and at the far ends: the first that holds most.
+TEST(PictureParts, WithMostPlacesIsTheFirstOfAll) {
+  for (int pattern = 0; pattern < 12; ++pattern) {
+    std::vector<std::pair<double, double>> places;
+    for (int k = 0; k < 14; ++k)
+      places.emplace_back(100 * test::scattered(k, pattern), 70 * test::scattered(pattern + 5, 3 * k));
+    std::vector<int> lefts, tops;
+    for (int at = 0; at < 100 - 33; at += 4) lefts.push_back(at);
+    for (int at = 0; at < 70 - 33; at += 4) tops.push_back(at);
+    lefts.push_back(100 - 33), tops.push_back(70 - 33);
+    int most = -1, best_left = 0, best_top = 0;
+    for (const int row : tops)
+      for (const int column : lefts) {
+        int held = 0;
+        for (const auto& [x, y] : places) held += x >= column && x < column + 33 && y >= row && y < row + 33;
+        if (held > most) most = held, best_left = column, best_top = row;
+      }
+    const PicturePart part = part_with_most(places, 33, 100, 70);
+    EXPECT_EQ(part.left, best_left) << pattern;
+    EXPECT_EQ(part.top, best_top) << pattern;
+  }
 }
 
 }  // namespace

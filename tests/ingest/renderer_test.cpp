@@ -329,5 +329,63 @@ TEST(SyntheticRows, AreAHoneycombOnTheFloor) {
   EXPECT_THROW(make_synthetic_bed(loose), std::invalid_argument);
 }
 
+// One speck a frame: a disk of one shade with an edge of a pixel, 0.4 to 1.6 times the size asked for, that leaves 0.35
+// to 0.85 of the light, anywhere. Means over the seeds within five standard errors of those of even chances.
+TEST(DrawnPixels, OfASpeckAreItsDiskInItsShade) {
+  double specks = 0, radii = 0, shades = 0, middle_x = 0, middle_y = 0, smallest = 1e9, largest = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Camera camera = unrounded(200, 160);
+    camera.dust_fraction = 1e-9, camera.dust_size_px = 12, camera.seed = seed;
+    const GrayFrame frame = render_frame({}, camera);
+    double loss = 0, most = 0, x = 0, y = 0;
+    bool cut = false;
+    for (int row = 0; row < 160; ++row)
+      for (int column = 0; column < 200; ++column) {
+        const double lost = 1 - static_cast<double>(frame.at(column, row)) / 200;
+        cut = cut || (lost > 1e-6 && (row == 0 || column == 0 || row == 159 || column == 199));
+        loss += lost, most = std::max(most, lost), x += lost * column, y += lost * row;
+      }
+    if (cut) continue;
+    x /= loss, y /= loss;
+    const double radius = std::sqrt(loss / most / std::numbers::pi - 1.0 / 12);
+    for (int row = 0; row < 160; ++row)
+      for (int column = 0; column < 200; ++column)
+        ASSERT_NEAR(1 - frame.at(column, row) / 200,
+                    most * std::clamp(radius + 0.5 - std::hypot(column - x, row - y), 0.0, 1.0), 0.1 * most)
+            << seed << ' ' << column << ' ' << row;
+    ++specks, radii += radius, shades += 1 - most, middle_x += x, middle_y += y;
+    smallest = std::min(smallest, radius), largest = std::max(largest, radius);
+    EXPECT_TRUE(1 - most > 0.35 - 1e-6 && 1 - most < 0.85 + 1e-6) << seed;
+  }
+  ASSERT_GT(specks, 45);
+  EXPECT_GT(smallest, 0.4 * 6 - 0.1);
+  EXPECT_LT(smallest, 0.4 * 6 + 1);
+  EXPECT_GT(largest, 1.6 * 6 - 1);
+  EXPECT_LT(largest, 1.6 * 6 + 0.1);
+  const double root = std::sqrt(12 * specks);
+  EXPECT_NEAR(radii / specks, 6, 5 * 1.2 * 6 / root);
+  EXPECT_NEAR(shades / specks, 0.6, 5 * 0.5 / root);
+  EXPECT_NEAR(middle_x / specks, 100, 5 * 200 / root);
+  EXPECT_NEAR(middle_y / specks, 80, 5 * 160 / root);
+}
+
+// 20,000 beads beside a frame of a pixel: their shares within five standard errors, the same in every frame.
+TEST(DrawnPixels, MissOrShineThroughInTheSharesAsked) {
+  Camera camera = unrounded(1, 1);
+  camera.missing_fraction = 0.2, camera.transparent_fraction = 0.3;
+  const std::vector<RenderedDisk> disks(20000, RenderedDisk{-50, -50, 1, 0, 0});
+  const FrameRenderer renderer(camera);
+  std::vector<DrawnAs> first, later;
+  (void)renderer.render(disks, 0, &first);
+  (void)renderer.render(disks, 7, &later);
+  EXPECT_EQ(first, later);
+  const auto count = [&](DrawnAs fate) { return static_cast<double>(std::count(first.begin(), first.end(), fate)); };
+  EXPECT_NEAR(count(DrawnAs::missing), 4000, 5 * std::sqrt(20000 * 0.2 * 0.8));
+  EXPECT_NEAR(count(DrawnAs::transparent), 6000, 5 * std::sqrt(20000 * 0.3 * 0.7));
+  camera.seed = 2;
+  (void)FrameRenderer(camera).render(disks, 0, &later);
+  EXPECT_NE(first, later);
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

@@ -14,7 +14,9 @@
 #include "ingest/find/find_disks.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/learned_beads.hpp"
+#include "ingest/find/missed_beads.hpp"
 #include "ingest/profile/film_calibration.hpp"
+#include "ingest/profile/frame_findings.hpp"
 #include "ingest/profile/measure_bed.hpp"
 #include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
@@ -314,6 +316,251 @@ TEST(SmallFilm, APhotographInMemoryIsFound) {
   EXPECT_EQ(find_disks({0, 130, even.data(), PixelType::u8, 0}).status, FindStatus::bad_input);
   seen.radius_px = -1;
   EXPECT_EQ(find_disks(view, seen).status, FindStatus::bad_input);
+}
+
+// A frame that is said to be reduced by 2 gives what it gives by itself, in pixels half as large. Column 0 of the one
+// is at 1/2 of the other.
+TEST(SmallFilm, ReducedIsItselfInSmallerPixels) {
+  for (const bool floor_given : {true, false}) {
+    const std::vector<GrayFrame> frames = {small_frame(four_rows()), small_frame(four_rows(2))};
+    MeasureOptions options = small_options();
+    options.left_wall_px = 9.75, options.right_wall_px = 134.75;
+    if (floor_given) options.floor_px = 111, options.floor_slope = 0.01;
+    const Measurement own = measured(frames, options);
+    options.left_wall_px = 20, options.right_wall_px = 270;
+    if (floor_given) options.floor_px = 222.5 - 0.01 * 0.5;
+    options.find.seen->radius_px = 16, options.reduction = 2;
+    const Measurement twice = measured(frames, options);
+    ASSERT_EQ(own.disks.size(), 48U);
+    ASSERT_EQ(twice.disks.size(), 48U);
+    for (std::size_t k = 0; k < 48; ++k) {
+      EXPECT_NEAR(twice.disks[k].x_px, 2 * own.disks[k].x_px + 0.5, 1e-9);
+      EXPECT_NEAR(twice.disks[k].y_px, 2 * own.disks[k].y_px + 0.5, 1e-9);
+      EXPECT_NEAR(twice.disks[k].radius_px, 2 * own.disks[k].radius_px, 1e-9);
+      EXPECT_NEAR(twice.disks[k].std_error_px, 2 * own.disks[k].std_error_px, 1e-12);
+      EXPECT_NEAR(twice.disks[k].variance_x, 4 * own.disks[k].variance_x, 1e-12);
+      EXPECT_NEAR(twice.disks[k].variance_y, 4 * own.disks[k].variance_y, 1e-12);
+      EXPECT_NEAR(twice.disks[k].covariance_xy, 4 * own.disks[k].covariance_xy, 1e-12);
+      EXPECT_NEAR(twice.disks[k].x, own.disks[k].x, 1e-9);
+      EXPECT_NEAR(twice.disks[k].z, own.disks[k].z, 1e-9);
+    }
+    const BedCalibration &a = own.calibration, &b = twice.calibration;
+    EXPECT_NEAR(b.scale_m_per_px, 0.5 * a.scale_m_per_px, 1e-15);
+    EXPECT_NEAR(b.radius_px, 2 * a.radius_px, 1e-9);
+    EXPECT_NEAR(b.radius_std_error_px, 2 * a.radius_std_error_px, 1e-9);
+    EXPECT_NEAR(b.edge_width_px, 2 * a.edge_width_px, 1e-9);
+    EXPECT_NEAR(b.floor_px, 2 * a.floor_px + 0.5 - 0.5 * a.floor_slope, 1e-9);
+    EXPECT_EQ(b.floor_slope, a.floor_slope);
+    EXPECT_EQ(a.floor_std_error_px > 0, !floor_given);
+    EXPECT_NEAR(b.floor_std_error_px, 2 * a.floor_std_error_px, 1e-9);
+    EXPECT_NEAR(b.left_wall_px, 20, 1e-9);
+    EXPECT_NEAR(b.right_wall_px, 270, 1e-9);
+    EXPECT_NEAR(b.width, a.width, 1e-9);
+    EXPECT_NEAR(twice.contacts.nearest_px, 2 * own.contacts.nearest_px, 1e-9);
+    EXPECT_NEAR(twice.contacts.touching_px, 2 * own.contacts.touching_px, 1e-9);
+    EXPECT_EQ(twice.bed_region.width, 2 * own.bed_region.width);
+    EXPECT_EQ(twice.bed_region.height, 2 * own.bed_region.height);
+    ASSERT_EQ(twice.profile.bins.count, own.profile.bins.count);
+    for (std::size_t k = 0; k < own.profile.bins.count; ++k)
+      EXPECT_NEAR(twice.profile.number_density[k], own.profile.number_density[k], 1e-9);
+  }
+}
+
+// The rows' covered area is that of the beads between the walls given, and of all where the sides are periodic. A wall
+// through the middle of a column of four, at 20.4 px, leaves what lies right of the edge of pixel 20: half of each,
+// less a strip of 0.1 px.
+TEST(SmallFilm, CoversTheAreaBetweenItsWalls) {
+  const GrayFrame frame = small_frame(four_rows());
+  MeasureOptions options = small_options();
+  const auto beads_covered = [&] {
+    FrameSource source = FrameSource::from_frames({frame});
+    const FilmCalibration film = calibrate_film(source, options);
+    source.rewind();
+    auto item = source.next_item();
+    const FrameFindings findings = FrameExaminer(film).examine(*item);
+    double sum = 0;
+    for (const float row : findings.coverage_of_row) sum += static_cast<double>(row);
+    EXPECT_EQ(findings.coverage_of_row.size(), 130U);
+    return sum / (std::numbers::pi * film.finder.radius_px * film.finder.radius_px);
+  };
+  const double strip = 1.6 / (std::numbers::pi * 64), all = beads_covered();
+  EXPECT_NEAR(all, 24, 0.5);
+  options.left_wall_px = 30.5;
+  EXPECT_NEAR(beads_covered() / all, 20.0 / 24, 3e-3);
+  options.left_wall_px = 20.4;
+  EXPECT_NEAR(beads_covered() / all, (22 - 4 * strip) / 24, 3e-3);
+  options.right_wall_px = 111;
+  EXPECT_NEAR(beads_covered() / all, (18 - 4 * strip) / 24, 3e-3);
+  options.periodic_sides = true;
+  EXPECT_NEAR(beads_covered() / all, 1, 1e-12);
+}
+
+// What is learned of the bead is what was drawn: 100 levels darker than the background, noise of 1.5 levels, an edge of
+// blur and pixel. Half of the beads look at least as the one in the middle does.
+TEST(SmallFilm, LearnsTheBeadThatWasDrawn) {
+  const GrayFrame frame = small_frame(four_rows());
+  FinderCalibration finder;
+  const FindResult found = find_disks(frame, {}, &finder);
+  ASSERT_EQ(found.disks.size(), 24U);
+  EXPECT_EQ(finder.polarity, Polarity::dark_beads);
+  EXPECT_NEAR(finder.radius_px, 8, 0.03);
+  EXPECT_NEAR(finder.contrast_level, -100, 1);
+  EXPECT_NEAR(finder.noise_level, 1.5, 0.15);
+  EXPECT_NEAR(finder.residual_level, 1.6, 0.4);
+  EXPECT_NEAR(finder.edge_width_px, std::hypot(0.8, 0.289), 0.06);
+  EXPECT_EQ(finder.width, 144);
+  EXPECT_EQ(finder.height, 130);
+  EXPECT_EQ(finder.frames_used, 1U);
+  EXPECT_EQ(finder.disks_used, 24U);
+  EXPECT_FALSE(finder.solid_borders);
+  std::size_t best = 0;
+  for (const FoundDisk& disk : found.disks) {
+    best += disk.quality == 1;
+    EXPECT_GT(disk.quality, 0.97);
+    EXPECT_NEAR(disk.contrast, 1, 0.02);
+    EXPECT_EQ(disk.radius_px, finder.radius_px);
+    EXPECT_FALSE(disk.half_hidden || disk.cut || disk.other_size);
+    // Of one disk of contrast c and noise s the least variance is s^2/(pi R c^2) times 2 sqrt(pi) edge, and 0.0012 px.
+    const double least =
+        1.5 * 1.5 / 1e4 * 2 * std::sqrt(std::numbers::pi) * finder.edge_width_px / (std::numbers::pi * 8);
+    EXPECT_NEAR(disk.variance_x, least + 0.0012 * 0.0012, 0.2 * least);
+    EXPECT_NEAR(disk.variance_y, least + 0.0012 * 0.0012, 0.2 * least);
+    EXPECT_NEAR(disk.covariance_xy, 0, 0.1 * least);
+  }
+  EXPECT_GE(best, 12U);
+  EXPECT_LT(best, 24U);
+  EXPECT_EQ(found.rejected, 0U);
+  // Of four beads hardly anything is learned, and this is said.
+  std::vector<RenderedDisk> few = four_rows();
+  few.resize(4);
+  find_disks(small_frame(few), {}, &finder);
+  EXPECT_TRUE(test::any_holds(finder.warnings, "learned from only 4 disks"));
+  few = four_rows();
+  few.resize(5);
+  find_disks(small_frame(few), {}, &finder);
+  EXPECT_FALSE(test::any_holds(finder.warnings, "learned from only"));
+}
+
+// A radius that is held is taken as it is; without a learned profile the bead is a flat disk with a Gaussian edge;
+// without sweeps centres are those of the map, less sharp.
+TEST(SmallFilm, ObeysTheOptionsOfItsFinder) {
+  const std::vector<RenderedDisk> truth = four_rows();
+  const GrayFrame frame = small_frame(truth);
+  const auto rms_of = [&](const std::vector<FoundDisk>& disks) {
+    EXPECT_EQ(disks.size(), 24U);
+    double squares = 0;
+    for (const FoundDisk& disk : disks) {
+      double nearest = 100;
+      for (const RenderedDisk& one : truth)
+        nearest = std::min(nearest, std::pow(one.x_px - disk.x_px, 2) + std::pow(one.y_px - disk.y_px, 2));
+      squares += nearest / 48;
+    }
+    return std::sqrt(squares);  // of a coordinate
+  };
+  FindOptions options;
+  FinderCalibration finder;
+  const double fitted = rms_of(find_disks(frame, options, &finder).disks);
+  EXPECT_LT(fitted, 0.01);
+  options.radius_px = 8.3, options.hold_radius = true;
+  const FindResult held = find_disks(frame, options, &finder);
+  EXPECT_EQ(finder.radius_px, 8.3);
+  EXPECT_EQ(held.disks.front().radius_px, 8.3);
+  options.hold_radius = false;
+  find_disks(frame, options, &finder);
+  EXPECT_NEAR(finder.radius_px, 8, 0.03) << "a first value";
+  options = {};
+  options.learn_profile = false;
+  EXPECT_LT(rms_of(find_disks(frame, options, &finder).disks), 0.02);
+  ASSERT_GT(finder.profile.level.size(), 20U);
+  for (std::size_t k = 0; k + 1 < finder.profile.level.size(); ++k) {
+    const double flat = blurred_disk_contrast(
+        finder.rim_radius_px, finder.edge_width_px, [](double) { return 1.0; },
+        static_cast<double>(k) * finder.profile.step_px);
+    ASSERT_NEAR(finder.profile.level[k], flat, 2e-3) << k;
+    ASSERT_EQ(finder.profile.fourth_harmonic[k], 0) << k;
+  }
+  EXPECT_EQ(finder.profile.asymmetry, nullptr);
+  options = {};
+  options.joint_fit_sweeps = 0;
+  const double without = rms_of(find_disks(frame, options).disks);
+  EXPECT_GT(without, 1.5 * fitted) << fitted;
+  EXPECT_LT(without, 0.1);
+}
+
+// A bead of which half is covered by background: not reported, or with its flag.
+TEST(SmallFilm, KeepsWhatIsHalfHiddenIfAsked) {
+  const std::vector<RenderedDisk> truth = four_rows();
+  GrayFrame frame = small_frame(truth);
+  const RenderedDisk& covered = truth[9];
+  for (int row = 0; row < 130; ++row)
+    for (int column = 0; column < 144; ++column)
+      if (std::hypot(column - covered.x_px, row - covered.y_px) < 10.5 && column > covered.x_px + 0.5)
+        test::set(frame, column, row, 160 + 1.5 * (test::scattered(column, row) - 0.5));
+  FindOptions options;
+  const FindResult whole = find_disks(frame, options);
+  EXPECT_EQ(whole.disks.size(), 23U);
+  EXPECT_EQ(whole.rejected, 1U);
+  options.keep_half_hidden = true;
+  const FindResult all = find_disks(frame, options);
+  ASSERT_EQ(all.disks.size(), 24U);
+  EXPECT_EQ(all.rejected, 0U);
+  for (const FoundDisk& disk : all.disks) {
+    const bool own = std::hypot(disk.x_px - covered.x_px, disk.y_px - covered.y_px) < 3;
+    EXPECT_EQ(disk.half_hidden, own);
+    EXPECT_EQ(disk.quality < 0.9, own) << disk.quality;
+    EXPECT_NEAR(disk.contrast, own ? 0.53 : 1, own ? 0.05 : 0.01);
+  }
+}
+
+// Frames of another size, and nothing that is a bead: what is said, with the radius in pixels as recorded.
+TEST(SmallFilm, SaysWhyItFindsNothing) {
+  const GrayFrame frame = small_frame(four_rows());
+  FinderCalibration finder;
+  find_disks(frame, {}, &finder);
+  finder.recorded_px = 2, finder.rim_radius_px = 8;
+  const FindResult other = find_disks(test::even_frame(100, 90, 160), finder);
+  EXPECT_EQ(other.why_nothing, "the frame is 100 x 90 px, but the beads were learned in frames of 144 x 130 px");
+  const FindResult nothing = find_disks(test::even_frame(144, 130, 160), finder);
+  EXPECT_TRUE(nothing.empty());
+  EXPECT_EQ(nothing.why_nothing, "no place in the frame looks like a bead of radius 16.000000 px");
+  EXPECT_THROW(residual_frame(test::even_frame(100, 90, 160), other, finder), std::invalid_argument);
+  EXPECT_THROW(learn_again({}, {}, finder), std::invalid_argument);
+  EXPECT_EQ(learn_finder({}, {}).why_not, "there is no frame from which beads could be learned");
+}
+
+// Beads missed are counted one by one, smaller ones by their area; not one that lies alone, nor a straight line, nor
+// what is outside the region.
+TEST(MissedBeads, AreCountedByTheirAreas) {
+  RimModel model;
+  model.polarity = Polarity::dark_beads, model.radius_px = 8, model.contrast = 100;
+  const auto missed = [&](std::vector<RenderedDisk> drawn, const std::vector<std::size_t>& left_out,
+                          const std::optional<PixelRectangle>& region = {}) {
+    std::vector<Circle> circles;
+    for (std::size_t k = 0; k < 24; ++k)
+      if (std::find(left_out.begin(), left_out.end(), k) == left_out.end())
+        circles.push_back({.x = drawn[k].x_px, .y = drawn[k].y_px, .radius = 8});
+    return expected_missed_beads(small_frame(drawn), model, circles, region);
+  };
+  std::vector<RenderedDisk> disks = four_rows();
+  EXPECT_EQ(missed(disks, {}), 0);
+  EXPECT_EQ(missed(disks, {9}), 1);
+  EXPECT_EQ(missed(disks, {7, 9, 15}), 3);
+  EXPECT_EQ(missed(disks, {7, 9}, PixelRectangle{70, 60, 40, 40}), 1) << "disk 9 alone";
+  // Between four at these distances a place of 0.8 or 0.6 radii is free, and none of one radius.
+  for (const auto& [away, radius, counted] : {std::array{14.8, 6.4, 0.64}, {13.2, 4.8, 0.36}}) {
+    disks = four_rows();
+    const double x = disks[9].x_px, y = disks[9].y_px;
+    disks[8].x_px = x - away, disks[10].x_px = x + away, disks[3].y_px = y + away, disks[15].y_px = y - away;
+    disks[9].radius_px = radius;
+    EXPECT_NEAR(missed(disks, {9}), counted, 1e-9);
+  }
+  disks = four_rows();
+  disks.push_back({60, 11, 8, 0, 0});  // its centre 25 px above the next: 9 px between rims
+  EXPECT_EQ(missed(disks, {}), 1);
+  std::vector<Circle> below;
+  for (std::size_t k = 0; k < 12; ++k) below.push_back({.x = disks[k].x_px, .y = disks[k].y_px, .radius = 8});
+  disks.erase(disks.begin() + 12, disks.begin() + 24);
+  EXPECT_EQ(expected_missed_beads(small_frame(disks), model, below, {}), 0) << "far from all others";
 }
 
 }  // namespace

@@ -237,5 +237,131 @@ TEST(Velocities, OfDenseBedsAreGivenOnlyWhereTheirErrorHoldsTheTruth) {
   EXPECT_LE(given, 14);  // at 2.8 none of the dense ones
 }
 
+// Of a velocity that forgets within a time, steps of x such times have a share of its mean square, and two of them that
+// follow one another are correlated.
+double kept_of_square(double x) { return 2 * (x - 1 + std::exp(-x)) / (x * x); }
+double correlation_after(double x) { return std::pow(1 - std::exp(-x), 2) / (2 * (x - 1 + std::exp(-x))); }
+
+// Fours of disks in three frames, `fours` of them at one height. They step by a times (1, 1, -1, -1), then by c times
+// that and sqrt(1 - c^2) times (1, -1, 1, -1): steps of one size, of mean 0 and of correlation c.
+void add_fours(Measurement& film, std::size_t fours, double z, double a, double c_x, double c_z) {
+  constexpr std::array<double, 4> first = {1, 1, -1, -1}, across = {1, -1, 1, -1};
+  for (std::size_t k = 0; k < 4 * fours; ++k) {
+    const double one = a * first[k % 4], other = a * across[k % 4];
+    const std::array<double, 3> x = {0, one, one + c_x * one + std::sqrt(1 - c_x * c_x) * other},
+                                up = {0, one, one + c_z * one + std::sqrt(1 - c_z * c_z) * other};
+    for (std::size_t frame = 0; frame < 3; ++frame) {
+      MeasuredDisk disk;
+      disk.frame = frame, disk.x = 3.0 * static_cast<double>(k) + x[frame], disk.z = z + up[frame];
+      film.disks.push_back(disk);
+    }
+  }
+}
+Measurement film_of_steps() {
+  Measurement film;
+  film.calibration.radius_px = 10, film.calibration.scale_m_per_px = 1e-4;  // D = 2 mm
+  return film;
+}
+void in_order_of_frames(Measurement& film) {
+  std::stable_sort(film.disks.begin(), film.disks.end(),
+                   [](const MeasuredDisk& one, const MeasuredDisk& other) { return one.frame < other.frame; });
+}
+
+// Steps of 0.1 D, whose correlation says that the frames are 0.8 memories apart along x and 0.3 along z.
+TEST(Velocities, AreCorrectedByTheCorrelationOfTheirSteps) {
+  Measurement film = film_of_steps();
+  add_fours(film, 8, 4.5, 0.1, correlation_after(0.8), correlation_after(0.3));
+  in_order_of_frames(film);
+  const VelocityMeasurement found = measure_velocities(film, {.frame_rate_hz = 100});
+  EXPECT_EQ(found.links, 64U);
+  const double square = 32.0 / 31 * 0.01 * 4e-6 * 1e4 / 9.81;  // a degree of freedom is that of the flow
+  const auto expect = [&](const KineticTemperature& t, double x) {
+    EXPECT_NEAR(t.displacement_m / square, 1, 1e-9);
+    EXPECT_NEAR(t.finite_time_factor, 1 / kept_of_square(x), 1e-6);
+    EXPECT_NEAR(t.over_mg_m / (square / kept_of_square(x)), 1, 1e-6);
+    EXPECT_NEAR(t.finite_time_error, 0.6 * (1 - kept_of_square(x)), 1e-6);
+    EXPECT_NEAR(t.displacement_error_m / square, 0, 1e-9) << "both pairs of frames have the same";
+    EXPECT_NEAR(t.std_error_m / (t.finite_time_error * t.over_mg_m), 1, 1e-9);
+  };
+  expect(found.horizontal, 0.8);
+  expect(found.vertical, 0.3);
+  ASSERT_EQ(found.warnings.size(), 1U);
+  EXPECT_NE(found.warnings[0].find("is corrected by a factor of 1.28."), std::string::npos) << found.warnings[0];
+  // Errors of the centres of 0.4 px, 0.02 D: they add twice their variance to the squares, and take it from the
+  // products.
+  for (MeasuredDisk& disk : film.disks) disk.std_error_px = 0.4;
+  const VelocityMeasurement noisy = measure_velocities(film, {.frame_rate_hz = 100});
+  const double noise = 2 * 0.0004, moved = 32.0 / 31 * 0.01 - noise;
+  const double correlation = (32.0 / 31 * 0.01 * correlation_after(0.8) + 0.5 * noise) / moved;
+  double low = 1e-3, high = 5;
+  for (int round = 0; round < 60; ++round) {
+    const double x = 0.5 * (low + high);
+    (correlation_after(x) > correlation ? low : high) = x;
+  }
+  EXPECT_NEAR(noisy.horizontal.displacement_m / (moved * 4e-6 * 1e4 / 9.81), 1, 1e-9);
+  EXPECT_NEAR(noisy.horizontal.finite_time_factor, 1 / kept_of_square(low), 1e-6);
+  // Of 28 steps that are followed by another nothing is said.
+  Measurement few = film_of_steps();
+  add_fours(few, 7, 4.5, 0.1, 0.5, 0.5);
+  in_order_of_frames(few);
+  EXPECT_EQ(measure_velocities(few, {.frame_rate_hz = 100}).horizontal.finite_time_factor, 1);
+}
+
+// Two heights of different correlations: each has its own correction as far as the two differ by more than chance, and
+// what that changes is a part of the error.
+TEST(Velocities, OfEachHeightHaveTheirOwnCorrection) {
+  Measurement film = film_of_steps();
+  const std::array<double, 2> c = {correlation_after(0.2), correlation_after(1.6)}, a = {0.05, 0.1}, n = {80, 48};
+  for (std::size_t k = 0; k < 2; ++k)
+    add_fours(film, static_cast<std::size_t>(n[k] / 4), k == 0 ? 2.5 : 12.5, a[k], c[k], c[k]);
+  in_order_of_frames(film);
+  const VelocityMeasurement found = measure_velocities(film, {.frame_rate_hz = 100});
+  const auto factor = [](double correlation) {
+    double low = 1e-4, high = 50;
+    for (int round = 0; round < 80; ++round) {
+      const double x = 0.5 * (low + high);
+      (correlation_after(x) > correlation ? low : high) = x;
+    }
+    return 1 / kept_of_square(low);
+  };
+  // Squares of a step, with the degree of freedom; two pairs of frames, of which the second follows the first.
+  double squares = 0, products = 0, steps = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double square = n[k] * a[k] * a[k] * n[k] / (n[k] - 1);
+    squares += 2 * square, products += square * c[k], steps += n[k];
+  }
+  const double of_all = products / steps / (squares / (2 * steps));
+  // A correlation of n pairs is uncertain by 1/sqrt(n); each height is there in two pairs of frames.
+  double excess = 0, precision = 0;
+  for (std::size_t k = 0; k < 2; ++k) excess += 2 * (n[k] * std::pow(c[k] - of_all, 2) - 1), precision += 2 * n[k];
+  const double scatter = excess / precision;
+  ASSERT_GT(scatter, 0);
+  double corrected = 0;
+  for (std::size_t k = 0; k < 2; ++k)
+    corrected +=
+        2 * n[k] * a[k] * a[k] * n[k] / (n[k] - 1) * factor(of_all + (c[k] - of_all) * scatter / (scatter + 1 / n[k]));
+  const double by_heights = corrected / squares;
+  for (const KineticTemperature* t : {&found.horizontal, &found.vertical}) {
+    EXPECT_NEAR(t->finite_time_factor, by_heights, 1e-6);
+    EXPECT_NEAR(t->finite_time_error, std::hypot(1 - factor(of_all) / by_heights, 0.6 * (1 - 1 / by_heights)), 1e-6);
+  }
+}
+
+// Pictures so far apart that the correction is above 2 give no temperature, and say so.
+TEST(Velocities, AreRefusedBeyondTwiceTheirSquare) {
+  for (const double x : {2.5, 2.6}) {  // factors of 1.975 and 2.019
+    Measurement film = film_of_steps();
+    add_fours(film, 10, 4.5, 0.1, correlation_after(x), correlation_after(0.1));
+    in_order_of_frames(film);
+    const VelocityMeasurement found = measure_velocities(film, {.frame_rate_hz = 100});
+    EXPECT_EQ(found.usable(), x == 2.5) << found.horizontal.finite_time_factor;
+    ASSERT_EQ(found.warnings.size(), 1U);
+    EXPECT_NE(found.warnings[0].find(x == 2.5 ? "is corrected by a factor of 1.98."
+                                              : "have to be corrected by a factor of 2."),
+              std::string::npos)
+        << found.warnings[0];
+  }
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

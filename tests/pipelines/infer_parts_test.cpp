@@ -347,4 +347,102 @@ TEST_F(BedsOfAFormula, WithoutTheirNumberAreLeftOut) {
   EXPECT_EQ(known_parameters(stage_, options_, beds_, {target}).all->beds(rise_), 50U);
 }
 
+// The same beds photographed at two moments: there the rise is 2 more and 2 less than on average. The density at two
+// heights goes with x, too. The prior of the average is 0.4, of each moment 0.3.
+class ViewsOfAFormula : public BedsOfAFormula {
+ protected:
+  ViewsOfAFormula() {
+    options_.bed.views = views_of(2, 0.4, {});
+    options_.bed.heights = {0.5, 1.5};
+    for (std::size_t i = 0; i < 30; ++i) beds_[i] = beds_[2 * i];
+    beds_.resize(30);
+    for (std::size_t i = 0; i < beds_.size(); ++i) {
+      const double x = (beds_[i].values[0] - 2) / 4, scatter = i % 2 == 0 ? 0.01 : -0.01;
+      std::vector<double> all;
+      for (const double more : {0.0, 2.0, -2.0}) {
+        const std::size_t first = all.size();
+        all.insert(all.end(), beds_[i].numbers.begin(), beds_[i].numbers.end());
+        all[first + rise_] += more;
+        all.push_back(root_to_density(0.9 - 0.3 * x + 0.05 * more + scatter));
+        all.push_back(root_to_density(0.4 + 0.2 * x - 0.05 * more + scatter));
+      }
+      beds_[i].numbers = std::move(all);
+    }
+  }
+  static double root_to_density(double root) { return root * root - 0.01; }
+  BedSurrogate surrogate(const ScaledTarget& target) {
+    return {options_, beds_, {target}, BedSurrogate::Training{{{0}, {1}}, false, 1}};
+  }
+  const ScaledTarget target_{rise_, 5, 0.3, 0, 0.3};
+};
+
+TEST_F(ViewsOfAFormula, ArePredictedEachByItself) {
+  const BedSurrogate all = surrogate(target_);
+  for (const auto& [view, more] : {std::pair<std::size_t, double>(0, 0), {1, 2}, {2, -2}}) {
+    EXPECT_NEAR(all.predicted(std::vector<double>{0.25}, view, rise_).value, 4 + more, 0.05) << view;
+    EXPECT_NEAR(all.predicted(std::vector<double>{0.25}, view, rise_).std_error, 0.1, 0.03) << view;
+    // chi2 of 5 +- 0.3 at places 0, 0.5 and 1, where the rise is 3, 5 and 7 on average.
+    const BedSurrogate::Fit fit = all.fit(std::vector<double>{0, 0.5, 1}, {target_});
+    ASSERT_EQ(fit.chi2.size(), 9U);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double off = 5 - (3 + 2 * static_cast<double>(i) + more);
+      EXPECT_NEAR(fit.chi2[3 * i + view], off * off / 0.1, 0.02 + 0.1 * off * off / 0.1) << i << ' ' << view;
+    }
+  }
+  const BedSurrogate::Fit fit = all.fit(std::vector<double>{0, 0.5, 1}, {target_});
+  EXPECT_NEAR(fit.log_likelihood[3 * 0 + 1], fit.log_likelihood[3 * 1 + 0], 0.1) << "both give the target";
+  EXPECT_NEAR(fit.log_likelihood[3 * 2 + 2], fit.log_likelihood[3 * 1 + 0], 0.1);
+  EXPECT_LT(fit.log_likelihood[3 * 1 + 1], fit.log_likelihood[3 * 1 + 0] - 10);
+  const ScaledTarget density{observables().size() + 1, 0.4, 0.05, 0, 0.05};
+  const BedSurrogate of_density = surrogate(density);
+  const std::vector<shakebed::sim::Measured> profile = of_density.profile(std::vector<double>{0.5}, 0);
+  ASSERT_EQ(profile.size(), 2U);
+  EXPECT_NEAR(profile[0].value, 0.75, 0.004);
+  EXPECT_NEAR(profile[1].value, 0.5, 0.004);
+  EXPECT_NEAR(profile[1].std_error, 0.01, 0.003);
+  EXPECT_TRUE(std::isnan(of_density.predicted(std::vector<double>{0.5}, 1, rise_).value)) << "no target's moments";
+  const std::vector<shakebed::sim::Measured> moment = of_density.profile(std::vector<double>{0.5}, 2);
+  EXPECT_NEAR(moment[0].value, 0.65, 0.004);
+  EXPECT_NEAR(moment[1].value, 0.6, 0.004);
+  EXPECT_NEAR(of_density.predicted(std::vector<double>{0.5}, 1, density.number).value, 0.4, 0.004);
+}
+
+// The posterior is the sum over the views: a normal curve of width s about 0.5 by the average, and by the moments the
+// halves of those about 0 and 1 that the prior leaves.
+TEST_F(ViewsOfAFormula, AreWeighedByTheirPriors) {
+  const KnownParameters known = known_parameters(stage_, options_, beds_, {target_});
+  double mean = 0, square = 0, middle = 0;
+  for (std::size_t i = 0; i < known.posterior.size(); ++i) {
+    const double x = known.posterior.point(i)[0], w = known.posterior.weight[i];
+    mean += w * x, square += w * (x - 0.5) * (x - 0.5), middle += std::abs(x - 0.5) < 0.25 ? w : 0;
+  }
+  const double s = std::hypot(0.3, 0.1) / 4;
+  EXPECT_NEAR(middle, 0.4 / 0.7, 0.02);
+  EXPECT_NEAR(mean, 0.5, 0.01);
+  EXPECT_NEAR(square, (0.4 * s * s + 0.3 * (s * s - s * std::sqrt(2 / M_PI) + 0.25)) / 0.7, 0.004);
+}
+
+// A moment at which more than a twentieth of the beds lack the number is left out, and the others share its prior.
+TEST_F(ViewsOfAFormula, AreLeftOutWhereBedsLackTheNumber) {
+  const std::size_t numbers = observables().size() + 2;
+  beds_[20].numbers[2 * numbers + rise_] = NAN;
+  EXPECT_DOUBLE_EQ(surrogate(target_).view_prior(2), 0.3) << "one of 30";
+  beds_[7].numbers[2 * numbers + rise_] = NAN;
+  const BedSurrogate fewer = surrogate(target_);
+  EXPECT_DOUBLE_EQ(fewer.view_prior(0), 0.4 / 0.7);
+  EXPECT_DOUBLE_EQ(fewer.view_prior(1), 0.3 / 0.7);
+  EXPECT_EQ(fewer.view_prior(2), 0);
+  const BedSurrogate::Fit fit = fewer.fit(std::vector<double>{0.5}, {target_});
+  EXPECT_EQ(fit.log_likelihood[2], -INFINITY);
+  EXPECT_EQ(fit.chi2[2], INFINITY);
+  EXPECT_NEAR(fit.chi2[0], 0, 0.05);
+  EXPECT_TRUE(std::isnan(fewer.predicted(std::vector<double>{0.5}, 2, rise_).value));
+  // Photographs at one phase leave nothing else.
+  options_.bed.views = views_of(0, 1, 0.5);
+  for (RunBed& bed : beds_) bed.numbers.resize(2 * numbers);
+  EXPECT_EQ(surrogate(target_).view_prior(1), 1);
+  for (std::size_t i = 0; i < 2; ++i) beds_[i].numbers[numbers + rise_] = NAN;
+  EXPECT_THROW(surrogate(target_), StageError);
+}
+
 }  // namespace

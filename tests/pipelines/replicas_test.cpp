@@ -71,6 +71,67 @@ TEST(Replicas, AndSingleBedsThatStillChangeAreNamed) {
   EXPECT_THAT(warnings_of({bed(2, 0.1, 0, 0)}), IsEmpty());
 }
 
+// What a bed lacks has no mean; what is the same everywhere and has no error stays; words are the first bed's.
+TEST(Replicas, JoinWhatSomeLack) {
+  Json one = bed(1, 0.1), two = bed(3, 0.1);
+  one["word"] = "first", two["word"] = "second";
+  one["constant"] = two["constant"] = Json{{"value", 5}, {"unit", "1"}};
+  one["known"] = two["known"] = Json{{"value", 5}, {"std_error", 0.5}};
+  two["elastic_share"]["value"] = nullptr;
+  two["temperature_x"].erase("std_error");
+  const Json joined = joined_results({one, two});
+  EXPECT_EQ(joined["word"], "first");
+  EXPECT_EQ(joined["constant"], one["constant"]);
+  EXPECT_TRUE(joined["elastic_share"].is_null());
+  EXPECT_NEAR(joined["known"]["std_error"].get<double>(), 0.5 / std::sqrt(2.0), 1e-15);
+  EXPECT_EQ(joined["known"]["spread"], 0);
+  EXPECT_EQ(joined["temperature_x"]["within"], 0) << "one of two states no error";
+  EXPECT_NEAR(joined["temperature_x"]["std_error"].get<double>(), few_beds_factor(2), 1e-12) << "spread 1.414";
+  // Student's t over that of a normal distribution [any table].
+  EXPECT_EQ(few_beds_factor(1), 1);
+  EXPECT_NEAR(few_beds_factor(2), 12.706205 / 1.959964, 1e-5);
+  EXPECT_NEAR(few_beds_factor(4), 3.182446 / 1.959964, 1e-5);
+}
+
+TEST(Replicas, HaveATableOfWhatAnyHas) {
+  Json one = bed(1, 0.1), two = bed(3, 0.1);
+  one.erase("drift_temperature_x"), one.erase("max_overlap"), two.erase("max_overlap");
+  two["elastic_share"]["value"] = nullptr;
+  two["rise"] = Json{{"value", 2.5}};
+  const Table table = replicas_table({one, two});
+  EXPECT_EQ(table.csv(), "replica,temperature_x,elastic_share,drift_temperature_x,rise\n0,1,0.01,,\n1,3,,0,2.5\n");
+  const Json columns = table.metadata("r.csv")["tableSchema"]["columns"];
+  EXPECT_THAT(columns[1].dump(), HasSubstr("m g D"));
+  EXPECT_THAT(columns[1].dump(), HasSubstr("temperature_x of the replica"));
+}
+
+// Beds at rest differ by nothing that matters; of those that move, the first number that differs or changes is named.
+TEST(Replicas, ThatDifferOrChangeHaveTheirNumbers) {
+  const auto with = [](Json joined, double tz, double spread, double change) {
+    joined["temperature_z"] = Json{{"value", tz}, {"std_error", 0.1}, {"spread", spread}, {"within", 0.1}};
+    joined["center_of_mass_rise"] = Json{{"value", -4}, {"std_error", 0.1}, {"spread", 0.5}, {"within", 0.1}};
+    joined["drift_center_of_mass"] = Json{{"value", change}, {"std_error", 0.1}};
+    return joined;
+  };
+  const auto spread = notable_spread(with(bed(2, 0.1), 2, 0.4, 0), 4);
+  ASSERT_TRUE(spread);
+  EXPECT_STREQ(spread->what, "T_z");
+  EXPECT_EQ(spread->spread, 0.4);
+  EXPECT_EQ(spread->within, 0.1);
+  EXPECT_STREQ(notable_spread(with(bed(2, 0.1), 2, 0.19, 0), 4)->what, "the rise of the centre of mass");
+  EXPECT_FALSE(notable_spread(with(bed(2, 0.1), 2, 0.4, 0), 1)) << "a single bed";
+  EXPECT_FALSE(notable_spread(with(bed(1e-12, 0.1), 1e-12, 0.4, 0), 4)) << "at rest";
+  EXPECT_TRUE(notable_spread(with(bed(2, 0.1), 1e-12, 0.4, 0), 4)) << "it moves across";
+  const auto drift = notable_drift_of(with(bed(2, 0.1), 2, 0.1, 0.5));
+  ASSERT_TRUE(drift);
+  EXPECT_STREQ(drift->what, "the rise of the centre of mass");
+  EXPECT_EQ(drift->change, 0.5);
+  EXPECT_EQ(drift->error, 0.1);
+  EXPECT_EQ(drift->part, 0.125);
+  EXPECT_FALSE(notable_drift_of(with(bed(2, 0.1), 2, 0.1, 0.39)));
+  EXPECT_FALSE(notable_drift_of(with(bed(1e-12, 0.1), 1e-12, 0.1, 0.5)));
+}
+
 // The same bed twice agrees better than chance: what both show of their densities by themselves is halved, and no less.
 // Where the errors of the mean are larger, all of it grows until its trace is the sum of their squares.
 TEST(Replicas, ThatAgreeHaveTheCovarianceOfWhatEachShows) {

@@ -2,8 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "pipelines/report/crate.hpp"
 #include "pipelines/report/report.hpp"
 #include "tests/pipelines/program.hpp"
 
@@ -259,6 +263,101 @@ TEST_F(ReportPage, HasPublishedAndAssumedNumbers) {
   EXPECT_THAT(summary_,
               HasSubstr("\n## Warnings\n\n- one\n\n## Stages\n\n| stage | kind | |\n|---|---|---|\n| map | map | "));
   EXPECT_THAT(summary_, HasSubstr("\n<!-- times -->\nTime: 1 min 40 s; a-bed-of-14-xx 2.5 s\n<!-- /times -->\n"));
+}
+
+// --- crate.hpp
+
+std::map<std::string, Json> entities_of(const Json& crate) {
+  std::map<std::string, Json> found;
+  for (const Json& entity : crate["@graph"]) found.emplace(entity["@id"].get<std::string>(), entity);
+  return found;
+}
+std::string names_of(const Json& references) {
+  std::string all;
+  for (const Json& one : references) all += (all.empty() ? "" : " ") + one["@id"].get<std::string>();
+  return all;
+}
+
+// Which entity is made from which, by name; files with their size, hash and kind.
+TEST_F(ReportPage, HasItsCrate) {
+  read();
+  const auto add = [&](std::size_t stage, const std::string& name, std::uint64_t bytes) {
+    if (!outcome_.stages[stage].record) outcome_.stages[stage].record.emplace();
+    outcome_.stages[stage].record->outputs.push_back({.file = name, .bytes = bytes, .fast = "", .sha256 = "s" + name});
+  };
+  add(0, "a b#c%.csv", 12), add(1, "t.extxyz.zst", 5), add(2, "fit.json", 6);
+  for (const char* page : {"report.html", "summary.json"}) write_text(folder_ / page, "x");
+  std::map<std::string, Json> found = entities_of(crate_json(plan_, outcome_));
+  EXPECT_EQ(found.at("map/a%20b%23c%25.csv"),
+            Json::parse(R"({"@id": "map/a%20b%23c%25.csv", "@type": "File", "name": "map/a b#c%.csv",
+                            "encodingFormat": "text/csv", "contentSize": "12", "sha256": "sa b#c%.csv"})"));
+  EXPECT_EQ(found.at("a-bed-of-14-xx/t.extxyz.zst")["encodingFormat"], "application/zstd");
+  EXPECT_EQ(names_of(found.at("map/")["hasPart"]), "map/a%20b%23c%25.csv");
+  EXPECT_EQ(found.at("map/")["description"],
+            "results of the stage \"map\" (map: " + std::string(plan_.stages[0].row->summary) + ")");
+  EXPECT_EQ(found.at("#run-map"), Json::parse(R"x({"@id": "#run-map", "@type": "CreateAction", "name": "map (map)",
+                             "instrument": {"@id": "#shakebed"}, "object": [{"@id": "resolved.json"}],
+                             "result": {"@id": "map/"}})x"));
+  EXPECT_EQ(found.at("#run-a-bed-of-14-xx")["description"], "seed 7");
+  EXPECT_EQ(found.at("#run-a-bed-of-14-xx")["name"], "a-bed-of-14-xx (simulate)");
+  EXPECT_EQ(names_of(found.at("#run-a-fit-of-15-xxx")["object"]), "resolved.json a-bed-of-14-xx/");
+  EXPECT_FALSE(found.contains("figure/")) << "it has not run";
+  const Json root = found.at("./");
+  EXPECT_EQ(root["name"], "a_bed");
+  EXPECT_EQ(root["description"], "Results of the shakebed recipe \"a_bed\": see report.html.");
+  EXPECT_EQ(root["mainEntity"]["@id"], "report.html");
+  EXPECT_EQ(root["license"]["@id"], "#licence");
+  EXPECT_EQ(names_of(root["hasPart"]), "report.html summary.json manifest.json map/ a-bed-of-14-xx/ a-fit-of-15-xxx/");
+  EXPECT_EQ(names_of(root["mentions"]), "#run-map #run-a-bed-of-14-xx #run-a-fit-of-15-xxx");
+  EXPECT_EQ(found.at("report.html")["description"], "all results on one page, which needs no network");
+  EXPECT_FALSE(found.at("report.html").contains("sha256")) << "it holds times";
+  EXPECT_FALSE(found.contains("resolved.json")) << "there is none";
+  EXPECT_EQ(found.size(), 2 + 2 + 3 + 3 * 3U);  // descriptor, root; program, licence; pages; file, folder, action
+  // What each ending means.
+  for (const auto& [name, type] : {std::pair("x.json", "application/json"),
+                                   {"x.svg", "image/svg+xml"},
+                                   {"x.pdf", "application/pdf"},
+                                   {"x.png", "image/png"},
+                                   {"x.html", "text/html"},
+                                   {"x.md", "text/markdown"},
+                                   {"x.xml", "application/xml"},
+                                   {"x.txt", "text/plain"},
+                                   {"x.dat", "text/plain"},
+                                   {"x.gp", "text/plain"},
+                                   {"x.extxyz", "chemical/x-xyz"},
+                                   {"x", "application/octet-stream"}}) {
+    outcome_.stages[0].record->outputs = {{.file = name, .bytes = 1, .fast = "", .sha256 = ""}};
+    EXPECT_EQ(entities_of(crate_json(plan_, outcome_)).at(std::string("map/") + name)["encodingFormat"], type) << name;
+  }
+  read(R"("description": "why it was done", "report": { "title": "A title" }, )");
+  std::filesystem::remove(folder_ / "report.html");
+  const Json titled = entities_of(crate_json(plan_, outcome_)).at("./");
+  EXPECT_EQ(titled["name"], "A title");
+  EXPECT_EQ(titled["description"], "why it was done");
+  EXPECT_FALSE(titled.contains("mainEntity"));
+}
+
+// A file of the user's that two stages read is named once, and both were made from it.
+TEST_F(ReportPage, CrateNamesFilesOfTheUserOnce) {
+  write_text(folder_ / "p q.csv", "height,number_density\n1,1\n2,0.5\n");
+  write_text(folder_ / "r.csv", "height,number_density\n1,1\n2,0.5\n");
+  std::vector<Problem> problems;
+  plan_ = make_plan(*parse_json(R"({ "name": "three", "stages": [ { "stage": "fit", "id": "f", "profile": "p q.csv" },
+      { "stage": "fit", "id": "g", "profile": "r.csv" }, { "stage": "fit", "id": "h", "profile": "p q.csv" } ] })",
+                                "r.json", problems),
+                    "r.json", folder_.path());
+  outcome_.out = folder_.path();
+  for (const PlannedStage& stage : plan_.stages) {
+    outcome_.stages.emplace_back().id = stage.id;
+    outcome_.stages.back().record.emplace();
+  }
+  const auto found = entities_of(crate_json(plan_, outcome_));
+  EXPECT_EQ(names_of(found.at("#run-f")["object"]), "resolved.json #input-1-p%20q.csv");
+  EXPECT_EQ(names_of(found.at("#run-g")["object"]), "resolved.json #input-2-r.csv");
+  EXPECT_EQ(names_of(found.at("#run-h")["object"]), "resolved.json #input-1-p%20q.csv");
+  EXPECT_EQ(found.at("#input-1-p%20q.csv")["name"], "p q.csv");
+  EXPECT_EQ(found.at("#input-2-r.csv")["name"], "r.csv");
+  EXPECT_EQ(found.size(), crate_json(plan_, outcome_)["@graph"].size()) << "each once";
 }
 
 }  // namespace

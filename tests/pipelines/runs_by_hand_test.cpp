@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -13,7 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "pipelines/runner/folder_lock.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "pipelines/runner/moved_points.hpp"
 #include "pipelines/runner/pages.hpp"
 #include "pipelines/runner/plan_graph.hpp"
 #include "pipelines/runner/slurm.hpp"
@@ -25,6 +28,7 @@ namespace {
 
 using namespace shakebed::pipelines;
 using namespace shakebed::tests;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -398,6 +402,137 @@ TEST_F(SweepsByHand, KeysSayWhatDecides) {
   EXPECT_EQ(value_text(Json()), "");
   EXPECT_EQ(value_text(Json("3 mm")), "3 mm");
   EXPECT_EQ(value_text(Json(2.5)), "2.5");
+}
+
+// --- points under another number
+
+// Folders of points, each with the key of what it holds, and a file of that name.
+class MovedPoints : public testing::Test {
+ protected:
+  void hold(const std::string& folder, const std::string& key, int code = 0) {
+    std::filesystem::create_directories(points_ / folder);
+    write_text(points_ / folder / ".point", R"({"key": ")" + key + R"(", "code": )" + std::to_string(code) + "}");
+    write_text(points_ / folder / key, "");
+  }
+  std::string places(const NamedKeys& points) {
+    std::string all;
+    for (const auto& [name, folder] : earlier_places(points, points_)) all += name + " from " + folder + "; ";
+    return all;
+  }
+  // "000000 a, 000001 b": what each folder holds.
+  std::string held() {
+    std::map<std::string, std::string> found;
+    for (const auto& entry : std::filesystem::directory_iterator(points_)) {
+      if (!entry.is_directory()) continue;
+      std::string& own = found[entry.path().filename().string()];
+      for (const auto& file : std::filesystem::directory_iterator(entry.path()))
+        if (!file.path().filename().string().starts_with(".")) own += file.path().filename().string();
+    }
+    std::string all;
+    for (const auto& [name, key] : found) all += (all.empty() ? "" : ", ") + name + " " + key;
+    return all;
+  }
+  std::string moved(const NamedKeys& points) {
+    EXPECT_TRUE(move_to_own_places(earlier_places(points, points_), points_));
+    return held();
+  }
+  ScratchFolder folder_;
+  std::filesystem::path points_ = folder_ / "points";
+};
+
+TEST_F(MovedPoints, AreFoundByTheirKeys) {
+  hold("000000", "a"), hold("000001", "b", 6), hold("000002", "c", 5), hold("000003", "d");
+  EXPECT_EQ(places({{"000000", "a"}, {"000001", "b"}, {"000002", "c"}, {"000003", "d"}}), "") << "each at home";
+  EXPECT_EQ(places({{"000004", "a"}}), "") << "no folder holds another point than its name says";
+  EXPECT_EQ(places({{"000000", "x"}, {"000001", "a"}, {"000002", "b"}, {"000003", "c"}, {"000004", "d"}}),
+            "000001 from 000000; 000002 from 000001; 000004 from 000003; ")
+      << "a failed check is a result, a failed stage is none";
+  EXPECT_EQ(places({{"000000", "d"}, {"000003", "d"}}), "") << "000003 is at home, and nobody else has d";
+  hold("000005", "d");
+  EXPECT_EQ(places({{"000000", "d"}, {"000003", "d"}}), "000000 from 000005; ");
+  EXPECT_THAT(places({{"000001", "d"}, {"000002", "d"}}),
+              AnyOf("000001 from 000003; 000002 from 000005; ", "000001 from 000005; 000002 from 000003; "))
+      << "each is taken once";
+}
+
+TEST_F(MovedPoints, AreExchangedUntilEachIsAtHome) {
+  hold("000000", "a"), hold("000001", "b"), hold("000002", "c"), hold("000003", "d");
+  EXPECT_FALSE(move_to_own_places({}, points_));
+  EXPECT_EQ(moved({{"000000", "b"}, {"000001", "a"}, {"000002", "c"}}), "000000 b, 000001 a, 000002 c, 000003 d");
+  // In a circle of three, and of four the other way round.
+  EXPECT_EQ(moved({{"000000", "a"}, {"000001", "c"}, {"000002", "b"}}), "000000 a, 000001 c, 000002 b, 000003 d");
+  EXPECT_EQ(moved({{"000000", "d"}, {"000001", "a"}, {"000002", "c"}, {"000003", "b"}}),
+            "000000 d, 000001 a, 000002 c, 000003 b");
+  // A value put in front of the others: the last moves to where nothing was.
+  EXPECT_EQ(moved({{"000000", "x"}, {"000001", "d"}, {"000002", "a"}, {"000003", "c"}, {"000004", "b"}}),
+            "000001 d, 000002 a, 000003 c, 000004 b");
+  // While another process runs a point there, nothing moves.
+  const NamedKeys back = {{"000001", "a"}, {"000002", "d"}};
+  {
+    const FolderLock lock(points_ / "000003");
+    EXPECT_FALSE(move_to_own_places(earlier_places(back, points_), points_));
+  }
+  EXPECT_EQ(held(), "000001 d, 000002 a, 000003 c, 000004 b");
+  EXPECT_EQ(moved(back), "000001 a, 000002 d, 000003 c, 000004 b");
+}
+
+TEST_F(MovedPoints, AreAtHomeAfterEveryPermutation) {
+  std::string before = "abcd", after = before;
+  do {
+    std::filesystem::remove_all(points_);
+    NamedKeys points;
+    std::string all;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string name = "00000" + std::to_string(k);
+      hold(name, before.substr(k, 1));
+      points.emplace_back(name, after.substr(k, 1));
+      all += (k > 0 ? ", " : "") + name + " " + after.substr(k, 1);
+    }
+    move_to_own_places(earlier_places(points, points_), points_);
+    ASSERT_EQ(held(), all);
+  } while (std::next_permutation(after.begin(), after.end()));
+}
+
+// --- what is gathered of a point
+
+TEST_F(SweepsByHand, GatherNumbersOfEveryKind) {
+  const Plan plan = this->plan(fit_of + "," + map_of("4"));
+  std::filesystem::create_directories(folder_ / "p/map");
+  std::filesystem::create_directories(folder_ / "p/f");
+  write_text(
+      folder_ / "p/map/map.json",
+      R"({ "gamma": {"value": 4, "std_error": 0.5}, "no error": {"value": 2.5}, "none": {"value": null, "std_error": null},
+                  "word": "x, y", "truth": true, "list": [1, 2], "a/b": {"c": 7} })");
+  EXPECT_THAT(gather_cells(plan, folder_ / "p",
+                           {"/map/gamma", "/map/no error", "/map/none", "/map/word", "/map/truth", "/map/list",
+                            "/map/list/1", "/map/a~1b/c", "/map/nothing", "/nobody/gamma", "/f/temperature"}),
+              ElementsAre("4", "0.5", "2.5", "", "", "", "x, y", "", "true", "", "", "", "2", "", "7", "", "", "", "",
+                          "", "", ""));
+  EXPECT_EQ(verdict_of(plan, folder_ / "p"), "") << "the fit has not run";
+  for (const auto& [text, verdict] : {std::pair(R"({ "answer": { "verdict": "one temperature" } })", "one temperature"),
+                                      {R"({ "answer": { "verdict": 3 } })", ""},
+                                      {R"({ "verdict": "x" })", ""}}) {
+    write_text(folder_ / "p/f/fit.json", text);
+    EXPECT_EQ(verdict_of(plan, folder_ / "p"), verdict) << text;
+  }
+  EXPECT_EQ(answering_stage(plan)->id, "f");
+  EXPECT_EQ(answering_stage(this->plan(map_of("4"))), nullptr);
+  EXPECT_EQ(verdict_of(this->plan(map_of("4")), folder_ / "p"), "");
+}
+
+// A recipe of a file has its hash and folder; a preset and changes are named.
+TEST_F(RunsByHand, NameTheirRecipe) {
+  Plan plan = this->plan(map_of("4"));
+  write_text(folder_ / "own.json", "abc");
+  plan.file = folder_ / "own.json", plan.preset = "quick";
+  RunOptions given = options();
+  given.settings = {parse_setting("/a/b=[1, 2]"), parse_setting("/c=3 mm")};
+  EXPECT_EQ(recipe_json(plan, given),
+            (Json{{"file", plan.file},
+                  {"sha256", "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"},
+                  {"directory", folder_.path().string()},
+                  {"preset", "quick"},
+                  {"settings", Json{{"/a/b", Json::array({1, 2})}, {"/c", "3 mm"}}}}));
 }
 
 // --- jobs for a cluster

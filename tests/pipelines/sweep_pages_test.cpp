@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipelines/report/crate.hpp"
 #include "pipelines/report/report.hpp"
 #include "pipelines/runner/sweep_table.hpp"
 #include "tests/pipelines/program.hpp"
@@ -265,6 +266,34 @@ TEST_F(SweepPages, TableIsInSi) {
   EXPECT_EQ(unit_of_result(plan_, "/fit/no_such"), "1");
   EXPECT_EQ(unit_of_result(plan_, "/nobody/temperature"), "1");
   EXPECT_EQ(unit_of_result(plan_, ""), "1");
+}
+
+// Its crate: tables and pages that are there, figures by their names, the folders of the points that have one.
+TEST_F(SweepPages, HaveTheirCrate) {
+  read(R"({ "over": { "/stages/fit/column_number": [10, 12, 14] }, "collect": ["/fit/temperature"] })");
+  for (const char* name : {"sweep.csv", "resolved.json", "report.html"}) write_text(folder_ / name, "x");
+  std::filesystem::create_directories(folder_ / "figures");
+  for (const char* name : {"figures/sweep-2.svg", "figures/sweep-1.dat"}) write_text(folder_ / name, "x");
+  for (const char* name : {"points/000000", "points/000002"}) std::filesystem::create_directories(folder_ / name);
+  const Json crate = crate_json(plan_, SweepOutcome{.out = folder_.path(),
+                                                    .points = points_,
+                                                    .collected = plan_.sweep->collect,
+                                                    .table = table_,
+                                                    .problems = problems_,
+                                                    .verdicts = verdicts_,
+                                                    .warnings = warnings_,
+                                                    .complete = true});
+  std::string ids, parts;
+  for (const Json& entity : crate["@graph"]) ids += entity["@id"].get<std::string>() + " ";
+  for (const Json& part : crate["@graph"][1]["hasPart"]) parts += part["@id"].get<std::string>() + " ";
+  const std::string there =
+      "sweep.csv resolved.json report.html figures/sweep-1.dat figures/sweep-2.svg points/000000/ points/000002/ ";
+  EXPECT_EQ(parts, there);
+  EXPECT_EQ(ids, "ro-crate-metadata.json ./ #shakebed #licence " + there + "#run ");
+  EXPECT_EQ(crate["@graph"][1]["mentions"], Json::parse(R"([{"@id": "#run"}])"));
+  EXPECT_EQ(crate["@graph"][9]["name"], "point 000000");
+  EXPECT_EQ(crate["@graph"][11], Json::parse(R"({"@id": "#run", "@type": "CreateAction", "name": "swept_bed",
+      "instrument": {"@id": "#shakebed"}, "object": [{"@id": "resolved.json"}], "result": {"@id": "./"}})"));
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ namespace {
 
 using namespace shakebed::pipelines;
 using namespace shakebed::tests;
+using testing::ElementsAre;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
@@ -127,6 +128,90 @@ TEST(ReasonsToRun, NameEachThingThatChanged) {
     StageRecord fresh = a_record();
     change(fresh);
     EXPECT_THAT(reasons_to_run(fresh, a_record(), folder.path()), testing::Contains(HasSubstr(reason))) << reason;
+  }
+}
+
+// Of many files two are named; of what it made, three; the code's change has the day of the last run.
+TEST(ReasonsToRun, AreFewOfManyFiles) {
+  const ScratchFolder folder;
+  const auto reasons = [&](const StageRecord& fresh, const StageRecord& found) {
+    return reasons_to_run(fresh, found, folder.path());
+  };
+  StageRecord found = a_record(), fresh = a_record();
+  for (const char* name : {"c", "d"}) fresh.inputs.push_back({name, 1, "x", ""});
+  fresh.inputs[1].fast = "bbba";
+  EXPECT_THAT(reasons(fresh, found),
+              ElementsAre("input bed/bed.json changed", "input c was added", "input d was added"));
+  fresh.inputs[0].fast = "aaab";
+  EXPECT_THAT(reasons(fresh, found),
+              ElementsAre("input bed/profile.csv changed", "input bed/bed.json changed", "and 2 more inputs"));
+  found.outputs = {{"a", 3, fast_hash("abc"), ""},
+                   {"b", 3, fast_hash("abc"), ""},
+                   {"c", 3, fast_hash("abc"), ""},
+                   {"d", 3, fast_hash("abc"), ""},
+                   {"e", 3, fast_hash("abc"), ""}};
+  for (const char* name : {"a", "c"}) write_text(folder / name, "abc");
+  write_text(folder / "b", "abd");
+  EXPECT_THAT(reasons(a_record(), found), ElementsAre("its output b was changed after the run",
+                                                      "its output d is missing", "its output e is missing"));
+  write_text(folder / "a", "abcd"), fs::remove(folder / "c");
+  EXPECT_THAT(reasons(a_record(), found),
+              ElementsAre("its output a was changed after the run", "its output b was changed after the run",
+                          "its output c is missing"));
+  for (const char* name : {"a", "b", "c", "d", "e"}) write_text(folder / name, "abc");
+  EXPECT_THAT(reasons(a_record(), found), testing::IsEmpty());
+  found.code = "c0dd";
+  EXPECT_THAT(reasons(a_record(), found), ElementsAre("the code of fit changed"));
+  StageCost cost;
+  cost.finished = "2026-01-02T03:04:05Z";
+  write_text(folder.path() / cost_name, cost.to_json().dump());
+  EXPECT_THAT(reasons(a_record(), found), ElementsAre("the code of fit changed since 2026-01-02"));
+}
+
+TEST(Differences, AreOfLeavesInShort) {
+  const std::string long_one(59, 'x'), longer(58, 'x');
+  EXPECT_THAT(differences(Json::parse(R"({"a": {"b": 1, "c": [1, 2]}, "d": {}, "e": 5})"),
+                          Json::parse(R"({"a": {"b": 1, "c": [1, 3]}, "d": {"f": true}, "g/$comment": "x"})")),
+              ElementsAre("a/c changed [1,2] → [1,3]", "d/f was added: true", "d was removed (it was {})",
+                          "e was removed (it was 5)"));
+  EXPECT_THAT(differences(Json{{"a", longer}}, Json{{"a", long_one}}),
+              ElementsAre("a changed \"" + longer + "\" → \"" + std::string(56, 'x') + "..."))
+      << "60 letters are shown, of 61 the first 57";
+}
+
+// What a stage cost comes back; a file that is no cost is none. Its fingerprints are those of its other files.
+TEST(StageFolder, HasItsCostAndTheFingerprintsOfItsFiles) {
+  const ScratchFolder folder;
+  EXPECT_FALSE(read_cost(folder.path()));
+  const StageCost cost{.wall_seconds = 1.5,
+                       .cpu_seconds = 5.5,
+                       .threads = 4,
+                       .host = "h",
+                       .finished = "2026-01-02T03:04:05Z",
+                       .timings = Json{{"events", 7}, {"parts", {{"settle", 0.5}}}}};
+  write_text(folder.path() / cost_name, cost.to_json().dump());
+  const auto back = read_cost(folder.path());
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->to_json(), cost.to_json());
+  EXPECT_EQ(back->timings, cost.timings);
+  EXPECT_EQ(back->cpu_seconds, 5.5);
+  EXPECT_EQ(back->threads, 4);
+  write_text(folder.path() / record_name, "x"), write_text(folder / "log.txt", "x");
+  fs::create_directories(folder / "b/c");
+  write_text(folder / "b/c/d.csv", "abc"), write_text(folder / "a", ""), write_text(folder / "b/log.txt", "x");
+  const std::vector<Fingerprint> files = fingerprint_directory(folder.path(), true);
+  ASSERT_EQ(files.size(), 3U);
+  EXPECT_EQ(files[0].file, "a");
+  EXPECT_EQ(files[0].bytes, 0U);
+  EXPECT_EQ(files[1].file, "b/c/d.csv");
+  EXPECT_EQ(files[1].bytes, 3U);
+  EXPECT_EQ(files[1].fast, fast_hash("abc"));
+  EXPECT_EQ(files[1].sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(files[2].file, "b/log.txt") << "the log is that beside the record";
+  EXPECT_EQ(fingerprint_directory(folder.path(), false)[1].sha256, "");
+  for (const char* text : {"{}", "x", R"({"wall_seconds": "1", "cpu_seconds": 1})"}) {
+    write_text(folder.path() / cost_name, text);
+    EXPECT_FALSE(read_cost(folder.path())) << text;
   }
 }
 
