@@ -346,7 +346,6 @@ class Engine final : public Simulation {
 
   // --- synchronisation
   void synchronise();
-  double density_round_disks() const;  // disks a unit of area
   void begin_interval();
   void renumber();
   template <class Self, class Visit>
@@ -443,9 +442,9 @@ class Engine final : public Simulation {
 
   // --- bookkeeping
   double smallest_skin_ = 0.15, largest_skin_ = 0.36;
-  double ahead_ = 0;           // how far ahead of its disk a shell of the largest size is centred
-  bool beyond_cache_ = false;  // so many disks that it pays to fetch ahead
-  std::variant<ShellGrid<NarrowCell>, ShellGrid<WideCell>> grid_;  // where the shells are
+  double ahead_ = 0;                 // how far ahead of its disk a shell of the largest size is centred
+  bool beyond_cache_ = false;        // so many disks that it pays to fetch ahead
+  ShellGridFor<Space::falls> grid_;  // where the shells are
   NeighbourLists lists_;
   EventQueue queue_;
   std::array<Pending, 2> pending_;

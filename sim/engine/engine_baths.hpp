@@ -3,61 +3,80 @@
 
 namespace shakebed::sim {
 
+// The disks that a reservoir acts on, and the sum of the work that it does.
+struct DisksInBath {
+  std::span<Disk> disks;
+  const double* masses;  // null where all are 1
+  Random& random;
+  double& work;
+
+  double mass(std::size_t i) const { return masses == nullptr ? 1 : masses[i]; }
+  void set_velocity(std::size_t i, double vx, double vz) const {
+    Disk& disk = disks[i];
+    const auto kinetic = [&] { return 0.5 * mass(i) * (disk.vx * disk.vx + disk.vz * disk.vz); };
+    const double before = kinetic();
+    disk.vx = vx;
+    disk.vz = vz;
+    work += kinetic() - before;
+  }
+};
+
+// Each returns the time to its next action.
+inline double act(const LangevinBath& bath, const DisksInBath& in) {
+  const double keep = std::exp(-bath.rate * bath.interval);
+  const double given = std::sqrt(bath.temperature * -std::expm1(-2 * bath.rate * bath.interval));
+  for (std::size_t i = 0; i < in.disks.size(); ++i) {
+    const double kick = given / std::sqrt(in.mass(i));
+    const Random::Pair draw = in.random.normal_pair();
+    in.set_velocity(i, keep * in.disks[i].vx + kick * draw.first, keep * in.disks[i].vz + kick * draw.second);
+  }
+  return bath.interval;
+}
+
+inline double act(const WhiteNoiseBath& noise, const DisksInBath& in) {
+  std::vector<Random::Pair> kicks(in.disks.size());
+  Random::Pair mean{0, 0};
+  double total_mass = 0;
+  for (std::size_t i = 0; i < kicks.size(); ++i) {
+    const double mass = in.mass(i), kick = std::sqrt(noise.heating * noise.interval / mass);
+    const Random::Pair draw = in.random.normal_pair();
+    kicks[i] = {kick * draw.first, kick * draw.second};
+    mean.first += mass * kicks[i].first;
+    mean.second += mass * kicks[i].second;
+    total_mass += mass;
+  }
+  if (!noise.conserve_momentum) mean = {0, 0};
+  for (std::size_t i = 0; i < kicks.size(); ++i) {
+    const Disk& disk = in.disks[i];
+    in.set_velocity(i, disk.vx + (kicks[i].first - mean.first / total_mass),
+                    disk.vz + (kicks[i].second - mean.second / total_mass));
+  }
+  return noise.interval;
+}
+
+// One disk's velocity is drawn anew.
+inline double act(const AndersenBath& bath, std::uint32_t i, const DisksInBath& in) {
+  const double speed = std::sqrt(bath.temperature / in.mass(i));
+  const Random::Pair draw = in.random.normal_pair();
+  in.set_velocity(i, speed * draw.first, speed * draw.second);
+  return -std::log(in.random.uniform_positive()) / (bath.rate * static_cast<double>(in.disks.size()));
+}
+
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::act_bath() {
-  const auto kinetic = [&](const Disk& disk, std::uint32_t i) {
-    return 0.5 * sizes_.mass(i) * (disk.vx * disk.vx + disk.vz * disk.vz);
-  };
+  const DisksInBath in{{disks_.data(), count_}, sizes_.mass_table(), random_, bath_work_};
   if (const auto* bath = std::get_if<AndersenBath>(&bath_)) {
     const std::uint32_t i = random_.below(count_);
-    Disk& disk = disks_[i];
     bring_forward(i);
-    const double before = kinetic(disk, i), speed = std::sqrt(bath->temperature / sizes_.mass(i));
-    const Random::Pair draw = random_.normal_pair();
-    disk.vx = speed * draw.first;
-    disk.vz = speed * draw.second;
-    bath_work_ += kinetic(disk, i) - before;
-    predict(i, motion_at(disk, now_));
+    bath_at_ = now_ + act(*bath, i, in);
+    predict(i, motion_at(disks_[i], now_));
     settle();
     tell(i);
-    bath_at_ = now_ - std::log(random_.uniform_positive()) / (bath->rate * count_);
     return;
   }
   for (std::uint32_t i = 0; i < count_; ++i) bring_forward(i);
-  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) {
-    const double keep = std::exp(-bath->rate * bath->interval);
-    const double given = std::sqrt(bath->temperature * -std::expm1(-2 * bath->rate * bath->interval));
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      Disk& disk = disks_[i];
-      const double before = kinetic(disk, i), kick = given / std::sqrt(sizes_.mass(i));
-      const Random::Pair draw = random_.normal_pair();
-      disk.vx = keep * disk.vx + kick * draw.first;
-      disk.vz = keep * disk.vz + kick * draw.second;
-      bath_work_ += kinetic(disk, i) - before;
-    }
-    bath_at_ = now_ + bath->interval;
-  } else if (const auto* noise = std::get_if<WhiteNoiseBath>(&bath_)) {
-    std::vector<Random::Pair> kicks(count_);
-    Random::Pair mean{0, 0};
-    double total_mass = 0;
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      const double mass = sizes_.mass(i), kick = std::sqrt(noise->heating * noise->interval / mass);
-      const Random::Pair draw = random_.normal_pair();
-      kicks[i] = {kick * draw.first, kick * draw.second};
-      mean.first += mass * kicks[i].first;
-      mean.second += mass * kicks[i].second;
-      total_mass += mass;
-    }
-    if (!noise->conserve_momentum) mean = {0, 0};
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      Disk& disk = disks_[i];
-      const double before = kinetic(disk, i);
-      disk.vx += kicks[i].first - mean.first / total_mass;
-      disk.vz += kicks[i].second - mean.second / total_mass;
-      bath_work_ += kinetic(disk, i) - before;
-    }
-    bath_at_ = now_ + noise->interval;
-  }
+  if (const auto* bath = std::get_if<LangevinBath>(&bath_)) bath_at_ = now_ + act(*bath, in);
+  if (const auto* noise = std::get_if<WhiteNoiseBath>(&bath_)) bath_at_ = now_ + act(*noise, in);
   predict_all();
   tell_all();
 }

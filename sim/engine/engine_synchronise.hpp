@@ -51,22 +51,30 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   }
 }
 
+template <class Values>
+void permute_by_keys(Values& values, const std::vector<std::uint64_t>& keys) {
+  const Values old = values;
+  for (std::size_t i = 0; i < keys.size(); ++i) values[i] = old[static_cast<std::uint32_t>(keys[i])];
+}
+
+// Keys of the disks in the order of a space-filling curve; a key's lower half is the disk's number.
+inline std::vector<std::uint64_t> keys_along_curve(std::span<const Disk> disks, const Period& across,
+                                                   const Period& up) {
+  std::vector<std::uint64_t> keys(disks.size());
+  for (std::size_t i = 0; i < disks.size(); ++i) {
+    const std::uint32_t column = hilbert_cell(across.wrapped(disks[i].x)), row = hilbert_cell(up.wrapped(disks[i].z));
+    keys[i] = static_cast<std::uint64_t>(hilbert_place(column, row)) << 32 | i;
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
 // Numbers the disks along a space-filling curve. Sorting what is sorted changes
 // nothing, so a resumed run has the numbers of the one it continues.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::renumber() {
-  std::vector<std::uint64_t> keys(count_);
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    double x = disks_[i].x, z = disks_[i].z;
-    if constexpr (Space::wraps_x) x = period_x_.wrapped(x);
-    if constexpr (Space::wraps_z) z = period_z_.wrapped(z);
-    keys[i] = static_cast<std::uint64_t>(hilbert_place(hilbert_cell(x), hilbert_cell(z))) << 32 | i;
-  }
-  std::sort(keys.begin(), keys.end());
-  const auto permute = [&](auto& values) {
-    auto old = values;
-    for (std::uint32_t i = 0; i < count_; ++i) values[i] = old[static_cast<std::uint32_t>(keys[i])];
-  };
+  const std::vector<std::uint64_t> keys = keys_along_curve({disks_.data(), count_}, period_x_, period_z_);
+  const auto permute = [&keys](auto& values) { permute_by_keys(values, keys); };
   permute(disks_);
   permute(labels_);
   if constexpr (Rule::spins) permute(spins_);
@@ -85,21 +93,20 @@ void Engine<Space, Rule, Sizes>::renumber() {
 
 // The density in layers across the box, mean over the disks: a bed under gravity is denser where its disks are than the
 // space that it takes up.
-template <class Space, class Rule, class Sizes>
-double Engine<Space, Rule, Sizes>::density_round_disks() const {
+inline double density_round(std::span<const Disk> disks, double width) {
   constexpr double usual_thickness = 3;  // some rows of a crystal
   constexpr std::size_t most_layers = 4096;
   double low = never, high = -never;
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    low = std::min(low, disks_[i].z);
-    high = std::max(high, disks_[i].z);
+  for (const Disk& disk : disks) {
+    low = std::min(low, disk.z);
+    high = std::max(high, disk.z);
   }
   const double thickness = std::max(usual_thickness, (high - low) / (most_layers - 1));
   std::vector<double> layers(most_layers);
-  for (std::uint32_t i = 0; i < count_; ++i) layers[static_cast<std::size_t>((disks_[i].z - low) / thickness)] += 1;
+  for (const Disk& disk : disks) layers[static_cast<std::size_t>((disk.z - low) / thickness)] += 1;
   double squares = 0;
-  for (const double disks : layers) squares += disks * disks;
-  return squares / (count_ * width_ * thickness);
+  for (const double in_layer : layers) squares += in_layer * in_layer;
+  return squares / (static_cast<double>(disks.size()) * width * thickness);
 }
 
 // The largest shell: where it is as dense as round the disks, it has so many neighbours on the average that few have
@@ -152,27 +159,26 @@ void Engine<Space, Rule, Sizes>::begin_interval() {
   double top = 0;
   for (std::uint32_t i = 0; i < count_; ++i) top = std::max(top, disks_[i].z);
   const double height = Space::wraps_z ? period_z_.length : std::min(top, 4.0 * count_ / width_) + 2;
-  const double density = Space::wraps_z ? count_ / (width_ * height) : density_round_disks();
+  const double density = Space::wraps_z ? count_ / (width_ * height) : density_round({disks_.data(), count_}, width_);
   bound_shells(density, height, top);
   lists_.reset(disks_.data(), count_);
   if constexpr (Space::is_cell) draw_lid_bound();
   choose_tiles();
   choose_ahead(density);
   file_shells(height);
-  std::visit(
-      [this](auto& grid) {
-        for (std::uint32_t i = 0; i < count_; ++i) {
-          look_round<true>(grid, i);
-          choose_skin(i);
-          grid.set_reach(i, reach(i));
-        }
-        for (std::uint32_t i = 0; i < count_; ++i) {
-          mark_near_bounds(i);
-          look_round<true>(grid, i);
-          lists_.list(i, find_neighbours(i));
-        }
-      },
-      grid_);
+  const auto look = [this](std::uint32_t i) {
+    std::visit([&](auto& grid) { this->look_round<true>(grid, i); }, grid_);
+  };
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    look(i);
+    choose_skin(i);
+    std::visit([&](auto& grid) { grid.set_reach(i, reach(i)); }, grid_);
+  }
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    mark_near_bounds(i);
+    look(i);
+    lists_.list(i, find_neighbours(i));
+  }
   predict_all();
 }
 

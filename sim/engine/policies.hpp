@@ -82,6 +82,7 @@ struct EqualSizes {
   static constexpr bool equal = true;
   double radius(std::uint32_t) const { return 0.5; }
   double mass(std::uint32_t) const { return 1; }
+  const double* mass_table() const { return nullptr; }
   double contact_distance(std::uint32_t, std::uint32_t) const { return 1; }
 };
 struct TwoSizes {
@@ -89,6 +90,7 @@ struct TwoSizes {
   std::vector<double> radii, masses;  // radii also of the sentinel
   double radius(std::uint32_t i) const { return radii[i]; }
   double mass(std::uint32_t i) const { return masses[i]; }
+  const double* mass_table() const { return masses.data(); }
   double contact_distance(std::uint32_t i, std::uint32_t k) const { return radii[i] + radii[k]; }
 };
 

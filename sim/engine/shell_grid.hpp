@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "sim/engine/disk.hpp"
@@ -226,5 +228,10 @@ class ShellGrid {
   std::vector<Cell> crowded_;  // what did not fit; the first place is not used, it is an empty cell
   std::uint32_t free_cell_ = 0;
 };
+
+// The kinds of grid that a space may need. A bed that falls is denser at times than it may be now: seven to a cell.
+template <bool falls>
+using ShellGridFor = std::conditional_t<falls, std::variant<ShellGrid<WideCell>>,
+                                        std::variant<ShellGrid<NarrowCell>, ShellGrid<WideCell>>>;
 
 }  // namespace shakebed::sim
