@@ -22,6 +22,9 @@ namespace shakebed::ingest {
 
 constexpr int highest_harmonic = 6;  // a hexagon's: beyond it outlines are as round as pixels show
 
+// px, radius: up to this, blur makes the outlines of touching beads look not round.
+inline constexpr double coarse_px = 10;
+
 // One side of a straight cut along a row or a column.
 struct SideOfCut {
   bool left_or_right = true;  // of a column; else above or below a row

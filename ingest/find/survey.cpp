@@ -44,9 +44,9 @@ constexpr double much_smaller = 0.7;  // radii
 constexpr double speck_px = 4;
 // Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
 constexpr double largest_proposed = 0.25;
-// px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
-// not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
-constexpr double coarse_px = 10, wide_enough_px = 24;
+// px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
+// drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
+constexpr double wide_enough_px = 24;
 // px, width: twice as wide, so that the shape of an outline shows in the reduced picture that circles are searched in.
 constexpr double outline_tells_px = 2 * wide_enough_px;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
@@ -380,7 +380,8 @@ SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypot
   if (candidate.why_not.empty()) {
     const Roundness roundness = roundness_of(picture, candidate.rims, candidate.disks);
     judge_shape(candidate, roundness, asked.options.any_shape);
-    if (roundness.round_side && !asked.options.any_shape && !asked.options.roi)
+    const bool outlines_tell = candidate.rims.radius_px > coarse_px && !asked.options.any_shape && !asked.options.roi;
+    if (roundness.round_side && outlines_tell)
       candidate.region = part_on(*roundness.round_side, picture.width, picture.height);
   }
   candidate.plausible = candidate.plausible && candidate.why_not != spots;
