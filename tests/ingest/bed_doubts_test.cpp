@@ -104,8 +104,8 @@ TEST(BedDoubts, DisksThatOverlapAreCountedAsWrongByAMeasurement) {
   const auto wrong_with = [](int overlapping) {
     std::vector<RenderedDisk> disks;
     for (int row = 0; row < 5; ++row)
-      for (int column = 0; column < 10; ++column) disks.push_back({30 + 24.0 * column, 210 - 30.0 * row, radius, 0, 0});
-    for (int k = 0; k < overlapping; ++k) disks.push_back({30 + 48.0 * k, 210 - 60.0 - 14, radius, 0, 0});
+      for (int column = 0; column < 10; ++column) disks.push_back({30 + 24.0 * column, 220 - 45.0 * row, radius, 0, 0});
+    for (int k = 0; k < overlapping; ++k) disks.push_back({30 + 48.0 * k, 220 - 45 - 17, radius, 0, 0});
     const GrayFrame frame = render_frame(disks, {.width = 280, .height = 240, .blur_px = 0.8, .read_noise = 2});
     MeasureOptions options;
     options.bead_diameter_m = 2e-3;
