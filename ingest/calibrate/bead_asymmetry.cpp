@@ -11,15 +11,22 @@ BeadAsymmetry::BeadAsymmetry(Harmonics harmonics) : harmonics_(std::move(harmoni
   side_ = static_cast<int>(std::ceil(reach_)) + 1;
   constexpr double small = 16;  // px: finer samples are cheap
   finer_ = reach_ < small ? 8 : 4;
+}
+
+void BeadAsymmetry::sample() const {
   const int width = 2 * side_ + 1, rows = 2 * side_ * finer_ + 1;
   samples_.assign(
       static_cast<std::size_t>(rows) * static_cast<std::size_t>(finer_ + 1) * static_cast<std::size_t>(width), 0.0F);
   float* to = samples_.data();
-  for (int j = 0; j < rows; ++j)
-    for (int phase = 0; phase <= finer_; ++phase)
+  for (int j = 0; j < rows; ++j) {
+    const float* first = to;
+    for (int phase = 0; phase < finer_; ++phase)
       for (int k = 0; k < width; ++k)
         *to++ = static_cast<float>(
             at(k - side_ - static_cast<double>(phase) / finer_, static_cast<double>(j) / finer_ - side_));
+    *to++ = 0;  // the last phase is the first one, a pixel farther: beyond the reach there is nothing
+    to = std::copy_n(first, width - 1, to);
+  }
 }
 
 double BeadAsymmetry::at(double dx, double dy) const {
@@ -61,6 +68,7 @@ const float* BeadAsymmetry::line(int j, int phase) const {
 }
 
 void BeadAsymmetry::add_to_row(float* row, int left, int count, double x_px, double dy_px, float sign) const {
+  std::call_once(sampled_, [this] { sample(); });
   const double down = (dy_px + side_) * finer_;
   const int j = static_cast<int>(std::floor(down));
   if (j < 0 || j >= 2 * side_ * finer_) return;

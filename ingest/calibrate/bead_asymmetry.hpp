@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <mutex>
 #include <vector>
 
 namespace shakebed::ingest {
@@ -31,8 +32,12 @@ class BeadAsymmetry {
   double reach_ = 0;
   // Sampled `finer_` times as finely as pixels, columns of one phase beside one another. Row j, phase p, place k hold
   // the value at dx = k - side_ - p/finer_, dy = j/finer_ - side_.
+  // Taken when the first bead is drawn: of large beads they are a million values, and many that are learned are not
+  // used.
   int finer_ = 4, side_ = 0;
-  std::vector<float> samples_;
+  mutable std::once_flag sampled_;
+  mutable std::vector<float> samples_;
+  void sample() const;
   [[nodiscard]] const float* line(int j, int phase) const;
 };
 

@@ -1,6 +1,7 @@
 #include "ingest/calibrate/picture_parts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -48,6 +49,58 @@ class BlockSums {
   int columns_, rows_;
   std::vector<double> sums_;
 };
+
+// Texture: in blocks of a picture, `blocks_a_side` along its shorter side.
+constexpr int blocks_a_side = 32, smallest_block = 8;
+constexpr std::size_t features = 3;
+constexpr double least_side_share = 0.15;  // of the picture, on each side of a cut
+// Share of the variance of a feature that a cut must explain: of textures that differ, most of it.
+constexpr double least_explained_by_cut = 0.3;
+
+using Texture = std::array<double, features>;
+
+Texture texture_of(const GrayFrame& frame, const PicturePart& block) {
+  constexpr int far = 4;  // px
+  Texture sums{};
+  double count = 0;
+  for (int y = block.top; y + far < block.top + block.height; y += 2)
+    for (int x = block.left; x + far < block.left + block.width; x += 2) {
+      const float level = frame.at(x, y);
+      const float near_change = std::abs(frame.at(x + 1, y) - level) + std::abs(frame.at(x, y + 1) - level);
+      const float far_change = std::abs(frame.at(x + far, y) - level) + std::abs(frame.at(x, y + far) - level);
+      if (unseen(near_change + far_change)) continue;
+      sums[0] += static_cast<double>(level);
+      sums[1] += static_cast<double>(near_change);
+      sums[2] += static_cast<double>(far_change);
+      ++count;
+    }
+  for (double& sum : sums) sum /= std::max(1.0, count);
+  // Changes of level by ratios.
+  for (std::size_t k = 1; k < features; ++k) sums[k] = std::log1p(sums[k]);
+  return sums;
+}
+
+struct Moments {
+  double count = 0, sum = 0, squares = 0;
+  void add(double value) { ++count, sum += value, squares += value * value; }
+  void add(const Moments& other) { count += other.count, sum += other.sum, squares += other.squares; }
+  [[nodiscard]] double scatter() const { return count > 0 ? squares - sum * sum / count : 0; }
+};
+using TextureMoments = std::array<Moments, features>;
+
+// Largest share of a feature's variance that a cut after line `cut` explains.
+double explained_by_cut(const std::vector<TextureMoments>& lines, std::size_t cut) {
+  TextureMoments before{}, after{};
+  for (std::size_t line = 0; line < lines.size(); ++line)
+    for (std::size_t k = 0; k < features; ++k) (line < cut ? before : after)[k].add(lines[line][k]);
+  double most = 0;
+  for (std::size_t k = 0; k < features; ++k) {
+    Moments all = before[k];
+    all.add(after[k]);
+    if (all.scatter() > 0) most = std::max(most, 1 - (before[k].scatter() + after[k].scatter()) / all.scatter());
+  }
+  return most;
+}
 
 }  // namespace
 
@@ -116,6 +169,39 @@ PicturePart part_with_most(const std::vector<std::pair<double, double>>& places,
       if (count > most) most = count, best.left = x, best.top = y;
     }
   return best;
+}
+
+std::vector<PicturePart> parts_that_differ(const GrayFrame& frame) {
+  const int block = std::min(frame.width, frame.height) / blocks_a_side;
+  if (block < smallest_block) return {};
+  const int columns = frame.width / block, rows = frame.height / block;
+  std::vector<TextureMoments> by_column(static_cast<std::size_t>(columns)), by_row(static_cast<std::size_t>(rows));
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const Texture here = texture_of(frame, {column * block, row * block, block, block});
+      for (std::size_t k = 0; k < features; ++k) {
+        by_column[static_cast<std::size_t>(column)][k].add(here[k]);
+        by_row[static_cast<std::size_t>(row)][k].add(here[k]);
+      }
+    }
+  double most = least_explained_by_cut;
+  std::vector<PicturePart> parts;
+  const auto look_along = [&](const std::vector<TextureMoments>& lines, bool across) {
+    const auto least = static_cast<std::size_t>(std::ceil(least_side_share * static_cast<double>(lines.size())));
+    for (std::size_t cut = least; cut + least <= lines.size(); ++cut) {
+      const double explained = explained_by_cut(lines, cut);
+      if (explained <= most) continue;
+      most = explained;
+      const int at = static_cast<int>(cut) * block;
+      if (across)
+        parts = {{0, 0, at, frame.height}, {at, 0, frame.width - at, frame.height}};
+      else
+        parts = {{0, 0, frame.width, at}, {0, at, frame.width, frame.height - at}};
+    }
+  };
+  look_along(by_column, true);
+  look_along(by_row, false);
+  return parts;
 }
 
 }  // namespace shakebed::ingest

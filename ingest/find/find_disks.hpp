@@ -53,6 +53,7 @@ struct FindOptions {
   bool one_size = false;                // learn_beads() looks for no beads of other sizes
   bool rims_of_one_size = false;        // learn_beads() searches rims at a higher resolution for one size only
   bool quick_rims_only = false;         // learn_beads() looks at no faces, and searches rims quickly
+  bool any_shape = false;               // things that are not round may be beads
   std::optional<PixelRectangle> roi{};  // centres outside are not reported
   int joint_fit_sweeps =
       20;  // at most; few frames need more than 12; 0 stops at the peaks of the map: fast, about 0.1 px

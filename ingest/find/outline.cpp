@@ -47,9 +47,14 @@ constexpr double largest_own_elongation = 0.035;
 constexpr double largest_single_deviation = 0.045, least_single_on_circle = 0.85, largest_single_gap = 0.3;
 constexpr double most_not_round = 0.4;  // beads seen 2.6 px in radius, enlarged by repeating pixels: 0.21 to 0.32
 
+// Outlines on each side of a cut, at least; and the chance that shapes without a place give such a cut.
+constexpr std::size_t fewest_on_a_side = 8;
+constexpr double cut_by_chance = 1e-4;
+
 constexpr std::size_t outline_terms = 1 + 2 * highest_harmonic;
 
 struct OneOutline {
+  double x = 0, y = 0;  // px, of the circle
   double followed = 0, on_circle = 1, gap = 0, deviation = 0, rim_width = 0;
   std::array<std::complex<double>, highest_harmonic + 1> harmonic{};
   bool developed = false;
@@ -230,6 +235,7 @@ class OutlineFollower {
     for (const Ray& ray : rays()) rim.push_back(static_cast<double>(slopes_.at_rim(circle, ray)));
     const OutlinePath path(slopes_, circle, std::max(least_slope_, median_of(rim)));
     OneOutline outline;
+    outline.x = circle.x, outline.y = circle.y;
     double clear = 0, on_circle = 0;
     for (std::size_t k = 0; k < outline_directions; ++k) {
       clear += path.weight[k];
@@ -309,29 +315,40 @@ class OutlineFollower {
   double least_slope_;
 };
 
+// The second harmonic that all share, which is the picture's aspect.
+std::complex<double> shared_second_of(const std::vector<OneOutline>& outlines) {
+  std::complex<double> second;
+  double developed = 0;
+  for (const OneOutline& one : outlines)
+    if (one.developed) second += one.harmonic[2], ++developed;
+  return developed > 0 ? second / developed : second;
+}
+
+// Without what all share.
+double own_deviation(const OneOutline& one, std::complex<double> second) {
+  const double own = 0.5 * (std::norm(one.harmonic[2]) - std::norm(one.harmonic[2] - second));
+  return std::sqrt(std::max(0.0, one.deviation * one.deviation - own));
+}
+
+bool plainly_not_round(const OneOutline& one, std::complex<double> second) {
+  return own_deviation(one, second) > largest_single_deviation || one.on_circle < least_single_on_circle ||
+         one.gap > largest_single_gap;
+}
+
 Roundness summary_of(const std::vector<OneOutline>& outlines) {
   Roundness out;
   std::vector<double> on_circle, gap, deviation, rim_width;
   std::array<std::vector<double>, highest_harmonic + 1> harmonic;
-  std::complex<double> second;
+  const std::complex<double> second = shared_second_of(outlines);
+  double not_round = 0;
   for (const OneOutline& one : outlines) {
     on_circle.push_back(one.on_circle);
     gap.push_back(one.gap);
     rim_width.push_back(one.rim_width);
+    not_round += plainly_not_round(one, second);
     if (!one.developed) continue;
-    second += one.harmonic[2];
+    deviation.push_back(own_deviation(one, second));
     for (std::size_t q = 2; q <= highest_harmonic; ++q) harmonic[q].push_back(std::abs(one.harmonic[q]));
-  }
-  const auto developed = static_cast<double>(harmonic[2].size());
-  if (developed > 0) second /= developed;
-  double not_round = 0;
-  for (const OneOutline& one : outlines) {
-    // Without what all share, which is the picture's aspect.
-    const double own = 0.5 * (std::norm(one.harmonic[2]) - std::norm(one.harmonic[2] - second));
-    const double left = std::sqrt(std::max(0.0, one.deviation * one.deviation - own));
-    if (one.developed) deviation.push_back(left);
-    not_round +=
-        left > largest_single_deviation || one.on_circle < least_single_on_circle || one.gap > largest_single_gap;
   }
   out.outlines = outlines.size();
   if (outlines.empty()) return out;
@@ -346,7 +363,69 @@ Roundness summary_of(const std::vector<OneOutline>& outlines) {
   return out;
 }
 
+// k ln(k / n) and the same of the rest: the largest log likelihood of k successes in n.
+double log_likelihood(double k, double n) {
+  const auto part = [n](double count) { return count > 0 ? count * std::log(count / n) : 0; };
+  return part(k) + part(n - k);
+}
+
+// Which of all cuts along rows and columns best separates outlines that are not round from the others, if chance does
+// not give such a one.
+std::optional<SideOfCut> best_cut(std::vector<OneOutline> outlines) {
+  const std::complex<double> second = shared_second_of(outlines);
+  const auto count = static_cast<double>(outlines.size());
+  double all = 0;
+  for (const OneOutline& one : outlines) all += plainly_not_round(one, second);
+  double most = log_likelihood(all, count) + std::log(2 * count / cut_by_chance);
+  std::optional<SideOfCut> best;
+  for (const bool left_or_right : {true, false}) {
+    const auto place = [&](const OneOutline& one) { return left_or_right ? one.x : one.y; };
+    std::sort(outlines.begin(), outlines.end(),
+              [&](const OneOutline& a, const OneOutline& b) { return place(a) < place(b); });
+    double before = 0;
+    for (std::size_t k = 1; k < outlines.size(); ++k) {
+      before += plainly_not_round(outlines[k - 1], second);
+      const auto here = static_cast<double>(k);
+      const double likely = log_likelihood(before, here) + log_likelihood(all - before, count - here);
+      if (likely <= most || k < fewest_on_a_side || outlines.size() - k < fewest_on_a_side) continue;
+      most = likely;
+      best = SideOfCut{left_or_right, before / here > (all - before) / (count - here),
+                       0.5 * (place(outlines[k - 1]) + place(outlines[k]))};
+    }
+  }
+  return best;
+}
+
+bool on_side(const OneOutline& one, const SideOfCut& side) {
+  return ((side.left_or_right ? one.x : one.y) > side.at) == side.beyond;
+}
+
+// A cut with round outlines on one side alone.
+std::optional<SideOfCut> round_side_of(const std::vector<OneOutline>& outlines) {
+  const std::optional<SideOfCut> side = best_cut(outlines);
+  if (!side) return std::nullopt;
+  std::vector<OneOutline> here, there;
+  for (const OneOutline& one : outlines) (on_side(one, *side) ? here : there).push_back(one);
+  if (!summary_of(here).round() || summary_of(there).round()) return std::nullopt;
+  return side;
+}
+
+std::vector<OneOutline> outlines_of(const OutlineFollower& follower, const std::vector<Circle>& circles,
+                                    std::size_t step) {
+  std::vector<OneOutline> outlines;
+  for (std::size_t k = 0; k < circles.size(); k += step)
+    if (const auto outline = follower.follow(circles[k])) outlines.push_back(*outline);
+  return outlines;
+}
+
 }  // namespace
+
+PixelRectangle part_on(const SideOfCut& side, int width, int height) {
+  const int limit = side.left_or_right ? width : height;
+  const int at = std::clamp(static_cast<int>(std::lround(side.at)), 1, limit - 1);
+  const int from = side.beyond ? at : 0, size = side.beyond ? limit - at : at;
+  return side.left_or_right ? PixelRectangle{from, 0, size, height} : PixelRectangle{0, from, width, size};
+}
 
 std::string Roundness::why_not() const {
   if (outlines == 0) return {};
@@ -379,11 +458,14 @@ std::string Roundness::why_not() const {
 
 Roundness roundness_of(const EdgeMap& edges, const std::vector<Circle>& circles, Polarity polarity) {
   const OutlineFollower follower(edges, circles, polarity);
-  std::vector<OneOutline> outlines;
   const std::size_t step = std::max<std::size_t>(1, circles.size() / most_outlines);
-  for (std::size_t k = 0; k < circles.size(); k += step)
-    if (const auto outline = follower.follow(circles[k])) outlines.push_back(*outline);
-  return summary_of(outlines);
+  const std::vector<OneOutline> outlines = outlines_of(follower, circles, step);
+  Roundness out = summary_of(outlines);
+  out.round_side = round_side_of(outlines);
+  // Where the cut runs is known by all outlines.
+  if (out.round_side && step > 1)
+    if (const auto side = round_side_of(outlines_of(follower, circles, 1))) out.round_side = side;
+  return out;
 }
 
 }  // namespace shakebed::ingest

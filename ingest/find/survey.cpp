@@ -44,9 +44,9 @@ constexpr double much_smaller = 0.7;  // radii
 constexpr double speck_px = 4;
 // Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
 constexpr double largest_proposed = 0.25;
-// px, radius: up to this, blur makes the outlines of touching beads look not round. And the width from which it does
-// not: drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
-constexpr double coarse_px = 10, wide_enough_px = 24;
+// px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
+// drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
+constexpr double wide_enough_px = 24;
 // px, width: twice as wide, so that the shape of an outline shows in the reduced picture that circles are searched in.
 constexpr double outline_tells_px = 2 * wide_enough_px;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
@@ -62,6 +62,12 @@ constexpr double rim_of_another = 1.15;
 // enough to refuse a hypothesis.
 constexpr double part_radii = 80;
 constexpr std::ptrdiff_t fewest_in_part = 50;
+
+// Beads that are believed in one part of a picture in which there seem to be none: so many at least, since more is
+// tried.
+constexpr std::size_t fewest_in_region = 10;
+// Hypotheses looked at in full in each part of such a picture: most of these pictures show no beads anywhere.
+constexpr std::size_t most_examined_in_parts = 2;
 
 // Share of a circle's rim that is seen, of that which no other circle touches or covers.
 double support_beside_others(const std::vector<RimDisk>& disks, std::size_t which) {
@@ -214,7 +220,7 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
 // Where smaller things that are not round make up more of the picture, a circle only surrounds several of them.
 void compare_with_smaller(std::vector<SurveyCandidate>& candidates) {
   for (SurveyCandidate& candidate : candidates) {
-    if (!candidate.credible) continue;
+    if (!candidate.credible || candidate.region) continue;
     for (const SurveyCandidate& other : candidates) {
       if (!other.not_round || other.rims.radius_px > much_smaller * candidate.rims.radius_px ||
           other.explained_share <= candidate.explained_share)
@@ -236,6 +242,9 @@ void enlarge(SurveyCandidate& candidate, int factor) {
   candidate.rims.radius_px *= scale;
   candidate.rims.open_radius_px *= scale;
   candidate.rims.radius_std_error_px *= scale;
+  if (auto& region = candidate.region; region)
+    region =
+        PixelRectangle{region->left * factor, region->top * factor, region->width * factor, region->height * factor};
   for (RimDisk& disk : candidate.disks) {
     disk.circle.x = scale * disk.circle.x + shift;
     disk.circle.y = scale * disk.circle.y + shift;
@@ -352,7 +361,11 @@ struct SurveyAsked {
   double largest_px = 0;  // largest radius that is proposed, px of the picture
 };
 
-// What a picture shows of a hypothesis.
+void move_by(SurveyCandidate& candidate, int right, int down) {
+  for (RimDisk& disk : candidate.disks) disk.circle.x += right, disk.circle.y += down;
+}
+
+// What a picture shows of a hypothesis. `region`: where all outlines are round, if those elsewhere are not.
 SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
   const bool given = asked.options.radius_px.has_value();
   const Known unasked = 2 * hypothesis.radius_px >= outline_tells_px ? Known::wide : Known::nothing;
@@ -364,8 +377,13 @@ SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypot
   candidate.plausible = candidate.why_not.empty() && candidate.rims.radius_px <= asked.largest_px;
   if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
   if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
-  if (candidate.why_not.empty())
-    judge_shape(candidate, roundness_of(picture, candidate.rims, candidate.disks), asked.options.any_shape);
+  if (candidate.why_not.empty()) {
+    const Roundness roundness = roundness_of(picture, candidate.rims, candidate.disks);
+    judge_shape(candidate, roundness, asked.options.any_shape);
+    const bool outlines_tell = candidate.rims.radius_px > coarse_px && !asked.options.any_shape && !asked.options.roi;
+    if (roundness.round_side && outlines_tell)
+      candidate.region = part_on(*roundness.round_side, picture.width, picture.height);
+  }
   candidate.plausible = candidate.plausible && candidate.why_not != spots;
   return candidate;
 }
@@ -392,16 +410,50 @@ std::optional<SurveyCandidate> refused_by_part(const GrayFrame& picture, const C
   });
   if (seen < fewest_in_part) return std::nullopt;
   SurveyCandidate candidate = examined(cut_out(picture, *part), hypothesis, asked);
-  if (candidate.why_not.empty()) return std::nullopt;
-  for (RimDisk& disk : candidate.disks) disk.circle.x += part->left, disk.circle.y += part->top;
+  if (candidate.why_not.empty() || candidate.region) return std::nullopt;
+  move_by(candidate, part->left, part->top);
   return candidate;
 }
 
-}  // namespace
+// In all of the picture, or where the things seen are round.
+SurveyCandidate examined_where_round(const GrayFrame& picture, const CircleHypothesis& hypothesis,
+                                     const SurveyAsked& asked) {
+  if (std::optional<SurveyCandidate> refused = refused_by_part(picture, hypothesis, asked)) return std::move(*refused);
+  SurveyCandidate all = examined(picture, hypothesis, asked);
+  const std::optional<PixelRectangle> region = std::exchange(all.region, std::nullopt);
+  if (!region) return all;
+  SurveyCandidate there =
+      examined(cut_out(picture, {region->left, region->top, region->width, region->height}), hypothesis, asked);
+  if (!there.why_not.empty()) return all;
+  move_by(there, region->left, region->top);
+  there.region = region;
+  return there;
+}
 
-Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
+// Of a candidate in the frames that were read, which becomes one of the full frame.
+void settle_credibility(SurveyCandidate& candidate, int reduction, const SurveyOptions& options) {
+  enlarge(candidate, reduction);
+  candidate.gain_px *= reduction;
+  if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
+    candidate.why_not =
+        formatted("the circles seen have a radius of %.1f px, which is not within 25 %% of the given %.1f px",
+                  candidate.rims.radius_px, *options.radius_px);
+  candidate.credible = candidate.why_not.empty();
+  if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
+    candidate.credible = false;
+    candidate.why_not = formatted(
+        "circles of %.1f px radius are seen, too small to be distinguished from specks (at least %.0f px is needed). "
+        "Photograph the beads with more pixels, or give their radius",
+        candidate.rims.radius_px, speck_px);
+  }
+}
+
+enum class Effort { full, glance };
+
+Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, Effort effort) {
   Survey survey;
-  const std::vector<const ChannelFrames::One*> channels = different_channels(frames);
+  std::vector<const ChannelFrames::One*> channels = different_channels(frames);
+  if (effort == Effort::glance) channels.resize(1);
   std::vector<GrayFrame> cropped;
   std::vector<const GrayFrame*> pictures;
   if (options.roi)
@@ -414,29 +466,14 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   const CircleCensus census = take_census(pictures, asked);
   const SurveyAsked asked_of_each{options, signs,
                                   largest_proposed * std::min(frames.width, frames.height) / frames.reduction};
+  const std::size_t most = effort == Effort::full ? most_examined : most_examined_in_parts;
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
-    if (survey.candidates.size() >= most_examined) break;
+    if (survey.candidates.size() >= most) break;
     if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
     if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
-    const GrayFrame& picture = *pictures[hypothesis.channel];
-    std::optional<SurveyCandidate> refused = refused_by_part(picture, hypothesis, asked_of_each);
-    SurveyCandidate candidate = refused ? std::move(*refused) : examined(picture, hypothesis, asked_of_each);
-    candidate.channel = channels[hypothesis.channel]->channel;
-    enlarge(candidate, frames.reduction);
-    if (options.radius_px && !is_the_given_one(candidate.rims.radius_px, *options.radius_px))
-      candidate.why_not =
-          formatted("the circles seen have a radius of %.1f px, which is not within 25 %% of the given %.1f px",
-                    candidate.rims.radius_px, *options.radius_px);
-    candidate.credible = candidate.why_not.empty();
-    candidate.gain_px *= frames.reduction;
-    if (candidate.credible && !options.radius_px && candidate.rims.radius_px < speck_px) {
-      candidate.credible = false;
-      candidate.why_not = formatted(
-          "circles of %.1f px radius are seen, too small to be distinguished from specks (at least %.0f px is needed). "
-          "Photograph the beads with more pixels, or give their radius",
-          candidate.rims.radius_px, speck_px);
-    }
-    survey.candidates.push_back(std::move(candidate));
+    survey.candidates.push_back(examined_where_round(*pictures[hypothesis.channel], hypothesis, asked_of_each));
+    survey.candidates.back().channel = channels[hypothesis.channel]->channel;
+    settle_credibility(survey.candidates.back(), frames.reduction, options);
   }
   if (!options.any_shape) compare_with_smaller(survey.candidates);
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
@@ -445,18 +482,53 @@ Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
                      return a.gain_px > b.gain_px;
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
-  if (!survey.found || leaves_room(survey.candidates.front())) {
+  if (effort == Effort::glance && !survey.found) return survey;
+  if (!survey.found || (!survey.candidates.front().region && leaves_room(survey.candidates.front()))) {
     const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
     SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
     consider_packed_bed(survey, picture, starts_from(census, options, frames.reduction), options);
   }
   if (survey.found) {
-    SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), options);
+    SurveyOptions in_region = options;
+    if (!options.roi) in_region.roi = survey.candidates.front().region;
+    SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), in_region);
     survey.candidates.front().by_rims = settled.by_rims;
     if (settled.channel != survey.candidates.front().channel)
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }
   if (!survey.found) survey.why_not = why_none(survey);
+  return survey;
+}
+
+// In one part of the frames. `part`: px of the frames that were read.
+Survey survey_of_part(const ChannelFrames& frames, const PicturePart& part, const SurveyOptions& options) {
+  ChannelFrames cut;
+  cut.reduction = frames.reduction;
+  cut.width = part.width * frames.reduction, cut.height = part.height * frames.reduction;
+  for (const ChannelFrames::One& one : frames.channels) {
+    cut.channels.push_back({one.channel, cut_out(one.frame, part)});
+    cut.channels.back().frame.enlargement = one.frame.enlargement;
+  }
+  Survey survey = survey_of_all(cut, options, Effort::glance);
+  const int left = part.left * frames.reduction, top = part.top * frames.reduction;
+  for (SurveyCandidate& candidate : survey.candidates) {
+    move_by(candidate, left, top);
+    PixelRectangle region = candidate.region.value_or(PixelRectangle{0, 0, cut.width, cut.height});
+    region.left += left, region.top += top;
+    candidate.region = region;
+  }
+  return survey;
+}
+
+}  // namespace
+
+Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
+  Survey survey = survey_of_all(frames, options, Effort::full);
+  if (survey.found || options.roi || frames.channels.empty()) return survey;
+  for (const PicturePart& part : parts_that_differ(frames.channels.front().frame)) {
+    Survey there = survey_of_part(frames, part, options);
+    if (there.found && there.candidates.front().disks.size() >= fewest_in_region) return there;
+  }
   return survey;
 }
 

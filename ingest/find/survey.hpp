@@ -29,6 +29,8 @@ struct SurveyCandidate {
   bool few_edges = false;      // they may be beads, but other things make up the picture
   // The circles are no chance, so they may be beads of another shape, or smaller than those that are believed unasked.
   bool plausible = false;
+  // Where the rest of the picture shows something else, the part in which the beads are; px of the full frame.
+  std::optional<PixelRectangle> region;
 };
 
 struct Survey {

@@ -9,7 +9,9 @@
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/find/rim_finder.hpp"
 #include "ingest/find/two_kinds.hpp"
+#include "ingest/profile/photographs.hpp"
 
 namespace shakebed::ingest {
 
@@ -80,6 +82,7 @@ class FilmLearner {
 
   FilmCalibration learn() {
     learn_from_first_frames();
+    keep_to_round_side();
     if (!learn_both_kinds()) {  // else no lens is looked for: rims of two sizes would mislead it
       learn_lens();
       tell_radius(calibrated_);
@@ -163,6 +166,32 @@ class FilmLearner {
                        "check the files");
     throw NoDisksError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
                        "check that sharp beads, at least 10 px wide, are visible");
+  }
+
+  // Faces fit squares of the beads' size nearly as well as beads. Where the outlines in one part of the picture are
+  // round and those in the rest are not, the beads are looked for in that part alone.
+  void keep_to_round_side() {
+    const FinderCalibration& calibration = calibrated_.calibration;
+    if (find_.roi || find_.any_shape || !calibration.rims || calibration.rims->radius_px <= coarse_px) return;
+    const GrayFrame& frame = straight_.back();
+    const FindResult found =
+        calibrated_.in_last_frame ? *calibrated_.in_last_frame : find_beads(frame, calibration, find_);
+    std::vector<RimDisk> disks;
+    for (const FoundDisk& disk : found.disks) {
+      Circle& circle = disks.emplace_back().circle;
+      circle.x = disk.x_px, circle.y = disk.y_px;
+      // Outlines run where rims are steepest, which is not where faces end.
+      circle.radius = disk.radius_px * calibration.rims->radius_px / calibration.radius_px;
+    }
+    const std::optional<SideOfCut> side = roundness_of(frame, *calibration.rims, disks).round_side;
+    if (!side) return;
+    FindOptions there = find_;
+    there.roi = part_on(*side, frame.width, frame.height);
+    CalibrationResult again = learn_beads(pointers_to(straight_), there);
+    if (!again.found) return;
+    find_ = there, film_.options.find.roi = there.roi;
+    calibrated_ = std::move(again);
+    film_.warnings.push_back(why_only_a_part(*there.roi, find_.recorded_px));
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.

@@ -96,10 +96,14 @@ Survey survey_of(GrayFrame& frame, const FindOptions& options) {
   return survey;
 }
 
-// The most credible kind of beads.
-BeadsSeen seen_in(const Survey& survey) {
-  const SurveyCandidate& best = survey.candidates.front();
-  return {best.rims.polarity, best.rims.radius_px, best.one_sided};
+// The most credible kind of beads, where they are.
+void look_for(const SurveyCandidate& best, FindOptions& find) {
+  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided};
+  if (!find.roi) find.roi = best.region;
+}
+
+void warn_of_part(const std::optional<PixelRectangle>& region, std::vector<std::string>& warnings) {
+  if (region) warnings.insert(warnings.begin(), why_only_a_part(*region));
 }
 
 // Of the scale given, if any, to the beads seen.
@@ -232,6 +236,14 @@ std::string why_reduced(int width, int height, int reduction) {
       width, height, reduction, reduction);
 }
 
+std::string why_only_a_part(const PixelRectangle& part, double recorded_px) {
+  return formatted(
+      "Only a part of the picture shows beads, from column %.0f to %.0f and from row %.0f to %.0f. The rest shows "
+      "something else and was left out. If it contains beads, give the region of all beads (--roi).",
+      part.left * recorded_px, (part.left + part.width) * recorded_px, part.top * recorded_px,
+      (part.top + part.height) * recorded_px);
+}
+
 Doubt doubt_of(double expected_wrong) {
   if (expected_wrong > most_wrong) return Doubt::too_many;
   return expected_wrong > share_worth_a_word ? Doubt::some : Doubt::little;
@@ -257,11 +269,13 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   }
   out.status = FindStatus::no_beads;
   FindOptions find = options;
+  std::optional<PixelRectangle> region;
   if (!find.seen) {
     const Survey survey = survey_of(frame, options);
     out.message = survey.why_not;
     if (!survey.found) return out;
-    find.seen = seen_in(survey);
+    look_for(survey.candidates.front(), find);
+    region = survey.candidates.front().region;
   }
   CalibrationResult learned = learn_beads({&frame}, find);
   out.message = learned.why_not;
@@ -269,7 +283,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
   tell_radius(learned);
   out.calibration = std::move(learned.calibration);
   FindResult found = find_beads(frame, out.calibration, find);
-  learn_other_shade(frame, options, out.calibration, found);
+  learn_other_shade(frame, find, out.calibration, found);
   out.message = found.why_nothing;
   if (found.empty()) return out;
   out.status = FindStatus::ok;
@@ -280,6 +294,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
     warnings.insert(warnings.begin(), formatted("%.0f %% of the beads may be missed", 100 * missed));
   if (doubt_of(out.expected_wrong) != Doubt::little)
     warnings.insert(warnings.begin(), formatted("%.1f %% of the disks found may be wrong", 100 * out.expected_wrong));
+  warn_of_part(region, warnings);
   return out;
 }
 
@@ -290,13 +305,15 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
   MeasureOptions measure = options;
   FrameSourceOptions source = source_options;
   std::string reduced_why;
+  std::optional<PixelRectangle> region;
   if (!measure.find.seen) {
     FrameSource names = FrameSource::open(paths, source);
     const auto look = look_at_first(names.first_origins(most_tried), survey_options(options.find), source);
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
-      measure.find.seen = seen_in(look->survey);
+      look_for(look->survey.candidates.front(), measure.find);
+      region = look->survey.candidates.front().region;
       if (const std::string why = scale_objection(measure); !why.empty())
         return refused(FindStatus::bad_input, look->path + ": " + why);
       source.channel = look->survey.candidates.front().channel;
@@ -309,6 +326,7 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
   if (!measure.frame_rate_hz) measure.frame_rate_hz = frames.film_rate_hz();
   BedFound found = measured(frames, std::move(measure));
   if (!reduced_why.empty()) found.measurement.warnings.push_back(reduced_why);
+  warn_of_part(region, found.measurement.warnings);
   return found;
 }
 
@@ -320,16 +338,20 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
     if (const char* why = unusable(images[k]))
       return refused(FindStatus::bad_input, formatted("frame %zu: %s", k, why));
   MeasureOptions measure = options;
+  std::optional<PixelRectangle> region;
   if (!measure.find.seen) {
     GrayFrame first = frame_of(images.front());
     const Survey survey = survey_of(first, options.find);
     if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
-    measure.find.seen = seen_in(survey);
+    look_for(survey.candidates.front(), measure.find);
+    region = survey.candidates.front().region;
     if (const std::string why = scale_objection(measure); !why.empty()) return refused(FindStatus::bad_input, why);
   }
   FrameSource source =
       FrameSource::from_generator(images.size(), [&](std::size_t index) { return frame_of(images[index]); });
-  return measured(source, std::move(measure));
+  BedFound found = measured(source, std::move(measure));
+  warn_of_part(region, found.measurement.warnings);
+  return found;
 }
 
 std::string DisksFound::brief() const {

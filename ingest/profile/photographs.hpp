@@ -74,6 +74,10 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
 // of three the circles may be the bright middle of beads, or hold their shadow, and the scale is believed.
 std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double radius_px);
 
+// Says that only a part of a picture was searched, since the rest shows something else.
+// `recorded_px`: px of the original picture that one px of the rectangle stands for.
+std::string why_only_a_part(const PixelRectangle& part, double recorded_px = 1);
+
 // By which factor frames of this size may be averaged (FrameSourceOptions::reduction). Large beads need not be seen by
 // every pixel: a radius of 12 to 24 px is enough. Where beads are found by their rims alone it is 24 to 48 px. 1 below
 // two million pixels. Frames of more pixels than are held in memory (FrameSourceOptions::largest_frame_pixels) are

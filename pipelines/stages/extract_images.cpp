@@ -84,6 +84,7 @@ UsedLook use_first_look(const ExtractOptions& options, RunContext& context, Film
   if (!chosen->why_drawn.empty())
     context.warning(
         fmt::format("{}: {}. The circles are measured because shape is \"any\".", look->path, chosen->why_drawn));
+  if (chosen->region && !measure.find.roi) context.warning(ingest::why_only_a_part(*chosen->region));
   go_on_with(*chosen, *look, film.source, measure);
   if (const std::string why = ingest::why_reduced(look->width, look->height, film.source.reduction); !why.empty())
     context.warning(why);

@@ -111,6 +111,8 @@ StagePages extract_pages() {
           {"disks found overlap", measurement,
            "Check in the film that the circles are as large as your beads. If not, give the length of a pixel "
            "(\"scale\")."},
+          {"Only a part of the picture", measurement,
+           "Check in the film that all beads have circles; else give a region (\"roi\") that contains all of them."},
           {"beside the bed", measurement, "Check in the film that the proposed region contains all beads of the bed."},
           {"No level floor", measurement, "Photograph the bed from the side, or give the floor's row (\"floor\")."},
           {"missed or out of view", measurement,

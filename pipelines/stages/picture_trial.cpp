@@ -97,6 +97,7 @@ ingest::MeasureOptions asked_for(const ExtractOptions& options) {
   measure.find.polarity = polarity_of(options.polarity);
   measure.find.radius_px = options.radius;
   measure.find.keep_half_hidden = options.keep_half_hidden;
+  measure.find.any_shape = options.shape == BeadShape::any;
   if (options.roi.size() == 4) {
     measure.find.roi = ingest::PixelRectangle{static_cast<int>(options.roi[0]), static_cast<int>(options.roi[1]),
                                               static_cast<int>(options.roi[2]), static_cast<int>(options.roi[3])};
@@ -143,6 +144,7 @@ const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const Ext
 void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, ingest::FrameSourceOptions& source,
                 ingest::MeasureOptions& measure) {
   source.channel = chosen.channel;
+  if (!measure.find.roi) measure.find.roi = chosen.region;
   measure.find.seen = ingest::BeadsSeen{chosen.rims.polarity, chosen.rims.radius_px, chosen.one_sided};
   source.reduction = measure.reduction =
       ingest::reduction_for(look.width, look.height, chosen.rims.radius_px, chosen.by_rims);

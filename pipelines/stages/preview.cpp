@@ -125,7 +125,10 @@ std::string options_for(const ingest::SurveyCandidate& candidate) {
     text = fmt::format("--channel {} ", ingest::name_of(candidate.channel));
   return text +
          fmt::format("--polarity {} --radius {:.2f}", name_of(candidate.rims.polarity), candidate.rims.radius_px) +
-         (needs_any_shape(candidate) ? " --shape any" : "");
+         (needs_any_shape(candidate) ? " --shape any" : "") +
+         (candidate.region ? fmt::format(" --roi {},{},{},{}", candidate.region->left, candidate.region->top,
+                                         candidate.region->width, candidate.region->height)
+                           : "");
 }
 
 void take_candidate(const ingest::SurveyCandidate& candidate, ExtractOptions& options) {
@@ -136,6 +139,9 @@ void take_candidate(const ingest::SurveyCandidate& candidate, ExtractOptions& op
       candidate.rims.polarity == ingest::Polarity::bright_beads ? BeadPolarity::bright : BeadPolarity::dark;
   options.radius = std::round(digits * candidate.rims.radius_px) / digits;
   options.shape = needs_any_shape(candidate) ? BeadShape::any : options.shape;
+  if (const auto& region = candidate.region)
+    options.roi = {static_cast<double>(region->left), static_cast<double>(region->top),
+                   static_cast<double>(region->width), static_cast<double>(region->height)};
 }
 
 std::vector<const ingest::SurveyCandidate*> different_candidates(const ingest::Survey& survey) {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "ingest/profile/bed_doubts.hpp"
+#include "ingest/profile/measure_bed.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest::bed_doubts_test {
 namespace {
@@ -95,6 +97,29 @@ TEST(BedDoubts, OfTwoDisksThatOverlapOneIsTooMany) {
   EXPECT_EQ(overlapping_too_many(disks, 0.9 * diameter), 0) << "the outline is larger than the bead";
   disks.back().other_size = true;
   EXPECT_EQ(overlapping_too_many(disks, diameter), 0);
+}
+
+// Disks drawn over others: however sure each of the circles is, the measurement counts one of two as wrong.
+TEST(BedDoubts, DisksThatOverlapAreCountedAsWrongByAMeasurement) {
+  const auto wrong_with = [](int overlapping) {
+    std::vector<RenderedDisk> disks;
+    for (int row = 0; row < 5; ++row)
+      for (int column = 0; column < 10; ++column) disks.push_back({30 + 24.0 * column, 220 - 45.0 * row, radius, 0, 0});
+    for (int k = 0; k < overlapping; ++k) disks.push_back({30 + 48.0 * k, 220 - 45 - 17, radius, 0, 0});
+    const GrayFrame frame = render_frame(disks, {.width = 280, .height = 240, .blur_px = 0.8, .read_noise = 2});
+    MeasureOptions options;
+    options.bead_diameter_m = 2e-3;
+    options.scale_m_per_px = 1e-4;
+    options.find.seen = BeadsSeen{Polarity::dark_beads, radius};
+    FrameSource source = FrameSource::from_generator(1, [&](std::size_t) { return frame; });
+    std::vector<MeasuredDisk> seen;
+    options.disk_sink = [&](const FrameReport&, const std::vector<MeasuredDisk>& all) { seen = all; };
+    const Measurement found = measure_bed(source, options);
+    EXPECT_EQ(seen.size(), disks.size());
+    return found.expected_wrong * static_cast<double>(seen.size());
+  };
+  EXPECT_LT(wrong_with(0), 0.5);
+  EXPECT_GE(wrong_with(4), 4);
 }
 
 TEST(BedDoubts, AFewDisksFarBesideTheBedAreNoPartOfIt) {
