@@ -317,17 +317,29 @@ TEST(StartByHand, FillsAClosedBoxEvenly) {
 }
 
 TEST(StartByHand, RefusesRowsThatDoNotFit) {
+  const auto said = [](const Scene& scene) {
+    try {
+      place_disks(scene);
+      return std::string();
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
   Scene scene = plain();
   scene.start = HexagonalStart{9, 0};  // 7 D for 8.5 spacings
-  EXPECT_THROW(place_disks(scene), std::runtime_error);
+  EXPECT_EQ(said(scene),
+            "10 disks of up to 1 D do not fit into a box 8 D wide and inf D high. Give fewer disks or a larger box");
   scene.start = HexagonalStart{7, 0};
-  EXPECT_NO_THROW(place_disks(scene));
+  EXPECT_EQ(said(scene), "");
   Scene fluid = weightless(6, 6);
   fluid.disks.species[0].count = 36;  // six a row, six rows of 1 D: there is room
   fluid.start = HexagonalStart{6, 0};
-  EXPECT_NO_THROW(place_disks(fluid));
+  EXPECT_EQ(said(fluid), "");
   fluid.disks.species[0].count = 48;  // eight rows of 0.75 D
-  EXPECT_THROW(place_disks(fluid), std::runtime_error);
+  EXPECT_EQ(said(fluid).substr(0, 37), "48 disks of up to 1 D do not fit into");
+  fluid.disks.species[0].count = 42;
+  fluid.start = HexagonalStart{3, 0};  // fourteen rows of 0.43 D
+  EXPECT_EQ(said(fluid).substr(0, 37), "42 disks of up to 1 D do not fit into");
 }
 
 // Under gravity each velocity is drawn alone; without it momentum is 0 and T exact.
