@@ -232,11 +232,13 @@ TEST(WeightsByHand, OfFewSamplesAreSmoothErrors) {
   const Bins without = with_measured_errors(bins, 0.5);
   EXPECT_NEAR(without.correlation(2, 2), bins.correlation(2, 2) - 0.25 / 64, 1e-14);
   EXPECT_NEAR(without.correlation(1, 2), bins.correlation(1, 2), 1e-14);
-  // Eight heights: two on either side.
-  const Bins more = bins_of(with_covariance({1, 1, 1, 1, 32, 1, 1, 1}, 0, 3), {0, 9, ""}, nullptr);
-  EXPECT_NEAR(more.inverse_error[1], 1, 1e-14);
-  EXPECT_NEAR(more.inverse_error[2], 0.5, 1e-14) << "the fifth root of 32";
-  EXPECT_NEAR(more.inverse_error[6], std::pow(32, -0.25), 1e-14) << "of four heights";
+  // Twelve heights: three on either side.
+  const Bins more = bins_of(with_covariance({1, 1, 1, 1, 128, 1, 1, 1, 1, 1, 1, 1}, 0, 3), {0, 20, ""}, nullptr);
+  EXPECT_NEAR(more.inverse_error[0], 1, 1e-14);
+  EXPECT_NEAR(more.inverse_error[1], std::pow(128, -0.2), 1e-14) << "of five heights";
+  EXPECT_NEAR(more.inverse_error[3], 0.5, 1e-14) << "the seventh root of 128";
+  EXPECT_NEAR(more.inverse_error[7], 0.5, 1e-14);
+  EXPECT_NEAR(more.inverse_error[8], 1, 1e-14);
 }
 
 // ---------------------------------------------------------------------------------------------------------------------

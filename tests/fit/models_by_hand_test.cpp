@@ -1,5 +1,6 @@
 // Curves of all models above a base that is not 0: derivatives by differences, areas by sums, starts; and the numbers
 // that a fit derives from its parameters.
+#include <gsl/gsl_cdf.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/inference/posterior.hpp"
 #include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/fit_model.hpp"
 #include "fit/theory/expansion.hpp"
@@ -223,6 +225,33 @@ TEST(FitNumbersByHand, HaveTheIntervalOfTheirLikelihood) {
     EXPECT_LT(fit.temperature_interval.low, fit.temperature.value);
     EXPECT_GT(fit.temperature_interval.high, fit.temperature.value);
   }
+}
+
+// A covariance of few samples: chi2 over dof is a ratio of two variances, the second known from dof (samples - 1) of
+// them, and its chance is Snedecor's F.
+TEST(FitNumbersByHand, HaveTheChanceOfSnedecorsF) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
+  Profile data = synthetic::profile_of(truth, {}, 30, 16, 0.02, 4);
+  const std::size_t n = data.height.size();
+  data.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
+  FitOptions options;
+  options.plateau_density = 1.10, options.sweep = options.compare = options.interval = false;
+  for (const int samples : {60, 200}) {
+    data.covariance_samples = samples;
+    const FitResult fit = fit_profile(data, options);
+    ASSERT_TRUE(fit.ok());
+    // aic is this chi2 and twice the two parameters: so many degrees of freedom it counts as.
+    const double dof = (fit.aic - 4) / fit.chi2_per_dof;
+    EXPECT_NEAR(fit.p_value, gsl_cdf_fdist_Q(fit.chi2_per_dof, dof, dof * (samples - 1.0)), 1e-9) << samples;
+  }
+}
+
+// From (1, 0): the farthest point first, then always the one that is farthest from all chosen.
+TEST(SpreadOutByHand, TakesTheFarthestPointInThePlane) {
+  const std::vector<double> points{0, 0, 1, 0, 0, 2, 0.4, 0.1};
+  EXPECT_EQ(spread_out(2, points, 4, 1), (std::vector<std::size_t>{1, 2, 0, 3}));
+  EXPECT_EQ(spread_out(2, points, 2, 3), (std::vector<std::size_t>{3, 2}));
 }
 
 }  // namespace

@@ -277,5 +277,17 @@ TEST(TimeLeft, CountsFromWhereAPartIsTakenUp) {
   EXPECT_NEAR(*time.seconds(), 20 / 0.4, 1e-12);
 }
 
+// In its first second, too: half a second of four.
+TEST(TimeLeft, HasAFractionFromItsBeginningOn) {
+  double now = 10;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.expect(0, 2);
+  time.expect(1, 2);
+  time.begin(0);
+  EXPECT_EQ(time.fraction(), 0);
+  now = 10.5;
+  EXPECT_NEAR(time.fraction(), 0.5 / 4, 1e-12);
+}
+
 }  // namespace
 }  // namespace shakebed
