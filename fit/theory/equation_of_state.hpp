@@ -90,8 +90,8 @@ class EquationOfState {
   [[nodiscard]] virtual double pair_function(double number_density) const;
   // Densities where Z has a kink or a jump of slope (the ends of a coexistence).
   [[nodiscard]] virtual std::span<const double> breaks() const { return {}; }
-  // Where phi(F) is steepest between fluid and solid, F = ln phi + g, and over what length of F 8 Gauss points still
-  // integrate it there; length 0: nowhere steeper than elsewhere.
+  // Where phi(F) is steepest between fluid and solid, F = ln phi + g. `length`: of a panel of F there that 8 Gauss
+  // points integrate; 0: nowhere steeper than elsewhere.
   struct Steep {
     double f = 0.0, length = 0.0;
   };
