@@ -88,6 +88,9 @@ class WindowRule {
     std::size_t beyond = last;
     while (beyond > 0 && measured_.height[last] - measured_.height[beyond] < cliff_depth) --beyond;
     if (last + 1 >= n || !(measured_.density[beyond] > cliff_density * measured_.greatest_mean)) return;
+    // Means over a diameter reach half of one beyond the cliff.
+    for (std::size_t empty = last; empty > beyond && measured_.density[empty] == 0.0; --empty)
+      measured_.usable[empty] = true;
     while (last + 1 < n && measured_.height[last + 1] <= window_.high + cliff_margin) measured_.usable[++last] = true;
     if (last + 1 < n && measured_.height[last] == window_.high) measured_.usable[++last] = true;
     window_.high = measured_.height[last];

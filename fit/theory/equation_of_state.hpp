@@ -90,6 +90,12 @@ class EquationOfState {
   [[nodiscard]] virtual double pair_function(double number_density) const;
   // Densities where Z has a kink or a jump of slope (the ends of a coexistence).
   [[nodiscard]] virtual std::span<const double> breaks() const { return {}; }
+  // Where phi(F) is steepest between fluid and solid, F = ln phi + g. `length`: of a panel of F there that 8 Gauss
+  // points integrate; 0: nowhere steeper than elsewhere.
+  struct Steep {
+    double f = 0.0, length = 0.0;
+  };
+  [[nodiscard]] virtual Steep steep() const { return {}; }
   // phi against f - f_constant(): for loops that evaluate whole profiles. Built at the first call.
   [[nodiscard]] const InverseTable& inverse_table() const;
   // What it is built from, the smooth pieces of the range upwards: one, unless there is a coexistence.

@@ -44,7 +44,7 @@ class HydrostaticProfile {
   [[nodiscard]] double column_number() const { return column_above(base_); }
   // Height of the centre of mass [D].
   [[nodiscard]] double center_of_mass() const;
-  // The density through a kernel, at many heights. Accurate to 1e-9 (3e-8 for luding, whose transition is narrow).
+  // The density through a kernel, at many heights. Accurate to 1e-9.
   void sample(std::span<const double> heights, const Kernel& kernel, std::span<double> densities) const;
 
  private:

@@ -11,6 +11,7 @@ namespace shakebed::fit {
 void Tail::prepare(const EquationOfState& equation) {
   start = std::max(reference, base);
   jump = {};
+  steep_length = 0.0;
   inverse_temperature_ = 0.0;
   if (!(temperature > 0.0)) return;
   inverse_temperature_ = 1.0 / temperature;
@@ -20,6 +21,9 @@ void Tail::prepare(const EquationOfState& equation) {
     const double at = std::log(breaks[0]) + equation.excess(breaks[0]);
     if (at < f_at(start)) jump = {at, breaks[0], breaks[1], height_of_f(at)};
   }
+  const EquationOfState::Steep steep = equation.steep();
+  if (steep.length > 0.0 && steep.f < f_at(start))
+    steep_at = height_of_f(steep.f), steep_length = steep.length * temperature;
 }
 
 // phi(F) is smooth on the scale F/2 at high density, on the scale 3 about F = 0 (its nearest complex singularity lies
@@ -27,6 +31,7 @@ void Tail::prepare(const EquationOfState& equation) {
 double Tail::panel_at(double height) const {
   const double panel = temperature * std::max(2.2, 0.22 * f_at(height));
   // Just below freezing the fluid's stiffness almost vanishes: phi(F) has a branch point 0.01 beyond the jump.
+  if (steep_length > 0.0) return std::min(panel, steep_length + 0.6 * std::abs(height - steep_at));
   if (jump.upper > 0.0 && height >= jump.at) return std::min(panel, 0.01 * temperature + 0.8 * (height - jump.at));
   return panel;
 }
@@ -34,8 +39,9 @@ double Tail::panel_at(double height) const {
 template <std::size_t Components, class Curve>
 void Tail::add_tail(double height, const KernelRule& rule, Curve&& curve, std::array<double, Components>& sum) const {
   const auto panel = [this](double h) { return panel_at(h); };
-  const CurveShape<decltype(panel)> shape{start, end, std::span<const double>(&jump.at, jump.upper > 0.0 ? 1 : 0),
-                                          panel};
+  const std::span<const double> breaks(jump.upper > 0.0 ? &jump.at : &steep_at,
+                                       jump.upper > 0.0 || steep_length > 0.0 ? 1 : 0);
+  const CurveShape<decltype(panel)> shape{start, end, breaks, panel};
   add_convolution<Components>(rule, height, shape, curve, sum);
 }
 
@@ -146,6 +152,7 @@ void Tail::smoothed_with_gradient(std::span<const double> heights, const KernelR
   for (double from = start; from < highest;) {
     double to = std::min(end, from + std::min(rule.panel_length(), panel_at(from)));
     if (jump.upper > 0.0 && jump.at > from && jump.at < to) to = jump.at;
+    if (steep_length > 0.0 && steep_at > from && steep_at < to) to = steep_at;
     if (!(to > from)) break;
     if (to > lowest) {
       const double half = 0.5 * (to - from);

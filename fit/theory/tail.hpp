@@ -35,6 +35,9 @@ struct Tail {
     double f = 0.0, lower = 0.0, upper = 0.0, at = 0.0;
   };
   Jump jump;
+  // The height where the density falls most steeply, and the length of a panel there; length 0: none. With a jump:
+  // none.
+  double steep_at = 0.0, steep_length = 0.0;
   double end = 0.0;  // above, the density is below 1e-17
 
   // To be called when the rest is set.

@@ -90,11 +90,11 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
   if (a_row == 0) no_room(room);
   const double a = start.spacing > 0 && std::isinf(room.height) ? start.spacing * d : spacing_of(a_row);
   const double touching = d * d * (1 + 1e-6) - a * a / 4;  // squared distance of rows that just do not touch
-  double row_height = std::sqrt(std::max(touching, 0.0));
+  double row_height = std::max(std::sqrt(std::max(touching, 0.0)), d / 2 * (1 + 1e-6));  // of every other row: d
   if (!std::isinf(room.height)) {
     const double height = room.periodic_z ? room.height : room.height - d * (1 + margin) - room.floor;
     const double even = room.periodic_z ? height / rows : (rows > 1 ? height / (rows - 1) : height);
-    if (even * even < d * d - a * a / 4) no_room(room);
+    if (even * even < d * d - a * a / 4 || (rows > 2 && even < d / 2)) no_room(room);
     row_height = even;
   }
   if (a_row > 1 && a < d) no_room(room);

@@ -58,12 +58,13 @@ class Cells {
   }
 
  private:
-  std::int64_t column(double x) const {
-    return std::clamp(static_cast<std::int64_t>(std::floor((x - start_x_) / size_x_)), std::int64_t{0}, columns_ - 1);
+  // Places beyond a periodic side are those of their images.
+  static std::int64_t index(double place, double period, double size, std::int64_t count) {
+    const double inside = period > 0 ? place - period * std::floor(place / period) : place;
+    return std::clamp(static_cast<std::int64_t>(std::floor(inside / size)), std::int64_t{0}, count - 1);
   }
-  std::int64_t row(double z) const {
-    return std::clamp(static_cast<std::int64_t>(std::floor((z - start_z_) / size_z_)), std::int64_t{0}, rows_ - 1);
-  }
+  std::int64_t column(double x) const { return index(x - start_x_, period_x_, size_x_, columns_); }
+  std::int64_t row(double z) const { return index(z - start_z_, period_z_, size_z_, rows_); }
   std::size_t cell(std::int64_t column, std::int64_t row) const {
     return static_cast<std::size_t>(row * columns_ + column);
   }

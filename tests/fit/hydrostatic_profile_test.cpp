@@ -141,9 +141,8 @@ TEST(Kernels, SmoothTheProfileAsDirectIntegrationDoes) {
         profile.sample({&height, 1}, kernel, {&smooth, 1});
         const double direct = brute_force(profile, kernel, height, breaks);
         worst = std::max(worst, std::abs(smooth - direct));
-        const double allowed = profile.equation().name() == "luding" ? 3e-8 : 1e-9;  // as its header says
-        EXPECT_NEAR(smooth, direct, allowed) << profile.equation().name() << " T " << profile.temperature() << " "
-                                             << to_string(kernel.kind) << " " << kernel.width << " at " << height;
+        EXPECT_NEAR(smooth, direct, 1e-9) << profile.equation().name() << " T " << profile.temperature() << " "
+                                          << to_string(kernel.kind) << " " << kernel.width << " at " << height;
       }
     }
   }

@@ -224,5 +224,70 @@ TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
   EXPECT_NEAR(*time.seconds(), 10, 1e-12);
 }
 
+// Three parts of 10, 20 and 30 s on two threads, by pencil: what runs is done after 6 and 12 s, the third begins on the
+// thread that is free first.
+TEST(TimeLeft, OfTwoThreadsIsThatOfTheLastOne) {
+  double now = 0;
+  TimeLeft time(4, 2, [&] { return now; });
+  time.expect(0, 10);
+  time.expect(1, 20);
+  time.expect(2, 30);
+  time.expect(3, -5);  // takes no time
+  EXPECT_NEAR(*time.seconds(), 40, 1e-12) << "10 and 30 on one thread, 20 on the other";
+  EXPECT_EQ(time.fraction(), 0) << "it has not begun";
+  time.begin(0);
+  time.begin(1);
+  now = 4;
+  EXPECT_NEAR(*time.seconds(), 6 + 30, 1e-12);
+  EXPECT_NEAR(time.fraction(), 4.0 / 40, 1e-12);
+  time.end(0);
+  // 4 s for 10 expected ones; the whole, 60 s, counts as 0.6 s at the pace expected. The second part has taken 4 s.
+  const double pace = (4 + 0.6) / (10 + 0.6);
+  EXPECT_NEAR(*time.seconds(), 30 * pace, 1e-12);
+  EXPECT_GT(30 * pace, 20 * pace - 4);
+  time.begin(2);
+  time.drop(2);
+  now = 5;
+  EXPECT_NEAR(*time.seconds(), 20 * pace - 5, 1e-12);
+}
+
+// Taken up again at 0.6, it reaches 0.8 in 10 s: half of what was left. What was there before took no time now.
+TEST(TimeLeft, CountsFromWhereAPartIsTakenUp) {
+  double now = 50;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.begin(0);
+  time.reached(0, -1);  // no less than nothing
+  now = 60;
+  time.begin(0);
+  time.reached(0, 0.6);
+  now = 70;
+  time.reached(0, 0.8);
+  now = 72;
+  // 10 s for 0.2: 50 s a part by itself and by the pace of all. 10 s were left two seconds ago; the second part
+  // takes 50.
+  EXPECT_NEAR(*time.seconds(), 8 + 50, 1e-12);
+  time.reached(0, 0.7);  // never back
+  EXPECT_NEAR(*time.seconds(), 8 + 50, 1e-12);
+  time.end(1);  // it does not run
+  EXPECT_NEAR(*time.seconds(), 8 + 50, 1e-12);
+  now = 80;
+  time.end(0);
+  EXPECT_NEAR(*time.seconds(), 20 / 0.4, 1e-12) << "0.4 of a part in 20 s";
+  time.reached(0, 0.9);  // too late
+  EXPECT_NEAR(*time.seconds(), 20 / 0.4, 1e-12);
+}
+
+// In its first second, too: half a second of four.
+TEST(TimeLeft, HasAFractionFromItsBeginningOn) {
+  double now = 10;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.expect(0, 2);
+  time.expect(1, 2);
+  time.begin(0);
+  EXPECT_EQ(time.fraction(), 0);
+  now = 10.5;
+  EXPECT_NEAR(time.fraction(), 0.5 / 4, 1e-12);
+}
+
 }  // namespace
 }  // namespace shakebed
