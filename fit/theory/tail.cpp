@@ -131,7 +131,43 @@ double fast_exp(double x) {
   return std::bit_cast<double>(std::bit_cast<std::uint64_t>(sum) + (std::bit_cast<std::uint64_t>(shifted) << 52U));
 }
 
+constexpr std::size_t panel_points = 8;
+
 }  // namespace
+
+double Tail::end_of_panel(double from, double longest) const {
+  double to = std::min(end, from + std::min(longest, panel_at(from)));
+  if (jump.upper > 0.0 && jump.at > from && jump.at < to) to = jump.at;
+  if (steep_length > 0.0 && steep_at > from && steep_at < to) to = steep_at;
+  return to;
+}
+
+Tail::Nodes Tail::nodes_between(double lowest, double highest, const KernelRule& rule) const {
+  const auto& gauss = gauss_legendre<panel_points>();
+  const double factor = 0.5 * std::numbers::sqrt2 * std::numbers::inv_sqrtpi / rule.kernel().width;
+  Nodes nodes;
+  for (double from = start; from < std::min(end, highest);) {
+    const double to = end_of_panel(from, rule.panel_length());
+    if (!(to > from)) break;
+    if (to > lowest) {
+      const double half = 0.5 * (to - from);
+      const double middle = 0.5 * (to + from);
+      for (std::size_t i = 0; i < panel_points; ++i) {
+        const double h = middle + half * gauss.node[i];
+        const InverseTable::Point point = table->point(f_at(h));
+        const double weight = half * gauss.weight[i] * factor;
+        nodes.height.push_back(h);
+        nodes.phi.push_back(weight * point.density);
+        nodes.slope.push_back(weight * point.slope);
+        nodes.moment.push_back(weight * point.slope * (h - reference));
+      }
+      if (nodes.edge.empty()) nodes.edge.push_back(from);
+      nodes.edge.push_back(to);
+    }
+    from = to;
+  }
+  return nodes;
+}
 
 void Tail::smoothed_with_gradient(std::span<const double> heights, const KernelRule& rule,
                                   std::span<std::array<double, 1 + max_parameters>> out) const {
@@ -140,59 +176,29 @@ void Tail::smoothed_with_gradient(std::span<const double> heights, const KernelR
     for (std::size_t i = 0; i < heights.size(); ++i) out[i] = smoothed_with_gradient(heights[i], rule);
     return;
   }
-  // Panels from the start of the tail upwards; their nodes, and the curve there times the weights.
-  constexpr std::size_t points = 8;
-  const auto& gauss = gauss_legendre<points>();
-  const double lowest = heights.front() - rule.reach();
-  const double highest = std::min(end, heights.back() + rule.reach());
-  const double width = rule.kernel().width;
-  const double factor = 0.5 * std::numbers::sqrt2 * std::numbers::inv_sqrtpi / width;
-  std::vector<double> edge;  // of the panels: the lower end of the first, then the upper ends
-  std::vector<double> node, phi, slope, moment;
-  for (double from = start; from < highest;) {
-    double to = std::min(end, from + std::min(rule.panel_length(), panel_at(from)));
-    if (jump.upper > 0.0 && jump.at > from && jump.at < to) to = jump.at;
-    if (steep_length > 0.0 && steep_at > from && steep_at < to) to = steep_at;
-    if (!(to > from)) break;
-    if (to > lowest) {
-      const double half = 0.5 * (to - from);
-      const double middle = 0.5 * (to + from);
-      for (std::size_t i = 0; i < points; ++i) {
-        const double h = middle + half * gauss.node[i];
-        const InverseTable::Point point = table->point(f_at(h));
-        const double weight = half * gauss.weight[i] * factor;
-        node.push_back(h);
-        phi.push_back(weight * point.density);
-        slope.push_back(weight * point.slope);
-        moment.push_back(weight * point.slope * (h - reference));
-      }
-      if (edge.empty()) edge.push_back(from);
-      edge.push_back(to);
-    }
-    from = to;
-  }
-  std::vector<double> kernel(node.size());
-  const std::size_t panels = node.size() / points;
+  const Nodes nodes = nodes_between(heights.front() - rule.reach(), heights.back() + rule.reach(), rule);
+  std::vector<double> kernel(nodes.height.size());
+  const std::size_t panels = kernel.size() / panel_points;
   std::size_t first = 0;
   std::size_t last = 0;
-  const double inverse_width = 1.0 / width;
+  const double inverse_width = 1.0 / rule.kernel().width;
   for (std::size_t i = 0; i < heights.size(); ++i) {
     // All panels that the kernel touches, whole: beyond its reach it is below 1e-9 of itself, and smooth.
-    while (first < panels && edge[first + 1] <= heights[i] - rule.reach()) ++first;
+    while (first < panels && nodes.edge[first + 1] <= heights[i] - rule.reach()) ++first;
     last = std::max(last, first);
-    while (last < panels && edge[last] < heights[i] + rule.reach()) ++last;
-    const std::size_t from = first * points;
-    const std::size_t to = last * points;
+    while (last < panels && nodes.edge[last] < heights[i] + rule.reach()) ++last;
+    const std::size_t from = first * panel_points;
+    const std::size_t to = last * panel_points;
     for (std::size_t j = from; j < to; ++j) {
-      const double s = (node[j] - heights[i]) * inverse_width;
+      const double s = (nodes.height[j] - heights[i]) * inverse_width;
       kernel[j] = fast_exp(-0.5 * s * s);
     }
     std::array<std::array<double, 4>, 3> sum{};
     for (std::size_t j = from; j < to; j += 4) {
       for (std::size_t lane = 0; lane < 4; ++lane) {
-        sum[0][lane] += kernel[j + lane] * phi[j + lane];
-        sum[1][lane] += kernel[j + lane] * slope[j + lane];
-        sum[2][lane] += kernel[j + lane] * moment[j + lane];
+        sum[0][lane] += kernel[j + lane] * nodes.phi[j + lane];
+        sum[1][lane] += kernel[j + lane] * nodes.slope[j + lane];
+        sum[2][lane] += kernel[j + lane] * nodes.moment[j + lane];
       }
     }
     const auto total = [](const std::array<double, 4>& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "fit/theory/convolution.hpp"
 #include "fit/theory/equation_of_state.hpp"
@@ -64,6 +65,14 @@ struct Tail {
                                                                 const std::array<double, 3>& sum) const;
   // A length of tail about `height` that 8 Gauss points integrate.
   [[nodiscard]] double panel_at(double height) const;
+  // Panels of the tail from its start upwards, those that reach above `lowest`, and their nodes: the curve there, times
+  // the weights of a Gaussian kernel.
+  struct Nodes {
+    std::vector<double> edge;  // of the panels: the lower end of the first, then the upper ends
+    std::vector<double> height, phi, slope, moment;
+  };
+  [[nodiscard]] Nodes nodes_between(double lowest, double highest, const KernelRule& rule) const;
+  [[nodiscard]] double end_of_panel(double from, double longest) const;
   [[nodiscard]] double rectangle_cover(double height, const Kernel& kernel) const;
   template <std::size_t Components, class Curve>
   void add_tail(double height, const KernelRule& rule, Curve&& curve, std::array<double, Components>& sum) const;
