@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/calibrate/solid_borders.hpp"
@@ -473,6 +476,36 @@ TEST(RimChoice, UsesWhatIsKnownAndRefusesWhatNoDiskExplains) {
   conditions.from_px = 14.5;
   EXPECT_FALSE(choose_rim(profile, conditions).rim.good);
   EXPECT_EQ(choose_rim(profile, conditions).rim.radius_px, 0);
+}
+
+// Beads that are lit as each of the shapes says, half of their contrast by it: known almost without noise, so that one
+// shape alone explains the profile.
+TEST(RimsOfShadings, AreAtTheRadiusForEachShape) {
+  const std::vector<std::pair<std::string, RadialContrast>> shapes{
+      {"flat", [](double) { return 1.0; }},
+      {"sphere", [](double rho) { return std::sqrt(1 - rho * rho); }},
+      {"parabola", [](double rho) { return 1 - rho * rho; }},
+      {"cone", [](double rho) { return 1 - rho; }},
+      {"quartic", [](double rho) { return (1 - rho * rho) * (1 - rho * rho); }}};
+  for (const auto& [name, shape] : shapes) {
+    BeadProfile profile;
+    profile.step_px = 0.05;
+    const RadialContrast lit = [&](double rho) { return 0.5 + 0.5 * shape(std::min(rho, 1.0)); };
+    for (int k = 0; k <= 300; ++k)
+      profile.level.push_back(static_cast<float>(blurred_disk_contrast(10, 1.1, lit, 0.05 * k)));
+    const RimChoice choice = choose_rim(profile, {.radius_px = 10.1,
+                                                  .edge_px = 1.2,
+                                                  .knot_px = 0.4,
+                                                  .noise = 1e-3,
+                                                  .beads = 1e6,
+                                                  .background_level = 200,
+                                                  .bead_level = 60,
+                                                  .linear_only = true});
+    EXPECT_TRUE(choice.rim.good) << name;
+    EXPECT_NEAR(choice.rim.radius_px, 10, 2e-3) << name;
+    EXPECT_NEAR(choice.rim.edge_px, 1.1, 5e-3) << name;
+    EXPECT_LT(choice.rim.misfit, 1e-4) << name;
+  }
 }
 
 // Levels encoded for display are distinguished from linear ones, but only where this is asked for.

@@ -504,5 +504,26 @@ TEST(BedDoubts, DoubtsStateTheirNumbers) {
   EXPECT_TRUE(holds(more[1], "2.5 diameters"));
 }
 
+// In frame k of 14 the bed lies k/4 px farther to the right. The walls are where one of the frames reaches beyond: the
+// second rank of 14 is the nearest to a tenth.
+TEST(WallsOfFrames, AreReachedByATenthOfThem) {
+  FilmCalibration film;
+  film.finder.width = film.recorded_width = 300, film.finder.height = film.recorded_height = 200;
+  film.finder.radius_px = film.finder.rim_radius_px = 10;
+  film.finder.radius_std_error_px = 0.05;
+  film.options.bead_diameter_m = 2e-3;
+  std::vector<FrameFindings> frames(14);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    for (int row = 0; row < 3; ++row)
+      for (int i = 0; i < 8; ++i)
+        frames[k].disks.push_back(found_at(30 + 31.0 * i + 0.25 * static_cast<double>(k), 140 - 40.0 * row, 9));
+  FinderCalibration refined = film.finder;
+  BedCalibration bed;
+  find_geometry(film, frames, refined, bed);
+  EXPECT_NEAR(bed.left_wall_px, 20 + 0.25 * 1, 1e-9);
+  EXPECT_NEAR(bed.right_wall_px, 257 + 0.25 * 12, 1e-9);
+  EXPECT_FALSE(bed.walls_are_frame_sides);
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

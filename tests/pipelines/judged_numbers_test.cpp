@@ -376,13 +376,18 @@ TEST(MapTexts, HaveALineAFormula) {
 
 // --- budgets
 
-// One bed of the pilot has the standard error `within`; all differ by `spread`. With many beds that agree the variance
-// is pooled.
-TEST(BudgetedBeds, ThatAgreeNeedTheirPooledVariance) {
+// Nine beds that agree: one has the standard error `within`, all differ by `spread`.
+EffortReading nine_beds_that_agree() {
   EffortReading pilot;
   pilot.effort = {100, 9, 0};
   pilot.settling = 50, pilot.within = 0.02, pilot.spread = 0.02;
   pilot.settling_work = {9 * 50 * 0.01, 9 * 50 * 1000.0}, pilot.measuring_work = {9 * 100 * 0.01, 9 * 100 * 1000.0};
+  return pilot;
+}
+
+// With many beds that agree the variance is pooled.
+TEST(BudgetedBeds, ThatAgreeNeedTheirPooledVariance) {
+  const EffortReading pilot = nine_beds_that_agree();
   EffortLimits limits;
   limits.settling = 50, limits.shortest = 1, limits.fewest_beds = 9, limits.even_beds = false;
   // variance 0.02^2 x 100 a length, 8 + 9 degrees of freedom. In 12 s on one thread: of n beds, 12/n - 0.5 s measure
@@ -410,6 +415,21 @@ TEST(BudgetedBeds, ThatAgreeNeedTheirPooledVariance) {
   EXPECT_NEAR(choice.wall_seconds, choice.work.cpu_seconds, 1e-9);
   const EffortChoice on_four = choose_effort(pilot, limits, seconds, 4);
   EXPECT_NEAR(on_four.wall_seconds, std::ceil(on_four.effort.beds / 4.0) * (0.5 + 0.01 * on_four.effort.length), 1e-9);
+}
+
+// Nine beds that agree, each known by one block, leave 8 + 9 degrees of freedom. Of 40 beds and more Student's factor
+// is smaller than what the reciprocal of such a variance is too large by, 17/15.
+TEST(BudgetOfManyBeds, AllowsForThePooledVariance) {
+  EffortLimits limits;
+  limits.settling = 50, limits.shortest = 1, limits.fewest_beds = 40, limits.even_beds = false;
+  Budget budget;
+  budget.error = 0.001;
+  const EffortChoice choice = choose_effort(nine_beds_that_agree(), limits, budget, 1);
+  ASSERT_TRUE(choice.possible);
+  EXPECT_EQ(choice.effort.beds, 40U);
+  const double length = 0.04 * 17 / 15 / (40 * std::pow(0.9 * 0.001, 2));
+  EXPECT_GE(choice.effort.length, length * (1 - 1e-9));
+  EXPECT_LE(choice.effort.length, length * 1.01) << "rounded up to three digits";
 }
 
 // --- covariances

@@ -21,16 +21,19 @@ using testing::Not;
 class ReportPage : public testing::Test {
  protected:
   void read(const std::string& top = "") {
-    std::vector<Problem> problems;
-    plan_ = make_plan(*parse_json(R"({ "name": "a_bed", )" + top + R"( "stages": [
+    read_recipe(R"({ "name": "a_bed", )" + top + R"( "stages": [
         { "stage": "map", "id": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 },
         { "stage": "simulate", "id": "a-bed-of-14-xx", "seed": 7, "disks": { "count": 50, "diameter": "3 mm" },
           "box": { "width": "19 mm" }, "settle": "0.5 s", "measure": "0.5 s",
           "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz" } },
         { "stage": "fit", "id": "a-fit-of-15-xxx", "from": "a-bed-of-14-xx" },
         { "stage": "figure", "from": ["a-bed-of-14-xx", "a-fit-of-15-xxx"] } ] })",
-                                  "folder/r.json", problems),
-                      "folder/r.json", folder_.path());
+                "folder/r.json");
+  }
+  // A recipe of which no stage has run.
+  void read_recipe(const std::string& recipe, const std::string& file = "r.json") {
+    std::vector<Problem> problems;
+    plan_ = make_plan(*parse_json(recipe, file, problems), file, folder_.path());
     outcome_ = {};
     outcome_.out = folder_.path();
     for (const PlannedStage& stage : plan_.stages) {
@@ -166,15 +169,10 @@ TEST_F(ReportPage, GroupsItsWarnings) {
 // recipe.
 TEST_F(ReportPage, BeginsWithTheFirstAnswer) {
   write_text(folder_ / "p.csv", "height,number_density\n1,1\n2,0.5\n3,0.2\n");
-  std::vector<Problem> problems;
-  plan_ = make_plan(*parse_json(R"({ "name": "two", "stages": [ { "stage": "fit", "id": "f", "profile": "p.csv" },
-      { "stage": "fit", "id": "g", "profile": "p.csv" }, { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })",
-                                "r.json", problems),
-                    "r.json", folder_.path());
-  outcome_.out = folder_.path();
+  read_recipe(R"({ "name": "two", "stages": [ { "stage": "fit", "id": "f", "profile": "p.csv" },
+      { "stage": "fit", "id": "g", "profile": "p.csv" }, { "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 } ] })");
+  for (StageOutcome& stage : outcome_.stages) stage.record.emplace();
   for (const PlannedStage& stage : plan_.stages) {
-    outcome_.stages.emplace_back().id = stage.id;
-    outcome_.stages.back().record.emplace();
     std::filesystem::create_directories(folder_ / stage.id);
     write_text(folder_ / (stage.id + "/" + std::string(stage.row->result)),
                stage.id == "map"
@@ -341,16 +339,9 @@ TEST_F(ReportPage, HasItsCrate) {
 TEST_F(ReportPage, CrateNamesFilesOfTheUserOnce) {
   write_text(folder_ / "p q.csv", "height,number_density\n1,1\n2,0.5\n");
   write_text(folder_ / "r.csv", "height,number_density\n1,1\n2,0.5\n");
-  std::vector<Problem> problems;
-  plan_ = make_plan(*parse_json(R"({ "name": "three", "stages": [ { "stage": "fit", "id": "f", "profile": "p q.csv" },
-      { "stage": "fit", "id": "g", "profile": "r.csv" }, { "stage": "fit", "id": "h", "profile": "p q.csv" } ] })",
-                                "r.json", problems),
-                    "r.json", folder_.path());
-  outcome_.out = folder_.path();
-  for (const PlannedStage& stage : plan_.stages) {
-    outcome_.stages.emplace_back().id = stage.id;
-    outcome_.stages.back().record.emplace();
-  }
+  read_recipe(R"({ "name": "three", "stages": [ { "stage": "fit", "id": "f", "profile": "p q.csv" },
+      { "stage": "fit", "id": "g", "profile": "r.csv" }, { "stage": "fit", "id": "h", "profile": "p q.csv" } ] })");
+  for (StageOutcome& stage : outcome_.stages) stage.record.emplace();
   const auto found = entities_of(crate_json(plan_, outcome_));
   EXPECT_EQ(names_of(found.at("#run-f")["object"]), "resolved.json #input-1-p%20q.csv");
   EXPECT_EQ(names_of(found.at("#run-g")["object"]), "resolved.json #input-2-r.csv");

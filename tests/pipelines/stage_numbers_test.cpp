@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "fit/theory/hydrostatic_profile.hpp"
 #include "pipelines/formats/bed.hpp"
@@ -158,6 +159,28 @@ TEST(MapNumbers, ComeFromTheBedAndTheFit) {
                                        R"(}, "plateau_density": {"value": 1.1}})");
   const Json back = map.run(R"({ "gamma": 3, "frequency": "25 Hz", "diameter": "3 mm", "initial_height": 10 })");
   EXPECT_NEAR(value(back["readings"][0]["gamma_of_measured_temperature"]), 5, 1e-6);
+}
+
+// A floor that throws nothing gives T = 0 by every formula, and none of them is out of its range.
+TEST(MapWarnings, CountTheFormulasThatDoNotApply) {
+  LoneStage map(*find_stage("map"));
+  const auto said = [&](const std::string& gamma) {
+    map.warnings.clear();
+    const Json json =
+        map.run(R"({ "gamma": )" + gamma +
+                R"(, "frequency": "25 Hz", "diameter": "3 mm", "initial_height": 10, "plateau_density": 1.1 })");
+    std::size_t out = 0;
+    for (const Json& row : json["readings"]) out += row["in_range"].get<bool>() ? 0 : 1;
+    return std::pair(map.warnings, out);
+  };
+  EXPECT_THAT(said("0.9").first, testing::Not(testing::Contains(testing::HasSubstr("do not apply"))));
+  EXPECT_EQ(said("0.9").second, 0U);
+  const auto [words, out] = said("5");
+  EXPECT_GT(out, 0U);
+  EXPECT_THAT(words, testing::ElementsAre(
+                         std::to_string(out) +
+                         " of the 28 formulas that predict T from Gamma do not apply at this Gamma (see map.csv, "
+                         "column in_range)."));
 }
 
 // Beds of a table whose series name what has no column: with blanks, commas or both between the numbers. A number with

@@ -51,15 +51,18 @@ class SweepPages : public testing::Test {
   std::string& cell(std::size_t point, std::size_t k, bool error = false) {
     return table_[1 + point][3 + plan_.sweep->axes.size() + 2 * k + (error ? 1 : 0)];
   }
+  SweepOutcome outcome(bool complete) const {
+    return {.out = folder_.path(),
+            .points = points_,
+            .collected = plan_.sweep->collect,
+            .table = table_,
+            .problems = problems_,
+            .verdicts = verdicts_,
+            .warnings = warnings_,
+            .complete = complete};
+  }
   void write(bool complete = true) {
-    report_pages().write(plan_, SweepOutcome{.out = folder_.path(),
-                                             .points = points_,
-                                             .collected = plan_.sweep->collect,
-                                             .table = table_,
-                                             .problems = problems_,
-                                             .verdicts = verdicts_,
-                                             .warnings = warnings_,
-                                             .complete = complete});
+    report_pages().write(plan_, outcome(complete));
     if (complete) page_ = read_text(folder_ / "report.html");
     summary_ = read_text(folder_ / "summary.md");
   }
@@ -275,14 +278,7 @@ TEST_F(SweepPages, HaveTheirCrate) {
   std::filesystem::create_directories(folder_ / "figures");
   for (const char* name : {"figures/sweep-2.svg", "figures/sweep-1.dat"}) write_text(folder_ / name, "x");
   for (const char* name : {"points/000000", "points/000002"}) std::filesystem::create_directories(folder_ / name);
-  const Json crate = crate_json(plan_, SweepOutcome{.out = folder_.path(),
-                                                    .points = points_,
-                                                    .collected = plan_.sweep->collect,
-                                                    .table = table_,
-                                                    .problems = problems_,
-                                                    .verdicts = verdicts_,
-                                                    .warnings = warnings_,
-                                                    .complete = true});
+  const Json crate = crate_json(plan_, outcome(true));
   std::string ids, parts;
   for (const Json& entity : crate["@graph"]) ids += entity["@id"].get<std::string>() + " ";
   for (const Json& part : crate["@graph"][1]["hasPart"]) parts += part["@id"].get<std::string>() + " ";

@@ -1,11 +1,13 @@
-// Texts that are read and written: JSON with its mistakes, trajectories, quantities, pages; each against its text by
-// hand.
+// Texts that are read and written: cells of tables, JSON with its mistakes, trajectories, quantities, pages; each
+// against its text by hand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -17,12 +19,33 @@
 #include "pipelines/formats/markup.hpp"
 #include "pipelines/formats/process.hpp"
 #include "pipelines/formats/quantity.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
 
 namespace {
 
 using namespace shakebed::pipelines;
 using testing::HasSubstr;
+
+TEST(TableCells, QuoteWhatWouldBreakALine) {
+  EXPECT_EQ(Cell("two words").text(), "two words");
+  EXPECT_EQ(Cell("a,b").text(), "\"a,b\"");
+  EXPECT_EQ(Cell("say \"a\"").text(), "\"say \"\"a\"\"\"");
+  EXPECT_EQ(Cell("a\nb").text(), "\"a\nb\"");
+  EXPECT_EQ(Cell("# no comment").text(), "\"# no comment\"");
+  EXPECT_EQ(Cell(std::numeric_limits<double>::quiet_NaN()).text(), "");
+  EXPECT_EQ(Cell(0.25).text(), "0.25");
+  EXPECT_EQ(Cell(std::int64_t{-3}).text(), "-3");
+}
+
+TEST(JsonWords, AreNamedWhole) {
+  for (const std::string word : {"yes", "not_a_number", "a_"}) {
+    std::vector<Problem> problems;
+    parse_json("{\"a\": " + word + "}", "f.json", problems);
+    ASSERT_EQ(problems.size(), 1U) << word;
+    EXPECT_EQ(problems.front().what, "'" + word + "' is not a JSON value");
+  }
+}
 
 struct Mistake {
   const char* text;
