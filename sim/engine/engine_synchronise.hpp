@@ -51,6 +51,7 @@ void Engine<Space, Rule, Sizes>::synchronise() {
   }
 }
 
+// Puts values of all disks into the order of keys_along_curve().
 template <class Values>
 void permute_by_keys(Values& values, const std::vector<std::uint64_t>& keys) {
   const Values old = values;
