@@ -143,6 +143,9 @@ constexpr double least_contact_tolerance = 0.02;  // D: what touching beads scat
 // square; beads located to 0.003 and 0.01 D), and by 0.6 with beads located to 0.02 D.
 constexpr double step_to_no_tolerance_wrong = 0.4;
 // The amplitude is stated as the middle is: in 23 films of 12 other beds it was off by half of that (root mean square).
+// Bottoms at one phase of the period and half a period later tell the floor there alone. 1 when there are no others;
+// each phase may be spread over a twelfth of the period.
+constexpr double at_opposite_phases = 0.95;
 
 std::vector<Bottom> bottoms_by_phase(const std::vector<LowestBottoms>& frames, double turns_per_frame) {
   std::vector<Bottom> bottoms;
@@ -218,13 +221,14 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
   const double narrow_middle = fit[0];
   for (std::size_t k = 0; k < fit.size(); ++k) fit[k] = 2 * fit[k] - wide[k];
   std::vector<std::size_t> touching(parts, 0);
-  double squares = 0;
+  double squares = 0, twice_cosine = 0, twice_sine = 0;  // the latter of twice the phase
   for (const Bottom& bottom : bottoms) {
     const double gap = gap_above(fit, bottom);
-    const bool touches = gap < 2 * least;
-    touching[bottom.part] += touches;
-    motion.touching += touches;
-    if (touches) squares += gap * gap;
+    if (gap >= 2 * least) continue;
+    ++touching[bottom.part], ++motion.touching;
+    squares += gap * gap;
+    twice_cosine += bottom.cosine * bottom.cosine - bottom.sine * bottom.sine;
+    twice_sine += 2 * bottom.cosine * bottom.sine;
   }
   motion.middle = fit[0];
   motion.middle_std_error =
@@ -235,7 +239,8 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
   const double turns = std::atan2(fit[2], fit[1]) / (2 * std::numbers::pi);
   motion.phase = turns - std::floor(turns);
   // Beyond half a period without a touching bead nothing bounds the fit there.
-  motion.known = longest_stretch_without(touching) <= parts / 2;
+  motion.known = longest_stretch_without(touching) <= parts / 2 &&
+                 std::hypot(twice_cosine, twice_sine) <= at_opposite_phases * static_cast<double>(motion.touching);
   return motion;
 }
 
