@@ -39,6 +39,28 @@ TEST(Fall, TakesTheTimeOfAParabola) {
   EXPECT_EQ(time_to_fall(1, 0, 0), never);
 }
 
+// Slower than a hundred-trillionth nothing approaches; a gap that rounding has closed is none.
+TEST(ContactTimes, EndWhereNothingApproaches) {
+  EXPECT_EQ(time_to_disk(1.5, 0, -1e-15, 0, 1), never);
+  EXPECT_NEAR(time_to_disk(1.5, 0, -1e-12, 0, 1) * 1e-12, 0.5, 1e-12);
+  EXPECT_EQ(time_to_wall(0.5, 0), never);
+  EXPECT_EQ(time_to_wall(0.5, -1), never);
+  EXPECT_EQ(time_to_wall(0.5, 1e-15), never);
+  EXPECT_NEAR(time_to_wall(0.5, 1e-12) * 1e-12, 0.5, 1e-12);
+  EXPECT_EQ(time_to_wall(3, 4), 0.75);
+  EXPECT_EQ(time_to_wall(-1e-15, 4), 0);
+  EXPECT_EQ(time_to_lid(-1e-15, 1, 1), 0);
+  EXPECT_EQ(time_to_lid(0, 0, 1), never);
+  EXPECT_EQ(time_to_lid(0.5, -1, 1), never);
+  EXPECT_EQ(time_to_lid(3, 2, 0), 1.5) << "without gravity";
+  EXPECT_NEAR(time_to_lid(0.5, 1, 1), 1, 1e-7) << "just reached";
+  EXPECT_EQ(time_to_fall(0, 0, 1), 0) << "at rest on the floor";
+  EXPECT_EQ(time_to_fall(3, -2, 0), 1.5);
+  EXPECT_EQ(time_to_fall(3, 2, 0), never);
+  EXPECT_NEAR(time_to_fall(3, 1, 2), (1 + std::sqrt(13.0)) / 2, 1e-15);
+  EXPECT_NEAR(time_to_fall(3, -1, 2), (-1 + std::sqrt(13.0)) / 2, 1e-15);
+}
+
 // The path must stay inside its shell until the time given, and the time must not be needlessly short.
 TEST(ShellExit, IsNeverLaterThanTheTrueExit) {
   Random random(12);

@@ -66,6 +66,16 @@ TEST(Measure, LooksAtEveryPhaseOfEveryPeriodOnce) {
   EXPECT_EQ(diary.ended, 1);
 }
 
+TEST(Measure, HasItsMomentsInEqualPartsOfPeriods) {
+  MeasurementSchedule schedule;
+  schedule.settle = 2, schedule.period = 0.5, schedule.periods = 3, schedule.phases = 4;
+  EXPECT_EQ(schedule.looks(), 12U);
+  EXPECT_EQ(schedule.moment(0), 2);
+  EXPECT_EQ(schedule.moment(3), 2.375);
+  EXPECT_EQ(schedule.moment(5), 2.625);
+  EXPECT_EQ(schedule.end(), 3.5);
+}
+
 // A moment between two synchronisations that the sum of the first and of the time since then does not reach.
 double moment_lost_to_rounding(double first, double second) {
   double moment = 0.25 * first + 0.75 * second;

@@ -49,6 +49,7 @@ TEST(MeasuredBed, FramesAreTakenAtTheNamedPhases) {
   const std::vector<double> named{0.75, 0.25};
   const LookPlan plan = plan_looks(0.3, {.duration = 30, .phases = 8, .frames = 50, .frame_phases = named});
   EXPECT_EQ(plan.possible_frames(), 200U);
+  EXPECT_EQ(plan_looks(0.3, {.duration = 30, .phases = 8, .frames = 50}).possible_frames(), 800U) << "at all phases";
   std::array<int, 8> taken{};
   for (std::uint64_t look = 0; look < plan.schedule.looks(); ++look) taken[look % 8] += plan.takes_frame(look);
   EXPECT_EQ(taken, (std::array<int, 8>{0, 0, 25, 0, 0, 0, 25, 0}));
