@@ -304,7 +304,7 @@ TEST(BedProfile, AMeterAveragesItsStretches) {
   VelocityMeter meter(2e-3, {.frame_rate_hz = 100}, 4);
   for (const auto& frame : frames) meter.add(frame);
   const VelocityMeasurement mean = meter.result();
-  double sum = 0, links = 0;
+  double sum = 0, links = 0, factor = 0, bias = 0, error = 0;
   for (std::size_t first = 0; first + 3 < 10; first += 3) {
     Measurement stretch;
     for (std::size_t f = first; f < first + 4; ++f)
@@ -312,7 +312,13 @@ TEST(BedProfile, AMeterAveragesItsStretches) {
     stretch.calibration.radius_px = 10, stretch.calibration.scale_m_per_px = 1e-4;
     const VelocityMeasurement one = measure_velocities(stretch, {.frame_rate_hz = 100});
     sum += one.horizontal.displacement_m / 3, links += static_cast<double>(one.links);
+    factor += one.vertical.finite_time_factor / 3, bias += one.vertical.localisation_bias_m / 3;
+    error += one.vertical.finite_time_error / 3;
   }
+  EXPECT_GE(factor, 1);
+  EXPECT_NEAR(mean.vertical.finite_time_factor, factor, 1e-12);
+  EXPECT_NEAR(mean.vertical.localisation_bias_m, bias, 1e-15);
+  EXPECT_NEAR(mean.vertical.finite_time_error, error, 1e-12);
   EXPECT_NEAR(mean.horizontal.displacement_m, sum, 1e-12);
   EXPECT_EQ(static_cast<double>(mean.links), links);
   EXPECT_NEAR(mean.linked_share, 1, 0.05);

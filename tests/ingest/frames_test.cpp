@@ -326,6 +326,14 @@ INSTANTIATE_TEST_SUITE_P(Frames, Films,
                                          std::pair{"mp4", std::array<char, 4>{'m', 'p', '4', 'v'}}),
                          [](const auto& test_info) { return std::string(test_info.param.first); });
 
+// The program's own channels are one higher, with the automatic one at 0: it counts on these numbers.
+TEST(Frames, ChannelsAreNumberedFromTheAutomaticOneOn) {
+  int number = -1;
+  for (const Channel channel : {Channel::automatic, Channel::red, Channel::green, Channel::blue, Channel::grey,
+                                Channel::saturation, Channel::background_distance})
+    EXPECT_EQ(static_cast<int>(channel), number++) << name_of(channel);
+}
+
 // Red beads on green: only one channel shows them well; the choice of the first frame holds for the others.
 TEST(Frames, ColourFramesAreReadInTheChannelThatShowsTheBeads) {
   const ScratchFolder folder;

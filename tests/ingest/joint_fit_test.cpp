@@ -282,6 +282,32 @@ TEST(JointFit, MovesThoseThatMovedAndTheirNeighbours) {
   }
 }
 
+// A bead that is woken by one that moved takes part with it, although another of its neighbours rests and stays.
+TEST(JointFit, CouplesABeadBesideOneThatRests) {
+  constexpr double radius = 5, edge = 1.6;
+  const ProfileTable table(test::blurred_profile(radius, edge, 10.5), radius, edge, 0);
+  const std::vector<ModelDisk> truth = {model_at(32, 14), model_at(16, 22), model_at(38.6, 22.2)};
+  const GrayFrame flat = frame_by(56, 40, [&](int column, int row) {
+    double sum = 0;
+    for (const ModelDisk& disk : truth) sum += level_of(table, disk.x, disk.y, column, row);
+    return sum;
+  });
+  JointFit fit(flat);
+  fit.set_table(&table);
+  std::vector<ModelDisk> disks = truth;
+  for (ModelDisk& disk : disks) disk.last_step = 1e-4;
+  disks[0].x += 0.1, disks[0].y += 0.12;
+  disks[2].x -= 0.1, disks[2].y -= 0.12, disks[2].last_step = 0.1;
+  fit.reset(flat, disks);
+  fit.step_together(flat, disks, 1, 1, 0.01);
+  EXPECT_EQ(disks[1].x, truth[1].x) << "it rests";
+  EXPECT_EQ(disks[1].last_step, 1e-4);
+  for (const std::size_t k : {0U, 2U}) {
+    EXPECT_NEAR(disks[k].x, truth[k].x, 0.006) << k;
+    EXPECT_NEAR(disks[k].y, truth[k].y, 0.006) << k;
+  }
+}
+
 // The inverse of the whole matrix of second derivatives, of a lone bead, of two and of three in a row.
 TEST(JointFit, KnowsTheCovarianceOfCentresThatShareTheirPixels) {
   constexpr double radius = 5, edge = 1.6;

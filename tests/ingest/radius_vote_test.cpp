@@ -228,6 +228,25 @@ TEST(RadiusVote, CountsAsItsRulesSay) {
   }
 }
 
+// The spacing of nine circles is not told, that of ten is: rows of five, 14 px apart, or of four and five.
+TEST(RadiusVote, KnowsTheSpacingOfTenCircles) {
+  for (const int count : {9, 10}) {
+    Camera camera;
+    camera.width = 80, camera.height = 45;
+    camera.blur_px = 0.6, camera.round_to_8_bits = false;
+    std::vector<RenderedDisk> disks;
+    for (int k = 0; k < count; ++k) disks.push_back({12.0 + 14 * (k % 5), 14.0 + 14 * (k / 5), 4, 0, 0});
+    const GrayFrame frame = render_frame(disks, camera);
+    const auto all = vote_for_radii(frame, 1, {3, 5});
+    const auto best = std::max_element(all.begin(), all.end(), [](const RadiusCandidate& a, const RadiusCandidate& b) {
+      return a.explained * a.support < b.explained * b.support;
+    });
+    ASSERT_NE(best, all.end());
+    EXPECT_EQ(best->count, static_cast<std::size_t>(count));
+    EXPECT_NEAR(best->spacing.median, count == 10 ? 14 : 0, 0.8);
+  }
+}
+
 // One small disk in an even picture: 98 % of the pixels have no gradient, so that the reference is half of the
 // steepest. Fewer than twelve edges do not vote.
 TEST(RadiusVote, OfALoneDiskIsThatOfItsEdges) {

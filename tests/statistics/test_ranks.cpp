@@ -1,6 +1,7 @@
 // Values by their rank, against a sorted list.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "statistics/ranks.hpp"
@@ -18,6 +19,13 @@ TEST(Ranks, AreThoseOfASortedList) {
       EXPECT_EQ(quantile_of(values, part / 10.0), sorted[place]) << count << " " << part;
     }
     EXPECT_EQ(median_of(values), sorted[count / 2]) << "of an even number the upper one";
+  }
+  // Values whose middle in the list is none of those in the middle by size.
+  for (const auto& list : {std::vector<double>{1, 2, 9, 3, 4}, {5, 1, 2, 9, 3, 4}, {4, 3, 0, 1, 2, 5, 6}, {8, 7}}) {
+    sorted = list;
+    std::sort(sorted.begin(), sorted.end());
+    EXPECT_EQ(median_of(list), sorted[list.size() / 2]);
+    EXPECT_EQ(quantile_of(list, 0.5), sorted[(list.size() - 1) / 2]) << "of an even number the lower one";
   }
   EXPECT_EQ(quantile_of(std::vector<float>{}, 0.5), 0);
   EXPECT_EQ(median_of(std::vector<int>{}), 0);
