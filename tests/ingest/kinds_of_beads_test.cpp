@@ -181,6 +181,27 @@ TEST(TwoKinds, AreFoundEachInItsPlaces) {
   EXPECT_LT(found.unexplained, 0.01);
 }
 
+// The area that a disk of radius r has more than small ones, less what it lacks of large ones, is (2 r^2 - 208)/80 of
+// the difference: a disk of 10.2 px is as near to one kind as to the other, and is none of either.
+TEST(TwoKinds, ADiskHalfWayBetweenThemIsUndecided) {
+  std::vector<RenderedDisk> truth = two_sizes();
+  const GrayFrame clear = strewn_frame(truth, 184, 128);
+  const LearnedKinds learned = learn_two_kinds({&clear}, kinds_asked(1.5), {});
+  ASSERT_TRUE(learned.kinds) << learned.why_not;
+  for (const double radius : {9.2, 10.2, 11.2}) {
+    truth[8].radius_px = radius;
+    const KindsFound found = find_two_kinds(strewn_frame(truth, 184, 128), *learned.kinds, {});
+    const auto has_it = [&](const FindResult& kind) {
+      return std::any_of(kind.disks.begin(), kind.disks.end(), [&](const FoundDisk& disk) {
+        return std::hypot(disk.x_px - truth[8].x_px, disk.y_px - truth[8].y_px) < 3;
+      });
+    };
+    EXPECT_EQ(has_it(found.small), radius == 9.2) << radius;
+    EXPECT_EQ(has_it(found.large), radius == 11.2) << radius;
+    EXPECT_EQ(found.undecided > 0, radius == 10.2) << radius << ": " << found.undecided;
+  }
+}
+
 // Whichever of the two the film names first.
 TEST(TwoKinds, AreTheFirstAndTheSecondOfTheirFilm) {
   const GrayFrame frame = strewn_frame(two_sizes(), 184, 128);
