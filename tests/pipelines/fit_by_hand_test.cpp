@@ -83,7 +83,7 @@ TEST_F(FitByHand, MatchesALibrary) {
   add_bed("cold", profile_at(0.08, smoothed, 0), bed_json(0),
           R"({ "temperature_x": { "value": 0.06 }, "temperature_z": { "value": 0.1 } })");
   add_bed("warm", profile_at(0.16, smoothed, 0), bed_json(0.16));
-  add_bed("hot", profile_at(0.122, smoothed, 0), bed_json(0.32));
+  add_bed("hot", profile_at(0.32, smoothed, 0), bed_json(0.32));
   const Json found = run(matching);
   EXPECT_EQ(found["status"], "ok");
   EXPECT_EQ(found["model"], "simulation");
@@ -113,7 +113,7 @@ TEST_F(FitByHand, MatchesALibrary) {
   EXPECT_NEAR(found["bic"].get<double>(), std::log(60), 1e-6);
   EXPECT_EQ(value(found["statistical_error"]), error(found["temperature"]));
   // Of the tail at T and, for their errors, at T and its error.
-  EXPECT_GT(value(found["solid_height"]), 5);
+  EXPECT_GT(value(found["solid_height"]), 1);
   EXPECT_LT(value(found["solid_height"]), 9);
   EXPECT_GT(error(found["solid_height"]), 0.05);
   EXPECT_GT(error(found["shift"]), 0.05);
