@@ -376,6 +376,10 @@ TEST_F(InferenceByHand, PredictsDensitiesOfItsDraws) {
     EXPECT_NEAR(profile("predicted", i), mean * mean - 0.01, 0.006);
     EXPECT_NEAR(profile("predicted_error", i), std::hypot(half, 0.01) * 2 * mean, 0.006);
   }
+  // Of one draw: the scatter of one bed alone.
+  found_.draws = {3}, found_.draw_views = {2};
+  write();
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(table("profile.csv")("predicted_error", i), 0.01 * 2 * 0.6, 0.004);
 }
 
 }  // namespace

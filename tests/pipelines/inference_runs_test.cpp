@@ -323,6 +323,26 @@ TEST_F(InferenceFromBeds, SaysWhatIsMissing) {
   EXPECT_NEAR(found["photographs"][2]["prior"].get<double>(), 0.1 / 0.9, 1e-12);
 }
 
+// Beds that were given up are named once: no fit of theirs failed.
+TEST_F(InferenceFromBeds, NamesBedsThatWereGivenUpOnce) {
+  for (Json& one : stored_["beds"][3]["numbers"]) one = nullptr;
+  infer();
+  EXPECT_THAT(stage_.warnings, ElementsAre(HasSubstr("1 of 40 beds were stopped because they made too many contacts")));
+}
+
+// Moments that look like the average: each draw has one of the three by its prior, 0.8, 0.1 and 0.1.
+TEST_F(InferenceFromBeds, DrawsItsViewsByTheirShares) {
+  for (std::size_t i = 0; i < 40; ++i)
+    for (const std::size_t view : {1U, 2U}) number(i, view, rise_) = Json(number(i, 0, rise_));
+  infer();
+  const NumberTable draws(stage_.output("posterior.csv"));
+  std::map<std::string, int> views;
+  for (std::size_t r = 0; r < draws.rows(); ++r) ++views[draws.text("photographs", r)];
+  EXPECT_NEAR(views["average"], 800, 50);
+  EXPECT_NEAR(views["0"], 100, 40);
+  EXPECT_NEAR(views["0.5"], 100, 40);
+}
+
 // Beds of another measurement are refused.
 TEST_F(InferenceFromBeds, TakesBedsOfTheSameMeasurement) {
   const auto refused = [&](const char* key, const Json& value) {
