@@ -210,10 +210,8 @@ TEST_F(ChartDetails, MapsMarkWithinLimits) {
   EXPECT_EQ(found["marked"], Json::parse(R"({ "none": 0, "some": 2, "any": 3 })"));
   EXPECT_THAT(output("m.dat"), HasSubstr("\n\n\n# some: x y\n2 1\n3 1\n\n\n# any: x y\n1 1\n2 1\n3 1\n"));
   const std::string script = output("m.gp");
-  EXPECT_THAT(script, HasSubstr("index 1 "));
-  EXPECT_THAT(script, HasSubstr("title 'some'"));
-  EXPECT_THAT(script, HasSubstr("index 2 "));
-  EXPECT_THAT(script, HasSubstr("title 'any'"));
+  EXPECT_THAT(script, HasSubstr("index 1 using 1:2 with points pt 2 ps 0.7*scale lw 2 lc rgb '#D55E00' title 'some'"));
+  EXPECT_THAT(script, HasSubstr("index 2 using 1:2 with points pt 8 ps 0.7*scale lw 2 lc rgb '#D55E00' title 'any'"));
   EXPECT_THAT(script, Not(HasSubstr("index 3 ")));
 }
 
