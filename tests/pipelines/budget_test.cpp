@@ -44,6 +44,10 @@ TEST(BudgetText, ThatIsNoBudgetIsRefusedWithItsReason) {
   EXPECT_THAT(refusal("0 %"), HasSubstr("from 0.01 to 50 %"));
   EXPECT_THAT(refusal("-1 %"), HasSubstr("from 0.01 to 50 %"));
   EXPECT_THAT(refusal("nan %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("50.1 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("0.0099 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_EQ(refusal("50 %"), "");
+  EXPECT_EQ(refusal("0.01 %"), "");
   EXPECT_THAT(refusal("many %"), HasSubstr("is not a number of per cent"));
   EXPECT_THAT(refusal("1 2 %"), HasSubstr("is not a number of per cent"));
   EXPECT_THAT(refusal("3 kg"), HasSubstr("a mass"));

@@ -157,6 +157,25 @@ TEST_F(ChartDetails, LeaveOutWhatHasNoNumber) {
               HasSubstr("# x y std_error\n1 0 0.5\n4 " + number_text(std::log(4)) + " 0.125\n6 0 0\n"));
 }
 
+// What may be null, as it is stated before a run: what a curve, a fit or a level may not give.
+TEST_F(ChartDetails, StateWhatMayBeNull) {
+  chart_.read(R"({ "charts": [ { "name": "c", "x_label": "x", "y_label": "y", "points": [ { "name": "p", "x": "x",
+      "y": "y", "line_fit": true, "power_fit": true, "levels": [2], "against": "l" } ],
+      "curves": [ { "name": "l", "polynomial": [1] } ] } ] })");
+  std::string nulls, texts;
+  for (const pipelines::StatedResult& one : chart_.stated().all()) {
+    if (one.may_be_null) nulls += one.pointer.substr(one.pointer.find("/p/") + 2) + " ";
+    if (one.kind == pipelines::ResultKind::text) texts += one.pointer.substr(one.pointer.find("/p/") + 2) + " ";
+  }
+  std::string laws;
+  for (const std::string law : {"/power/law/", "/power/given/1/", "/power/given/2/"})
+    for (const char* key : {"amplitude ", "offset ", "chi2 ", "dof ", "p_value "}) laws += law + key;
+  EXPECT_EQ(nulls, "/p_value /power/exponent " + laws +
+                       "/against/chi2 /against/p_value /against/mean_difference /against/rms_difference "
+                       "/against/largest_difference /crossings/2 ");
+  EXPECT_THAT(texts, HasSubstr("/line_fit /power/status /against/curve "));
+}
+
 // --- maps
 
 // Uneven places: edges half way, the outer cells as far out as in. One place alone: half a unit to each side.

@@ -66,6 +66,7 @@ class LiveBeds : public testing::Test {
     bed_->measure();
     return *bed_;
   }
+  void expect_nearest(double gamma);
   static double end() { return 13 * 0.04 / time_unit * (1 + 1e-12); }
   std::optional<LiveBed> bed_;
   int bites_ = 0;
@@ -113,9 +114,9 @@ TEST_F(LiveBeds, SayWhereTheyAre) {
   EXPECT_NEAR(bed.numbers().amplitude, 6 * 9.81 / (omega * omega) / 0.002, 1e-12);
   EXPECT_NEAR(bed.numbers().column_number, 24 / 5.3, 1e-12);
   EXPECT_EQ(bed.numbers().time, 0);
-  const double time = 0.21 / time_unit;
+  const double time = 0.213 / time_unit;
   ASSERT_TRUE(bed.advance_towards(time, 1'000'000'000));
-  EXPECT_NEAR(bed.snapshot().floor_position, bed.numbers().amplitude * std::sin(omega * 0.21), 1e-9);
+  EXPECT_NEAR(bed.snapshot().floor_position, bed.numbers().amplitude * std::sin(omega * 0.213), 1e-9);
   EXPECT_EQ(bed.numbers().floor, bed.snapshot().floor_position);
   EXPECT_EQ(bed.snapshot().x.size(), 24U);
   EXPECT_NEAR(bed.numbers().time, time, 1e-12);
@@ -123,7 +124,13 @@ TEST_F(LiveBeds, SayWhereTheyAre) {
   EXPECT_EQ(bed.numbers().periods, 0);
   bed.measure();
   EXPECT_TRUE(bed.profile().height.empty() && bed.curve().empty());
-  EXPECT_EQ(bed.numbers().temperature_x, 0);
+  const Numbers none = bed.numbers();
+  for (const double number : {none.temperature_x, none.temperature_x_error, none.temperature_z,
+                              none.temperature_z_error, none.rise, none.rise_error, none.curve_temperature})
+    EXPECT_EQ(number, 0);
+  // A look at the very moment it was asked for counts: the last of a period ends it.
+  ASSERT_TRUE(bed.advance_towards(none.settled + (0 + 31.0 / 32) * none.period, 1'000'000'000));
+  EXPECT_EQ(bed.numbers().periods, 1);
 }
 
 // A page asks for a few events at a time: the same bed, in many bites.
@@ -141,8 +148,10 @@ TEST_F(LiveBeds, AreTheSameInBites) {
 }
 
 // Of the curves whose centre of mass is the bed's no other is nearer, be it a little or much colder or hotter.
-TEST_F(LiveBeds, HaveTheNearestCurve) {
-  LiveBed& bed = live(settings());
+void LiveBeds::expect_nearest(double gamma) {
+  Settings of_gamma = settings();
+  of_gamma.gamma = gamma;
+  LiveBed& bed = live(of_gamma);
   const Numbers numbers = bed.numbers();
   const sim::Profile& profile = bed.profile();
   ASSERT_EQ(bed.curve().size(), profile.height.size());
@@ -166,6 +175,9 @@ TEST_F(LiveBeds, HaveTheNearestCurve) {
   EXPECT_NEAR(numbers.curve_misfit, misfit(numbers.curve_temperature), 1e-9);
   for (const double factor : {0.2, 0.5, 0.8, 0.99, 1.01, 1.25, 2.0, 10.0})
     EXPECT_GE(misfit(numbers.curve_temperature * factor), numbers.curve_misfit) << factor;
+}
+TEST_F(LiveBeds, HaveTheNearestCurve) {
+  for (const double gamma : {6.0, 1.5}) expect_nearest(gamma);
 }
 
 TEST_F(LiveBeds, RefuseWhatIsNoBed) {
