@@ -223,7 +223,7 @@ TEST_F(FilmPage, FollowsDisksThatAreNearestToEachOther) {
   // To the left and upwards; one for two, nearer to the second; one 0.49 and one 0.51 away; none; one 0.6 above, and
   // one as far to the side.
   add(4, 0.75, 1.25), add(4, 3.25, 1), add(4, 8, 0.51), add(4, 11.51, 1), add(4, 17, 1), add(4, 20, 1.6),
-      add(4, 20.4, 0.8);
+      add(4, 19.6, 0.8);
   add(5, 1, 1);
   write_text(folder_ / "extract/disks.csv", rows);
   const std::vector<unsigned> disks = bytes_of(data()["disks"]);
@@ -235,7 +235,7 @@ TEST_F(FilmPage, FollowsDisksThatAreNearestToEachOther) {
   EXPECT_EQ(step(3), std::pair(127U, 3U));
   EXPECT_EQ(step(4), none);
   EXPECT_EQ(step(5), none);
-  EXPECT_EQ(step(6), std::pair(229U, 76U)) << "the nearest is not the one straight above";
+  EXPECT_EQ(step(6), std::pair(25U, 76U)) << "the nearest is not the one straight above";
   EXPECT_EQ(step(7), none) << "frame 6 has no disks";
 }
 
