@@ -625,7 +625,7 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
     out[options.name] = numbers_of(chart, options, data);
   }
   for (const CurveOptions& curve : chart.curves) {
-    if (!curve.label.empty()) add_curve(curve, picture);
+    if (!curve.label.empty() && curve.look != Look::none) add_curve(curve, picture);
   }
   draw_picture(picture, context.output_directory(), chart.name);
   return out;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
 #include "fit/profile_fit/simulated_profiles.hpp"
 #include "fit/theory/expansion.hpp"
@@ -324,6 +325,11 @@ Matched match(const FitTask& task, const std::vector<LibraryBed>& beds, const Wi
   fit.temperature = found.temperature, fit.temperature_interval = found.interval;
   fit.warnings = found.warnings;
   fit.chi2 = found.chi2, fit.dof = found.dof, fit.chi2_per_dof = found.chi2_per_dof, fit.bins = found.bins;
+  fit.statistical_error = found.temperature.std_error;  // without the scatter of the library, which follows
+  if (found.dof > 0) {                                  // the temperature is the one parameter
+    fit.p_value = fit::chance_of_chi2(found.chi2, found.dof);
+    fit.aic = found.chi2 + 2, fit.bic = found.chi2 + std::log(found.bins);
+  }
   out.interpolation_error = found.interpolation_error;
   const fit::Value scatter = fit::library_scatter(fit::test_library(library, how), found.temperature.value);
   if (found.status == fit::FitStatus::ok && scatter.ok()) {

@@ -251,7 +251,7 @@ void Infer::check_first_round(Fields& fields) const {
   fields.require(options_.parts == 1 || options_.rounds == 0, "rounds",
                  "a part of the first round is followed by no further rounds", "Give \"rounds\": 0");
   fields.require(
-      options_.first / options_.parts >= fewest, "parts",
+      options_.parts == 1 || options_.first / options_.parts >= fewest, "parts",
       fmt::format("{} unknown parameters need at least {} beds in each part", options_.dimensions(), fewest));
 }
 

@@ -1,5 +1,7 @@
 #include "pipelines/stages/measure_options.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <string>
 
@@ -62,10 +64,12 @@ void BedMeasureOptions::check(Fields& fields, double floor_period, double time_u
   using MeasureProblem = sim::MeasureOptions::Problem;
   const sim::MeasureOptions options = reduced(time_unit);
   for (const MeasureProblem problem : options.problems(floor_period)) {
-    if (problem == MeasureProblem::shorter_than_a_period)
-      fields.require(
-          false, "measure", "the bed must be measured over at least one period of the floor",
-          "Give " + handy_text(rounded_up_to_four_digits(floor_period * time_unit), dimension::time) + " or more");
+    if (problem == MeasureProblem::shorter_than_a_period) {
+      const double least = rounded_up_to_four_digits(floor_period * time_unit);
+      fields.require(false, "measure", "the bed must be measured over at least one period of the floor",
+                     "Give " + (fields.reduced() ? fmt::format("{:.6g}", least) : handy_text(least, dimension::time)) +
+                         " or more");
+    }
     if (problem == MeasureProblem::too_many_periods)
       fields.require(false, "measure", "the floor would shake more than 1e12 times, which no run can reach",
                      "Give a shorter \"measure\" or \"settle\", or a lower frequency");

@@ -588,12 +588,16 @@ std::vector<Json> Study::run_all(RunContext& context, const std::vector<Point>& 
   }
   const std::vector<double> seconds = trials(context, all, there);
   for (std::size_t i = 0; i < all.size(); ++i) time.expect(i, seconds[i]);
-  for (const LongPart& part : long_parts(seconds))
+  std::size_t said = all.size();  // the place that the last notice named: its replicas take the same time
+  for (const LongPart& part : long_parts(seconds)) {
+    if (part.part / replicas_ == said) continue;
+    said = part.part / replicas_;
     context.notice(
         fmt::format("the run of {}, {} = {} {}. To save this time, stop with Ctrl-C. Then remove this value, or "
                     "measure for a shorter time",
                     kinds_[all[part.part].series].name, parameter_.name, parameter_.values[all[part.part].value],
                     long_part_text(part)));
+  }
   const std::string runs = fmt::format("{} runs", all.size());
   for_each_index(all.size(), context.jobs(), [&](std::size_t i) {
     context.check_interrupted();

@@ -44,6 +44,10 @@ TEST(BudgetText, ThatIsNoBudgetIsRefusedWithItsReason) {
   EXPECT_THAT(refusal("0 %"), HasSubstr("from 0.01 to 50 %"));
   EXPECT_THAT(refusal("-1 %"), HasSubstr("from 0.01 to 50 %"));
   EXPECT_THAT(refusal("nan %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("50.1 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_THAT(refusal("0.0099 %"), HasSubstr("from 0.01 to 50 %"));
+  EXPECT_EQ(refusal("50 %"), "");
+  EXPECT_EQ(refusal("0.01 %"), "");
   EXPECT_THAT(refusal("many %"), HasSubstr("is not a number of per cent"));
   EXPECT_THAT(refusal("1 2 %"), HasSubstr("is not a number of per cent"));
   EXPECT_THAT(refusal("3 kg"), HasSubstr("a mass"));
@@ -155,6 +159,44 @@ TEST(EffortForATime, FitsIntoIt) {
   EXPECT_LT(choose_effort(eight_beds(), quick, budget, 8).error, choose_effort(eight_beds(), quick, budget, 1).error);
 }
 
+// Beds of 10 that settle and 0.016 t^2/(0.009^2 n) that are measured, each: t^2 of ten beds is 1.3321, so that ten cost
+// 363.1 and nine 363.4. Of lengths three digits, upwards.
+TEST(EffortForAnError, IsTheCheapestNumberOfBeds) {
+  EffortLimits quick = limits();
+  quick.settling = 10;
+  EffortChoice one = choose_effort(eight_beds(), quick, error_of(0.01), 1);
+  EXPECT_EQ(one.effort, (Effort{26.4, 10, 0}));
+  EXPECT_NEAR(one.work.events, 10 * (1e5 + 26.4 * 2e4), 1);
+  EXPECT_NEAR(one.error, std::sqrt(0.016 / 26.4 / 10), 1e-9);
+  EXPECT_NEAR(one.stated_error, 1.1541830 * std::sqrt(0.016 / 26.4 / 10), 1e-8);
+  quick.fewest_beds = 11;
+  one = choose_effort(eight_beds(), quick, error_of(0.01), 1);
+  EXPECT_EQ(one.effort, (Effort{23.3, 11, 0}));
+  quick.shortest = 24;
+  EXPECT_EQ(choose_effort(eight_beds(), quick, error_of(0.01), 1).effort.length, 24);
+  quick.even_beds = true, quick.fewest_beds = 8, quick.shortest = 1, quick.settling = 13;
+  EXPECT_EQ(choose_effort(eight_beds(), quick, error_of(0.01), 1).effort.beds % 2, 0U);
+}
+
+// In 60 s on one thread n beds are measured for (60/n - 0.05)/0.02: nineteen for 155.39, since from nineteen on the
+// pilot's 15 degrees of freedom, 15/13, count and not Student's factor. Of eight threads each has three rounds.
+TEST(EffortForATime, IsTheNumberOfBedsWithTheSmallestError) {
+  EffortLimits quick = limits();
+  quick.settling = 10;
+  const Budget budget{.seconds = 60, .text = "60 s"};
+  const EffortChoice one = choose_effort(eight_beds(), quick, budget, 1);
+  EXPECT_EQ(one.effort, (Effort{155, 19, 0})) << "three digits, downwards";
+  EXPECT_NEAR(one.wall_seconds, 19 * (0.05 + 155 * 0.02), 1e-9);
+  EXPECT_NEAR(one.error, std::sqrt(0.016 / 155 / 19), 1e-9);
+  EXPECT_EQ(choose_effort(eight_beds(), quick, budget, 8).effort, (Effort{997, 24, 0}));
+  // As long as the shortest there is an effort; at least the fewest beds are named where there is none.
+  const Budget tight{.seconds = 4 * (0.05 + 1.015 * 0.02), .text = "as asked"};
+  EXPECT_EQ(choose_effort(eight_beds(), quick, tight, 1).effort, (Effort{1.01, 4, 0}));
+  const EffortChoice none = choose_effort(eight_beds(), quick, {.seconds = 0.2, .text = "0.2 s"}, 1);
+  EXPECT_FALSE(none.possible);
+  EXPECT_EQ(none.effort, (Effort{1, 4, 0}));
+}
+
 TEST(EffortForATime, IsNotPossibleBelowTheTimeToSettle) {
   EXPECT_FALSE(choose_effort(eight_beds(), limits(), {.seconds = 60, .text = "60 s"}, 1).possible)
       << "200 s of settling a bed";
@@ -255,6 +297,45 @@ TEST(NextPilot, HasAFinerModelWhereTheSystematicPartIsLarge) {
   EXPECT_EQ(next->refinement, 1);
 }
 
+// A choice of more than 12 times the pilot's length is approached by a sixth of it, one of more than 1.5 times all of
+// the pilot's beds by 16 beds.
+TEST(NextPilot, HasItsLimits) {
+  const EffortReading pilot = eight_beds();
+  const auto next = [&](const EffortReading& from, const Effort& choice, double settling = 1e4) {
+    EffortLimits given = limits();
+    given.settling = settling;
+    EffortChoice chosen;
+    chosen.effort = choice;
+    return next_pilot(from, given, chosen, error_of(0.01)).value_or(Effort{});
+  };
+  EXPECT_EQ(next(pilot, {121, 8, 0}), (Effort{20.2, 16, 0}));
+  EXPECT_EQ(next(pilot, {120, 8, 0}), (Effort{10, 16, 0}));
+  EXPECT_EQ(next(pilot, {12.1, 10, 0}), (Effort{10, 16, 0}));
+  EXPECT_EQ(next(pilot, {12, 10, 0}), Effort{}) << "1.5 times as much: this pilot will do";
+  // Beds that differ are watched four times as long where that costs less than half of the choice: 8 x 40 of 22 x 30.
+  EffortReading apart = pilot;
+  apart.spread = 0.3;
+  EXPECT_EQ(next(apart, {20, 22, 0}, 10), (Effort{40, 16, 0}));
+  EXPECT_EQ(next(apart, {20, 21, 0}, 10), (Effort{10, 16, 0}));
+}
+
+// A tenth of the error asked for, or of the one that the time allows, may be systematic.
+TEST(NextPilot, RefinesAboveATenthOfTheError) {
+  EffortReading pilot = eight_beds();
+  EffortLimits fine = limits();
+  fine.most_refinement = 1;
+  EffortChoice choice;
+  choice.effort = pilot.effort, choice.stated_error = 0.02;
+  const Budget time{.seconds = 60, .text = "60 s"};
+  for (const auto& [systematic, refined] : {std::pair(0.00199, false), {0.00201, true}}) {
+    pilot.systematic = systematic;
+    EXPECT_EQ(next_pilot(pilot, fine, choice, error_of(0.02)).has_value(), refined) << systematic;
+    EXPECT_EQ(next_pilot(pilot, fine, choice, time).has_value(), refined) << systematic;
+  }
+  pilot.effort.refinement = 1;
+  EXPECT_FALSE(next_pilot(pilot, fine, choice, error_of(0.02))) << "there is no finer one";
+}
+
 // ------------------------------------------------------------------------------------------------ frames
 
 // 16 frames leave 4 %; their own uncertainty makes 15/13 of its square. For 2 % 16 * 15/13 * 4 = 73.8 are needed.
@@ -344,6 +425,22 @@ TEST(BudgetRun, SaysWhatItPicksAndWritesItIntoTheRecipe) {
   const Json seen = Json::parse(read_text(folder / "o" / "bed" / "observables.json"));
   EXPECT_NEAR(seen["events"].get<double>() / said["events"].get<double>(), 1, 0.3);
   EXPECT_LE(said["stated_error"].get<double>(), 0.0501);
+  // The pilot: eight beds for 16 periods, which settle no longer and keep no frames.
+  const Json pilot = Json::parse(read_text(folder / "o/.pilot/bed/0/bed/.record"))["options"];
+  EXPECT_EQ(pilot["replicas"], 8);
+  EXPECT_NEAR(pilot["measure"].get<double>(), 16 / 0.45, 1e-9);
+  EXPECT_EQ(pilot["settle"], 20);
+  EXPECT_EQ(pilot["frames"]["count"], 0);
+  EXPECT_EQ(said["id"], "bed");
+  EXPECT_EQ(said["number"], "T_x");
+  EXPECT_EQ(manifest["budget"]["asked"], "5 %");
+  EXPECT_EQ(said["length"], said["picked"]["/measure"]);
+  EXPECT_EQ(said["beds"], said["picked"]["/replicas"]);
+  EXPECT_EQ(said["possible"], true);
+  EXPECT_GT(said["pilot"]["cpu_seconds"].get<double>(), 0);
+  EXPECT_GE(said["pilot"]["beds"], 8);
+  EXPECT_THAT(ran.err, testing::StartsWith("bed: pilot run for --budget\nbed: --budget \"5 %\" chooses \"measure\": " +
+                                           said["length"].dump() + ", \"replicas\": " + said["beds"].dump()));
 }
 
 TEST(BudgetRun, IsRepeatedByRerunWithoutAPilot) {
@@ -406,6 +503,46 @@ TEST(BudgetRun, IsNotForSweeps) {
   const ProgramResult ran = run_shakebed({"run", "sweep.json", "--budget", "1 %"}, folder.path());
   EXPECT_EQ(ran.exit_code, 2) << ran.err;
   EXPECT_THAT(ran.err, HasSubstr("sweep"));
+}
+
+// What a finished run says of its error: that of four beds has Student's factor 1.6237, and is 0.04 x 1.6237/2; within
+// counts where it is larger.
+TEST(BudgetReached, IsSaidBesideWhatWasExpected) {
+  const ScratchFolder folder;
+  std::vector<Problem> problems;
+  const Plan plan = make_plan(*parse_json(recipe(), "hot.json", problems), "hot.json", folder.path());
+  RunOutcome outcome;
+  outcome.out = folder.path();
+  outcome.stages.push_back({.id = "bed", .kind = "simulate"});
+  outcome.stages[0].record.emplace(), outcome.stages[0].cost.emplace();
+  outcome.stages[0].cost->timings = Json{{"simulation_cpu_seconds", 3.0}, {"measuring_cpu_seconds", 1.0}};
+  std::filesystem::create_directory(folder / "bed");
+  const auto said = [&](double within, double spread, const std::string& asked) {
+    write_text(folder / "bed/observables.json",
+               dump(Json{{"temperature_x", {{"value", 0.5}, {"within", within}, {"spread", spread}}}, {"events", 10}}));
+    const Json record{
+        {"asked", asked},
+        {"stages",
+         Json::array(
+             {Json{{"id", "bed"}, {"length", 40.0}, {"beds", 4}, {"stated_error", 0.0123}, {"cpu_seconds", 90.0}}})}};
+    testing::internal::CaptureStderr();
+    {
+      Console console(Console::Level::normal);
+      say_reached(plan, record, outcome, console);
+    }
+    return testing::internal::GetCapturedStderr();
+  };
+  const std::string line = "bed: stated error of T_x: 3.2 % (expected 1.2 %). Processor time: 3.0 s (expected 90 s)\n";
+  EXPECT_EQ(said(0.01, 0.02, "2 %"), line);
+  EXPECT_EQ(said(0.0324738, 0.01, "5 %"), line);
+  EXPECT_EQ(said(0.01, 0.02, "30 s"), line) << "a time is no error that could be missed";
+  // 3.2474 times 1 %: 10.5 times as many beds, 42.2 of them.
+  EXPECT_EQ(said(0.01, 0.02, "1 %"),
+            line +
+                "warning: bed: the stated error of T_x is 3.2 %, more than the wanted 1 %: these beds differ by more "
+                "than those of the pilot. About 11 times as many beds would reach it: set \"replicas\" to 43\n");
+  outcome.stages[0].record.reset();
+  EXPECT_EQ(said(0.01, 0.02, "1 %"), "") << "it has not run";
 }
 
 // A shipped figure, of which only the pilot runs.
@@ -477,6 +614,33 @@ TEST(BudgetOfABed, ThatDoesNotMoveSidewaysIsRefused) {
   const std::unique_ptr<Stage> stage = bed_stage(lone);
   const Json still{{"temperature_x", {{"value", 1e-6}}}, {"temperature_z", {{"value", 1}}}};
   EXPECT_THROW(stage->scalable()->read({1, 4, 0}, still, Json::object()), StageError);
+}
+
+// A pilot settles no longer than it measures, and keeps no frames. Frames of a recipe must fit into the shortest
+// length.
+TEST(BudgetOfABed, HasPilotsWithoutFrames) {
+  LoneStage lone(*find_stage("simulate"));
+  const std::unique_ptr<Stage> stage = bed_stage(lone);
+  const Scalable::Changes pilot = stage->scalable()->pilot_changes({1.5, 6, 0});
+  ASSERT_EQ(pilot.size(), 4U);
+  EXPECT_EQ(pilot[2], (std::pair<std::string, Json>("/settle", "1.5 s")));
+  EXPECT_EQ(pilot[3].first, "/frames");
+  EXPECT_EQ(pilot[3].second["count"], 0);
+  EXPECT_EQ(stage->scalable()->pilot_changes({12, 6, 0})[2].second, "9 s");
+  EXPECT_EQ(stage->scalable()->limits().written, 2);
+  EXPECT_EQ(stage->scalable()->number(), "T_x");
+  EXPECT_EQ(stage->scalable()->systematic_cause(), "the contact duration");
+  LoneStage still(*find_stage("simulate"));
+  still.reduced = true;
+  const auto bath = still.read(R"({"disks": {"count": 20}, "box": {"width": 5}, "settle": 3, "measure": 500,
+    "bath": {"kind": "andersen", "temperature": 0.2, "rate": 0.3}})");
+  const EffortLimits without = bath->scalable()->limits();
+  EXPECT_DOUBLE_EQ(without.shortest, 16 * 4) << "the floor stands still";
+  EXPECT_DOUBLE_EQ(without.telling, 32 * 4);
+  EXPECT_EQ(without.most_refinement, 0) << "no contact duration";
+  EXPECT_FALSE(without.even_beds);
+  EXPECT_EQ(without.fewest_beds, 1U);
+  EXPECT_EQ(bath->scalable()->changes({70, 2, 0})[0].second, Json(70.0));
 }
 
 }  // namespace

@@ -555,6 +555,14 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   EXPECT_THAT(all.err, HasSubstr("all 48 frames together leave a statistical error of T of about"));
   EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured) << "nothing ran";
 
+  // Of no more frames than a pilot's all are measured, each.
+  const std::string first = std::filesystem::directory_iterator(folder / "o/render/frames")->path().string();
+  const ProgramResult one =
+      run_shakebed({"fit-images", first, "--diameter", "3 mm", "--budget", "6 %", "--out", "one"}, folder.path());
+  EXPECT_THAT(one.err, HasSubstr("--budget \"6 %\": all 1 frames are measured"));
+  EXPECT_EQ(read_json(folder / "one/manifest.json")["budget"]["frames"],
+            Json::parse(R"({ "stride": 1, "measured": 1, "of": 1 })"));
+
   const ProgramResult short_time = fit("some", {"--budget", "1 ms"});
   EXPECT_EQ(short_time.exit_code, 5) << short_time.err;
   EXPECT_THAT(short_time.err, HasSubstr("Allow more time"));

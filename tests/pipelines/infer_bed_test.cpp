@@ -86,6 +86,39 @@ TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
   }
 }
 
+// The recipe alone, in the folder whose frames are measured: ranges as they are asked for, whose middles are in the
+// scene. A bed settles for 50 periods and is measured as long as the film, two of them.
+TEST_F(InferBed, WritesTheRangesThatAreAskedFor) {
+  const ProgramResult ran =
+      infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--gamma", "2,7", "--restitution", "0.5,0.9",
+                  "--friction", "0.1,0.3", "--beds", "31", "--plateau-density", "1.1", "--only", "figure"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json recipe = read_json(*folder_ / "o/resolved.json"), stage = recipe["stages"].back();
+  ASSERT_EQ(stage["stage"], "infer");
+  EXPECT_EQ(stage["parameters"]["gamma"]["low"], 2);
+  EXPECT_EQ(stage["parameters"]["gamma"]["high"], 7);
+  EXPECT_FALSE(stage["parameters"]["gamma"].contains("mean"));
+  EXPECT_EQ(stage["parameters"]["restitution"]["set"].size(), 3U);
+  EXPECT_EQ(stage["parameters"]["friction"]["high"], 0.3);
+  EXPECT_EQ(stage["floor"]["gamma"], 4.5);
+  EXPECT_EQ(stage["floor"]["frequency"], "20 Hz");
+  for (const Json* material : {&stage["disks"], &stage["floor"], &stage["box"]["sides"]}) {
+    EXPECT_NEAR((*material)["restitution"].get<double>(), 0.7, 1e-12);
+    EXPECT_NEAR((*material)["friction"].get<double>(), 0.2, 1e-12);
+  }
+  EXPECT_EQ(stage["disks"]["inertia"], "sphere");
+  EXPECT_EQ(stage["settle"], "2.5 s");
+  EXPECT_EQ(stage["measure"], "0.1 s") << "80 frames at 800 Hz are two periods of 20 Hz";
+  EXPECT_EQ(stage["first"], 31);
+  EXPECT_EQ(stage["each"], 10);
+  EXPECT_EQ(stage["rounds"], 2);
+  EXPECT_EQ(stage["plateau_density"], 1.1);
+  const Json& profile = stage["targets"]["profile"];
+  EXPECT_EQ(profile["low"], 0.5);
+  EXPECT_NEAR(std::fmod(profile["high"].get<double>(), 1), 0.5, 1e-12) << "whole diameters above";
+  EXPECT_EQ(stage["kernel_width"], 0.5);
+}
+
 TEST_F(InferBed, SaysWhatIsMissing) {
   const auto refused = [](const std::vector<std::string>& more, int code, const std::string& words) {
     const ProgramResult ran = infer("wrong", more, "hidden/film/frames/000000.png");

@@ -324,11 +324,11 @@ TEST(StatedPointers, ThatLeadNowhereAreNamed) {
 TEST(TheoryTexts, HaveALineANumberAndItsUnit) {
   TheoryQuestion question{.diameter = 0.003, .initial_height = 10, .temperature = 0.05};
   const Json json = theory_json(question);
-  const double critical = json["critical_temperature"];
+  const double vanishing = json["critical_temperature"];
   EXPECT_EQ(json["units"]["critical_temperature"], "m g D");
-  EXPECT_DOUBLE_EQ(json["critical_temperature_over_mg"], 0.003 * critical);
+  EXPECT_DOUBLE_EQ(json["critical_temperature_over_mg"], 0.003 * vanishing);
   EXPECT_DOUBLE_EQ(json["temperature_over_mg"], 0.00015);
-  EXPECT_DOUBLE_EQ(json["reduced_temperature"], 0.05 / critical);
+  EXPECT_DOUBLE_EQ(json["reduced_temperature"], 0.05 / vanishing);
   EXPECT_DOUBLE_EQ(json["column_number"], 10 * json["plateau_density"].get<double>());
   EXPECT_TRUE(json["status"].empty());
   const std::string text = theory_text(question);

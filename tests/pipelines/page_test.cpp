@@ -159,6 +159,86 @@ TEST_F(FilmPage, OffersTheTruthWhereItIsKnown) {
   EXPECT_EQ(data()["marks"][0]["missed"], Json::parse("[1.5, 2.5]"));
 }
 
+// Without scripts: the first frame shown with its disks. Colours are offered where they are known.
+TEST_F(FilmPage, HasAStillPictureAndItsWords) {
+  film();
+  const std::string page = film_viewer(stage_);
+  EXPECT_THAT(page,
+              HasSubstr("<svg viewBox=\"-0.5 -0.5 400 220\" role=\"img\" aria-label=\"disks found in frame 3\" "));
+  EXPECT_THAT(page, HasSubstr("<image href=\"data:image/webp;base64,AA==\" x=\"-0.5\" y=\"-0.5\" width=\"400\" "
+                              "height=\"220\"/>"));
+  EXPECT_THAT(page, HasSubstr("<circle cx=\"100.0\" cy=\"120.0\" r=\"10.0\"/><circle cx=\"120.0\" cy=\"120.0\""));
+  EXPECT_THAT(page, HasSubstr("pictures 200 px wide, compressed."));
+  EXPECT_THAT(page, Not(HasSubstr("<option value=\"speed\">")));
+  stage_.result["velocities"] = Json{{"linked_share", 0.5}};
+  EXPECT_THAT(film_viewer(stage_), HasSubstr("<option value=\"speed\">speed</option><option value=\"none\">"));
+  stage_.result["velocities"] = Json{{"linked_share", 0.49}};
+  EXPECT_EQ(data()["follows"], false);
+  film();
+  std::string text = read_text(folder_ / "extract/film.json");
+  text.replace(text.find("\"of\": 5"), 7, "\"of\": 2");
+  write_text(folder_ / "extract/film.json", text);
+  EXPECT_THAT(film_viewer(stage_), HasSubstr("<figcaption>All 2 good frames; pictures"));
+  text.replace(text.find("\"of\": 2"), 7, "\"of\": 1");
+  write_text(folder_ / "extract/film.json", text);
+  EXPECT_THAT(film_viewer(stage_), HasSubstr("<figcaption>The only good frame; pictures"));
+}
+
+// Heights from the floor, or the lowest disk, to one diameter above the highest, 5 + sin 60 degrees: 0 to 7.
+TEST_F(FilmPage, HasItsProfileAndScales) {
+  film();
+  stage_.result["diameter"] = Json{{"value", 0.003}};
+  Json found = data();
+  EXPECT_EQ(found["profile"]["low"], 0);
+  EXPECT_EQ(found["profile"]["n"], 7 * 4 + 1);
+  EXPECT_EQ(found["diameter"], 0.003);
+  EXPECT_EQ(found["step"], 0.5);
+  EXPECT_EQ(found["follows"], false);
+  double disks = 0;
+  for (const Json& density : found["profile"]["mean"]) disks += density.get<double>() * 0.25 * 20;
+  EXPECT_NEAR(disks, 4, 0.02) << "7 and 1 in a bed of 20 D";
+  write_text(folder_ / "extract/disks.csv",
+             "frame,x_px,y_px,radius_px,x,z,quality\n3,100,120,10,5,-0.25,1\n5,100,120,12.5,5,3.5,1\n");
+  found = data();
+  EXPECT_EQ(found["profile"]["low"], -1);
+  EXPECT_EQ(found["profile"]["n"], 6 * 4 + 1);
+  EXPECT_EQ(found["radius"], 12.5);
+  EXPECT_EQ(bytes_of(found["disks"])[4], 204U) << "10 of 12.5";
+  stage_.result.erase("width");
+  EXPECT_TRUE(data()["profile"].is_null());
+  write_text(folder_ / "extract/disks.csv", "frame,x_px,y_px,radius_px,x,z,quality\n3,100,120,10,5,none,1\n");
+  EXPECT_THROW(data(), InputError);
+}
+
+// A disk is followed to the nearest of the next frame where each is the other's nearest, less than 0.5 D away. Bytes
+// are 127 for no step, 0 and 254 for 0.5 D.
+TEST_F(FilmPage, FollowsDisksThatAreNearestToEachOther) {
+  film();
+  stage_.result["velocities"] = Json{{"linked_share", 1}};
+  std::string rows = "frame,x_px,y_px,radius_px,x,z,quality\n";
+  const auto add = [&](int frame, double x, double z) {
+    rows += std::to_string(frame) + ",10,10,10," + std::to_string(x) + "," + std::to_string(z) + ",1\n";
+  };
+  add(3, 1, 1), add(3, 3, 1), add(3, 3.4, 1), add(3, 8, 1), add(3, 11, 1), add(3, 14, 1), add(3, 20, 1);
+  // To the left and upwards; one for two, nearer to the second; one 0.49 and one 0.51 away; none; one 0.6 above, and
+  // one as far to the side.
+  add(4, 0.75, 1.25), add(4, 3.25, 1), add(4, 8, 0.51), add(4, 11.51, 1), add(4, 17, 1), add(4, 20, 1.6),
+      add(4, 19.6, 0.8);
+  add(5, 1, 1);
+  write_text(folder_ / "extract/disks.csv", rows);
+  const std::vector<unsigned> disks = bytes_of(data()["disks"]);
+  const auto step = [&](std::size_t i) { return std::pair(disks[10 * i + 8], disks[10 * i + 9]); };
+  const std::pair<unsigned, unsigned> none(255, 255);
+  EXPECT_EQ(step(0), std::pair(64U, 191U));
+  EXPECT_EQ(step(1), none);
+  EXPECT_EQ(step(2), std::pair(89U, 127U));
+  EXPECT_EQ(step(3), std::pair(127U, 3U));
+  EXPECT_EQ(step(4), none);
+  EXPECT_EQ(step(5), none);
+  EXPECT_EQ(step(6), std::pair(25U, 76U)) << "the nearest is not the one straight above";
+  EXPECT_EQ(step(7), none) << "frame 6 has no disks";
+}
+
 TEST_F(FilmPage, IsLeftOutWhereTheStageKeptNoPictures) { EXPECT_EQ(film_viewer(stage_), ""); }
 
 TEST(FigureHtml, CannotBeEndedByWhatItHolds) {

@@ -356,6 +356,19 @@ TEST(ProposalsForAPicture, LeaveOutTheOptionThatExcludesBeads) {
   EXPECT_EQ(proposals[0].found.disks.size(), bed.places.size());
 }
 
+// A candidate's polarity and radius are given in place of those that are there, and of another shape: no more.
+TEST(ProposalsForAPicture, GiveWhatACandidateNeeds) {
+  BedInAPicture bed;
+  bed.look.survey.candidates[0].plausible = true;
+  const auto left_out = [&] {
+    const std::vector<Proposal> proposals = proposals_for(bed.look, bed.options, RefusedBy::measurement);
+    return proposals.empty() ? std::vector<std::string>{"no proposal"} : proposals[0].leave_out;
+  };
+  EXPECT_THAT(left_out(), IsEmpty());
+  bed.options.shape = BeadShape::any;
+  EXPECT_THAT(left_out(), ElementsAre("--shape"));
+}
+
 // The circles that lie near one another, 2.5 radii beyond their centres, in whole pixels and inside the picture. One
 // that is hardly a bead counts for nothing, nor does one farther than 20 radii.
 TEST(ProposalsForAPicture, GiveTheRegionOfTheBeads) {

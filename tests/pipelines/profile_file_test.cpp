@@ -1,11 +1,13 @@
 // Profiles as people write them: every spelling of a column, every separator, either kind of density, missing errors,
 // and the covariance beside them.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/profile_csv.hpp"
 #include "pipelines/formats/table.hpp"
 #include "tests/pipelines/program.hpp"
@@ -100,6 +102,101 @@ TEST(ProfileFile, ComesBackWithItsNotesAndCovariance) {
   EXPECT_EQ(part.values[1], 0);
   EXPECT_EQ(part.values[4], 0.06);
   EXPECT_EQ(part.values[7], 0.001);
+}
+
+// What is wrong with a file, behind its path.
+std::string mistake_of(const std::string& text, const std::string& metadata = "") {
+  const ScratchFolder folder;
+  write_text(folder / "p.csv", text);
+  if (!metadata.empty()) write_text(metadata_path(folder / "p.csv"), metadata);
+  try {
+    read_profile_csv(folder / "p.csv");
+  } catch (const shakebed::pipelines::InputError& error) {
+    return std::string(error.what()).substr((folder / "p.csv").string().size());
+  }
+  return "none";
+}
+
+TEST(ProfileFile, NamesItsMistakes) {
+  EXPECT_EQ(mistake_of("x,y\n1,2\n"),
+            ":1: the header must name at least \"height\" (in D) and \"number_density\" (n D^2), or \"area_fraction\"; "
+            "found \"x,y\"");
+  EXPECT_THAT(mistake_of("height\n1\n"), testing::StartsWith(":1: the header must name"));
+  EXPECT_THAT(mistake_of("phi,nu\n1,1\n"), testing::StartsWith(":1: the header must name"));
+  EXPECT_EQ(mistake_of("# a comment\n"),
+            ": there is no header line. Write the names of the columns in the first line, "
+            "for example height,number_density");
+  EXPECT_EQ(mistake_of("z,phi\n# 1,1\n"), ": there are no rows below the header line");
+  EXPECT_EQ(mistake_of("z,phi\n\n1,1,1\n"), ":3: this row has 3 cells, but the header has 2");
+  EXPECT_EQ(mistake_of("z,phi\n1,1e999\n"), ":2: \"1e999\" in column \"phi\" is not a finite number");
+  EXPECT_EQ(mistake_of("z,phi,error\n1,1,x\n"), ":2: \"x\" in column \"error\" is not a finite number");
+  EXPECT_EQ(mistake_of("z,phi,error\n1,1,-0.5\n"), ":2: the standard error -0.5 is negative");
+  EXPECT_EQ(mistake_of("z,phi\n1,-0.5\n"),
+            ":2: the density -0.5 is negative. Set negative densities to 0, or leave their rows out");
+  EXPECT_EQ(mistake_of("z,nu\n1,1.7e308\n"), ":2: the density is beyond the largest possible number");
+  EXPECT_EQ(
+      mistake_of("# kernel: square\n# kernel_width: 2\nz,phi\n1,1\n"),
+      ":1: there is no kernel \"square:2\"; write gaussian:WIDTH, top_hat:WIDTH, disk_chord:WIDTH (in D) or none");
+  EXPECT_EQ(mistake_of("z,phi\n# column_number: 0\n1,1\n"), ":2: column_number: expected a number above 0, got \"0\"");
+  EXPECT_EQ(mistake_of("z,phi\n1,1\n", R"({ "notes": [ { "kernel": { "kind": "square", "width": 1 } } ] })"),
+            "-metadata.json: /notes/0/kernel: expected a kind and a width");
+}
+
+// Of eight rows without an error all are named, of nine the first eight.
+TEST(ProfileFile, NamesTheRowsWithoutAnError) {
+  const auto note = [](int rows) {
+    std::string text = "z,phi,error\n0,1,0.1\n";
+    for (int k = 1; k <= rows; ++k) text += std::to_string(k) + ",1,\n";
+    const ProfileTable found = read(text);
+    EXPECT_EQ(found.notes.size(), 1U);
+    return found.notes.at(0).substr(found.notes.at(0).find(": ") + 2);
+  };
+  const std::string used = " The error of the nearest height that has one is used for each.";
+  EXPECT_EQ(note(1), "1 of 2 rows have no standard error or one of 0 (line 3)." + used);
+  EXPECT_EQ(note(8), "8 of 9 rows have no standard error or one of 0 (lines 3, 4, 5, 6, 7, 8, 9, 10)." + used);
+  EXPECT_EQ(note(9), "9 of 10 rows have no standard error or one of 0 (lines 3, 4, 5, 6, 7, 8, 9, 10, ...)." + used);
+  EXPECT_TRUE(read("z,phi\n0,1\n1,1\n").notes.empty());
+  EXPECT_TRUE(read("z,phi,error\n0,1,0.1\n1,1,0.1\n").notes.empty());
+}
+
+// Of several columns of one name the first is read, and the others are named.
+TEST(ProfileFile, ReadsTheFirstOfSeveralColumns) {
+  const ProfileTable densities = read("z,PHI_a,phi_b,phi_c,nu_a\n1,0.5,0.6,0.7,0.1\n");
+  EXPECT_EQ(densities.number_density[0], 0.5);
+  ASSERT_EQ(densities.notes.size(), 1U);
+  EXPECT_THAT(
+      densities.notes[0],
+      testing::EndsWith("p.csv: the density is read from column \"PHI_a\", and these columns are ignored: phi_b, "
+                        "phi_c. To use another column, name it \"number_density\"."));
+  const ProfileTable areas = read("nu_a,nu_b,z\n0.5,0.6,1\n");
+  EXPECT_EQ(areas.area_fraction[0], 0.5);
+  EXPECT_THAT(areas.notes.at(0), testing::EndsWith("p.csv: the area fraction is read from column \"nu_a\", and these "
+                                                   "columns are ignored: nu_b. To use another column, name it "
+                                                   "\"area_fraction\"."));
+  EXPECT_TRUE(read("z,phi_a\n1,0.5\n").notes.empty());
+}
+
+// Heights that differ by less than 1e-9 are one; pairs of others are left out. Rows must be three numbers.
+TEST(ProfileFile, HasACovarianceOfItsHeights) {
+  const ScratchFolder folder;
+  ProfileTable profile;
+  profile.height = {1, 2}, profile.number_density = {1, 1}, profile.std_error = {0.5, 0.25};
+  const auto read_back = [&](const std::string& rows) {
+    write_text(folder / "c.csv", "height_i,height_j,covariance\n" + rows);
+    return read_covariance_csv(folder / "c.csv", profile).values;
+  };
+  EXPECT_EQ(read_back(""), (std::vector<double>{0.25, 0, 0, 0.0625}));
+  EXPECT_EQ(read_back("1.0000000009,1.9999999991,0.125\n"), (std::vector<double>{0.25, 0.125, 0.125, 0.0625}));
+  EXPECT_EQ(read_back("1.000000002,2,0.125\n3,1,0.5\n2,2,0.75\n"), (std::vector<double>{0.25, 0, 0, 0.75}));
+  for (const char* wrong : {"1,2\n", "1,2,3,4\n", "1,x,3\n", "1,2,\n"}) {
+    try {
+      read_back(std::string("1,1,1\n") + wrong);
+      ADD_FAILURE() << wrong;
+    } catch (const shakebed::pipelines::InputError& error) {
+      EXPECT_EQ(std::string(error.what()),
+                (folder / "c.csv").string() + ":3: expected three numbers: height_i,height_j,covariance");
+    }
+  }
 }
 
 }  // namespace

@@ -61,6 +61,20 @@ TEST(RecipeMistakes, OfTheWholeAreNamed) {
             "/name: \"a b\" cannot be the name of a folder. Use letters, digits, '-', '_' and '.'");
 }
 
+// A file that is no recipe has a problem in every line: after 1000 the rest is left alone.
+TEST(RecipeMistakes, AreThousandAtMost) {
+  const auto count = [](std::size_t stages) {
+    std::string all = "7";
+    for (std::size_t i = 1; i < stages; ++i) all += ",7";
+    return mistakes_of(with(all));
+  };
+  EXPECT_EQ(count(1000).size(), 1000U);
+  const std::vector<Problem> more = count(1002);
+  ASSERT_EQ(more.size(), 1001U);
+  EXPECT_EQ(more.back().pointer, "/stages/1000");
+  EXPECT_EQ(more.back().what, "the recipe has more than 1000 mistakes; the rest of it was not checked");
+}
+
 TEST(RecipeMistakes, OfIdsAreNamed) {
   const auto with_id = [](const std::string& id) { return told(with(map_stage(", \"id\": \"" + id + "\""))); };
   const std::string no_id =
@@ -355,6 +369,33 @@ TEST(SweepPoints, HaveTheirMistakesAtTheirValues) {
   } catch (const ConfigError& error) {
     EXPECT_EQ(error.problems()[0].pointer, "/sweep/over/~1stages~1nobody~1gamma/0");
   }
+}
+
+// A warning is said once, with the first point that has it and how many have: replicas are one. Of mistakes 20 are
+// shown.
+TEST(SweepPoints, CountTheirWarningsAndMistakes) {
+  const std::vector<Warning> warnings = check_points(plan_of(with(
+      R"({ "stage": "simulate", "id": "bed", "units": "reduced", "disks": { "count": 40 }, "box": { "width": 10.3 },
+           "settle": 40, "measure": 40, "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": 0.5 } })",
+      R"("sweep": { "over": { "/stages/bed/floor/gamma": [4, 0.5, 0.6, 60], "/stages/bed/seed": [1, 2] }, "replicas": 2 }, )")));
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_THAT(
+      warnings[0].problem.what,
+      testing::EndsWith(" (point 000004 of the sweep: /stages/bed/floor/gamma = 0.5, /stages/bed/seed = 1; 4 of 8 "
+                        "points)"));
+  EXPECT_THAT(warnings[1].problem.what, testing::EndsWith("/stages/bed/seed = 1; 2 of 8 points)"));
+  const auto mistakes = [](int count) {
+    std::string values = "-1";
+    for (int k = 2; k <= count; ++k) values += ", -" + std::to_string(k);
+    try {
+      check_points(plan_of(with(map_stage(), R"("sweep": { "over": { "/stages/map/gamma": [)" + values + "] } }, ")));
+    } catch (const ConfigError& error) {
+      return error.problems().size();
+    }
+    return std::size_t{0};
+  };
+  EXPECT_EQ(mistakes(19), 19U);
+  EXPECT_EQ(mistakes(25), 20U);
 }
 
 // --- presets and --set

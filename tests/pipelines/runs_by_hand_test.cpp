@@ -367,6 +367,54 @@ TEST_F(SweepsByHand, RepeatWhatFailed) {
   EXPECT_EQ(pages_.table[2][4], pages_.table[1][4]);
 }
 
+// What a sweep says while it runs, and in the end.
+TEST_F(SweepsByHand, SayWhatTheyDid) {
+  testing::internal::GetCapturedStderr();
+  std::string said, out;
+  const auto run = [&](const Plan& plan, const std::string& shard = "", bool gather = false) {
+    arguments_ = {};
+    arguments_.gather = gather;
+    if (!shard.empty()) arguments_.shard = shard;
+    testing::internal::CaptureStderr(), testing::internal::CaptureStdout();
+    int code = 0;
+    {
+      Console console(Console::Level::normal);
+      code = run_sweep_command(plan, options(), arguments_, pages_, console);
+    }
+    std::fflush(stdout);
+    out = testing::internal::GetCapturedStdout(), said = testing::internal::GetCapturedStderr();
+    return code;
+  };
+  const std::string table = "table: " + (folder_ / "o/sweep.csv").string() + "\n";
+  const Plan plan = gammas("[2, 3, 4]");
+  run(plan, "2/3");
+  EXPECT_THAT(said, HasSubstr("1 points, 0 up to date, 1 to run on 1 threads\n"));
+  EXPECT_THAT(out, testing::MatchesRegex("1 of 3 points done in [^\n]*\n.*"));
+  EXPECT_EQ(run(plan, "", true), exit_stage_failed);
+  EXPECT_THAT(said,
+              HasSubstr("3 points, 1 of them up to date. --gather collects the existing results and runs no points. "
+                        "Run the same command without --gather to compute the other 2\n"));
+  EXPECT_EQ(run(plan), exit_ok);
+  EXPECT_THAT(said, HasSubstr("3 points, 1 up to date, 2 to run on 1 threads\n"));
+  EXPECT_THAT(out, testing::EndsWith(table));
+  EXPECT_EQ(run(plan, "", true), exit_ok);
+  EXPECT_THAT(said,
+              HasSubstr("3 points, 3 of them up to date. --gather collects the existing results and runs no points\n"));
+  // Of 22 points that fail the first 20 are named.
+  write_text(folder_ / "bad.csv", "height,number_density\n0,-1\n");
+  std::string values = "1";
+  for (int k = 2; k <= 22; ++k) values += ", " + std::to_string(k);
+  std::string fit = fit_of;
+  fit.replace(fit.find("p.csv"), 5, "bad.csv");
+  EXPECT_EQ(run(this->plan(fit, R"("sweep": { "over": { "/stages/f/column_number": [)" + values + "] } }, ")),
+            exit_stage_failed);
+  EXPECT_THAT(said, HasSubstr("error: point 000019: f (fit): "));
+  EXPECT_THAT(said, testing::Not(HasSubstr("error: point 000020")));
+  EXPECT_THAT(said, HasSubstr("error: 2 more points failed\n"));
+  EXPECT_THAT(out, testing::StartsWith("0 of 22 points done, 22 failed (run again to repeat only these) in "));
+  testing::internal::CaptureStderr();
+}
+
 // What two points have in common runs once.
 TEST_F(SweepsByHand, ShareStages) {
   const Plan plan = this->plan(

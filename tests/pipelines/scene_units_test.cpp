@@ -191,6 +191,16 @@ TEST(SceneInSi, HasItsStartInUnitsOfTheBed) {
   EXPECT_DOUBLE_EQ(std::get<sim::RandomStart>(scene.start).height, 10);
   EXPECT_DOUBLE_EQ(scene.start_temperature, 0.2);
   EXPECT_DOUBLE_EQ(scene_of().start_temperature, 0.01);
+  std::vector<Problem> problems;
+  const auto reduced = [&](const std::string& more) {
+    return decoded_scene(R"({ "disks": { "count": 12 }, "box": { "width": 12, "sides": "periodic")" + more + " }",
+                         problems, true)
+        .scene(7)
+        .start_temperature;
+  };
+  EXPECT_EQ(reduced(" }"), 0.01);
+  EXPECT_EQ(reduced(R"(, "lid": { "kind": "periodic", "height": 12 } }, "gravity": 0)"), 1) << "the unit of energy";
+  EXPECT_TRUE(problems.empty());
   const sim::Scene rows = scene_of(R"("start": { "kind": "hexagonal", "disks_a_row": 6, "spacing": 1.5 })");
   EXPECT_EQ(std::get<sim::HexagonalStart>(rows.start).disks_a_row, 6U);
   EXPECT_EQ(std::get<sim::HexagonalStart>(rows.start).spacing, 1.5);

@@ -208,6 +208,81 @@ TEST(MapNumbers, ReadAxesFromTheNamesOfSeries) {
   EXPECT_THROW(simulated(" ", "x"), InputError);
 }
 
+// T = 0.1 gamma^2/(1 - e) at four Gammas; of the table beds with a temperature above 0 count.
+class MapOfBeds : public testing::Test {
+ protected:
+  Json simulated(const std::string& restitutions, const std::string& options) {
+    std::string text = "series,gamma,T,T_error,frequency,initial_height\n";
+    for (const char e : restitutions)
+      for (const double gamma : {2.0, 3.0, 4.0, 5.0})
+        text += std::string("restitution=0.") + e + "," + number_text(gamma) + "," +
+                number_text(0.1 * gamma * gamma / (1 - 0.1 * (e - '0'))) + ",0.001,20,10\n";
+    write_text(map_.file("table.csv"), text + "restitution=0.8,2,0,0.001,20,10\nrestitution=0.8,2,,0.001,20,10\n");
+    map_.warnings.clear();
+    return map_.run(R"({"frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10, "table": ")" +
+                    map_.file("table.csv").string() + "\", " + options + "}");
+  }
+  std::string refusal(const std::string& options) {
+    try {
+      simulated("8", options);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  LoneStage map_{*find_stage("map")};
+};
+
+TEST_F(MapOfBeds, HasItsTemperatureInEveryUnit) {
+  const Json map =
+      simulated("789", R"("gamma": 3, "bead_restitution": 0.8, "columns": {"axes": ["gamma", "restitution"]})");
+  const Json& found = map["simulated"];
+  EXPECT_EQ(found["status"], "ok");
+  EXPECT_EQ(found["beds"], 12);
+  EXPECT_EQ(found["inside"], true);
+  EXPECT_EQ(found["at"], Json::parse(R"({"gamma": 3.0, "restitution": 0.8})"));
+  EXPECT_NEAR(value(found["temperature_over_mg"]), 0.003 * value(found["temperature"]), 1e-15);
+  EXPECT_NEAR(error(found["temperature_over_mg"]), 0.003 * error(found["temperature"]), 1e-15);
+  EXPECT_NEAR(value(found["reduced_temperature"]), value(found["temperature"]) / value(map["critical_temperature"]),
+              1e-12);
+  EXPECT_EQ(found["temperature_over_mg"]["unit"], "m");
+  EXPECT_THAT(map_.warnings, testing::Not(testing::Contains(testing::HasSubstr("table"))));
+  const Json all =
+      simulated("8", R"("gamma": 4, "columns": {"axes": ["gamma", "frequency", "initial_height"]})")["simulated"];
+  EXPECT_EQ(all["at"], Json::parse(R"({"gamma": 4.0, "frequency": 20.0, "initial_height": 10.0})"));
+}
+
+TEST_F(MapOfBeds, SaysWhatItsTableLacks) {
+  const std::string both = R"(, "columns": {"axes": ["gamma", "restitution"]})";
+  const std::string few =
+      "the table has only 2 values of restitution, so the error of the interpolation does not include the curvature of "
+      "T "
+      "between them. Add beds at other values";
+  simulated("79", R"("gamma": 3, "bead_restitution": 0.8)" + both);
+  EXPECT_THAT(map_.warnings, testing::Contains(few));
+  simulated("79", R"("gamma": 3, "bead_restitution": 0.9)" + both);
+  EXPECT_THAT(map_.warnings, testing::Not(testing::Contains(few))) << "it lies on one of the values";
+  simulated("789", R"("gamma": 3, "bead_restitution": 0.75)" + both);
+  EXPECT_THAT(map_.warnings, testing::Not(testing::Contains(testing::HasSubstr("the table has only"))));
+  const std::string beyond =
+      "the bed lies outside the table of simulated beds: its temperature there is an extrapolation";
+  EXPECT_EQ(simulated("8", R"("gamma": 5)")["simulated"]["inside"], true);
+  EXPECT_THAT(map_.warnings, testing::Not(testing::Contains(beyond)));
+  EXPECT_EQ(simulated("8", R"("gamma": 5.01)")["simulated"]["inside"], false);
+  EXPECT_THAT(map_.warnings, testing::Contains(beyond));
+  EXPECT_EQ(refusal(R"("gamma": 3)" + both),
+            "the restitution of the beads is an axis of the table, but no bed in \"from\" states it: give "
+            "\"bead_restitution\"");
+  EXPECT_THAT(refusal(R"("gamma": 3, "bead_friction": 0.2, "columns": {"axes": ["gamma", "friction"]})"),
+              testing::EndsWith("table.csv: row 1 states no friction: there is no such column, and the series "
+                                "\"restitution=0.8\" does not name it"));
+  const Json none = simulated("", R"("gamma": 3)")["simulated"];
+  EXPECT_EQ(none["beds"], 0);
+  EXPECT_FALSE(none.contains("temperature"));
+  EXPECT_THAT(map_.warnings,
+              testing::Contains(testing::StartsWith("the table of simulated beds gives no temperature: ")));
+}
+
 // --- fit
 
 // The tail of the hydrostatic profile with T = 0.4 above a solid that ends at 8, as fits are to find it.

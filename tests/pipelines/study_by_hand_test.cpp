@@ -27,7 +27,8 @@ class StudyByHand : public LoneStage {
   bool study(const std::string& options) {
     std::vector<Problem> problems;
     const auto node = parse_json(options, "options", problems);
-    Fields::Source source{.file = "options", .problems = &problems};
+    read_warnings.clear();
+    Fields::Source source{.file = "options", .problems = &problems, .warnings = &read_warnings};
     std::unique_ptr<Stage> stage = find_stage("study")->make();
     Fields fields = Fields::decode(*node, "", source);
     stage->describe(fields);
@@ -38,6 +39,9 @@ class StudyByHand : public LoneStage {
         for (PlannedStage& one : plan.stages)
           chain.stages.push_back(
               {one.id, std::string(one.row->name), !one.input_files.empty(), std::move(one.results)});
+        chain.stages.front().results->truth("/flag", "a flag");
+        const double g = recipe.to_json()["stages"][0]["gamma"].get<double>();
+        if (g > 3) chain.warnings.push_back({"strong", {"f", 1, 1, "/stages/0/gamma", "g is large", "Lower it"}});
         return chain;
       });
     }
@@ -58,20 +62,36 @@ class StudyByHand : public LoneStage {
     std::filesystem::create_directories(folder / "map");
     const double g = stage["gamma"].get<double>(), d = std::stod(stage["diameter"].get<std::string>());
     const int run = ++runs_[{g, d}] - 1;
+    if (stopping == static_cast<int>(chains.size())) throw StageError("no disk is left");
     const Json found = failing == static_cast<int>(chains.size())
                            ? Json{{"status", "failed"}, {"critical_temperature", {{"value", 1e6}}}}
                            : Json{{"critical_temperature", {{"value", 10 * g + d + run}, {"std_error", 0.5}}},
-                                  {"equation_of_state", "enskog"}};
+                                  {"equation_of_state", "enskog"},
+                                  {"flag", g > 2}};
     write_text(folder / "map/map.json", dump(found));
     // Rows in no order; the second is missing in the second run.
     write_text(folder / "map/map.csv", "name,jump,rise\nb,2," + number_text(g + 1) + "\na,1," + number_text(g - run) +
                                            "\n" + (run == 0 ? "c,3,7\n" : "") + "d,,5\n");
     return {{"map", "map", folder / "map", "map.json"}};
   }
+  double trial_of_chain(const JsonNode& recipe) const override {
+    ++trials;
+    return seconds_by_g * std::pow(recipe.to_json()["stages"][0]["gamma"].get<double>(), 2);
+  }
+  void notice(std::string_view sentence) override { notices.emplace_back(sentence); }
+  bool interrupted() const override { return stopped; }
+  void progress(double fraction, std::string_view what) override { reached = fraction, of = what; }
   std::string written(const std::string& name) { return read_text(output(name)); }
 
   std::vector<Json> chains;
-  int failing = 0;
+  int failing = 0, stopping = 0;  // number of the chain whose result says so, and of the one that ends the stage
+  bool stopped = false;           // by the user
+  double seconds_by_g = 0;        // of a run, over the square of g; 0: no trial
+  mutable int trials = 0;
+  std::vector<std::string> notices;
+  std::vector<Warning> read_warnings;
+  double reached = 0;
+  std::string of;
 
  private:
   ResultList study_stated_;
@@ -188,6 +208,82 @@ TEST(StudyDoneByHand, LeavesOutWhatDidNotSucceed) {
   EXPECT_EQ(read_json(study.output("study.json"))["series"]["all"][1]["t"]["runs"], 1);
   ASSERT_EQ(study.warnings.size(), 1U);
   EXPECT_THAT(study.warnings[0], HasSubstr("1 of 4 numbers are missing, because"));
+}
+
+// Runs that an earlier attempt left are not made again, and what is there counts.
+TEST(StudyDoneByHand, GoesOnWithTheRunsThatAreThere) {
+  StudyByHand study;
+  study.stopping = 3;
+  EXPECT_THROW(study.study(options(gammas, critical, R"(, "replicas": 2)")), StageError);
+  EXPECT_EQ(study.chains.size(), 3U);
+  write_text(study.scratch() / "run-1.json", R"({ "numbers": [[100, null]], "tables": [] })");
+  study.stopping = 0;
+  ASSERT_TRUE(study.study(options(gammas, critical, R"(, "replicas": 2)"))) << study.told;
+  EXPECT_EQ(study.chains.size(), 5U) << "the third and the fourth";
+  EXPECT_EQ(study.written("replicas.csv"), "series,g,replica,t\nall,1,0,13\nall,1,1,100\nall,2.5,0,29\nall,2.5,1,30\n");
+  EXPECT_EQ(study.of, "4 runs");
+  EXPECT_EQ(study.reached, 1);
+  EXPECT_FALSE(std::filesystem::exists(study.scratch() / "run-0")) << "of a finished run its numbers remain alone";
+}
+
+TEST(StudyDoneByHand, SaysWhichRunFailed) {
+  StudyByHand study;
+  study.stopping = 4;
+  try {
+    study.study(options(gammas, critical, R"(, "replicas": 2, "series": { "soft": {} })"));
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_STREQ(error.what(), "soft, g = 2.5, replica 1: no disk is left");
+  }
+}
+
+TEST(StudyDoneByHand, StopsWhenItIsInterrupted) {
+  StudyByHand study;
+  study.stopped = true;
+  EXPECT_THROW(study.study(options(gammas, critical)), Interrupted);
+  EXPECT_TRUE(study.chains.empty());
+  EXPECT_EQ(study.trials, 0);
+}
+
+// One trial a point. Of 0.25, 0.5, 1, 2 and 10 the last takes 100 times the median's g of 1, squared. It is said once,
+// however many replicas it has.
+TEST(StudyDoneByHand, NamesThePointThatTakesLong) {
+  const auto notices = [](double seconds, const std::string& last) {
+    StudyByHand study;
+    study.seconds_by_g = seconds;
+    EXPECT_TRUE(study.study(
+        options(R"({ "name": "g", "values": [0.25, 0.5, 1, 2, )" + last + R"(], "set": ["/stages/map/gamma"] })",
+                critical, R"(, "replicas": 3)")))
+        << study.told;
+    EXPECT_EQ(study.trials, seconds > 0 ? 5 : 1) << "of a chain that has no trial one is tried";
+    return study.notices;
+  };
+  EXPECT_THAT(
+      notices(0.5, "10"),
+      testing::ElementsAre("the run of all, g = 10 will take about 50 s, 100 times the median of 0.5 s. To save "
+                           "this time, stop with Ctrl-C. Then remove this value, or measure for a shorter time"));
+  EXPECT_THAT(notices(0.5, "3"), testing::IsEmpty()) << "nine times the median";
+  EXPECT_THAT(notices(0.01, "10"), testing::IsEmpty()) << "a second";
+  EXPECT_THAT(notices(0, "10"), testing::IsEmpty());
+}
+
+// Warnings of its chains are gathered: how many of its points have them.
+TEST(StudyDoneByHand, GathersTheWarningsOfItsPoints) {
+  StudyByHand study;
+  ASSERT_TRUE(study.study(options(R"({ "name": "g", "values": [1, 4, 5], "set": ["/stages/map/gamma"] })", critical,
+                                  R"(, "series": { "a": {}, "b": {} })")))
+      << study.told;
+  ASSERT_EQ(study.read_warnings.size(), 1U);
+  EXPECT_EQ(study.read_warnings[0].kind, "strong");
+  EXPECT_EQ(study.read_warnings[0].problem.what, "g is large (4 of 6 points)");
+  EXPECT_EQ(study.read_warnings[0].problem.suggestion, "Lower it");
+}
+
+// Yes is 1 and no is 0, whatever the factor.
+TEST(StudyDoneByHand, CountsWhatIsTrue) {
+  StudyByHand study;
+  ASSERT_TRUE(study.study(options(gammas, R"({ "f": { "at": "/map/flag", "times": 5 } })"))) << study.told;
+  EXPECT_EQ(study.written("replicas.csv"), "series,g,replica,f\nall,1,0,0\nall,2.5,0,1\n");
 }
 
 TEST(StudyDoneByHand, NamesItsMistakes) {

@@ -240,6 +240,23 @@ TEST_F(SweepPages, SummaryHoldsTheTable) {
             "| point | replica | status | column | T | T\\_error | verdict |\n|---|---|---|---|---|---|---|\n");
 }
 
+// Up to 40 columns. All cells alike are in the middle of the colours, a point that failed is an empty cell, and points
+// at random have no map.
+TEST_F(SweepPages, HoldMapsOfGridsAlone) {
+  const auto cells = [&](const std::string& kind, int columns) {
+    read(R"({ "kind": ")" + kind + R"(", "over": { "/stages/fit/column_number": { "from": 10, "to": 60, "count": )" +
+         std::to_string(columns) + R"( }, "/stages/fit/floor_height": ["1 mm", "2 mm"] },
+            "collect": ["/fit/temperature"] })");
+    for (std::size_t i = 0; i < points_.size(); ++i) cell(i, 0) = i == 0 ? "" : "0.5";
+    write();
+    return count_of("<td style=\"background:rgb(123 123 120);color:#000\">0.5</td>", page_);
+  };
+  EXPECT_EQ(cells("grid", 40), 79U);
+  EXPECT_EQ(count_of("<td>–</td>", page_), 1U);
+  EXPECT_EQ(cells("grid", 2), 3U);
+  EXPECT_EQ(cells("grid", 41), 0U);
+}
+
 // --- the table of a sweep
 
 TEST(SweepColumns, HaveNamesOfLettersAndDigits) {

@@ -57,8 +57,8 @@ struct Mistake {
 // Each kind of mistake: where it stands, what is there, and what to do.
 TEST(JsonMistakes, AreNamedWhereTheyStand) {
   const Mistake mistakes[] = {
-      {"", 1, 1, "", "the document is empty"},
-      {"{\"a\": 1}\n x", 2, 2, "", "more text after the end of the document: 'x'"},
+      {"", 1, 1, "", "the document is empty; A recipe is a JSON object with \"name\" and \"stages\""},
+      {"{\"a\": 1}\n x", 2, 2, "", "more text after the end of the document: 'x'; A file must contain one JSON value"},
       {"{\"a\": [1,\n  2 3]}", 2, 5, "/a", "expected ',' or ']' in the array, found '3'"},
       {"{\"a\": [1, 2,]}", 1, 13, "/a/2", "expected a value, found ']'; Remove the comma before it"},
       {"{\"a\": 1,}", 1, 9, "", "expected a key in double quotes, found '}'; Remove the comma before it"},
@@ -66,7 +66,7 @@ TEST(JsonMistakes, AreNamedWhereTheyStand) {
       {"{\"a\": 1 \"b\": 2}", 1, 9, "", "expected ',' or '}' in the object, found '\"'"},
       {"{1: 2}", 1, 2, "", "expected a key in double quotes, found '1'"},
       {"{\"a\": ", 1, 7, "/a", "expected a value, found the end of the file"},
-      {"{\"a\": 1e999}", 1, 7, "/a", "1e999 is beyond the largest possible number"},
+      {"{\"a\": 1e999}", 1, 7, "/a", "1e999 is beyond the largest possible number (1.8e308); Check its exponent"},
       {"{\"a\": -1e999}", 1, 7, "/a", "-1e999 is beyond the largest possible number"},
       {"{\"a\": NaN}", 1, 7, "/a", "NaN is not a number; Every number must be finite"},
       {"{\"a\": Infinity}", 1, 7, "/a", "Infinity is not a number"},
@@ -74,19 +74,21 @@ TEST(JsonMistakes, AreNamedWhereTheyStand) {
       {"{\"a\": -NaN}", 1, 7, "/a", "-NaN is not a number"},
       {"{\"a\": 1.}", 1, 7, "/a", "an incomplete number: expected digit after '.'"},
       {"{\"a\": -}", 1, 7, "/a", "an incomplete number: expected digit after '-'"},
-      {"{\"a\": [0, 012]}", 1, 12, "/a", "a number with a leading zero"},
-      {"{\"a\": 'x'}", 1, 7, "/a", "a string in single quotes"},
-      {"{\"a\": /* x */ 1}", 1, 7, "/a", "a comment"},
+      {"{\"a\": [0, 012]}", 1, 12, "/a", "a number with a leading zero; Write it without the leading zero"},
+      {"{\"a\": 'x'}", 1, 7, "/a", "a string in single quotes; Write strings in double quotes"},
+      {"{\"a\": /* x */ 1}", 1, 7, "/a",
+       "a comment; JSON has no comments; write \"$comment\": \"...\" inside an object instead"},
       {"{\"a\": 1 # x\n}", 1, 9, "", "a comment"},
       {"{\"a\": yes}", 1, 7, "/a", "'yes' is not a JSON value; Put strings in double quotes"},
       {"{\"a\": \"x}", 1, 7, "/a", "a string that is never closed"},
-      {"{\"a\": \"x\ny\"}", 1, 9, "/a", "a line break inside a string"},
-      {"{\"a\": \"x\ty\"}", 1, 9, "/a", "a control character inside a string"},
-      {"{\"a\": \"x\xff\"}", 1, 9, "/a", "byte 0xff is not UTF-8"},
+      {"{\"a\": \"x\ny\"}", 1, 9, "/a", "a line break inside a string; Close the string or write \\n"},
+      {"{\"a\": \"x\ty\"}", 1, 9, "/a", "a control character inside a string; Write it as \\u00.."},
+      {"{\"a\": \"x\xff\"}", 1, 9, "/a", "byte 0xff is not UTF-8; Save the file as UTF-8"},
       {"{\"a\": \"\\ud800\"}", 1, 14, "/a", "half of a surrogate pair"},
       {"{\"a\": \"\\u12x\"}", 1, 12, "/a", "\\u needs four hexadecimal digits"},
-      {"{\"a\": \"\\q\"}", 1, 9, "/a", "\\ before 'q' is not a valid escape sequence"},
-      {"{\"b\": 0,\n \"a\": 1,\n  \"a\": 2}", 3, 3, "/a", "the key \"a\" is given twice, first in line 2"},
+      {"{\"a\": \"\\q\"}", 1, 9, "/a", "\\ before 'q' is not a valid escape sequence; Write \\\\ for a backslash"},
+      {"{\"b\": 0,\n \"a\": 1,\n  \"a\": 2}", 3, 3, "/a",
+       "the key \"a\" is given twice, first in line 2; Remove one of the two"},
       {"\xEF\xBB\xBF{\"a\": yes}", 1, 7, "/a", "'yes' is not a JSON value"},
       {"{\"x/y\": {\"b\": [{}, {\"c\": yes}]}}", 1, 26, "/x~1y/b/1/c", "'yes'"},
   };
@@ -111,6 +113,11 @@ TEST(JsonMistakes, NestingIsLimited) {
   };
   EXPECT_EQ(nested(64), 0U);
   EXPECT_EQ(nested(65), 1U);
+  std::vector<Problem> problems;
+  parse_json(std::string(65, '['), "f", problems);
+  EXPECT_EQ(problems.at(0).what, "nested deeper than 64 levels");
+  EXPECT_EQ(problems.at(0).suggestion, "Look for a bracket that is not closed; no recipe needs so many levels");
+  EXPECT_EQ(problems.at(0).at.column, 65);
 }
 
 // Of a key that stands twice the first counts; numbers keep their literals, and what is too small is 0.
@@ -387,7 +394,19 @@ TEST(QuantityText, PowersSignsAndSpacesCount) {
   EXPECT_EQ(parse_quantity("5. mm", dimension::length), 0.005);
   EXPECT_NEAR(parse_quantity("90 deg", dimension::angle), std::numbers::pi / 2, 1e-15);
   EXPECT_EQ(parse_quantity("2 m^9/m^8", dimension::length), 2);
-  EXPECT_THROW(parse_quantity("2 m^10/m^9", dimension::length), std::invalid_argument);
+  const auto refused = [](const std::string& text) {
+    try {
+      parse_quantity(text, dimension::length);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("none");
+  };
+  EXPECT_EQ(refused("2 m^10/m^9"), "\"2 m^10/m^9\": ^ needs a whole number after it");
+  EXPECT_EQ(refused("2 m^x"), "\"2 m^x\": ^ needs a whole number after it");
+  EXPECT_EQ(refused("1e100001 m"), "\"1e100001 m\": its exponent is too large");
+  EXPECT_EQ(refused("2 m/"), "\"2 m/\": a unit is missing");
+  EXPECT_THAT(refused("2 qwertz"), testing::StartsWith("\"2 qwertz\": there is no unit \"qwertz\""));
   EXPECT_THROW(parse_quantity("2 mm", dimension::time), std::invalid_argument);
   EXPECT_EQ(likely_quantity(" 3 ", 3, dimension::length), "3 mm");
   EXPECT_EQ(likely_quantity("0.1", 0.1, dimension::length), "0.1 mm");
