@@ -153,6 +153,18 @@ PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling&
   return part;
 }
 
+double likeness(const GrayFrame& a, const GrayFrame& b) {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  const std::size_t step = std::max<std::size_t>(1, a.pixels.size() / 50000);
+  for (std::size_t k = 0; k < a.pixels.size(); k += step) {
+    const auto one = static_cast<double>(a.pixels[k]), other = static_cast<double>(b.pixels[k]);
+    if (unseen(a.pixels[k]) || unseen(b.pixels[k])) continue;
+    ++n, x += one, y += other, xx += one * one, yy += other * other, xy += one * other;
+  }
+  const double spread = (xx - x * x / n) * (yy - y * y / n);
+  return spread > 0 ? std::abs(xy - x * y / n) / std::sqrt(spread) : 1;
+}
+
 PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height) {
   constexpr int steps_a_side = 8;
   const int step = std::max(1, side / steps_a_side);

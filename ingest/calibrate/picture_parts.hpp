@@ -25,6 +25,9 @@ struct ChangeSampling {
 // The part of at most `side` x `side` px with the most change of level.
 PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling& sampling);
 
+// Size of the correlation of two pictures' levels; 1: they show the same.
+double likeness(const GrayFrame& a, const GrayFrame& b);
+
 // The part of a picture of width x height px, of at most `side` x `side` px, that holds most of the places (x, y).
 PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height);
 

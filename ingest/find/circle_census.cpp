@@ -7,6 +7,7 @@
 
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/picture_maps.hpp"
 #include "ingest/find/picture_scale.hpp"
 #include "statistics/ranks.hpp"
 
@@ -143,8 +144,8 @@ class Census {
     const double range = range_of(frame);
     for (const ScaledPicture& level : pyramid_of(frame, options_)) {
       const EdgeMap edges = find_edges(level.picture);
-      const EdgeMap one = find_edges(stretched(level.picture, decoy_stretch, 0), edges.threshold);
-      const EdgeMap other = find_edges(stretched(level.picture, decoy_stretch, std::numbers::pi / 4), edges.threshold);
+      const EdgeMap one = edges_of_stretched(level.picture, decoy_stretch, 0, edges.threshold);
+      const EdgeMap other = edges_of_stretched(level.picture, decoy_stretch, std::numbers::pi / 4, edges.threshold);
       const RadiusRange range_of_radii = radii_at(level.scale, options_);
       const bool tiny = std::min(level.picture.width, level.picture.height) < room_for_two;
       for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
@@ -204,10 +205,13 @@ class VoteMap {
         height_(static_cast<std::size_t>(edges.height)),
         votes_(width_ * height_),
         across_(width_),
-        sums_(window * width_) {}
+        sums_(window * width_),
+        blocks_((width_ + block - 1) / block),
+        voted_(blocks_ * height_),
+        filled_(window * blocks_) {}
 
   std::vector<Circle> peaks(double radius, float sign, double least_votes) {
-    std::fill(votes_.begin(), votes_.end(), Count{0});
+    clear();
     if (sign <= 0) vote(static_cast<float>(radius));
     if (sign >= 0) vote(static_cast<float>(-radius));
     const double least = std::ceil(least_votes * 2 * std::numbers::pi * radius);
@@ -215,6 +219,7 @@ class VoteMap {
     if (height_ < window) return peaks;
     // Sums of the two rows above and below a row are at hand when its peaks are looked for.
     std::fill(sums_.begin(), sums_.end(), Count{0});
+    std::fill(filled_.begin(), filled_.end(), std::uint8_t{0});
     for (std::size_t row = 1; row < height_; ++row) {
       gather(row);
       if (row >= 4) find_peaks_in(row - 2, static_cast<Count>(least), radius, peaks);
@@ -224,40 +229,66 @@ class VoteMap {
 
  private:
   using Count = std::uint16_t;
-  static constexpr std::size_t window = 5;
+  static constexpr std::size_t window = 5, block = 64;  // rows; columns
 
   void vote(float shift) {
     for (const RidgePixel& edge : edges_.ridge) {
       const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
       const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
       if (column < 1 || row < 1 || column >= edges_.width - 1 || row >= edges_.height - 1) continue;
-      ++votes_[static_cast<std::size_t>(row) * width_ + static_cast<std::size_t>(column)];
+      const auto x = static_cast<std::size_t>(column), y = static_cast<std::size_t>(row);
+      ++votes_[y * width_ + x];
+      voted_[y * blocks_ + x / block] = 1;
     }
+  }
+
+  // Most blocks of most pictures hold no vote.
+  void clear() {
+    for (std::size_t row = 0; row < height_; ++row)
+      for (std::size_t k = 0; k < blocks_; ++k)
+        if (std::exchange(voted_[row * blocks_ + k], 0) != 0)
+          std::fill(votes_.begin() + static_cast<std::ptrdiff_t>(row * width_ + k * block),
+                    votes_.begin() + static_cast<std::ptrdiff_t>(row * width_ + std::min(width_, (k + 1) * block)),
+                    Count{0});
   }
 
   Count* sums_of(std::size_t row) { return sums_.data() + row % window * width_; }
 
-  // Sums over 3 x 3 pixels; 0 in the outermost rows and columns.
-  void gather(std::size_t row) {
-    Count* to = sums_of(row);
-    if (row + 1 >= height_) {
-      std::fill(to, to + width_, Count{0});
-      return;
-    }
-    const Count *middle = votes_.data() + row * width_, *above = middle - width_, *below = middle + width_;
-    Count* across = across_.data();
-    const std::size_t width = width_;
-    for (std::size_t k = 0; k < width; ++k) across[k] = static_cast<Count>(above[k] + middle[k] + below[k]);
-    for (std::size_t k = 1; k + 1 < width; ++k) to[k] = static_cast<Count>(across[k - 1] + across[k] + across[k + 1]);
-    to[0] = to[width - 1] = 0;
+  // Whether there are votes within a block of block `k` in the rows beside `row`.
+  [[nodiscard]] bool voted_near(std::size_t row, std::size_t k) const {
+    const std::size_t first = k > 0 ? k - 1 : 0, last = std::min(k + 1, blocks_ - 1);
+    for (std::size_t y = row - 1; y <= row + 1; ++y)
+      for (std::size_t x = first; x <= last; ++x)
+        if (voted_[y * blocks_ + x] != 0) return true;
+    return false;
   }
 
-  // Most blocks of a row hold nothing.
+  // Sums over 3 x 3 pixels; 0 in the outermost rows and columns.
+  void gather(std::size_t row) {
+    for (std::size_t k = 0; k < blocks_; ++k) {
+      std::uint8_t& filled = filled_[row % window * blocks_ + k];
+      const std::size_t first = k * block, last = std::min(width_, first + block);
+      if (row + 1 < height_ && voted_near(row, k)) {
+        gather(row, std::max<std::size_t>(first, 1), std::min(last, width_ - 1));
+        filled = 1;
+      } else if (std::exchange(filled, 0) != 0) {
+        std::fill(sums_of(row) + first, sums_of(row) + last, Count{0});
+      }
+    }
+  }
+
+  void gather(std::size_t row, std::size_t first, std::size_t last) {
+    const Count *middle = votes_.data() + row * width_, *above = middle - width_, *below = middle + width_;
+    Count *across = across_.data(), *to = sums_of(row);
+    for (std::size_t k = first - 1; k <= last; ++k) across[k] = static_cast<Count>(above[k] + middle[k] + below[k]);
+    for (std::size_t k = first; k < last; ++k) to[k] = static_cast<Count>(across[k - 1] + across[k] + across[k + 1]);
+  }
+
   void find_peaks_in(std::size_t row, Count least, double radius, std::vector<Circle>& peaks) {
-    constexpr std::size_t block = 64;
     const Count* here = sums_of(row);
-    for (std::size_t first = 2; first + 2 < width_; first += block) {
-      const std::size_t last = std::min(first + block, width_ - 2);
+    for (std::size_t k = 0; k < blocks_; ++k) {
+      if (filled_[row % window * blocks_ + k] == 0) continue;
+      const std::size_t first = std::max<std::size_t>(k * block, 2), last = std::min((k + 1) * block, width_ - 2);
       Count most = 0;
       for (std::size_t column = first; column < last; ++column) most = std::max(most, here[column]);
       for (std::size_t column = most < least ? last : first; column < last; ++column)
@@ -280,6 +311,8 @@ class VoteMap {
   const EdgeMap& edges_;
   std::size_t width_, height_;
   std::vector<Count> votes_, across_, sums_;
+  std::size_t blocks_;
+  std::vector<std::uint8_t> voted_, filled_;  // blocks of the table in which there are votes, of `sums_` that are not 0
 };
 
 // Circles that are kept, in cells as wide as the distance that two of them need. Far fewer than all circles.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "statistics/ranks.hpp"
@@ -20,6 +22,7 @@ constexpr float gradient_noise = 0.150F;
 constexpr float weakest_share = 0.1F;
 // Grey levels per px: below the rounding of 8-bit pictures.
 constexpr float least_threshold = 0.3F;
+constexpr int smallest_map = 5;  // px, side
 
 // Standard deviation of white noise, from second differences along rows.
 float white_noise_of(const GrayFrame& frame) {
@@ -34,44 +37,87 @@ float white_noise_of(const GrayFrame& frame) {
   return 1.4826F * quantile_of(sizes, 0.5) / std::sqrt(6.0F);
 }
 
-// By 1/4, 1/2, 1/4 along both axes, in place; the outermost pixels stay.
-void smooth_by_three(GrayFrame& frame) {
-  const std::size_t width = static_cast<std::size_t>(frame.width), height = static_cast<std::size_t>(frame.height);
-  std::array<std::vector<float>, 3> across;  // of the row above, this row, the row below
-  const auto smooth_along = [&](std::size_t row) {
-    const float* from = frame.pixels.data() + row * width;
-    std::vector<float>& to = across[row % 3];
-    to.assign(from, from + width);
-    for (std::size_t k = 1; k + 1 < width; ++k) to[k] = 0.25F * (from[k - 1] + from[k + 1]) + 0.5F * from[k];
-  };
-  smooth_along(0);
-  smooth_along(1);
-  for (std::size_t row = 1; row + 1 < height; ++row) {
-    smooth_along(row + 1);
-    const float *above = across[(row - 1) % 3].data(), *here = across[row % 3].data(),
-                *below = across[(row + 1) % 3].data();
-    float* to = frame.pixels.data() + row * width;
-    for (std::size_t k = 0; k < width; ++k) to[k] = 0.25F * (above[k] + below[k]) + 0.5F * here[k];
+// Smooths by 1/4, 1/2, 1/4 along both axes, line by line; the outermost pixels stay. Hands each line on with its row.
+template <class Next>
+class SmoothedByThree {
+ public:
+  SmoothedByThree(int width, int height, Next& next)
+      : width_(static_cast<std::size_t>(width)), height_(height), next_(next), out_(width_) {
+    for (std::vector<float>& one : along_) one.resize(width_);
   }
-}
 
-void fill_gradients(const GrayFrame& smooth, EdgeMap& edges) {
-  constexpr float steepest = 0.01F * brightest_seen;  // beyond it something unseen is near
-  const std::size_t width = static_cast<std::size_t>(smooth.width);
-  edges.x.assign(smooth.pixels.size(), 0.0F);
-  edges.y.assign(smooth.pixels.size(), 0.0F);
-  for (int row = 1; row + 1 < smooth.height; ++row) {
-    const float* middle = smooth.pixels.data() + static_cast<std::size_t>(row) * width;
-    float* to_x = edges.x.data() + static_cast<std::size_t>(row) * width;
-    float* to_y = edges.y.data() + static_cast<std::size_t>(row) * width;
-    for (std::size_t k = 1; k + 1 < width; ++k) {
+  // Rows from 0 on.
+  void take(int row, const float* line) {
+    float* to = along_[static_cast<std::size_t>(row % 3)].data();
+    to[0] = line[0], to[width_ - 1] = line[width_ - 1];
+    for (std::size_t k = 1; k + 1 < width_; ++k) to[k] = 0.25F * (line[k - 1] + line[k + 1]) + 0.5F * line[k];
+    if (row == 0) next_.take(0, line);
+    if (row >= 2) hand_on(row - 1);
+    if (row == height_ - 1) next_.take(row, line);
+  }
+
+ private:
+  void hand_on(int row) {
+    const float *above = along_[static_cast<std::size_t>((row + 2) % 3)].data(),
+                *here = along_[static_cast<std::size_t>(row % 3)].data(),
+                *below = along_[static_cast<std::size_t>((row + 1) % 3)].data();
+    float* to = out_.data();
+    for (std::size_t k = 0; k < width_; ++k) to[k] = 0.25F * (above[k] + below[k]) + 0.5F * here[k];
+    next_.take(row, to);
+  }
+
+  std::size_t width_;
+  int height_;
+  Next& next_;
+  std::array<std::vector<float>, 3> along_;
+  std::vector<float> out_;
+};
+
+// Fills the map line by line.
+class Gradients {
+ public:
+  explicit Gradients(EdgeMap& edges) : edges_(edges), width_(static_cast<std::size_t>(edges.width)) {
+    for (std::vector<float>& one : lines_) one.resize(width_);
+  }
+
+  void take(int row, const float* line) {
+    std::copy(line, line + width_, lines_[static_cast<std::size_t>(row % 3)].begin());
+    if (row >= 2) fill(row - 1);
+  }
+
+ private:
+  void fill(int row) {
+    constexpr float steepest = 0.01F * brightest_seen;  // beyond it something unseen is near
+    const float *above = lines_[static_cast<std::size_t>((row + 2) % 3)].data(),
+                *middle = lines_[static_cast<std::size_t>(row % 3)].data(),
+                *below = lines_[static_cast<std::size_t>((row + 1) % 3)].data();
+    float *to_x = edges_.x.data() + edges_.at(0, row), *to_y = edges_.y.data() + edges_.at(0, row);
+    for (std::size_t k = 1; k + 1 < width_; ++k) {
       const float x = 0.5F * (middle[k + 1] - middle[k - 1]);
-      const float y = 0.5F * (middle[k + width] - *(middle + k - width));
+      const float y = 0.5F * (below[k] - above[k]);
       const bool seen = std::abs(x) < steepest && std::abs(y) < steepest;
       to_x[k] = seen ? x : 0.0F;
       to_y[k] = seen ? y : 0.0F;
     }
   }
+
+  EdgeMap& edges_;
+  std::size_t width_;
+  std::array<std::vector<float>, 3> lines_;
+};
+
+EdgeMap gradients_of(int width, int height, const std::function<const float*(int)>& row) {
+  EdgeMap edges;
+  edges.width = width;
+  edges.height = height;
+  edges.x.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0.0F);
+  edges.y = edges.x;
+  if (std::min(width, height) < smallest_map) return edges;
+  Gradients gradients(edges);
+  SmoothedByThree<Gradients> again(width, height, gradients);
+  SmoothedByThree<SmoothedByThree<Gradients>> once(width, height, again);
+  for (int k = 0; k < height; ++k) once.take(k, row(k));
+  return edges;
 }
 
 float threshold_of(const GrayFrame& frame, const EdgeMap& edges) {
@@ -82,16 +128,26 @@ float threshold_of(const GrayFrame& frame, const EdgeMap& edges) {
   return std::max({noise_multiple * gradient_noise * white_noise_of(frame), weakest_share * strong, least_threshold});
 }
 
+// First pixel of a line, from `column` on, that is marked; its end where there is none.
+int next_steep(const std::vector<std::uint8_t>& steep, int column) {
+  const auto size = static_cast<int>(steep.size());
+  if (column >= size) return size;
+  const void* found = std::memchr(steep.data() + column, 1, static_cast<std::size_t>(size - column));
+  return found == nullptr ? size : static_cast<int>(static_cast<const std::uint8_t*>(found) - steep.data());
+}
+
 // Pixels whose gradient is larger than that of both neighbours along it.
 void thin(EdgeMap& edges) {
   const int width = edges.width;
   const float least = edges.threshold * edges.threshold;
   const auto square = [&](std::size_t at) { return edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]; };
-  for (int row = 1; row + 1 < edges.height; ++row)
-    for (int column = 1; column + 1 < width; ++column) {
+  std::vector<std::uint8_t> steep(static_cast<std::size_t>(width));
+  for (int row = 1; row + 1 < edges.height; ++row) {
+    const std::size_t first = edges.at(0, row);
+    for (std::size_t k = 0; k < steep.size(); ++k) steep[k] = square(first + k) >= least ? 1 : 0;
+    for (int column = next_steep(steep, 1); column + 1 < width; column = next_steep(steep, column + 1)) {
       const std::size_t at = edges.at(column, row);
       const float here = square(at);
-      if (here < least) continue;
       const float x = edges.x[at], y = edges.y[at];
       constexpr float diagonal = 0.4142F;  // tan 22.5 degrees
       const int step_x = std::abs(x) < diagonal * std::abs(y) ? 0 : x > 0 ? 1 : -1;
@@ -101,24 +157,25 @@ void thin(EdgeMap& edges) {
       const float size = std::sqrt(here);
       edges.ridge.push_back({static_cast<float>(column), static_cast<float>(row), x / size, y / size});
     }
+  }
 }
 
 }  // namespace
 
 EdgeMap find_edges(const GrayFrame& frame, float threshold) {
-  EdgeMap edges;
-  edges.width = frame.width;
-  edges.height = frame.height;
-  if (frame.width < 5 || frame.height < 5) {
-    edges.x.assign(frame.pixels.size(), 0.0F);
-    edges.y = edges.x;
-    return edges;
-  }
-  GrayFrame smooth = frame;
-  smooth_by_three(smooth);
-  smooth_by_three(smooth);
-  fill_gradients(smooth, edges);
+  EdgeMap edges = gradients_of(frame.width, frame.height, [&](int row) {
+    return frame.pixels.data() + static_cast<std::ptrdiff_t>(row) * frame.width;
+  });
+  if (std::min(frame.width, frame.height) < smallest_map) return edges;
   edges.threshold = threshold > 0 ? threshold : threshold_of(frame, edges);
+  thin(edges);
+  return edges;
+}
+
+EdgeMap find_edges(int width, int height, const std::function<const float*(int)>& row, float threshold) {
+  EdgeMap edges = gradients_of(width, height, row);
+  if (std::min(width, height) < smallest_map) return edges;
+  edges.threshold = threshold;
   thin(edges);
   return edges;
 }

@@ -315,10 +315,11 @@ FindResult others_in(const GrayFrame& painted, const FinderCalibration& other, c
   return more;
 }
 
-// Median over the disks of the level inside less that behind, where they are painted over.
-double step_of(const GrayFrame& frame, const GrayFrame& behind, const std::vector<FoundDisk>& disks) {
+// Median over the disks of the mean level inside, by level_at(column, row) of pixels that are seen.
+template <class LevelAt>
+double median_inside(const GrayFrame& frame, const std::vector<FoundDisk>& disks, const LevelAt& level_at) {
   constexpr double inside = 0.7;  // radii
-  std::vector<double> steps;
+  std::vector<double> levels;
   for (const FoundDisk& disk : disks) {
     const int reach = static_cast<int>(inside * disk.radius_px);
     const int x = static_cast<int>(std::lround(disk.x_px)), y = static_cast<int>(std::lround(disk.y_px));
@@ -326,22 +327,40 @@ double step_of(const GrayFrame& frame, const GrayFrame& behind, const std::vecto
     for (int row = std::max(0, y - reach); row <= std::min(frame.height - 1, y + reach); ++row)
       for (int column = std::max(0, x - reach); column <= std::min(frame.width - 1, x + reach); ++column) {
         if (std::hypot(column - x, row - y) > reach || unseen(frame.at(column, row))) continue;
-        sum += static_cast<double>(frame.at(column, row) - behind.at(column, row));
+        sum += static_cast<double>(level_at(column, row));
         ++count;
       }
-    if (count > 0) steps.push_back(sum / count);
+    if (count > 0) levels.push_back(sum / count);
   }
-  return median_of(std::move(steps));
+  return median_of(std::move(levels));
 }
 
-// The contrast of the others, that of the beads found being 1.
-double contrast_ratio(const GrayFrame& frame, double margin, Polarity polarity, const std::vector<FoundDisk>& found,
-                      const std::vector<FoundDisk>& others) {
+// Level inside less that behind, where the disks are painted over.
+double step_of(const GrayFrame& frame, const GrayFrame& behind, const std::vector<FoundDisk>& disks) {
+  return median_inside(frame, disks,
+                       [&](int column, int row) { return frame.at(column, row) - behind.at(column, row); });
+}
+
+// Beads found and others, as they stand out against what is behind all of them.
+struct TwoShades {
+  double ratio = 1;  // the contrast of the others, that of the beads found being 1
+  bool same_ground =
+      true;  // what is behind the others differs by less from what is behind the beads found than they do
+};
+TwoShades shades_of(const GrayFrame& frame, double margin, Polarity polarity, const std::vector<FoundDisk>& found,
+                    const std::vector<FoundDisk>& others) {
+  TwoShades out;
   std::vector<FoundDisk> all = found;
   all.insert(all.end(), others.begin(), others.end());
   const std::optional<GrayFrame> behind = painted_over(frame, all, margin, polarity);
   const double first = behind ? step_of(frame, *behind, found) : 0;
-  return first != 0 ? step_of(frame, *behind, others) / first : 1;
+  if (first == 0) return out;
+  out.ratio = step_of(frame, *behind, others) / first;
+  const auto ground_of = [&](const std::vector<FoundDisk>& disks) {
+    return median_inside(*behind, disks, [&](int column, int row) { return behind->at(column, row); });
+  };
+  out.same_ground = std::abs(ground_of(others) - ground_of(found)) <= std::abs(first);
+  return out;
 }
 
 bool of_same_size(const FinderCalibration& other, const FinderCalibration& first) {
@@ -404,7 +423,9 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   tell_radius(learned);
   FindResult more = others_in(best->painted, learned.calibration, find, found.disks);
   if (!enough(expected_of(more.disks), found.disks) || by_chance(more.disks)) return;
-  const double ratio = contrast_ratio(frame, margin_of(calibration), find.polarity, found.disks, more.disks);
+  // Marks on other ground, as letters beside the bed, are no beads of the bed.
+  const auto [ratio, same_ground] = shades_of(frame, margin_of(calibration), find.polarity, found.disks, more.disks);
+  if (!same_ground) return;
   calibration.warnings.push_back(formatted(
       "Beads of two shades were found. In the first frame %zu of %zu beads differ from the background by %.2f of what "
       "the others do%s.",
@@ -428,7 +449,7 @@ void add_other_shade(const GrayFrame& frame, const FinderCalibration& calibratio
   FindOptions find = options;
   find.learn_rim = false;
   FindResult more = others_in(*painted, other, find, found.disks);
-  const double contrast = contrast_ratio(frame, margin_of(calibration), other.polarity, found.disks, more.disks);
+  const double contrast = shades_of(frame, margin_of(calibration), other.polarity, found.disks, more.disks).ratio;
   merge(std::move(more), contrast, calibration, found);
 }
 

@@ -11,6 +11,12 @@ double copy_angle(std::size_t copy) {
   return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretched_copies);
 }
 
+EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold) {
+  StretchedLines lines(picture, ratio, angle);
+  return find_edges(
+      picture.width, picture.height, [&](int row) { return lines.line(row); }, threshold);
+}
+
 PictureMaps::One& PictureMaps::made_for(double radius_px, float threshold) {
   const double scale = scale_for(radius_px, wanted_px_);
   for (One& one : made_)
@@ -28,7 +34,7 @@ const PictureMap& PictureMaps::scaled_for(double radius_px, float threshold) {
 const PictureMap& PictureMaps::with_copies(double radius_px, float threshold) {
   PictureMap& map = made_for(radius_px, threshold).map;
   for (std::size_t k = map.copies.size(); k < stretched_copies; ++k)
-    map.copies.push_back(find_edges(stretched(map.at.picture, decoy_stretch, copy_angle(k)), map.edges.threshold));
+    map.copies.push_back(edges_of_stretched(map.at.picture, decoy_stretch, copy_angle(k), map.edges.threshold));
   return map;
 }
 

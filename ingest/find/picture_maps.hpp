@@ -20,6 +20,9 @@ struct PictureMap {
 inline constexpr std::size_t stretched_copies = 4;
 double copy_angle(std::size_t copy);
 
+// Of a copy.
+EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold);
+
 // The frame must outlive it; not for several threads at once.
 class PictureMaps {
  public:

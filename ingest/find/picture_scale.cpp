@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ingest/find/vector_lanes.hpp"
 #include "ingest/frames/smooth_field.hpp"
 
 namespace shakebed::ingest {
@@ -30,6 +31,16 @@ class Stretching {
   }
   double last_column_, last_row_, xx_ = 1, xy_ = 0, yy_ = 1;
 };
+
+// At the borders 0 and `last`; so that one px to the right, or below, is in the picture, too.
+inline __attribute__((always_inline)) Floats mirrored(const Floats& place, float last) {
+  const float inside = 1e-3F + last * 0x1p-21F;  // more than a float's rounding
+  const Floats positive = place < 0 ? -place : place;
+  const Floats within = positive > last ? 2 * last - positive : positive;
+  const Floats least = within < 0 ? 0 * within : within;
+  const Floats most = last - inside + 0 * within;
+  return least < most ? least : most;
+}
 }  // namespace
 
 GrayFrame doubled(const GrayFrame& frame) {
@@ -58,22 +69,45 @@ FramePlace place_before_stretching(const GrayFrame& frame, double ratio, double 
   return Stretching(frame, ratio, angle).source_of(x, y);
 }
 
+StretchedLines::StretchedLines(const GrayFrame& frame, double ratio, double angle)
+    : frame_(frame),
+      middle_x_(0.5F * static_cast<float>(frame.width - 1)),
+      middle_y_(0.5F * static_cast<float>(frame.height - 1)),
+      line_(static_cast<std::size_t>((frame.width + lanes - 1) / lanes * lanes)) {
+  const double along = std::sqrt(ratio), c = std::cos(angle), s = std::sin(angle);
+  xx_ = static_cast<float>(c * c * along + s * s / along);
+  xy_ = static_cast<float>(c * s * (along - 1 / along));
+  yy_ = static_cast<float>(s * s * along + c * c / along);
+}
+
+const float* StretchedLines::line(int row) {
+  const float *upper = frame_.pixels.data(), *lower = upper + frame_.width;
+  const float last_x = 2 * middle_x_, last_y = 2 * middle_y_, v = static_cast<float>(row) - middle_y_;
+  for (int first = 0; first < frame_.width; first += lanes) {
+    const Floats u = lane_numbers + (static_cast<float>(first) - middle_x_);
+    const Floats x = mirrored(middle_x_ + xx_ * u + xy_ * v, last_x),
+                 y = mirrored(middle_y_ + xy_ * u + yy_ * v, last_y);
+    const Ints left = __builtin_convertvector(x, Ints), above = __builtin_convertvector(y, Ints);
+    const Floats right = x - __builtin_convertvector(left, Floats), down = y - __builtin_convertvector(above, Floats);
+    const Ints at = above * frame_.width + left;
+    Floats a, b, c, d;
+    gather(upper, at, a), gather(upper + 1, at, b), gather(lower, at, c), gather(lower + 1, at, d);
+    const Floats on_upper = (1 - right) * a + right * b, on_lower = (1 - right) * c + right * d;
+    store((1 - down) * on_upper + down * on_lower, line_.data() + first);
+  }
+  return line_.data();
+}
+
 GrayFrame stretched(const GrayFrame& frame, double ratio, double angle) {
-  const Stretching stretching(frame, ratio, angle);
+  StretchedLines lines(frame, ratio, angle);
   GrayFrame out;
   out.width = frame.width;
   out.height = frame.height;
-  out.pixels.resize(frame.pixels.size());
-  for (int row = 0; row < frame.height; ++row)
-    for (int column = 0; column < frame.width; ++column) {
-      const auto [x, y] = stretching.source_of(column, row);
-      const int left = static_cast<int>(x), upper = static_cast<int>(y);
-      const float right = static_cast<float>(x - left), down = static_cast<float>(y - upper);
-      out.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +
-                 static_cast<std::size_t>(column)] =
-          (1 - down) * ((1 - right) * frame.at(left, upper) + right * frame.at(left + 1, upper)) +
-          down * ((1 - right) * frame.at(left, upper + 1) + right * frame.at(left + 1, upper + 1));
-    }
+  out.pixels.reserve(frame.pixels.size());
+  for (int row = 0; row < frame.height; ++row) {
+    const float* line = lines.line(row);
+    out.pixels.insert(out.pixels.end(), line, line + frame.width);
+  }
   return out;
 }
 

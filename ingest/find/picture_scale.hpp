@@ -1,6 +1,8 @@
 #pragma once
 // Copies of a picture at another scale or shape, for searches.
 
+#include <vector>
+
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
@@ -11,6 +13,20 @@ GrayFrame doubled(const GrayFrame& frame);
 // The picture stretched by sqrt(ratio) along the axis at `angle` and shrunk by as much across it, about its middle;
 // what lies beyond the border is mirrored.
 GrayFrame stretched(const GrayFrame& frame, double ratio, double angle);
+
+// Its lines, one at a time.
+class StretchedLines {
+ public:
+  // The frame must outlive it.
+  StretchedLines(const GrayFrame& frame, double ratio, double angle);
+  // Valid until the next line is asked for.
+  const float* line(int row);
+
+ private:
+  const GrayFrame& frame_;
+  float middle_x_, middle_y_, xx_, xy_, yy_;
+  std::vector<float> line_;
+};
 
 // Where in the frame the copy's place (x, y) was taken from.
 struct FramePlace {

@@ -33,6 +33,9 @@ constexpr double hardly = 0.05;
 // the centres of disks in radii. A bead may have no contrast in one channel, as a dark one in the saturation.
 constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
 
+// Two channels of which one tells this share of the other's variance show the same beads.
+constexpr double the_same = 0.998;
+
 // Of the other channels, those in which a quick search by rims expects most beads are searched as thoroughly as this
 // one.
 constexpr std::size_t most_channels = 2;
@@ -141,6 +144,11 @@ class ChannelTrials {
     return contrast > 0 ? Polarity::bright_beads : Polarity::dark_beads;
   }
 
+  [[nodiscard]] bool alike(const GrayFrame& one, const GrayFrame& other) const {
+    const double share = likeness(small(one), small(other));
+    return share * share > the_same;
+  }
+
  private:
   // The same part of every channel, so that numbers of beads compare.
   [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
@@ -204,6 +212,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   const bool plain = !here.by_rims && !here.doubtful();
   double most = clearly_more * here.expected;
   for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
+    if (plain && trials.alike(first->frame, *other.frame)) continue;
     if (plain && here.expected + trials.rims_beside(here.disks, *other.frame, other.polarity) <= most) continue;
     const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
     if (there.expected <= most) continue;

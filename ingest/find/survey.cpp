@@ -13,6 +13,7 @@
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/edge_map.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/settle_channel.hpp"
 #include "statistics/text.hpp"
@@ -113,18 +114,6 @@ double least_seen_side(const std::vector<RimDisk>& disks) {
   for (std::size_t side = 0; side < sides; ++side)
     if (looked[side] > 0) least = std::min(least, met[side] / looked[side]);
   return least;
-}
-
-double likeness(const GrayFrame& a, const GrayFrame& b) {
-  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
-  const std::size_t step = std::max<std::size_t>(1, a.pixels.size() / 50000);
-  for (std::size_t k = 0; k < a.pixels.size(); k += step) {
-    const auto one = static_cast<double>(a.pixels[k]), other = static_cast<double>(b.pixels[k]);
-    if (unseen(a.pixels[k]) || unseen(b.pixels[k])) continue;
-    ++n, x += one, y += other, xx += one * one, yy += other * other, xy += one * other;
-  }
-  const double spread = (xx - x * x / n) * (yy - y * y / n);
-  return spread > 0 ? std::abs(xy - x * y / n) / std::sqrt(spread) : 1;
 }
 
 double spread_of(const GrayFrame& frame) {
@@ -359,17 +348,29 @@ struct SurveyAsked {
   const SurveyOptions& options;
   const DrawingSigns& signs;
   double largest_px = 0;  // largest radius that is proposed, px of the picture
+  int reduction = 1;      // of the picture
 };
 
 void move_by(SurveyCandidate& candidate, int right, int down) {
   for (RimDisk& disk : candidate.disks) disk.circle.x += right, disk.circle.y += down;
 }
 
+// A picture with its maps, which serve all hypotheses about it.
+struct ExaminedPicture {
+  explicit ExaminedPicture(const GrayFrame& frame) : picture(frame), maps(frame, quick_search.wanted_px) {}
+  const GrayFrame& picture;
+  PictureMaps maps;
+};
+
 // What a picture shows of a hypothesis. `region`: where all outlines are round, if those elsewhere are not.
-SurveyCandidate examined(const GrayFrame& picture, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
+SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
+  const GrayFrame& picture = of.picture;
   const bool given = asked.options.radius_px.has_value();
-  const Known unasked = 2 * hypothesis.radius_px >= outline_tells_px ? Known::wide : Known::nothing;
-  LearnedRims learned = learn_rims(picture, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : unasked);
+  const double width = 2 * hypothesis.radius_px;
+  const Known unasked = width >= outline_tells_px ? Known::wide
+                        : width >= wide_enough_px ? Known::fairly_wide
+                                                  : Known::nothing;
+  LearnedRims learned = learn_rims(of.maps, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : unasked);
   SurveyCandidate candidate;
   candidate.rims = std::move(learned.model);
   candidate.disks = std::move(learned.disks);
@@ -409,21 +410,25 @@ std::optional<SurveyCandidate> refused_by_part(const GrayFrame& picture, const C
            circle.y < part->top + part->height;
   });
   if (seen < fewest_in_part) return std::nullopt;
-  SurveyCandidate candidate = examined(cut_out(picture, *part), hypothesis, asked);
+  const GrayFrame cut = cut_out(picture, *part);
+  ExaminedPicture alone(cut);
+  SurveyCandidate candidate = examined(alone, hypothesis, asked);
   if (candidate.why_not.empty() || candidate.region) return std::nullopt;
   move_by(candidate, part->left, part->top);
   return candidate;
 }
 
 // In all of the picture, or where the things seen are round.
-SurveyCandidate examined_where_round(const GrayFrame& picture, const CircleHypothesis& hypothesis,
+SurveyCandidate examined_where_round(ExaminedPicture& of, const CircleHypothesis& hypothesis,
                                      const SurveyAsked& asked) {
+  const GrayFrame& picture = of.picture;
   if (std::optional<SurveyCandidate> refused = refused_by_part(picture, hypothesis, asked)) return std::move(*refused);
-  SurveyCandidate all = examined(picture, hypothesis, asked);
+  SurveyCandidate all = examined(of, hypothesis, asked);
   const std::optional<PixelRectangle> region = std::exchange(all.region, std::nullopt);
   if (!region) return all;
-  SurveyCandidate there =
-      examined(cut_out(picture, {region->left, region->top, region->width, region->height}), hypothesis, asked);
+  const GrayFrame cut = cut_out(picture, {region->left, region->top, region->width, region->height});
+  ExaminedPicture alone(cut);
+  SurveyCandidate there = examined(alone, hypothesis, asked);
   if (!there.why_not.empty()) return all;
   move_by(there, region->left, region->top);
   there.region = region;
@@ -448,33 +453,66 @@ void settle_credibility(SurveyCandidate& candidate, int reduction, const SurveyO
   }
 }
 
+// Whether a candidate is the beads of a hypothesis: credible, and of a radius from which the search would end there. Of
+// few circles, or of several sizes, the search may end elsewhere.
+bool is_known(const Survey& survey, const CircleHypothesis& hypothesis, Channel channel, int reduction) {
+  constexpr double searched_around = 1.07;
+  return std::any_of(survey.candidates.begin(), survey.candidates.end(), [&](const SurveyCandidate& known) {
+    const double ratio = hypothesis.radius_px * reduction / known.rims.radius_px;
+    return known.credible && !known.region && std::ssize(known.disks) >= fewest_in_part && known.channel == channel &&
+           known.rims.polarity == hypothesis.polarity && std::max(ratio, 1 / ratio) < searched_around;
+  });
+}
+
 enum class Effort { full, glance };
+
+// Channels of a picture and the frames searched in them.
+struct SearchedChannels {
+  std::vector<const ChannelFrames::One*> channels;
+  std::vector<GrayFrame> cropped;
+  std::vector<const GrayFrame*> pictures;
+};
+SearchedChannels channels_to_search(const ChannelFrames& frames, const SurveyOptions& options, Effort effort) {
+  SearchedChannels out;
+  out.channels = different_channels(frames);
+  if (effort == Effort::glance) out.channels.resize(1);
+  if (options.roi)
+    for (const auto* one : out.channels) out.cropped.push_back(only_inside(one->frame, *options.roi, frames.reduction));
+  for (std::size_t k = 0; k < out.channels.size(); ++k)
+    out.pictures.push_back(options.roi ? &out.cropped[k] : &out.channels[k]->frame);
+  return out;
+}
+
+void examine(const CircleCensus& census, const SearchedChannels& in, const SurveyAsked& asked, std::size_t most,
+             Survey& survey) {
+  std::optional<ExaminedPicture> last;  // of one channel at a time: maps are large
+  for (const CircleHypothesis& hypothesis : census.hypotheses) {
+    if (survey.candidates.size() >= most) break;
+    if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
+    if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
+    const Channel channel = in.channels[hypothesis.channel]->channel;
+    if (!asked.options.radius_px && is_known(survey, hypothesis, channel, asked.reduction)) continue;
+    const GrayFrame& picture = *in.pictures[hypothesis.channel];
+    if (!last || &last->picture != &picture) last.emplace(picture);
+    survey.candidates.push_back(examined_where_round(*last, hypothesis, asked));
+    survey.candidates.back().channel = channel;
+    settle_credibility(survey.candidates.back(), asked.reduction, asked.options);
+  }
+}
 
 Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, Effort effort) {
   Survey survey;
-  std::vector<const ChannelFrames::One*> channels = different_channels(frames);
-  if (effort == Effort::glance) channels.resize(1);
-  std::vector<GrayFrame> cropped;
-  std::vector<const GrayFrame*> pictures;
-  if (options.roi)
-    for (const auto* one : channels) cropped.push_back(only_inside(one->frame, *options.roi, frames.reduction));
-  for (std::size_t k = 0; k < channels.size(); ++k) pictures.push_back(options.roi ? &cropped[k] : &channels[k]->frame);
+  const SearchedChannels in = channels_to_search(frames, options, effort);
+  const std::vector<const ChannelFrames::One*>& channels = in.channels;
+  const std::vector<const GrayFrame*>& pictures = in.pictures;
   CensusOptions asked;
   asked.polarity = options.polarity;
   const DrawingSigns signs = signs_inside(frames, options.roi);
   if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
   const CircleCensus census = take_census(pictures, asked);
-  const SurveyAsked asked_of_each{options, signs,
-                                  largest_proposed * std::min(frames.width, frames.height) / frames.reduction};
-  const std::size_t most = effort == Effort::full ? most_examined : most_examined_in_parts;
-  for (const CircleHypothesis& hypothesis : census.hypotheses) {
-    if (survey.candidates.size() >= most) break;
-    if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
-    if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
-    survey.candidates.push_back(examined_where_round(*pictures[hypothesis.channel], hypothesis, asked_of_each));
-    survey.candidates.back().channel = channels[hypothesis.channel]->channel;
-    settle_credibility(survey.candidates.back(), frames.reduction, options);
-  }
+  const SurveyAsked asked_of_each{
+      options, signs, largest_proposed * std::min(frames.width, frames.height) / frames.reduction, frames.reduction};
+  examine(census, in, asked_of_each, effort == Effort::full ? most_examined : most_examined_in_parts, survey);
   if (!options.any_shape) compare_with_smaller(survey.candidates);
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
                    [](const SurveyCandidate& a, const SurveyCandidate& b) {

@@ -95,20 +95,27 @@ cv::Mat mixed_of(const cv::Mat& picture, GreyRule& rule) {
   if (rule.channel == Channel::background_distance && !rule.background)
     rule.background = most_frequent_colour<Level>(picture);
   cv::Mat level(picture.rows, picture.cols, CV_32F);
-  for (int row = 0; row < picture.rows; ++row) {
-    const Level* from = picture.ptr<Level>(row);
-    float* to = level.ptr<float>(row);
-    for (int column = 0; column < picture.cols; ++column) {
-      const cv::Vec3f c = colour_in(from, column);
-      if (rule.channel == Channel::grey) {
-        to[column] = 0.114F * c[0] + 0.587F * c[1] + 0.299F * c[2];  // ITU-R BT.601
-      } else if (rule.channel == Channel::saturation) {
-        to[column] = std::max({c[0], c[1], c[2]}) - std::min({c[0], c[1], c[2]});
-      } else {
-        const cv::Vec3f away = c - *rule.background;
-        to[column] = std::sqrt((away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) / 3);
-      }
+  const auto fill_by = [&](const auto& level_of) {
+    for (int row = 0; row < picture.rows; ++row) {
+      const Level* from = picture.ptr<Level>(row);
+      float* to = level.ptr<float>(row);
+      for (int column = 0; column < picture.cols; ++column, from += 3)
+        to[column] = level_of(static_cast<float>(from[0]), static_cast<float>(from[1]), static_cast<float>(from[2]));
     }
+  };
+  if (rule.channel == Channel::grey) {
+    fill_by([](float blue, float green, float red) {
+      return 0.114F * blue + 0.587F * green + 0.299F * red;  // ITU-R BT.601
+    });
+  } else if (rule.channel == Channel::saturation) {
+    fill_by([](float blue, float green, float red) {
+      return std::max(std::max(blue, green), red) - std::min(std::min(blue, green), red);
+    });
+  } else {
+    const cv::Vec3f behind = *rule.background;
+    fill_by([b = behind[0], g = behind[1], r = behind[2]](float blue, float green, float red) {
+      return std::sqrt(((blue - b) * (blue - b) + (green - g) * (green - g) + (red - r) * (red - r)) / 3);
+    });
   }
   return level;
 }

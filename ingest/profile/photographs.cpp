@@ -19,6 +19,8 @@ namespace {
 // px, radius in a reduced frame. Of a photograph with 190 photoelastic disks of two sizes, rims show 64 at 12 px, 176
 // at 16 px and 210 at 24 px (sums of probabilities; disks cut by the border included).
 constexpr double enough_radius_px = 12, enough_for_rims_px = 24;
+// Where a frame still has more pixels than a survey looks at: the radius at which faces are tried (settle_channel.cpp).
+constexpr double least_radius_px = 9;
 // px: of wider beads in a smaller frame. Two coins of 340 px were searched for 33 s; the centre of a rim of 100 px is
 // known to far less than a hundredth of its radius.
 constexpr double wide_radius_px = 100;
@@ -223,9 +225,14 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
 int reduction_for(int width, int height, double radius_px, bool by_rims) {
   const double pixels = static_cast<double>(width) * height;
   if (pixels <= large_frame_pixels) return std::max(1, static_cast<int>(radius_px / wide_radius_px));
-  const auto most_pixels = static_cast<double>(FrameSourceOptions().largest_frame_pixels);
-  return std::max({1, static_cast<int>(radius_px / (by_rims ? enough_for_rims_px : enough_radius_px)),
-                   static_cast<int>(std::ceil(std::sqrt(pixels / most_pixels)))});
+  const std::size_t most_pixels = FrameSourceOptions().largest_frame_pixels;
+  const auto by_pixels = [&](std::size_t most) {
+    return static_cast<int>(std::ceil(std::sqrt(pixels / static_cast<double>(most))));
+  };
+  int by = std::max(1, static_cast<int>(radius_px / (by_rims ? enough_for_rims_px : enough_radius_px)));
+  if (!by_rims)
+    by = std::max(by, std::min(static_cast<int>(radius_px / least_radius_px), by_pixels(most_surveyed_pixels)));
+  return std::max(by, by_pixels(most_pixels));
 }
 
 std::string why_reduced(int width, int height, int reduction) {

@@ -79,9 +79,9 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
 std::string why_only_a_part(const PixelRectangle& part, double recorded_px = 1);
 
 // By which factor frames of this size may be averaged (FrameSourceOptions::reduction). Large beads need not be seen by
-// every pixel: a radius of 12 to 24 px is enough. Where beads are found by their rims alone it is 24 to 48 px. 1 below
-// two million pixels. Frames of more pixels than are held in memory (FrameSourceOptions::largest_frame_pixels) are
-// always reduced.
+// every pixel: a radius of 12 to 24 px is enough. One of 9 px is enough where the frame would still have more than six
+// million pixels. Where beads are found by their rims alone it is 24 to 48 px. 1 below two million pixels. Frames of
+// more pixels than are held in memory (FrameSourceOptions::largest_frame_pixels) are always reduced.
 int reduction_for(int width, int height, double radius_px, bool by_rims = false);
 // The sentence that says so for the latter; empty for smaller frames.
 std::string why_reduced(int width, int height, int reduction);

@@ -325,8 +325,10 @@ class Extraction {
     on_the_way.quality_table(context_.table("quality.csv")).write(context_.output("quality.csv"));
     write_file(context_.output("quality.svg"), on_the_way.quality_figure());
     bead_table(context_.table("bead.csv"), found.finder).write(context_.output("bead.csv"));
-    ingest::write_png(context_.output("bead.png"), ingest::bead_picture(found.finder, 8));
-    write_file(context_.output("count.svg"), count_figure(found.frames));
+    // Beads found by their rims alone have no profile, and one frame has no course of time.
+    if (found.finder.profile.level.size() > 1)
+      ingest::write_png(context_.output("bead.png"), ingest::bead_picture(found.finder, 8));
+    if (found.frames.size() > 1) write_file(context_.output("count.svg"), count_figure(found.frames));
     if (options_.overlays == 0) return;
     draw_overlays(context_, film_, found, on_the_way);
     time_.begin(drawing);

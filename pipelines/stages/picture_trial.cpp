@@ -81,7 +81,7 @@ void judge_bead_number(std::uint64_t given, double mean_found, Judgement& judgem
     throw StageError(text + ". Other objects were found instead of the beads, or the number is wrong");
   if (std::abs(ratio - 1) > close)
     judgement.warning(
-        text + (ratio < 1 ? ": some beads are missed or out of view (see count.svg and the overlays)."
+        text + (ratio < 1 ? ": some beads are missed or out of view (see the overlays)."
                           : ": another object is taken for a bead (see the overlays), or there are more beads."));
 }
 

@@ -112,6 +112,32 @@ TEST(PartsOfPictures, BeadsBelowSquaresOfTheirSizeAreFoundAlone) {
                      radius);
 }
 
+// Things in one half of the picture that do not touch.
+std::vector<Middle> scattered_things(std::size_t count, const Box& box, double apart, unsigned seed) {
+  std::mt19937 random(seed);
+  const auto between = [&](double from, double to) {
+    return from + (to - from) * static_cast<double>(random()) / 4294967296.0;
+  };
+  std::vector<Middle> things;
+  for (int tried = 0; tried < 20000 && things.size() < count; ++tried) {
+    const Middle one{between(box.from_x, box.to_x), between(box.from_y, box.to_y)};
+    if (std::none_of(things.begin(), things.end(),
+                     [&](const Middle& other) { return std::hypot(other.x - one.x, other.y - one.y) < apart; }))
+      things.push_back(one);
+  }
+  return things;
+}
+
+// Few of each, apart: squares then are half of a circle less often than what the stretched copies make of them.
+TEST(PartsOfPictures, BeadsBesideAsManyUprightSquaresAreFoundAlone) {
+  constexpr double radius = 20;
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    const std::vector<Middle> beads = scattered_things(58, {24, 24, 476, 676}, 2.9 * radius, seed);
+    const std::vector<Middle> squares = scattered_things(52, {524, 24, 976, 676}, 2.9 * radius, seed + 10);
+    expect_beads_alone(bright_things(1000, 700, beads, squares, radius, radius), beads, radius);
+  }
+}
+
 // Stones of all sizes and shades, one over the other.
 void lay_gravel(GrayFrame& frame, const Box& box) {
   std::mt19937 random(11);

@@ -157,13 +157,23 @@ TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
   EXPECT_EQ(reduction_for(1000, 1000, 90), 1) << "the frame is small";
   EXPECT_EQ(reduction_for(1500, 800, 340), 3) << "the beads are so wide that a third of the pixels is enough";
   for (const double radius : {11.0, 13.0, 23.9, 24.0, 37.0, 100.0}) {
-    const int by = reduction_for(4000, 3000, radius);
+    const int by = reduction_for(3000, 2000, radius);
     EXPECT_EQ(by, std::max(1, static_cast<int>(radius / 12)));
     EXPECT_LT(radius / by, 24);
-    const int by_rims = reduction_for(4000, 3000, radius, true);
+    const int by_rims = reduction_for(3000, 2000, radius, true);
     EXPECT_EQ(by_rims, std::max(1, static_cast<int>(radius / 24)));
     EXPECT_LT(radius / by_rims, 48);
   }
+}
+
+// Of 20 million pixels: 2 x 2 of them become one as soon as that leaves a radius of 9 px, by rims not before 24.
+TEST(Photographs, VeryLargeFramesAreReducedToNinePixels) {
+  EXPECT_EQ(reduction_for(5472, 3648, 17.9), 1);
+  EXPECT_EQ(reduction_for(5472, 3648, 18), 2);
+  EXPECT_EQ(reduction_for(5472, 3648, 23.9), 2);
+  EXPECT_EQ(reduction_for(5472, 3648, 27), 2) << "five million pixels are few enough";
+  EXPECT_EQ(reduction_for(5472, 3648, 50), 4);
+  EXPECT_EQ(reduction_for(5472, 3648, 47.9, true), 1);
 }
 
 TEST(Photographs, FramesBeyondWhatMemoryHoldsAreReducedAndSaySo) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -73,6 +74,52 @@ TEST(Shades, BeadsDarkerThanTheBackgroundAreFoundBetweenBrighterOnes) {
   EXPECT_TRUE(warned_of(found, "in the opposite direction"));
   for (const FoundDisk& disk : found.disks)
     EXPECT_TRUE(std::abs(disk.contrast - 1) < 0.3 || std::abs(disk.contrast + 0.5) < 0.2) << disk.contrast;
+}
+
+// A page of text beside a bed: letters are dark on a white ground, and the beads are bright on a dark one.
+GrayFrame bed_beside_text(int width, int height, double radius, std::vector<cv::Point2d>& beads) {
+  cv::Mat picture(height, width, CV_32F, cv::Scalar(60));
+  picture.colRange(width / 2, width).setTo(235);
+  constexpr std::array<const char*, 7> words = {
+      "the quick brown", "fox jumps over",    "a lazy dog and", "measures density",
+      "of grains in",    "vibrated beds and", "so on"};
+  std::size_t word = 0;
+  for (int y = 24; y < height - 6; y += 22)
+    cv::putText(picture, words.at(word++ % words.size()), {width / 2 + 10, y}, cv::FONT_HERSHEY_SIMPLEX, 0.55, 20, 1,
+                cv::LINE_AA);
+  std::mt19937 random(9);
+  int row = 0;
+  for (double y = height - 10 - radius; y > 0.2 * height; y -= 1.77 * radius, ++row)
+    for (double x = 12 + radius + (row % 2) * radius; x < 0.5 * width - 12 - radius; x += 2.04 * radius)
+      if (random() % 12 != 0) beads.emplace_back(x, y);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width / 2; ++x)
+      for (const cv::Point2d& bead : beads) {
+        const double away = std::hypot(x - bead.x, y - bead.y), cover = std::clamp(radius + 0.5 - away, 0.0, 1.0);
+        if (cover == 0) continue;
+        const double high = std::sqrt(std::max(0.0, 1 - away * away / (radius * radius)));
+        float& level = picture.at<float>(y, x);
+        level = static_cast<float>((1 - cover) * static_cast<double>(level) + cover * (60 + 130 * (0.6 + 0.4 * high)));
+      }
+  cv::GaussianBlur(picture, picture, {0, 0}, 0.8);
+  std::normal_distribution<float> noise(0, 3);
+  GrayFrame frame{width, height, {}};
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) frame.pixels.push_back(picture.at<float>(y, x) + noise(random));
+  return frame;
+}
+
+TEST(Shades, LettersOnOtherGroundAreNoBeads) {
+  std::vector<cv::Point2d> beads;
+  const GrayFrame frame = bed_beside_text(520, 420, 11, beads);
+  const DisksFound found = found_in(frame);
+  ASSERT_TRUE(found.ok()) << found.message;
+  const auto hits = std::count_if(beads.begin(), beads.end(), [&](const cv::Point2d& bead) {
+    return std::any_of(found.disks.begin(), found.disks.end(),
+                       [&](const FoundDisk& disk) { return std::hypot(disk.x_px - bead.x, disk.y_px - bead.y) < 3; });
+  });
+  EXPECT_GE(2.0 * static_cast<double>(hits) / static_cast<double>(beads.size() + found.disks.size()), 0.95);
+  EXPECT_FALSE(warned_of(found, "two shades"));
 }
 
 // Dark beads on ground whose level varies by 6 over 7 px, as of paper or agar: rounded patches of it pass as beads of

@@ -233,6 +233,13 @@ TEST(ExtractedFrames, HaveTheGeometryOfTheirCamera) {
   EXPECT_FALSE(std::filesystem::exists(frames.stage.output("film.json")));
 }
 
+TEST(ExtractedFrames, OfOneHaveNoCourseOfTime) {
+  RenderedFrames frames(bed_of_camera(), 1);
+  EXPECT_EQ(frames.extracted()["frames"], 1);
+  EXPECT_FALSE(std::filesystem::exists(frames.stage.output("count.svg")));
+  EXPECT_TRUE(std::filesystem::exists(frames.stage.output("bead.png")));
+}
+
 TEST(ExtractedFrames, TakeWhatIsGivenBeforeTheGeometry) {
   RenderedFrames frames(bed_of_camera(), 1);
   frames.options.scale = 2.02e-4, frames.options.floor = 128, frames.options.left_wall = 12.5;
