@@ -12,14 +12,18 @@
 
 namespace shakebed::sim {
 
-// What was measured: T_x [m g D] of 500 disks, e = 0.9, Gamma = 1.5, 30.6 D wide. Soft spheres with contacts of 7e-4
-// have 0.0074(1) to 0.0076(2), events alone 0.0080(2). tests/bench/README.md has the tables.
+// What was measured: T_x of beds of 500 disks, 30.6 and 30.0 D wide, beside soft spheres with contacts of 7e-4.
+// tests/bench/README.md has the tables.
 
-// The longest contact time of a pressed bed [sqrt(D/g)]; 100 us for 2 mm disks.
-inline constexpr double pressed_contact_time = 0.007;
-// How far disks approach in a contact time [D], while it is shorter than that: T_x 0.0080(2) for 0.0090(2) with 2e-4.
-inline constexpr double pressed_travel = 1e-4;
-// How far they move against the floor in a contact time [D]: 0.0080(2) for 0.0085(3) with 5e-4.
+// The longest contact time of a pressed bed [sqrt(D/g)]; 100 us for 2 mm disks that are rough.
+template <class Rule>
+inline constexpr double longest_contact_time = Rule::spins ? 0.007 : 0.006;
+// Smooth disks are not pressed with shorter ones: 10 us for 2 mm disks.
+inline constexpr double shortest_contact_time = 7e-4;
+// How far disks approach in a contact time [D], while it is between the two. First: of beds that are taken for pressed
+// while they lie. Second: of others, and of hot ones later. Third: of cold ones later.
+inline constexpr double landing_approach = 0.7e-4, pressed_travel = 1e-4, travel_of_cold = 3e-4;
+// How far rough disks move against the floor in a contact time [D].
 inline constexpr double pressed_drift = 3e-4;
 // Quicker contacts are left to events, unless rows have locked; so they are in a bed's first period, a packing that the
 // floor hits.
@@ -132,15 +136,17 @@ void Engine<Space, Rule, Sizes>::ask_press() {
     if (!chatters()) return;
   }
   const bool pushed = on_floor >= least_on_floor * width_;
-  if (!crowded(pressed_contact_time, pushed ? pressed_crowd : locked_crowd)) return;
+  if (!crowded(longest_contact_time<Rule>, pushed ? pressed_crowd : locked_crowd)) return;
   const bool lies = pushed && gravity_ + floor_.motion(now_).acceleration > 0;
-  if (!crowded(pressed_contact_time, lies ? pressed_crowd : locked_crowd)) return;
+  if (!crowded(longest_contact_time<Rule>, lies ? pressed_crowd : locked_crowd)) return;
   const std::optional<double> approach = approach_of_neighbours();
   if (!approach) return;
-  const double contact_time = std::min(pressed_contact_time, pressed_travel / *approach);
+  const double travel = lies && !Rule::spins ? landing_approach : pressed_travel;
+  double contact_time = std::min(longest_contact_time<Rule>, travel / *approach);
+  if (!lies && !Rule::spins) contact_time = std::max(contact_time, shortest_contact_time);
   if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time_of_locked)) return;
   if (!crowded(contact_time, lies && contact_time >= least_contact_time ? pressed_crowd : locked_crowd)) return;
-  press_contact_time_ = contact_time;
+  press_contact_time_ = Rule::spins ? contact_time : std::max(contact_time, shortest_contact_time);
   press_wanted_ = true;
 }
 
@@ -248,13 +254,17 @@ void Engine<Space, Rule, Sizes>::end_press() {
   begin_interval();
 }
 
-// The contact time that follows from the contacts' speed, unless it is shorter by far.
+// The contact time that follows from the contacts' speed, unless it is shorter.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::soften_pressed() {
-  const double approach = pressed_.approach(), speed = std::sqrt(pressed_.mean_square_speed());
-  double contact_time = pressed_contact_time;
-  if (approach * contact_time > pressed_travel) contact_time = pressed_travel / approach;
-  if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
+  const double approach = pressed_.approach();
+  const double travel = !Rule::spins && pressed_.side_temperature() < cold ? travel_of_cold : pressed_travel;
+  double contact_time = longest_contact_time<Rule>;
+  if (approach * contact_time > travel) contact_time = travel / approach;
+  if constexpr (Rule::spins) {
+    const double speed = std::sqrt(pressed_.mean_square_speed());
+    if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
+  }
   if (contact_time <= press_contact_time_) return;
   press_contact_time_ = std::min(contact_time, (floor_falls_ ? softening_of_rough : softening) * press_contact_time_);
   pressed_.soften(press_contact_time_);
@@ -282,7 +292,7 @@ void Engine<Space, Rule, Sizes>::adapt_contact_time(bool stays) {
     harden_pressed(landing_contact_time, gained_by_hardening * count_);
   } else if (floor_falls_ && press_contact_time_ > longest) {
     harden_pressed(std::max(landing_contact_time, longest), gained_of_motion * 0.5 * square * count_);
-  } else {
+  } else if (Rule::spins || !flies) {
     soften_pressed();
   }
 }

@@ -62,6 +62,18 @@ Lanes state_at(const State* disks, std::uint32_t place) {
   return {__builtin_shufflevector(a01, a23, 0, 1, 4, 5), __builtin_shufflevector(b01, b23, 0, 1, 4, 5),
           __builtin_shufflevector(a01, a23, 2, 3, 6, 7), __builtin_shufflevector(b01, b23, 2, 3, 6, 7)};
 }
+// Of {x, z} alone, of which one disk has `numbers_a_disk` on.
+struct TwoDifferences {
+  Lanes x, z;
+};
+template <std::size_t numbers_a_disk>
+[[gnu::always_inline]] inline TwoDifferences differences_of_two(const double* numbers, const std::uint32_t* i,
+                                                                const std::uint32_t* k) {
+  const auto at = [&](std::uint32_t place) { return &numbers[numbers_a_disk * (place / sizeof(State))]; };
+  const Lanes d02 = two_pairs(at(k[0]), at(k[2])) - two_pairs(at(i[0]), at(i[2]));
+  const Lanes d13 = two_pairs(at(k[1]), at(k[3])) - two_pairs(at(i[1]), at(i[3]));
+  return {__builtin_shufflevector(d02, d13, 0, 4, 2, 6), __builtin_shufflevector(d02, d13, 1, 5, 3, 7)};
+}
 Lanes nearest_image(Lanes dx, double period) {
   const Lanes large = all_lanes(0x1.8p52);
   return fused(all_lanes(-period), fused(dx, all_lanes(1 / period), large) - large, dx);
@@ -116,8 +128,7 @@ void PressedBed::set_up(const Box& box, const Surfaces& surfaces, double inverse
     spring.grip = grip_of(wall);
     return spring;
   };
-  of_unit_time_ =
-      std::array<Spring, 4>{half, spring_on(surfaces.sides), spring_on(surfaces.floor), spring_on(surfaces.lid)};
+  of_unit_time_ = {half, spring_on(surfaces.sides), spring_on(surfaces.floor), spring_on(surfaces.lid)};
 }
 
 void PressedBed::soften(double contact_time) {
@@ -131,6 +142,9 @@ void PressedBed::soften(double contact_time) {
   side_ = soft(of_unit_time_[1]);
   floor_ = soft(of_unit_time_[2]);
   lid_ = soft(of_unit_time_[3]);
+  const double damping = of_unit_time_[0].damping;
+  if (!rough_ && damping > 0)
+    pair_.damping *= std::max(1.0, std::min(contact_time / dashpot_time, most_damping / damping));
 }
 
 void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time,
@@ -229,6 +243,7 @@ void PressedBed::list_pairs(double floor) {
 void PressedBed::interleave() {
   constexpr std::size_t parts = 16;
   const std::size_t pairs = first_.size(), part = (pairs + parts - 1) / parts;
+  in_contact_ = 0;
   active_first_.clear();
   active_second_.clear();
   for (std::size_t k = 0; k < part; ++k) {
@@ -258,16 +273,17 @@ void PressedBed::list_walls(double floor) {
 }
 
 // Of all neighbours those that may touch before the next check, and those whose tangential springs are stretched, so
-// that these are let go.
+// that these are let go. Smooth ones in contact come first.
 template <bool rough>
 void PressedBed::choose_active(double dt) {
   const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
   const std::size_t pairs = first_.size();
   const Lanes contact = all_lanes(4 * disk_radius * disk_radius);
-  active_first_.resize(pairs + 4);
-  active_second_.resize(pairs + 4);
-  if constexpr (rough) active_.resize(pairs + 4);
-  std::size_t active = 0;
+  active_first_.resize(pairs + 8);
+  active_second_.resize(pairs + 8);
+  if constexpr (rough) active_.resize(pairs + 8);
+  apart_.resize(pairs + 1);
+  std::size_t active = 0, apart = 0;
   Lanes approaches{};
   for (std::size_t p = 0; p < pairs; p += 4) {
     Differences d = differences(disks_.data(), &first_[p], &second_[p]);
@@ -282,18 +298,30 @@ void PressedBed::choose_active(double dt) {
       asked |= stretch != Lanes{};
     }
     approaches += closing * closing;
+    const LaneMask ahead_of_others = rough ? asked : squared < contact;
     for (std::size_t q = 0; q < 4; ++q) {
       active_first_[active] = first_[p + q];
       active_second_[active] = second_[p + q];
       if constexpr (rough) active_[active] = static_cast<std::uint32_t>(p + q);
-      active += static_cast<std::size_t>(asked[q] & 1);
+      apart_[apart] = static_cast<std::uint32_t>(p + q);
+      active += static_cast<std::size_t>(ahead_of_others[q] & 1);
+      apart += static_cast<std::size_t>(asked[q] & ~ahead_of_others[q] & 1);
     }
   }
-  for (; active % 4 != 0; ++active) {
-    active_first_[active] = place_of(count_);
-    active_second_[active] = place_of(count_ + 1);
-    if constexpr (rough) active_[active] = static_cast<std::uint32_t>(pairs);  // of no pair
+  const auto fill_block = [&] {
+    for (; active % 4 != 0; ++active) {
+      active_first_[active] = place_of(count_);
+      active_second_[active] = place_of(count_ + 1);
+      if constexpr (rough) active_[active] = static_cast<std::uint32_t>(pairs);  // of no pair
+    }
+  };
+  fill_block();
+  in_contact_ = active;
+  for (std::size_t k = 0; k < apart; ++k, ++active) {
+    active_first_[active] = first_[apart_[k]];
+    active_second_[active] = second_[apart_[k]];
   }
+  fill_block();
   active_first_.resize(active);
   active_second_.resize(active);
   usual_approach_ = std::sqrt(sum_of(approaches) / static_cast<double>(std::max<std::size_t>(pairs, 1)));
@@ -371,17 +399,6 @@ void PressedBed::let_go() {
   const auto at = [&](int q) { return numbers[places[q] / sizeof(State)]; };
   return Lanes{at(0), at(1), at(2), at(3)};
 }
-// Differences of four pairs of {x, z}, second less first.
-struct TwoDifferences {
-  Lanes x, z;
-};
-[[gnu::always_inline]] inline TwoDifferences differences_of_two(const double* numbers, const std::uint32_t* i,
-                                                                const std::uint32_t* k) {
-  const auto at = [&](std::uint32_t place) { return &numbers[2 * (place / sizeof(State))]; };
-  const Lanes d02 = two_pairs(at(k[0]), at(k[2])) - two_pairs(at(i[0]), at(i[2]));
-  const Lanes d13 = two_pairs(at(k[1]), at(k[3])) - two_pairs(at(i[1]), at(i[3]));
-  return {__builtin_shufflevector(d02, d13, 0, 4, 2, 6), __builtin_shufflevector(d02, d13, 1, 5, 3, 7)};
-}
 [[gnu::always_inline]] inline Lanes clamped(Lanes value, Lanes most) {
   return select(value < -most, -most, select(most < value, most, value));
 }
@@ -414,7 +431,7 @@ void PressedBed::add_rough_pair_forces() {
     const Lanes before = {stretch[pairs[0]], stretch[pairs[1]], stretch[pairs[2]], stretch[pairs[3]]};
     if (!any_of(touch | (before != Lanes{}))) continue;
     const Lanes distance = sqrt_lanes(squared), nx = d.x / distance, nz = d.z / distance;
-    const TwoDifferences past = differences_of_two(halfway, i, k);
+    const TwoDifferences past = differences_of_two<2>(halfway, i, k);
     const Lanes v = d.vx * nx + d.vz * nz, side = d.vz * nx - d.vx * nz, side_past = past.z * nx - past.x * nz;
     const Lanes force = stiffness * (one - distance) - damping * v;
     const PulledLanes pulled = pull(before, numbers_at(rim, i) + numbers_at(rim, k) - side,
@@ -477,19 +494,25 @@ void PressedBed::add_pair_forces() {
   char* const force = reinterpret_cast<char*>(force_.data());
   const Lanes stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping), one = all_lanes(1);
   Lanes squares{}, count{};
-  const auto add = [force](std::uint32_t first, std::uint32_t second, TwoLanes f) {
-    auto* const a = reinterpret_cast<double*>(force + first);
-    auto* const b = reinterpret_cast<double*>(force + second);
-    put_pair(a, pair_at(a) - f);
-    put_pair(b, pair_at(b) + f);
+  const auto add = [force](std::uint32_t first, std::uint32_t second, Lanes f) {
+    Lanes a, b;
+    std::memcpy(&a, force + first, sizeof a);
+    std::memcpy(&b, force + second, sizeof b);
+    a -= f, b += f;
+    std::memcpy(force + first, &a, sizeof a);
+    std::memcpy(force + second, &b, sizeof b);
   };
   for (std::size_t p = 0; p < pairs; p += 4) {
     const std::uint32_t *i = &active_first_[p], *k = &active_second_[p];
+    if (p >= in_contact_) {
+      TwoDifferences d = differences_of_two<4>(&disks->x, i, k);
+      if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
+      if (!any_of(fused(d.x, d.x, d.z * d.z) < one)) continue;
+    }
     Differences d = differences(disks, i, k);
     if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
     const Lanes u = one - fused(d.x, d.x, d.z * d.z);  // 1 - r^2
     const LaneMask touch = u > all_lanes(0);
-    if (!any_of(touch)) continue;
     // 1 - r and 1 / r of r = sqrt(1 - u), to 1e-10 for overlaps of 0.01 D
     const Lanes overlap =
         u * fused(u, fused(u, fused(u, all_lanes(5.0 / 128), all_lanes(1.0 / 16)), all_lanes(0.125)), all_lanes(0.5));
@@ -497,15 +520,16 @@ void PressedBed::add_pair_forces() {
         u, fused(u, fused(u, fused(u, all_lanes(35.0 / 128), all_lanes(5.0 / 16)), all_lanes(0.375)), all_lanes(0.5)),
         one);
     const Lanes nx = d.x * inverse, nz = d.z * inverse, v = fused(d.vx, nx, d.vz * nz);
-    const Lanes f = unless(~touch, fused(stiffness, overlap, -(damping * v)));
+    const Lanes dashpot = unless(~touch, -(damping * v)), f = unless(~touch, fused(stiffness, overlap, -(damping * v)));
     squares += unless(~touch, v * v);
     count += unless(~touch, one);
-    const Lanes fx = f * nx, fz = f * nz;
-    const Lanes even = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), odd = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
-    add(i[0], k[0], __builtin_shufflevector(even, even, 0, 1));
-    add(i[1], k[1], __builtin_shufflevector(odd, odd, 0, 1));
-    add(i[2], k[2], __builtin_shufflevector(even, even, 2, 3));
-    add(i[3], k[3], __builtin_shufflevector(odd, odd, 2, 3));
+    const Lanes fx = f * nx, fz = f * nz, dx = dashpot * nx, dz = dashpot * nz;
+    const Lanes f02 = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), f13 = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
+    const Lanes d02 = __builtin_shufflevector(dx, dz, 0, 4, 2, 6), d13 = __builtin_shufflevector(dx, dz, 1, 5, 3, 7);
+    add(i[0], k[0], __builtin_shufflevector(f02, d02, 0, 1, 4, 5));
+    add(i[1], k[1], __builtin_shufflevector(f13, d13, 0, 1, 4, 5));
+    add(i[2], k[2], __builtin_shufflevector(f02, d02, 2, 3, 6, 7));
+    add(i[3], k[3], __builtin_shufflevector(f13, d13, 2, 3, 6, 7));
   }
   touching_ = sum_of(count);
   pair_squares_ = sum_of(squares);
@@ -547,11 +571,10 @@ auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wa
   return contacts;
 }
 
+// To forces of 0.
 void PressedBed::add_forces(const FloorMotion::Motion& floor) {
-  std::fill(force_.begin(), force_.end(), 0.0);
   rubbed_ = 0;
   if (rough_) {
-    std::fill(rim_force_.begin(), rim_force_.end(), 0.0);
     box_.period > 0 ? add_rough_pair_forces<true>() : add_rough_pair_forces<false>();
   } else {
     box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
@@ -567,6 +590,18 @@ void PressedBed::add_forces(const FloorMotion::Motion& floor) {
   floor_at_ = floor;
 }
 
+// What the dashpots of pairs take from the disks at the velocities that they have. Their forces are of the velocities
+// foreseen: in a packed bed, where many disks brake one another, these are larger.
+double PressedBed::lost_in_dashpots() const {
+  const TwoLanes weight = {0, -1}, half = both(0.5 * last_step_);
+  TwoLanes lost{};
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    const TwoLanes v = fused(half, pair_at(&force_[4 * i]) + weight, pair_at(&halfway_[2 * i]));
+    lost -= pair_at(&force_[4 * i + 2]) * v;
+  }
+  return lost[0] + lost[1];
+}
+
 void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt) {
   assert(dt > 0);
   const TwoLanes weight = {0, -1}, half = both(0.5 * dt), halves = both(0.5 * (last_step_ + dt)), whole = both(dt);
@@ -576,11 +611,14 @@ void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Moti
     put_pair(&halfway_[2 * i], v);
     put_pair(disk, fused(whole, v, pair_at(disk)));
     put_pair(disk + 2, fused(half, a, v));
+    put_pair(&force_[4 * i], TwoLanes{});
+    put_pair(&force_[4 * i + 2], TwoLanes{});
   }
   if (rough_) {
     for (std::uint32_t i = 0; i < count_; ++i) {
       rim_halfway_[i] += 0.5 * (last_step_ + dt) * rim_force_[i];
       rim_[i] = rim_halfway_[i] + 0.5 * dt * rim_force_[i];
+      rim_force_[i] = 0;
     }
   }
   last_step_ = dt;
@@ -589,6 +627,7 @@ void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Moti
   slip_time_ = dt;
   add_forces(after);
   slip_time_ = 0;
+  if (!rough_) loss_rate_ += lost_in_dashpots() - pair_.damping * pair_squares_;
   floor_work_ += 0.5 * (force_before + floor_force_) * (after.position - before.position);
   damped_ += 0.5 * (loss_before + loss_rate_) * dt + rubbed_;
 }
@@ -616,6 +655,8 @@ void PressedBed::carry(const FloorMotion::Motion& before, const FloorMotion::Mot
 
 void PressedBed::wake(const FloorMotion::Motion& floor) {
   list_pairs(floor.position);
+  std::fill(force_.begin(), force_.end(), 0.0);
+  std::fill(rim_force_.begin(), rim_force_.end(), 0.0);
   add_forces(floor);
   damped_ += rubbed_;
 }

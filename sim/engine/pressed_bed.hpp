@@ -44,6 +44,10 @@ class PressedBed {
   // Steps a contact time. The mean loss is right with any; with 4 a packed bed was unstable. Spins against one another
   // swing faster than disks do: by 1.2 for spheres.
   static constexpr double steps_a_contact = 6, steps_of_rough = 8;
+  // Smooth disks whose contacts last longer than this keep the dashpots of contacts that do not, so that what the bed
+  // still does dies out as soon. Unless the dashpot of a contact time of 1 were more than the most: steps follow no
+  // more.
+  static constexpr double dashpot_time = 1.2e-3, most_damping = 0.4;
   static constexpr std::uint32_t steps_a_check = 8;  // of who may touch whom, and of the contact time
 
   // inverse_inertia_ratio: 1/q of disks that spin, 0 of smooth ones.
@@ -163,6 +167,7 @@ class PressedBed {
   void add_rough_pair_forces();
   void check(const FloorMotion::Motion& floor, double dt);
   void add_forces(const FloorMotion::Motion& floor);
+  double lost_in_dashpots() const;
   template <bool periodic>
   void add_pair_forces();
   static std::uint32_t disk_at(std::uint32_t place) { return place / static_cast<std::uint32_t>(sizeof(State)); }
@@ -179,7 +184,8 @@ class PressedBed {
   std::uint32_t count_ = 0;
   std::vector<State> disks_;     // velocities: those foreseen for the end of the step. Two sentinels behind the last
   std::vector<double> halfway_;  // velocities half a step before, {vx, vz}
-  std::vector<double> force_;    // {x, z} at the places of disks_; weight apart
+  // {x, z} at the places of disks_, weight apart, and what of it is that of the dashpots of smooth pairs.
+  std::vector<double> force_;
   double last_step_ = 0;
   // --- of rough disks
   bool rough_ = false;
@@ -195,6 +201,8 @@ class PressedBed {
   std::vector<double> listed_;         // {x, z} when the neighbours were listed, z above the floor
   // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
   std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
+  std::size_t in_contact_ = 0;        // of the active ones the first, when they were chosen
+  std::vector<std::uint32_t> apart_;  // while they are chosen
   std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;
   std::uint32_t until_check_ = steps_a_check;
   double usual_approach_ = 0;  // of neighbours
