@@ -79,7 +79,7 @@ class Watcher {
 };
 
 // The largest overlap that rounding leaves of hard disks, and the largest of a bed pressed on the floor [D]. The beds
-// of tests/bench/README.md have up to 2.5e-3.
+// of tests/bench/README.md have up to 9e-3, where rows lock.
 inline constexpr double hard_overlap = 1e-9, soft_overlap = 0.01;
 
 class Simulation {
